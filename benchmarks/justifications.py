@@ -3,9 +3,9 @@
     python benchmarks/justifications.py [FILE ...] [--random 100] [--facts 30]
 
 Of each ontology (files in any format that is read, and random ones, see `random_agreement.py`)
-some derived facts and subclasses are drawn. A justification is sufficient where HermiT derives the
-fact from it alone, and minimal where HermiT does so from no part that lacks one axiom; where HermiT
-does not confirm that, Pellet decides.
+some derived facts and subclasses are drawn, or the contradiction where there is one. A
+justification is sufficient where HermiT derives the fact from it alone, and minimal where HermiT
+does so from no part that lacks one axiom; where HermiT does not confirm that, Pellet decides.
 """
 
 from __future__ import annotations
@@ -45,10 +45,17 @@ class Judge:
         self._path = path
         self._java: dict[str, JavaReasoner] = {}
 
-    def confirms(self, axioms: Iterable[Axiom], fact: Axiom, expected: bool) -> bool | None:
-        """Tell whether either of them says that a fact follows, or does not; None: neither can."""
+    def confirms(self, axioms: Iterable[Axiom], fact: Axiom | None, expected: bool) -> bool | None:
+        """Tell whether either of them says that a fact follows, or does not; None: neither can.
+
+        Args:
+            axioms: The only axioms that are given.
+            fact: The fact; None for a contradiction.
+            expected: Whether it should follow.
+        """
         axioms = list(axioms)
-        named = {entity for axiom in (*axioms, fact) for entity in entities_of(axiom)}
+        asked = axioms if fact is None else [*axioms, fact]
+        named = {entity for axiom in asked for entity in entities_of(axiom)}
         declared = [Declaration(*entity) for entity in named if entity[0] != 'annotated']
         write_ontology(spelt_out([*declared, *axioms]), IRI, self._path)
         first = self._answer('hermit', fact)
@@ -57,12 +64,14 @@ class Judge:
         second = self._answer('pellet', fact)
         return None if first is None and second is None else second == expected
 
-    def _answer(self, kind: str, fact: Axiom) -> bool | None:
+    def _answer(self, kind: str, fact: Axiom | None) -> bool | None:
         java = self._java.get(kind) or JavaReasoner(kind)
         self._java[kind] = java
         try:
             consistent = java.ask('load', str(self._path)) == 'ok'
-            return not consistent or java.ask(*words_for(fact)) == 'true'
+            if fact is None or not consistent:
+                return not consistent
+            return java.ask(*words_for(fact)) == 'true'
         except JavaReasonerError as error:
             if 'no answer' in str(error):
                 del self._java[kind]
@@ -86,9 +95,10 @@ def derived(kb: KnowledgeBase, most: int, draw: random.Random) -> list[Axiom]:
 def judged(axioms: Iterable[Axiom], judge: Judge, most: int, counts: Counter[str]) -> Iterator[str]:
     """Count the justifications of one ontology and yield a line for every fault."""
     kb = KnowledgeBase(IRI, (a for a in axioms if not isinstance(a, Import)))
-    if not kb.reason():
-        return
-    for fact in derived(kb, most, random.Random(0)):
+    facts: list[Axiom | None] = [None]
+    if kb.reason():
+        facts = [*derived(kb, most, random.Random(0))]
+    for fact in facts:
         needed = kb.justification(fact)
         enough = judge.confirms(needed, fact, True)
         if enough is None:
@@ -99,10 +109,11 @@ def judged(axioms: Iterable[Axiom], judge: Judge, most: int, counts: Counter[str
         parts = {axiom: [a for a in needed if a is not axiom] for axiom in needed}
         loose = [a for a, part in parts.items() if judge.confirms(part, fact, False) is False]
         counts['minimal'] += not loose
+        said = 'contradiction' if fact is None else axiom_text(fact)
         if not enough:
-            yield f'  {axiom_text(fact)}: {len(needed)} axioms do not suffice'
+            yield f'  {said}: {len(needed)} axioms do not suffice'
         elif loose:
-            yield f'  {axiom_text(fact)}: not needed: {axiom_text(loose[0])}'
+            yield f'  {said}: not needed: {axiom_text(loose[0])}'
 
 
 def main() -> None:

@@ -87,13 +87,18 @@ def _floating(space: str, text: str) -> Value:
     return floating_value(space, number)
 
 
+def single(number: float) -> float:
+    """Return the nearest number that xsd:float has."""
+    try:
+        return float(struct.unpack('f', struct.pack('f', number))[0])
+    except OverflowError:
+        return math.copysign(math.inf, number)
+
+
 def floating_value(space: str, number: float) -> Value:
     """Return the value of a Python float in the space 'float' or 'double'."""
-    if space == 'float' and math.isfinite(number):
-        try:
-            number = struct.unpack('f', struct.pack('f', number))[0]
-        except OverflowError:
-            number = math.copysign(math.inf, number)
+    if space == 'float':
+        number = single(number)
     if math.isnan(number):
         return (space, 'NaN')
     if number == 0.0 and math.copysign(1.0, number) < 0:
@@ -309,7 +314,12 @@ def order(first: Value, second: Value) -> int | None:
     if isinstance(first, tuple) and isinstance(second, tuple) and first[0] == second[0]:
         if first[0] == 'dateTime':
             return moments.order(first, second)
-        if first[0] in ('other', 'ill-formed'):
+        if first[0] == 'other':
+            named = ((kind.removeprefix(XSD), text) for _, kind, text in (first, second))
+            return moments.calendar_order(*named)
+        if first[0] == 'ill-formed':
+            return None
+        if first[0] == 'langString' and first[2] != second[2]:
             return None
     (kind, key), (other, other_key) = comparable(first), comparable(second)
     if kind != other or key != key or other_key != other_key:

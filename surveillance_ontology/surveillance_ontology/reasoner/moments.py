@@ -1,4 +1,5 @@
-"""Moments of xsd:dateTime: lexical forms, values and order (XML Schema 1.1 part 2, 3.3.7).
+"""Moments of xsd:dateTime: lexical forms, values and order (XML Schema 1.1 part 2, 3.3.7), and the
+order of dates, times, parts of the calendar, and durations.
 
 A value is ``('dateTime', 'utc', seconds, offset)``, or ``('dateTime', 'local', seconds)`` where no
 zone is given. Seconds count from 0001-01-01T00:00:00 of the proleptic Gregorian calendar; the
@@ -12,9 +13,11 @@ import itertools
 import math
 import re
 from fractions import Fraction
+from functools import cache
 from typing import Any, TypeAlias
 
 Moment: TypeAlias = 'tuple[Any, ...]'
+Named: TypeAlias = 'tuple[str, str]'
 
 _FORM = re.compile(
     r'(-?(?:[1-9]\d{3,}|0\d{3}))-(\d\d)-(\d\d)T(\d\d):(\d\d):(\d\d)(\.\d+)?(Z|[+-]\d\d:\d\d)?',
@@ -24,6 +27,20 @@ _DAY = 86_400
 _CYCLE_YEARS, _CYCLE_DAYS = 400, 146_097
 """The calendar repeats itself; Python's dates know the years 1 to 9999 only."""
 _LARGEST_OFFSET = 14 * 3600
+_CALENDAR = {
+    'date': ('', '', 'T00:00:00'),
+    'time': ('', '1972-12-31T', ''),
+    'gYear': ('', '', '-01-01T00:00:00'),
+    'gYearMonth': ('', '', '-01T00:00:00'),
+    'gMonthDay': ('--', '1972-', 'T00:00:00'),
+    'gMonth': ('--', '1972-', '-01T00:00:00'),
+    'gDay': ('---', '1972-12-', 'T00:00:00'),
+}
+"""For each datatype what its forms begin with, and what makes a dateTime of the rest: before it,
+and behind it where the zone begins. Source: op:time-less-than and others of XPath, which take the
+same dates for what is not said."""
+_DURATIONS = frozenset(('duration', 'dayTimeDuration', 'yearMonthDuration'))
+_ZONE = re.compile(r'(?:Z|[+-]\d\d:\d\d)?$', re.ASCII)
 
 
 def moment_of(text: str) -> Moment:
@@ -85,3 +102,36 @@ def order(first: Moment, second: Moment) -> int | None:
     if first[1] != second[1] and abs(away) <= _LARGEST_OFFSET:
         return None
     return int(away > 0) - int(away < 0)
+
+
+@cache
+def calendar_order(first: Named, second: Named) -> int | None:
+    """Return the order of two dates, times, parts of the calendar or durations.
+
+    Args:
+        first, second: The local name of the datatype, and the lexical form.
+
+    Returns:
+        As `order`; None, too, of any other datatypes and where a form is not well-formed.
+    """
+    try:
+        if first[0] == second[0] and first[0] in _CALENDAR:
+            return order(_calendar_moment(*first), _calendar_moment(*second))
+        if not _DURATIONS.issuperset((first[0], second[0])):
+            return None
+        from elementpath.datatypes import Duration  # 70 ms, and few ontologies have one.
+
+        one, other = Duration.fromstring(first[1]), Duration.fromstring(second[1])
+    except (ValueError, OverflowError):
+        return None
+    return 0 if one == other else -1 if one < other else 1 if one > other else None
+
+
+def _calendar_moment(datatype: str, text: str) -> Moment:
+    mark, before, behind = _CALENDAR[datatype]
+    text = text.strip()
+    if not text.startswith(mark):
+        raise ValueError(f'{text!r} is no {datatype}')
+    if datatype == 'time' and text.startswith('24:00:00'):
+        text = '00' + text[2:]
+    return moment_of(before + _ZONE.sub(lambda zone: behind + zone[0], text[len(mark) :], count=1))

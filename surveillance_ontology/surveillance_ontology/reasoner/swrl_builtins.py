@@ -1,6 +1,6 @@
 """SWRL built-ins over values (https://www.w3.org/Submission/SWRL/, section 8): comparisons,
-arithmetic, booleans and strings. Those on dates, URIs and lists are not supported and reported as
-such.
+arithmetic, booleans and strings. Those that compute with dates, URIs and lists are not supported
+and reported as such; values of XML Schema's dates, times and durations are compared.
 
 Each built-in is known by two functions of the values of its arguments: whether they satisfy it,
 and, for those that compute, the values its first argument can take given the others. Arguments
@@ -24,6 +24,7 @@ from surveillance_ontology.reasoner.datatypes import (
     lexical_of,
     order,
     schema_pattern,
+    single,
 )
 
 _Number = int | Fraction | float
@@ -45,7 +46,9 @@ def _numbers(values: Iterable[Value]) -> tuple[str, list[_Number]] | None:
             numbers.append(math.nan if value[1] == 'NaN' else -0.0 if len(value) == 3 else value[1])
         else:
             return None
-    if space != 'exact':
+    if space == 'float':
+        numbers = [single(float(number)) for number in numbers]
+    elif space == 'double':
         numbers = [float(number) for number in numbers]
     return space, numbers
 
