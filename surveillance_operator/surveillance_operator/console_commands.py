@@ -23,6 +23,7 @@ from surveillance_controllers.manual.commands import (
     Grammar,
     number,
 )
+from surveillance_fsm.exceptions import CallError
 
 if TYPE_CHECKING:  # the launcher's prompt needs the words alone, without ROS
     from surveillance_operator.mission_actions import MissionActions
@@ -217,7 +218,7 @@ def answer(
         return [_told(actions, _CONTROLLER_OF[command.name], line)]
     try:
         return [Answer(_DOES[command.name](actions, *command.values))]
-    except ValueError as error:
+    except (ValueError, CallError) as error:
         return [Answer(f'{command.name}: {error}')]
 
 
@@ -230,7 +231,7 @@ def _exit(name: str, actions: MissionActions) -> Answer:
 def _told(actions: MissionActions, controller: str, line: str) -> Answer:
     try:
         return Answer(actions.command(controller, line), controller)
-    except LookupError as error:  # it does not answer at all
+    except CallError as error:
         return Answer(f'{controller} does not answer: {error}')
     except ValueError as error:
         return Answer(str(error), controller)

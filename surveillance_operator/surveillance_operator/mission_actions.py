@@ -1,6 +1,7 @@
 """What a person can do to a mission, each with an answer in words: for the console and the page.
 
-All calls block until the answer or a deadline, so they belong on a worker thread.
+All calls block until the answer or a deadline, so they belong on a worker thread. What was not done
+raises one line that says why: `ValueError` where it was refused, `CallError` where nobody answers.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import SetParameters
 from std_srvs.srv import Trigger
 
-from surveillance_fsm.ros import CallError, ServiceCaller, UnavailableError
+from surveillance_fsm.ros import ServiceCaller, UnavailableError
 from surveillance_interfaces.srv import (
     AddRoom,
     ConsoleCommand,
@@ -47,18 +48,6 @@ _OPTIONAL = ('simulation/', 'move_arm')
 ARM_SECONDS = 60.0
 """Deadline of a movement of the arm, whose answer comes when it has arrived."""
 _NAME = re.compile(r'[A-Za-z]\w{0,63}\Z', re.ASCII)
-
-
-class ActionError(ValueError):
-    """What was asked for was not done; the message is one line that says why."""
-
-
-class NoAnswerError(ActionError, LookupError):
-    """The node that should do it is not there, or does not answer."""
-
-
-class NoServerError(NoAnswerError):
-    """This kind of mission does not have the service."""
 
 
 class MissionActions:
@@ -98,7 +87,7 @@ class MissionActions:
         request = SetDoor.Request(door=_name(door), open=bool(is_open))
         try:
             return self._told('simulation/set_door', request)
-        except NoServerError:
+        except UnavailableError:
             return self._told('ontology_map/set_door', request)
 
     def place_obstacle(self, name: str, x: float, y: float, radius: float) -> str:
@@ -138,16 +127,16 @@ class MissionActions:
         """Return why the robot would not go to a place now, and the premises of that."""
         answer = self._call('why_not', WhyNot.Request(place=_name(place)))
         if not answer.success:
-            raise ActionError(answer.message or f'no answer about {place}')
+            raise ValueError(answer.message or f'no answer about {place}')
         return answer.message, list(answer.premises)
 
     def machine(self, word: str) -> str:
         """Pause, step or resume the state machine."""
         if word not in ('pause', 'step', 'resume'):
-            raise ActionError(f'{word!r}: expected pause, step or resume')
+            raise ValueError(f'{word!r}: expected pause, step or resume')
         answer = self._call(f'{BEHAVIOUR}/fsm/{word}', Trigger.Request())
         if not answer.success:
-            raise ActionError(answer.message or f'{word} was refused')
+            raise ValueError(answer.message or f'{word} was refused')
         done = {'pause': 'paused', 'step': 'one step made', 'resume': 'going on'}
         return str(answer.message) or f'state machine: {done[word]}'
 
@@ -155,7 +144,7 @@ class MissionActions:
         """Set after how long a place is URGENT, seconds."""
         number = _number('threshold', seconds)
         if number != int(number):
-            raise ActionError(f'{number:g} s: expected whole seconds')
+            raise ValueError(f'{number:g} s: expected whole seconds')
         value = ParameterValue(type=ParameterType.PARAMETER_INTEGER, integer_value=int(number))
         return self._set('urgency_threshold', value, f'{number:g} s')
 
@@ -168,18 +157,18 @@ class MissionActions:
         """Move the camera arm to a named pose: left, home, right, back; or stop it."""
         number = getattr(MarkerRoutine.Request, str(pose).upper(), None)
         if not isinstance(number, int):
-            raise ActionError(f'{pose!r}: expected left, home, right, back or stop')
+            raise ValueError(f'{pose!r}: expected left, home, right, back or stop')
         return self._told('move_arm', MarkerRoutine.Request(pos=number), ARM_SECONDS)
 
     def command(self, controller: str, line: str) -> str:
         """Give a controller one of its console's commands: the answers of mode MANUAL."""
         if controller not in CONTROLLERS:
-            raise ActionError(f'{controller!r}: expected one of {", ".join(CONTROLLERS)}')
+            raise ValueError(f'{controller!r}: expected one of {", ".join(CONTROLLERS)}')
         answer = self._call(
             f'{controller}/command', ConsoleCommand.Request(line=str(line)[:20_000])
         )
         if not answer.accepted:
-            raise ActionError(answer.answer)
+            raise ValueError(answer.answer)
         return str(answer.answer)
 
     def facts(self, place: str) -> list[tuple[str, bool]]:
@@ -193,10 +182,10 @@ class MissionActions:
         try:
             parse_fact(fact)
         except (ValueError, IndexError) as error:
-            raise ActionError(str(error)) from None
+            raise ValueError(str(error)) from None
         proof = self._ask(lambda armor: armor.query.explain(fact))
         if proof is None:
-            raise ActionError(f'{fact} does not hold')
+            raise ValueError(f'{fact} does not hold')
         lines = proof[1].splitlines()
         return [((len(line) - len(line.lstrip())) // 2, line.strip()) for line in lines]
 
@@ -213,19 +202,19 @@ class MissionActions:
                 )
             return question(self._armor)
         except (ArmorServiceCallError, ArmorServiceInternalError) as error:
-            raise ActionError(str(error)) from None
+            raise ValueError(str(error)) from None
 
     def _set(self, name: str, value: ParameterValue, shown: str) -> str:
         request = SetParameters.Request(parameters=[Parameter(name=name, value=value)])
         (result,) = self._call(f'{BEHAVIOUR}/set_parameters', request).results
         if not result.successful:
-            raise ActionError(result.reason or f'{name} was refused')
+            raise ValueError(result.reason or f'{name} was refused')
         return f'{name} is {shown}'
 
     def _told(self, service: str, request: Any, timeout: float | None = None) -> str:
         answer = self._call(service, request, timeout)
         if not answer.success:
-            raise ActionError(answer.message or f'{service} refused')
+            raise ValueError(answer.message or f'{service} refused')
         return str(answer.message) or 'done'
 
     def _call(self, service: str, request: Any, timeout: float | None = None) -> Any:
@@ -234,19 +223,14 @@ class MissionActions:
         if service.startswith(_OPTIONAL):
             # Nobody waits for a service that this kind of mission does not have.
             discovery = max(min(0.5, self._timeout), self._found_by - time.monotonic())
-        try:
-            return caller.call(
-                request, timeout or self._timeout, self._node.stopping, discovery=discovery
-            )
-        except UnavailableError as error:
-            raise NoServerError(str(error)) from None
-        except CallError as error:
-            raise NoAnswerError(str(error)) from None
+        return caller.call(
+            request, timeout or self._timeout, self._node.stopping, discovery=discovery
+        )
 
 
 def _name(text: str) -> str:
     if not isinstance(text, str) or not _NAME.match(text):
-        raise ActionError(f'name {str(text)[:80]!r}: expected letters, digits and _ like R3')
+        raise ValueError(f'name {str(text)[:80]!r}: expected letters, digits and _ like R3')
     return text
 
 
@@ -256,5 +240,5 @@ def _number(what: str, value: float) -> float:
     except (TypeError, ValueError):
         number = math.nan
     if not math.isfinite(number):
-        raise ActionError(f'{what} {str(value)[:40]!r}: expected a finite number')
+        raise ValueError(f'{what} {str(value)[:40]!r}: expected a finite number')
     return number

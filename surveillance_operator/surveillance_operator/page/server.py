@@ -33,6 +33,7 @@ from starlette.routing import Mount, Route
 from starlette.staticfiles import StaticFiles
 from starlette.types import ASGIApp, Receive, Scope, Send
 
+from surveillance_fsm.exceptions import CallError
 from surveillance_operator.page.hub import Hub
 
 STATIC = Path(__file__).with_name('static')
@@ -47,7 +48,8 @@ HEADERS = {
 }
 
 Action = Callable[..., Any]
-"""Takes a request's fields by name; returns what came of it; raises `ValueError` with one line."""
+"""Takes a request's fields by name; returns what came of it, or raises `ValueError` or `CallError`
+with one line."""
 
 
 class Page:
@@ -229,7 +231,7 @@ async def _answered(call: Action, fields: Mapping[str, Any]) -> Response:
     try:
         inspect.signature(call).bind(**fields)
         result = await run_in_threadpool(call, **fields)
-    except (ValueError, TypeError) as error:
+    except (ValueError, TypeError, CallError) as error:
         return JSONResponse({'ok': False, 'text': str(error)}, 422)
     return JSONResponse({'ok': True, 'text': result} if isinstance(result, str) else result)
 
