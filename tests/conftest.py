@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import threading
 import time
+import traceback
 from collections.abc import Callable, Iterator
 from typing import Any, TypeVar
 
@@ -59,6 +61,20 @@ def ros_domain() -> int:
     return _domain
 
 
+def destroy_half_made(error: BaseException) -> None:
+    """Destroy each node whose constructor failed, which nobody else can.
+
+    The error holds it, and pytest the error: its latched messages would reach the next tests.
+    """
+    from surveillance_runtime.node import PatrolNode
+
+    for frame, _ in traceback.walk_tb(error.__traceback__):
+        node = frame.f_locals.get('self')
+        if isinstance(node, PatrolNode):
+            with contextlib.suppress(AttributeError):  # it failed before it was a node
+                PatrolNode.destroy_node(node)  # a kind's own expects all that it makes
+
+
 class Graph:
     """Nodes of one test in a ROS context of their own, spun by one executor thread.
 
@@ -93,13 +109,17 @@ class Graph:
         from rclpy.parameter import Parameter
 
         overrides = [Parameter(name, value=value) for name, value in (parameters or {}).items()]
-        node = kind(
-            **options,
-            context=self.context,
-            namespace=namespace,
-            parameter_overrides=overrides,
-            use_global_arguments=False,
-        )
+        try:
+            node = kind(
+                **options,
+                context=self.context,
+                namespace=namespace,
+                parameter_overrides=overrides,
+                use_global_arguments=False,
+            )
+        except BaseException as error:
+            destroy_half_made(error)
+            raise
         self._nodes.append(node)  # type: ignore[arg-type]
         self._spinner.executor.add_node(node)
         return node

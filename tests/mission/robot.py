@@ -142,7 +142,7 @@ class Robot:
         self.time.unattended = 'robot_behavior' not in self.nodes
         self._graph.remove(node)
 
-    def until(self, seconds: float, timeout: float = 60.0) -> None:
+    def until(self, seconds: float, timeout: float = 300.0) -> None:
         """Run the mission until ``seconds`` after its start."""
         end = START + seconds
         self._graph.until(lambda: self.time.error or self.time.now >= end, timeout)
