@@ -14,8 +14,10 @@ from typing import TYPE_CHECKING
 from launcher import interrupt, package_commands, system
 from launcher.environment import CHECKOUT, Environment, clean_environ
 from launcher.instance_lock import claim
-from launcher.options import Parser, make_parser, shared_options
+from launcher.options import make_parser, shared_options
 from surveillance_runtime import node_table
+from surveillance_runtime.command_line import EXIT_BAD_INPUT, CommandParser
+from surveillance_runtime.suggestions import nearest
 
 if TYPE_CHECKING:
     from launcher.run import Run
@@ -33,7 +35,6 @@ def runs_folder(checkout: Path = CHECKOUT) -> Path:
 
 CONFIG = CHECKOUT / 'config'
 RUNS = runs_folder()
-EXIT_BAD_INPUT = 2
 EXIT_INTERRUPTED = 130
 
 _TEST_HELP = """\
@@ -100,8 +101,8 @@ def _dispatch(argv: list[str]) -> int:
     if argv and argv[0] in package_commands.COMMANDS:
         return _package_command(argv[0], argv[1:])
     if argv and not argv[0].startswith('-'):
-        known = ', '.join((*commands, *package_commands.COMMANDS))
-        raise ValueError(f'unknown command {argv[0]!r}: expected one of {known}')
+        known = nearest(argv[0], (*commands, *package_commands.COMMANDS))
+        raise ValueError(f'unknown command {argv[0]!r}: expected {known}')
     return _run(argv)
 
 
@@ -135,7 +136,7 @@ def wanted_run(options: argparse.Namespace) -> Run:
 
 
 def _node(argv: list[str]) -> int:
-    parser = Parser(
+    parser = CommandParser(
         prog='launch.py node',
         usage='%(prog)s [options] NAME [--ros-args ...]',
         description='Runs one node in this terminal, with the parameters of config/.',
@@ -181,7 +182,7 @@ def _split(argv: list[str], word: str) -> tuple[list[str], list[str]]:
 
 
 def _list(argv: list[str]) -> int:
-    Parser(prog='launch.py list', description='Names the nodes.').parse_args(argv)
+    CommandParser(prog='launch.py list', description='Names the nodes.').parse_args(argv)
     width = max(len(node.name) for node in node_table.NODES)
     for package in dict.fromkeys(node.package for node in node_table.NODES):
         print(package)
@@ -192,7 +193,7 @@ def _list(argv: list[str]) -> int:
 
 
 def _params(argv: list[str]) -> int:
-    parser = Parser(
+    parser = CommandParser(
         prog='launch.py params',
         usage='%(prog)s [options] [NODE]',
         description='Prints the parameters that the nodes get, and where each value comes from.',
@@ -223,7 +224,7 @@ def _params(argv: list[str]) -> int:
 def _service(argv: list[str]) -> int:
     from launcher import service
 
-    parser = Parser(
+    parser = CommandParser(
         prog='launch.py service',
         usage='%(prog)s [--print] [options of run]',
         description="Writes a unit of the user's systemd that keeps the robot running.",
@@ -247,9 +248,9 @@ def _service(argv: list[str]) -> int:
 
 
 def _setup(argv: list[str]) -> int:
-    Parser(prog='launch.py setup', description='Sets up what the other commands need.').parse_args(
-        argv
-    )
+    CommandParser(
+        prog='launch.py setup', description='Sets up what the other commands need.'
+    ).parse_args(argv)
     environment = _environment(())
     if environment is not None:
         environment.prepare()
@@ -269,7 +270,7 @@ def _test(argv: list[str]) -> int:
 
 
 def _lint(argv: list[str]) -> int:
-    Parser(
+    CommandParser(
         prog='launch.py lint', description='Runs ruff check, ruff format --check and mypy.'
     ).parse_args(argv)
     _enter(['lint'], extras=('test', 'lint'))

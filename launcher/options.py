@@ -6,10 +6,11 @@ import argparse
 import math
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any
 
 from launcher import package_commands
 from surveillance_runtime import node_table
+from surveillance_runtime.command_line import CommandParser
 
 DEFAULT_KEEP = 20.0
 _DESCRIPTION = """\
@@ -26,13 +27,6 @@ commands (each has its own --help):
   test [pytest args]        run the test suite
   lint                      check format, lint and types
 """
-
-
-class Parser(argparse.ArgumentParser):
-    """A parser whose errors are one line, like those of all the rest."""
-
-    def error(self, message: str) -> NoReturn:
-        raise ValueError(f'{message} (see {self.prog} --help)')
 
 
 def _names(text: str) -> list[str]:
@@ -61,7 +55,7 @@ def _number(
 
 def shared_options() -> argparse.ArgumentParser:
     """Options of `run` and of `node`."""
-    parser = Parser(add_help=False)
+    parser = CommandParser(add_help=False)
     parser.add_argument(
         '--mode',
         choices=node_table.MODES,
@@ -122,7 +116,7 @@ def make_parser(*, help_too: bool = True) -> argparse.ArgumentParser:
     package_lines = ''.join(
         f'  {name:<25} {purpose}\n' for name, (_, purpose) in package_commands.COMMANDS.items()
     )
-    parser = Parser(
+    parser = CommandParser(
         prog='launch.py',
         description=_DESCRIPTION,
         usage='%(prog)s [COMMAND] [options]',

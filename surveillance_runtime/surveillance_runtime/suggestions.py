@@ -6,7 +6,7 @@ import difflib
 import re
 from collections.abc import Iterable
 
-_MOST = 12
+_MOST = 16
 _ALIKE = 0.6
 _SHARED_WORD = 0.8
 
@@ -20,7 +20,7 @@ def nearest(name: str, known: Iterable[str]) -> str:
 
     Returns:
         The nearest name, in quotes, where one is like it, whatever the case of its letters, or
-        has it as one of its words; else the names, at most twelve of them.
+        has it as one of its words; else the names, at most sixteen of them.
     """
     names = list(dict.fromkeys(known))
     likest = max(names, key=lambda each: _likeness(name, each), default='')
@@ -32,6 +32,6 @@ def nearest(name: str, known: Iterable[str]) -> str:
 
 def _likeness(given: str, name: str) -> float:
     """Return 0 to 1, whatever the case; a name that has it as one of its words is much like it."""
-    given, name = given.casefold(), name.casefold()
+    given, name = given.casefold().lstrip('-'), name.casefold().lstrip('-')
     ratio = difflib.SequenceMatcher(None, name, given).ratio()
     return max(ratio, _SHARED_WORD) if given in re.split(r'[._/ -]', name) else ratio

@@ -33,14 +33,21 @@ from tests.launcher.conftest import ROOT
         (['--log-level', 'loud'], 'loud'),
         (['--behaviour', 'dance'], 'dance'),
         (['list', 'nodes'], 'nodes'),
-        (['--speed', '9'], '--speed'),
+        (['--speed', '9'], "unknown option '--speed': expected one of --help, --mode"),
+        (['--behavior', 'patrol'], "unknown option '--behavior': expected '--behaviour'"),
+        (['--web', '8123'], "unexpected word '8123'"),
+        (['wacth'], "unknown command 'wacth': expected 'watch'"),
     ],
 )
 def test_a_wrong_command_line_is_one_line_and_exit_code_2(arguments, wrong, capsys):
-    assert main(arguments) == 2
+    try:
+        code = main(arguments)
+    except SystemExit as ended:
+        code = ended.code
     error = capsys.readouterr().err
+    assert code == 2
     assert error.count('\n') == 1
-    assert error.startswith('launch.py: ')
+    assert error.startswith(('launch.py: ', f'{arguments[0]}: '))
     assert wrong in error
 
 

@@ -22,5 +22,5 @@ def test_the_likest_name_is_proposed_and_all_of_them_where_none_is_like(given, e
     assert nearest(given, NAMES) == expected
 
 
-def test_of_many_names_the_first_twelve_are_listed() -> None:
-    assert nearest('x', [f'name{i}' for i in range(14)]).endswith(', name11 and 2 more')
+def test_of_many_names_the_first_sixteen_are_listed() -> None:
+    assert nearest('x', [f'name{i}' for i in range(18)]).endswith(', name15 and 2 more')
