@@ -124,6 +124,7 @@ class Launcher:
         self.steps: defaultdict[str, dict[str, float]] = defaultdict(dict)
         self.folder: Path | None = None
         self._log = log.open('a')
+        self.steps['launcher']['started'] = time.monotonic()
         self.process = subprocess.Popen(
             on(sys.executable, str(ROOT / 'launch.py'), *words),
             cwd=ROOT,
@@ -281,7 +282,7 @@ class Results:
     machine: list[tuple[str, float]] = field(default_factory=list)
     restarted: int = 0
     left_behind: list[str] = field(default_factory=list)
-    usage: dict[int, Usage] = field(default_factory=dict)
+    usage: dict[tuple[int, float], Usage] = field(default_factory=dict)
     seen: dict[tuple[float, str], None] = field(default_factory=dict)
     collisions: int = 0
 
@@ -362,7 +363,6 @@ class Campaign:
             self._disk = SmallDisk(scratch / 'disk', DISK)
         if chosen.clock_steps and SteppedClock.may_be_made():
             self._clock = SteppedClock(scratch)
-        self._began: dict[int, float] = {}
         self.watcher = Watcher(self._domain)
         self.results = Results()
         described = read_place_file(ROOT / 'config' / PLACES[chosen.behaviour])
@@ -408,13 +408,13 @@ class Campaign:
         self._compare()
 
     def _note_usage(self) -> None:
-        now = time.monotonic()
-        launcher = {'launcher': self.launcher.process.pid}
-        for name, process in {**launcher, **self.launcher.processes}.items():
-            began = self._began.setdefault(process, now)
+        now, launcher = time.monotonic(), self.launcher
+        for name, process in {'launcher': launcher.process.pid, **launcher.processes}.items():
+            began = launcher.steps[name]['started']
             if now - began < SETTLED or (held := _held(process)) is None:
                 continue
-            usage = self.results.usage.setdefault(process, Usage(name, now, held))
+            # Not by its number alone: the kernel gives it to others later.
+            usage = self.results.usage.setdefault((process, began), Usage(name, now, held))
             usage.last_at, usage.last = now, held
 
     def _await_all(self, patience: float) -> None:
@@ -429,14 +429,15 @@ class Campaign:
         chance = self._chance
         names = chance.sample(sorted(self.launcher.processes), 2 if chance.random() < 0.3 else 1)
         kind = chance.choice((signal.SIGKILL, signal.SIGKILL, signal.SIGSTOP, signal.SIGTERM))
+        # Before the hit: the successor may be there before this thread runs on.
+        before = {name: self.launcher.processes[name] for name in names}
         began = time.monotonic()
         for name in names:
             try:
-                os.kill(self.launcher.processes[name], kind)
+                os.kill(before[name], kind)
             except ProcessLookupError:
                 continue
             self.results.hits[signal.Signals(kind).name] += 1
-        before = {name: self.launcher.processes[name] for name in names}
 
         def await_return(name: str) -> None:
             late = began + PATIENCE
