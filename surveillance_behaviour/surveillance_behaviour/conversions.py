@@ -14,7 +14,7 @@ from surveillance_behaviour.peers.ports import Point
 from surveillance_behaviour.policy.world import Decision
 from surveillance_interfaces.msg import Decision as DecisionMessage
 from surveillance_interfaces.msg import OntologyMap, OntologyPlace, RoomConnection
-from surveillance_runtime.conversions import seconds_of
+from surveillance_runtime.conversions import point_message, seconds_of
 
 MOST_CANDIDATES = 10_000
 """Of a decision; more are refused."""
@@ -23,12 +23,6 @@ MOST_CANDIDATES = 10_000
 def point_from(message: PointMessage) -> Point:
     """Return a point in metres."""
     return (message.x, message.y, message.z)
-
-
-def point_message(point: Sequence[float]) -> PointMessage:
-    """Return a point from x, y and perhaps z, metres."""
-    x, y, z = (*(float(value) for value in point), 0.0)[:3]
-    return PointMessage(x=x, y=y, z=z)
 
 
 def points_from(messages: Iterable[PointMessage]) -> list[Point]:

@@ -30,6 +30,7 @@ from surveillance_controllers.controller_parameters import (
 from surveillance_controllers.manual.commands import BATTERY, BATTERY_SET, ParsedCommand
 from surveillance_controllers.manual.requests import CommandConsole
 from surveillance_fsm.ros import ClockWait
+from surveillance_runtime.conversions import pose_from
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.process import run_node
 from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
@@ -196,7 +197,7 @@ class RobotBattery:
 
     def _on_pose(self, message: PoseWithCovarianceStamped) -> None:
         with conversions.refusing(self._node, 'amcl_pose'):
-            self._use.see_pose(conversions.pose_from(message.pose.pose), self._wait.elapsed())
+            self._use.see_pose(pose_from(message.pose.pose), self._wait.elapsed())
 
     def _on_joints(self, message: JointState) -> None:
         self._use.see_joints(message.position)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
@@ -11,8 +11,6 @@ import numpy as np
 from geometry_msgs.msg import (
     Point,
     PoseStamped,
-    PoseWithCovarianceStamped,
-    Quaternion,
     Transform,
     Twist,
 )
@@ -24,6 +22,7 @@ from sensor_msgs.msg import BatteryState, LaserScan
 
 from surveillance_controllers.battery.model import Battery
 from surveillance_controllers.geometry import Points, Pose, Scan
+from surveillance_runtime.conversions import map_from, point_message, pose_from
 
 if TYPE_CHECKING:
     from surveillance_controllers.motion.path_following import Velocity
@@ -44,15 +43,9 @@ def array_from_points(points: Iterable[Point]) -> Points:
     return np.array([(p.x, p.y, p.z) for p in points], dtype=float).reshape(-1, 3)
 
 
-def point_from(coordinates: Sequence[float] | Points) -> Point:
-    """Return a point from x, y and perhaps z, metres."""
-    x, y, z = (*(float(c) for c in coordinates), 0.0)[:3]
-    return Point(x=x, y=y, z=z)
-
-
 def points_from_array(array: Points) -> list[Point]:
     """Return the rows of an array of shape (n, 2) or (n, 3) as points."""
-    return [point_from(row) for row in array]
+    return [point_message(row) for row in array]
 
 
 def path_from_array(array: Points, stamp: Any) -> PathMessage:
@@ -61,7 +54,7 @@ def path_from_array(array: Points, stamp: Any) -> PathMessage:
     message.header.frame_id, message.header.stamp = 'map', stamp
     for row in array:
         pose = PoseStamped(header=message.header)
-        pose.pose.position = point_from(row)
+        pose.pose.position = point_message(row)
         message.poses.append(pose)
     return message
 
@@ -100,46 +93,6 @@ LONGEST_RANGE = 1000.0
 """No ray of a lidar goes farther, metres."""
 
 
-def pose_from(message: PoseMessage) -> Pose:
-    """Return a pose in the plane: x, y in metres and yaw in radians.
-
-    Raises:
-        ValueError: A coordinate is not finite, or too large to be one.
-    """
-    p, q = message.position, message.orientation
-    if not all(map(math.isfinite, (p.x, p.y, q.x, q.y, q.z, q.w))):
-        raise ValueError('a pose with a coordinate that is not finite')
-    if max(abs(p.x), abs(p.y)) > FARTHEST:
-        raise ValueError(
-            f'a pose at ({p.x:g}, {p.y:g}) m: expected at most {FARTHEST:g} m from the origin'
-        )
-    # Yaw of a quaternion in Z-Y-X order; exact for any tilt that is not straight up.
-    yaw = math.atan2(2 * (q.w * q.z + q.x * q.y), 1 - 2 * (q.y * q.y + q.z * q.z))
-    return message.position.x, message.position.y, yaw
-
-
-def pose_message(pose: Pose) -> PoseMessage:
-    """Return a pose in the plane as a message."""
-    message = PoseMessage()
-    message.position = point_from(pose[:2])
-    message.orientation = Quaternion(z=math.sin(pose[2] / 2), w=math.cos(pose[2] / 2))
-    return message
-
-
-def pose_estimate(pose: Pose, deviation: float, turn_deviation: float) -> PoseWithCovarianceStamped:
-    """Return an estimated pose with its standard deviations in metres and rad; the caller stamps
-    it.
-    """
-    message = PoseWithCovarianceStamped()
-    message.header.frame_id = 'map'
-    message.pose.pose = pose_message(pose)
-    covariance = [0.0] * 36
-    covariance[0] = covariance[7] = deviation**2
-    covariance[35] = turn_deviation**2
-    message.pose.covariance = covariance
-    return message
-
-
 def twist_from(velocity: Velocity) -> Twist:
     """Return a velocity of a differential drive as a message."""
     message = Twist()
@@ -149,32 +102,11 @@ def twist_from(velocity: Velocity) -> Twist:
 
 
 def grid_from(message: OccupancyGrid) -> GridMap:
-    """Return a map.
-
-    Raises:
-        ValueError: The message is not sound, or its origin is turned.
-    """
+    """Return a map; see `map_from`."""
     # Only here: a node without a map starts without OpenCV.
     from surveillance_controllers.planning.grid_map import GridMap
 
-    info = message.info
-    if info.width * info.height > MOST_CELLS:
-        raise ValueError(
-            f'a map of {info.width} x {info.height} cells: expected at most {MOST_CELLS}'
-        )
-    if not 1e-4 <= info.resolution <= 100.0:
-        raise ValueError(
-            f'a map of {info.resolution:g} m a cell: expected between 0.0001 and 100 m'
-        )
-    cells = np.array(message.data, dtype=np.int8)
-    if cells.size != info.width * info.height:
-        raise ValueError(
-            f'a map of {cells.size} cells: expected {info.width} x {info.height} of them'
-        )
-    x, y, yaw = pose_from(info.origin)
-    if abs(yaw) > 1e-6:
-        raise ValueError(f'a map turned by {yaw:.3f} rad: expected one that is not turned')
-    return GridMap(cells.reshape(info.height, info.width), float(info.resolution), (x, y))
+    return GridMap(*map_from(message, MOST_CELLS))
 
 
 def scan_from(message: LaserScan, mount: Pose = (0.0, 0.0, 0.0)) -> Scan:

@@ -26,6 +26,7 @@ from surveillance_controllers.stimuli import glide
 from surveillance_fsm.ros import GoalAbortedError, GoalRun, GoalServer
 from surveillance_interfaces.action import Control, FollowPath
 from surveillance_ontology.patrol_ontology import OntologyNotReadyError
+from surveillance_runtime.conversions import FARTHEST, point_message
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.process import run_node
 
@@ -91,17 +92,17 @@ class MotionController(PatrolNode):
 
     def _follow_path(self, goal: Any, run: GoalRun) -> FollowPath.Result:
         def report(position: Points) -> None:
-            run.feedback(FollowPath.Feedback(position=conversions.point_from(position)))
+            run.feedback(FollowPath.Feedback(position=point_message(position)))
 
         path = _checked(goal.path)
         try:
             end = self._move(path, run, report, 'follow a path')
         except MotionFailedError as failure:
-            position = conversions.point_from(path[0] if failure.end is None else failure.end)
+            position = point_message(path[0] if failure.end is None else failure.end)
             raise GoalAbortedError(str(failure), FollowPath.Result(position=position)) from failure
         if self._tells_ends:
             self._recorder.tell_point(end)
-        return FollowPath.Result(position=conversions.point_from(end))
+        return FollowPath.Result(position=point_message(end))
 
     def _control(self, goal: Any, run: GoalRun) -> Control.Result:
         path = _checked(goal.point_set)
@@ -112,7 +113,7 @@ class MotionController(PatrolNode):
             behind = geometry.points_passed(path, geometry.distance_nearest(path, position))
             if behind > passed:
                 passed = behind
-                point = conversions.point_from(path[passed - 1])
+                point = point_message(path[passed - 1])
                 run.feedback(Control.Feedback(reached_point=point))
 
         end: Points | None = None
@@ -123,9 +124,9 @@ class MotionController(PatrolNode):
         except (MotionFailedError, OntologyNotReadyError) as failure:
             if isinstance(failure, MotionFailedError):
                 end = failure.end
-            point = conversions.point_from(path[0] if end is None else end)
+            point = point_message(path[0] if end is None else end)
             raise GoalAbortedError(str(failure), Control.Result(reached_point=point)) from failure
-        return Control.Result(reached_point=conversions.point_from(end))
+        return Control.Result(reached_point=point_message(end))
 
     def _arrive(self, goal: Points, end: Points, run: GoalRun) -> None:
         """Make sure that the robot is in a place, tell it, and look around there."""
@@ -163,8 +164,8 @@ def _checked(points: Sequence[Any]) -> Points:
         raise GoalAbortedError('no points, expected at least one')
     if not np.isfinite(path).all():
         raise GoalAbortedError('a point is not finite')
-    if np.abs(path).max() > conversions.FARTHEST:
-        raise GoalAbortedError(f'a point is farther than {conversions.FARTHEST:g} m away')
+    if np.abs(path).max() > FARTHEST:
+        raise GoalAbortedError(f'a point is farther than {FARTHEST:g} m away')
     return path
 
 

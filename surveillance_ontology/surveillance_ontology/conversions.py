@@ -109,12 +109,6 @@ def changes_from_ros(msg: FactChanges) -> Sequence[tuple[ShortFact, bool, bool]]
     ]
 
 
-def point_to_ros(position: Position) -> Point:
-    """Write a position, metres."""
-    x, y, z = position
-    return Point(x=x, y=y, z=z)
-
-
 def position_from_ros(msg: Point) -> Position:
     """Read a position, metres."""
     return msg.x, msg.y, msg.z

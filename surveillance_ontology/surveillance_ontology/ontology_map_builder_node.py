@@ -18,9 +18,10 @@ from rclpy.event_handler import SubscriptionEventCallbacks
 from surveillance_interfaces.msg import FactChanges, OntologyMap
 from surveillance_interfaces.srv import AddRoom, ReferenceName, RemoveRoom, RoomPosition, SetDoor
 from surveillance_ontology.armor_client import CHANGES_QOS, CHANGES_TOPIC, ArmorClient
-from surveillance_ontology.conversions import point_to_ros, position_from_ros, room_note_from_ros
+from surveillance_ontology.conversions import position_from_ros, room_note_from_ros
 from surveillance_ontology.map_keeper import MapKeeper, Reports, Source
 from surveillance_ontology.patrol_ontology import PatrolOntology
+from surveillance_runtime.conversions import point_message
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.place import Place
 from surveillance_runtime.place.parameters import described_place
@@ -121,7 +122,7 @@ class OntologyMapBuilder(PatrolNode):
         position = place.positions.get(request.room_name) if place else None
         response.valid = position is not None
         if position is not None:
-            response.position = point_to_ros(position)
+            response.position = point_message(position)
         return response
 
     async def _on_add_room(self, request: Any, response: Any) -> Any:

@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
-from geometry_msgs.msg import Pose as PoseMessage
 from nav_msgs.msg import OccupancyGrid
 from nav_msgs.msg import Path as PathMessage
 from numpy.typing import NDArray
@@ -35,11 +34,10 @@ from surveillance_operator.snapshot import (
     Detection,
     Grid,
     Health,
-    Pose,
     Status,
     Transition,
 )
-from surveillance_runtime.conversions import points_from_cloud, seconds_of
+from surveillance_runtime.conversions import map_from, points_from_cloud, seconds_of
 
 MOST_CELLS = 16_000_000
 MOST_POINTS = 20_000
@@ -75,19 +73,6 @@ def doors_from(message: DoorStates) -> dict[str, bool]:
     return dict(sorted({**dict.fromkeys(opened, True), **dict.fromkeys(closed, False)}.items()))
 
 
-def pose_from(message: PoseMessage) -> Pose:
-    """Return x, y in metres and yaw in radians of a pose.
-
-    Raises:
-        ValueError: A coordinate is not finite.
-    """
-    q, at = message.orientation, message.position
-    yaw = math.atan2(2 * (q.w * q.z + q.x * q.y), 1 - 2 * (q.y * q.y + q.z * q.z))
-    if not all(map(math.isfinite, (at.x, at.y, yaw))):
-        raise ValueError(f'a pose at ({at.x:g}, {at.y:g}), yaw {yaw:g}: expected finite numbers')
-    return at.x, at.y, yaw
-
-
 def point_from(message: Any) -> tuple[float, float]:
     """Return x and y of a point in metres.
 
@@ -111,23 +96,8 @@ def percent_from(message: UInt8) -> float:
 
 
 def grid_from(message: OccupancyGrid) -> Grid:
-    """Return a map.
-
-    Raises:
-        ValueError: It has no cells, not as many as it says, too many, or is turned.
-    """
-    info = message.info
-    count = len(message.data)
-    if not count or count != info.width * info.height or not 0 < info.resolution < math.inf:
-        size = f'{info.width} x {info.height} of {info.resolution:g} m'
-        raise ValueError(f'{count} cells came where it says {size}')
-    if count > MOST_CELLS:
-        raise ValueError(f'a map of {count} cells: expected at most {MOST_CELLS}')
-    x, y, yaw = pose_from(info.origin)
-    if abs(yaw) > 1e-6:
-        raise ValueError(f'it is turned by {yaw:.3f} rad, which is not drawn')
-    cells = np.array(message.data, dtype=np.int8)
-    return Grid(cells.reshape(info.height, info.width), float(info.resolution), (x, y))
+    """Return a map; see `map_from`."""
+    return Grid(*map_from(message, MOST_CELLS))
 
 
 def cloud_from(message: PointCloud2) -> NDArray[np.float64]:

@@ -39,7 +39,7 @@ from surveillance_operator.topics import (
     with_fact,
     without,
 )
-from surveillance_runtime.conversions import clean_texts, seconds_of
+from surveillance_runtime.conversions import clean_texts, pose_from, seconds_of
 from surveillance_runtime.diagnostics import STALE_AFTER
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
@@ -417,7 +417,7 @@ class _OtherRobots:
         for robot, subscription in self._poses.items():
             if (newest := subscription.newest()) is not None:
                 with contextlib.suppress(ValueError):
-                    came[robot] = conversions.pose_from(newest[0].pose.pose)
+                    came[robot] = pose_from(newest[0].pose.pose)
         return came
 
 

@@ -38,7 +38,7 @@ from surveillance_ontology.patrol_ontology import CONNECTIONS, URGENT_PLACES, VI
 from surveillance_operator import conversions
 from surveillance_operator.conversions import MOST_NAMES
 from surveillance_operator.snapshot import NO_POINTS, TRAIL_STEP, Pose, Snapshot
-from surveillance_runtime.conversions import seconds_of
+from surveillance_runtime.conversions import pose_from, seconds_of
 from surveillance_runtime.qos import STATE_QOS
 from surveillance_runtime.robot_arm import ARM
 
@@ -131,7 +131,7 @@ def _on_transition(message: FsmTransition, old: Snapshot) -> Fields:
 
 def _on_pose(message: PoseWithCovarianceStamped, old: Snapshot) -> Fields:
     at = seconds_of(message.header.stamp)
-    pose = conversions.pose_from(message.pose.pose)
+    pose = pose_from(message.pose.pose)
     return {
         **moved(pose, old),
         **_seen(pose, at, old.lidar),

@@ -1,16 +1,25 @@
-"""Conversions of messages that several packages use: time stamps, points in the plane, texts."""
+"""Conversions that several packages use: times, points, poses in the plane, maps, clouds, texts."""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from functools import cache
 from typing import Any
 
 import numpy as np
 from builtin_interfaces.msg import Duration, Time
+from geometry_msgs.msg import Point, Pose, PoseWithCovariance, Quaternion
+from nav_msgs.msg import OccupancyGrid
 from numpy.typing import NDArray
 from sensor_msgs.msg import PointCloud2, PointField
 
 from surveillance_runtime.logging import without_controls
+
+PlanarPose = tuple[float, float, float]
+"""x, y in metres and yaw in radians."""
+FARTHEST = 1e6
+"""A pose farther from the origin than this is none, metres."""
 
 
 def clean_texts(message: Any) -> None:
@@ -46,6 +55,80 @@ def seconds_of(stamp: Time | Duration) -> float:
 def nanoseconds_of(stamp: Time) -> int:
     """Return a stamp as whole nanoseconds since the clock's start."""
     return int(stamp.sec) * 1_000_000_000 + int(stamp.nanosec)
+
+
+def point_message(coordinates: Sequence[float] | NDArray[np.float64]) -> Point:
+    """Return a point from x, y and perhaps z, metres."""
+    x, y, z = (*(float(each) for each in coordinates), 0.0)[:3]
+    return Point(x=x, y=y, z=z)
+
+
+def pose_from(message: Pose) -> PlanarPose:
+    """Return a pose in the plane.
+
+    Raises:
+        ValueError: A coordinate is not finite, or too large to be one.
+    """
+    at, q = message.position, message.orientation
+    if not all(map(math.isfinite, (at.x, at.y, q.x, q.y, q.z, q.w))):
+        raise ValueError('a pose with a coordinate that is not finite: expected finite numbers')
+    if max(abs(at.x), abs(at.y)) > FARTHEST:
+        raise ValueError(
+            f'a pose at ({at.x:g}, {at.y:g}) m: expected at most {FARTHEST:g} m from the origin'
+        )
+    # Yaw of a quaternion in Z-Y-X order; exact for any tilt that is not straight up.
+    yaw = math.atan2(2 * (q.w * q.z + q.x * q.y), 1 - 2 * (q.y * q.y + q.z * q.z))
+    return at.x, at.y, yaw
+
+
+def pose_message(pose: PlanarPose) -> Pose:
+    """Return a pose in the plane as a message."""
+    turn = Quaternion(z=math.sin(pose[2] / 2), w=math.cos(pose[2] / 2))
+    return Pose(position=point_message(pose[:2]), orientation=turn)
+
+
+def pose_estimate(pose: PlanarPose, deviation: float, turn_deviation: float) -> PoseWithCovariance:
+    """Return a pose in the plane with its standard deviations, metres and rad."""
+    covariance = planar_covariance(deviation, turn_deviation)
+    return PoseWithCovariance(pose=pose_message(pose), covariance=covariance)
+
+
+@cache
+def planar_covariance(deviation: float, turn_deviation: float) -> NDArray[np.float64]:
+    """Return the covariance of a pose or a velocity in the plane, shape (36,)."""
+    covariance = np.zeros(36)
+    covariance[[0, 7]] = deviation**2
+    covariance[35] = turn_deviation**2
+    return covariance
+
+
+def map_from(
+    message: OccupancyGrid, most_cells: int
+) -> tuple[NDArray[np.int8], float, tuple[float, float]]:
+    """Return a map's cells, shape (rows, columns), south first, their side, and its origin.
+
+    Args:
+        message: The map.
+        most_cells: A larger one is refused.
+
+    Raises:
+        ValueError: It has no cells, not as many as it says, too many, or is turned.
+    """
+    info = message.info
+    size = f'{info.width} x {info.height}'
+    if info.width * info.height > most_cells:
+        raise ValueError(f'a map of {size} cells: expected at most {most_cells}')
+    if not 1e-4 <= info.resolution <= 100.0:
+        raise ValueError(
+            f'a map of {info.resolution:g} m a cell: expected between 0.0001 and 100 m'
+        )
+    cells = np.array(message.data, dtype=np.int8)
+    if cells.size != info.width * info.height or not cells.size:
+        raise ValueError(f'a map of {cells.size} cells: expected {size} of them')
+    x, y, yaw = pose_from(info.origin)
+    if abs(yaw) > 1e-6:
+        raise ValueError(f'a map turned by {yaw:.3f} rad: expected one that is not turned')
+    return cells.reshape(info.height, info.width), float(info.resolution), (x, y)
 
 
 def cloud_from_points(

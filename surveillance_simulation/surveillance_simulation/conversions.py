@@ -4,19 +4,23 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from functools import cache
 
 import numpy as np
 import numpy.typing as npt
 from builtin_interfaces.msg import Time
-from geometry_msgs.msg import Pose, PoseStamped, PoseWithCovarianceStamped, TransformStamped
+from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped, TransformStamped
 from nav_msgs.msg import OccupancyGrid, Odometry
 from sensor_msgs.msg import CameraInfo, Image, JointState, LaserScan
 from trajectory_msgs.msg import JointTrajectory
 
 from surveillance_interfaces.msg import DoorStates
 from surveillance_interfaces.srv import SetMarker
-from surveillance_runtime.conversions import seconds_of
+from surveillance_runtime.conversions import (
+    planar_covariance,
+    pose_estimate,
+    pose_message,
+    seconds_of,
+)
 from surveillance_runtime.place.floor_plan import Marker
 from surveillance_runtime.place.floor_plan import Pose as PlanePose
 from surveillance_runtime.place.occupancy_grid import Grid
@@ -32,18 +36,9 @@ def time_to_ros(seconds: float) -> Time:
     return Time(sec=nanoseconds // 10**9, nanosec=nanoseconds % 10**9)
 
 
-def pose_to_ros(pose: PlanePose) -> Pose:
-    """Convert a pose in the plane (metres, rad) to a pose message."""
-    message = Pose()
-    message.position.x, message.position.y = float(pose[0]), float(pose[1])
-    message.orientation.z = math.sin(pose[2] / 2)
-    message.orientation.w = math.cos(pose[2] / 2)
-    return message
-
-
 def stamped_pose_to_ros(pose: PlanePose, frame: str, stamp: Time) -> PoseStamped:
     """Convert a pose in the plane to a stamped pose message."""
-    message = PoseStamped(pose=pose_to_ros(pose))
+    message = PoseStamped(pose=pose_message(pose))
     message.header.frame_id, message.header.stamp = frame, stamp
     return message
 
@@ -54,8 +49,7 @@ def uncertain_pose_to_ros(
     """Convert a pose in the plane and its standard deviations (metres, rad) to a message."""
     message = PoseWithCovarianceStamped()
     message.header.frame_id, message.header.stamp = frame, stamp
-    message.pose.pose = pose_to_ros(pose)
-    message.pose.covariance = _covariance(deviation, turn_deviation)
+    message.pose = pose_estimate(pose, deviation, turn_deviation)
     return message
 
 
@@ -65,11 +59,10 @@ def odometry_to_ros(
     """Convert odometry (metres, rad, m/s, rad/s) to a message."""
     message = Odometry(child_frame_id=child)
     message.header.frame_id, message.header.stamp = frame, stamp
-    message.pose.pose = pose_to_ros(pose)
-    message.pose.covariance = _covariance(0.02, 0.02)
+    message.pose = pose_estimate(pose, 0.02, 0.02)
     message.twist.twist.linear.x = float(speed)
     message.twist.twist.angular.z = float(turn_speed)
-    message.twist.covariance = _covariance(0.02, 0.02)
+    message.twist.covariance = planar_covariance(0.02, 0.02)
     return message
 
 
@@ -78,7 +71,7 @@ def transform_to_ros(pose: PlanePose, frame: str, child: str, stamp: Time) -> Tr
     message = TransformStamped(child_frame_id=child)
     message.header.frame_id, message.header.stamp = frame, stamp
     message.transform.translation.x, message.transform.translation.y = pose[0], pose[1]
-    message.transform.rotation = pose_to_ros(pose).orientation
+    message.transform.rotation = pose_message(pose).orientation
     return message
 
 
@@ -106,7 +99,7 @@ def grid_to_ros(grid: Grid, frame: str, stamp: Time) -> OccupancyGrid:
     message.info.map_load_time = stamp
     message.info.resolution = float(grid.resolution)
     message.info.height, message.info.width = grid.cells.shape
-    message.info.origin = pose_to_ros((*grid.origin, 0.0))
+    message.info.origin = pose_message((*grid.origin, 0.0))
     message.data.frombytes(grid.cells.tobytes())
     return message
 
@@ -175,11 +168,3 @@ def doors_to_ros(world: World) -> DoorStates:
 def marker_from_ros(request: SetMarker.Request, size: float) -> Marker:
     """Convert the request to hang a marker; its side (metres) is that of the place's markers."""
     return Marker(request.name, int(request.id), request.x, request.y, request.z, request.yaw, size)
-
-
-@cache
-def _covariance(deviation: float, turn_deviation: float) -> npt.NDArray[np.float64]:
-    covariance = np.zeros(36)
-    covariance[[0, 7]] = deviation**2
-    covariance[35] = turn_deviation**2
-    return covariance

@@ -13,6 +13,7 @@ from sensor_msgs.msg import BatteryState
 from surveillance_behaviour import conversions
 from surveillance_behaviour.policy.world import Decision
 from surveillance_interfaces.msg import Decision as DecisionMessage
+from surveillance_runtime.conversions import point_message
 
 numbers = st.floats(allow_nan=False, allow_infinity=False)
 names = st.text('ABCR0123456789_', min_size=1, max_size=6)
@@ -50,7 +51,7 @@ def test_a_decision_that_cannot_be_used_is_refused(message: DecisionMessage, wor
 
 
 def test_a_point_without_height_lies_on_the_floor() -> None:
-    message = conversions.point_message((1, 2))
+    message = point_message((1, 2))
     assert (message.x, message.y, message.z) == (1.0, 2.0, 0.0)
 
 

@@ -17,7 +17,15 @@ from std_msgs.msg import Header
 from surveillance_controllers import conversions
 from surveillance_controllers.battery.model import Battery, BatteryParameters
 from surveillance_controllers.motion.path_following import Velocity
-from surveillance_runtime.conversions import cloud_from_points, points_from_cloud, values_from_cloud
+from surveillance_runtime.conversions import (
+    cloud_from_points,
+    point_message,
+    points_from_cloud,
+    pose_estimate,
+    pose_from,
+    pose_message,
+    values_from_cloud,
+)
 
 NUMBER = st.floats(-1e4, 1e4)
 YAW = st.floats(-3.1, 3.1)
@@ -31,19 +39,19 @@ def test_points_come_back(points: list[tuple[float, float, float]]) -> None:
 
 
 def test_a_point_in_the_plane_has_no_height() -> None:
-    point = conversions.point_from((1, 2))
+    point = point_message((1, 2))
     assert (point.x, point.y, point.z) == (1.0, 2.0, 0.0)
 
 
 @given(NUMBER, NUMBER, YAW)
 @settings(max_examples=40)
 def test_poses_come_back(x: float, y: float, yaw: float) -> None:
-    pose = conversions.pose_from(conversions.pose_message((x, y, yaw)))
+    pose = pose_from(pose_message((x, y, yaw)))
     assert pose == pytest.approx((x, y, yaw))
-    estimate = conversions.pose_estimate((x, y, yaw), 0.5, 0.1)
-    assert conversions.pose_from(estimate.pose.pose) == pytest.approx((x, y, yaw))
-    assert estimate.pose.covariance[0] == 0.25
-    assert estimate.pose.covariance[35] == pytest.approx(0.01)
+    estimate = pose_estimate((x, y, yaw), 0.5, 0.1)
+    assert pose_from(estimate.pose) == pytest.approx((x, y, yaw))
+    assert estimate.covariance[0] == 0.25
+    assert estimate.covariance[35] == pytest.approx(0.01)
 
 
 @given(st.lists(st.tuples(st.floats(-99, 99), st.floats(-99, 99)), max_size=6))
@@ -157,10 +165,10 @@ def test_a_reach_without_end_is_cut() -> None:
 
 @pytest.mark.parametrize('x', [math.nan, math.inf, -1e308])
 def test_a_pose_that_is_none_is_refused(x: float) -> None:
-    message = conversions.pose_message((0.0, 0.0, 0.0))
+    message = pose_message((0.0, 0.0, 0.0))
     message.position.x = x
     with pytest.raises(ValueError, match='a pose'):
-        conversions.pose_from(message)
+        pose_from(message)
 
 
 def test_a_map_too_large_or_without_size_is_refused() -> None:

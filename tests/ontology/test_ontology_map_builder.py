@@ -21,9 +21,9 @@ from surveillance_ontology.armor_client import (
     ArmorServiceInternalError,
 )
 from surveillance_ontology.armor_server_node import ArmorServer
-from surveillance_ontology.conversions import point_to_ros
 from surveillance_ontology.ontology_map_builder_node import OntologyMapBuilder
 from surveillance_ontology.patrol_ontology import PatrolOntology
+from surveillance_runtime.conversions import point_message
 from surveillance_runtime.parameters import ParameterError
 from surveillance_runtime.qos import STATE_QOS
 
@@ -188,7 +188,7 @@ def test_doors_close_and_open(armor: ArmorClient, call: Caller, built: OntologyM
 
 
 def test_rooms_join_and_leave(armor: ArmorClient, call: Caller, built: OntologyMapBuilder) -> None:
-    here = point_to_ros((1.0, 2.0, 0.0))
+    here = point_message((1.0, 2.0, 0.0))
     assert call('add_room', room_name='R5', position=here, doors=['D8']).success
     assert armor.query.objectprop_b2_ind('connectedTo', 'R5') == []
     assert call('add_room', room_name='E', position=here, doors=['D8']).success
@@ -211,7 +211,7 @@ def test_rooms_join_and_leave(armor: ArmorClient, call: Caller, built: OntologyM
 def room(name: str, *connections: tuple[str, str]) -> OntologyPlace:
     return OntologyPlace(
         name=name,
-        position=point_to_ros((3.0, 4.0, 0.0)),
+        position=point_message((3.0, 4.0, 0.0)),
         connections=[RoomConnection(connected_to=to, through_door=by) for to, by in connections],
     )
 

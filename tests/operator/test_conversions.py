@@ -16,6 +16,7 @@ from surveillance_interfaces.msg import Decision
 from surveillance_operator import conversions
 from surveillance_operator.snapshot import Snapshot
 from surveillance_operator.topics import TOPICS, read_message
+from surveillance_runtime.conversions import pose_from
 
 TOPIC = {topic.name: topic for topic in TOPICS}
 
@@ -33,9 +34,9 @@ def grid(**info: Any) -> OccupancyGrid:
     [
         ('decision', Decision(candidates=['A'], scores=[]), '0 scores came for 1 candidates'),
         ('decision', Decision(candidates=['A'], scores=[math.nan]), 'score of A is not a number'),
-        ('map', grid(width=3), '2 cells came'),
-        ('map', grid(resolution=0.0), '2 cells came'),
-        ('map', grid(resolution=math.nan), '2 cells came'),
+        ('map', grid(width=3), 'a map of 2 cells'),
+        ('map', grid(resolution=0.0), 'a map of 0 m a cell'),
+        ('map', grid(resolution=math.nan), 'a map of nan m a cell'),
         ('battery_level', UInt8(data=200), 'a level of 200 %'),
         ('obstacles', PointCloud2(width=9, height=9, point_step=12), '0 bytes came for 81 points'),
         ('obstacles', PointCloud2(width=10**6, height=1), 'expected at most'),
@@ -56,7 +57,7 @@ def test_a_pose_that_is_not_finite_is_refused() -> None:
     pose = Pose()
     pose.position.x = math.nan
     with pytest.raises(ValueError, match='expected finite numbers'):
-        conversions.pose_from(pose)
+        pose_from(pose)
 
 
 def test_a_scan_leaves_out_what_is_no_hit() -> None:

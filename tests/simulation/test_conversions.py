@@ -13,7 +13,7 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from surveillance_controllers import conversions as received
 from surveillance_interfaces.srv import SetMarker
-from surveillance_runtime.conversions import seconds_of
+from surveillance_runtime.conversions import pose_from, pose_message, seconds_of
 from surveillance_runtime.place import occupancy_grid
 from surveillance_simulation import conversions
 from surveillance_simulation.camera.model import Camera
@@ -27,7 +27,7 @@ STAMP = Time(sec=3, nanosec=5)
 @settings(max_examples=50)
 @given(st.floats(-1e3, 1e3), st.floats(-1e3, 1e3), st.floats(-math.pi, math.pi))
 def test_a_pose_comes_back(x: float, y: float, yaw: float) -> None:
-    back = received.pose_from(conversions.pose_to_ros((x, y, yaw)))
+    back = pose_from(pose_message((x, y, yaw)))
     assert back[:2] == (x, y)
     assert math.cos(back[2] - yaw) == pytest.approx(1.0)
 

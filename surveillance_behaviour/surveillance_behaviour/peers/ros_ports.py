@@ -36,7 +36,7 @@ from surveillance_interfaces.msg import Decision as DecisionMessage
 from surveillance_interfaces.msg import RobotPlace
 from surveillance_interfaces.srv import Reason, ReferenceName, RoomPosition
 from surveillance_ontology.armor_client import RosTransport
-from surveillance_runtime.conversions import nanoseconds_of
+from surveillance_runtime.conversions import nanoseconds_of, point_message
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.parameters import parameter
 from surveillance_runtime.qos import STATE_QOS
@@ -159,9 +159,7 @@ class RosMotion:
 
     def plan(self, start: Point, goal: Point, interrupt: Interrupt) -> list[Point]:
         """Return a path from ``start`` to ``goal``."""
-        request = ComputePath.Goal(
-            start=conversions.point_message(start), goal=conversions.point_message(goal)
-        )
+        request = ComputePath.Goal(start=point_message(start), goal=point_message(goal))
         limits = self._deadlines
         result = run(self._planner, request, limits.answer, limits.plan, interrupt)
         return conversions.points_from(result.path)

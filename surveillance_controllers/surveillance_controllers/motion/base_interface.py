@@ -26,7 +26,7 @@ from surveillance_controllers.motion.transforms import Transforms
 from surveillance_controllers.planning.grid_planning import NoPathError
 from surveillance_fsm import Interrupt
 from surveillance_interfaces.msg import DoorStates
-from surveillance_runtime.conversions import cloud_from_points, seconds_of
+from surveillance_runtime.conversions import cloud_from_points, pose_estimate, pose_from, seconds_of
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
 from surveillance_runtime.robot_base import ROBOT_DECELERATION
@@ -210,14 +210,14 @@ class RobotBase:
 
     def _on_odometry(self, message: Odometry) -> None:
         with conversions.refusing(self._node, 'odom'):
-            pose = conversions.pose_from(message.pose.pose)
+            pose = pose_from(message.pose.pose)
             with self._lock:
                 self._base.hear('odom')
                 self._navigator.move(pose)
 
     def _on_initial_pose(self, message: PoseWithCovarianceStamped) -> None:
         with conversions.refusing(self._node, 'initialpose'):
-            pose = conversions.pose_from(message.pose.pose)
+            pose = pose_from(message.pose.pose)
             self._node.get_logger().info(f'told to be at ({pose[0]:.2f}, {pose[1]:.2f})')
             with self._lock:
                 self._navigator.believe(pose)
@@ -254,8 +254,8 @@ class RobotBase:
             return
         unsure = navigator.lost or navigator.ambiguous
         deviation = (5.0, 3.0) if unsure else (0.03, 0.02)
-        estimate = conversions.pose_estimate(navigator.pose, *deviation)
-        estimate.header.stamp = stamp
+        estimate = PoseWithCovarianceStamped(pose=pose_estimate(navigator.pose, *deviation))
+        estimate.header.frame_id, estimate.header.stamp = 'map', stamp
         self._pose_sent = measured
         self._poses.publish(estimate)
 

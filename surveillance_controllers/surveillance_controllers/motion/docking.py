@@ -11,11 +11,11 @@ from typing import Any, Protocol
 
 from geometry_msgs.msg import PoseStamped
 
-from surveillance_controllers import conversions
 from surveillance_controllers.controller_parameters import MotionSettings
 from surveillance_controllers.geometry import Points
 from surveillance_controllers.motion.arrival import MotionFailedError
 from surveillance_fsm.ros import CallError, GoalCaller, GoalRun
+from surveillance_runtime.conversions import pose_message
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.parameters import ParameterError
 
@@ -93,7 +93,7 @@ class DockingMotion:
         pose = PoseStamped()
         pose.header.frame_id = 'map'
         pose.header.stamp = self._node.get_clock().now().to_msg()
-        pose.pose = conversions.pose_message(self._settings.station)
+        pose.pose = pose_message(self._settings.station)
         goal = self._dock.Goal(
             use_dock_id=False,
             dock_pose=pose,

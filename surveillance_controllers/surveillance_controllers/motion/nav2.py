@@ -22,6 +22,7 @@ from surveillance_controllers.map_knowledge import MapKnowledge
 from surveillance_controllers.motion.arrival import MotionFailedError, place_reached
 from surveillance_controllers.motion.place_recording import PlaceRecorder
 from surveillance_fsm.ros import CallError, CallInterruptedError, GoalCaller, GoalRun
+from surveillance_runtime.conversions import pose_from, pose_message
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.parameters import ParameterError
 from surveillance_runtime.qos import STATE_QOS
@@ -121,7 +122,7 @@ class Nav2Motion:
             pose = PoseStamped()
             pose.header.frame_id, pose.header.stamp = 'map', stamp
             yaw = math.atan2(at[1] - before[1], at[0] - before[0])
-            pose.pose = conversions.pose_message((float(at[0]), float(at[1]), yaw))
+            pose.pose = pose_message((float(at[0]), float(at[1]), yaw))
             poses.append(pose)
         return poses
 
@@ -130,7 +131,7 @@ class Nav2Motion:
         if 0.0 <= now - self._tracked < TRACK_PERIOD:
             return
         with conversions.refusing(self._node, 'amcl_pose'):
-            point = point_of(conversions.pose_from(message.pose.pose))
+            point = point_of(pose_from(message.pose.pose))
             self._tracked = now
             self._recorder.tell_point(point, passing=True)
 

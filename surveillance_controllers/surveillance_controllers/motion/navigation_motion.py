@@ -19,6 +19,7 @@ from surveillance_controllers.motion.robot_parameters import RobotSettings
 from surveillance_controllers.planning.grid_planning import NoPathError
 from surveillance_fsm.ros import CallError, GoalCaller, GoalRun
 from surveillance_interfaces.action import ComputePath
+from surveillance_runtime.conversions import point_message
 from surveillance_runtime.node import PatrolNode
 
 
@@ -125,9 +126,7 @@ class NavigationMotion:
         self._base.set_positions(self._knowledge.places(stopping))
 
     def _ask_planner(self, start: Points, goal: Points, run: GoalRun) -> Points:
-        request = ComputePath.Goal(
-            start=conversions.point_from(start), goal=conversions.point_from(goal)
-        )
+        request = ComputePath.Goal(start=point_message(start), goal=point_message(goal))
         try:
             end = self._planner.run(
                 request,

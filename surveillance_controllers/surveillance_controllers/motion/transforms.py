@@ -10,6 +10,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from surveillance_controllers import conversions
 from surveillance_controllers.geometry import Pose, composed, relative
 from surveillance_runtime import parameter_checks
+from surveillance_runtime.conversions import pose_message
 from surveillance_runtime.node import PatrolNode
 
 try:
@@ -71,7 +72,7 @@ class Transforms:
         transform = TransformStamped(child_frame_id='odom')
         transform.header.frame_id, transform.header.stamp = 'map', stamp
         transform.transform.translation.x, transform.transform.translation.y = x, y
-        transform.transform.rotation = conversions.pose_message((x, y, yaw)).orientation
+        transform.transform.rotation = pose_message((x, y, yaw)).orientation
         self._publisher.publish(TFMessage(transforms=[transform]))
 
     def mount_of(self, frame: str) -> Pose:

@@ -26,7 +26,7 @@ from surveillance_controllers.planning.grid_planning import (
 )
 from surveillance_fsm import Interrupt
 from surveillance_fsm.ros import GoalAbortedError, GoalRun
-from surveillance_runtime.conversions import points_from_cloud, values_from_cloud
+from surveillance_runtime.conversions import points_from_cloud, pose_from, values_from_cloud
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.qos import STATE_QOS
 
@@ -120,7 +120,7 @@ class NavigationPlanning:
 
     def _on_pose(self, message: PoseWithCovarianceStamped) -> None:
         with conversions.refusing(self._node, 'amcl_pose'):
-            self._pose = conversions.pose_from(message.pose.pose)
+            self._pose = pose_from(message.pose.pose)
 
 
 def route(
