@@ -19,7 +19,7 @@ from surveillance_runtime.configuration import (
     argument_layer,
     resolved_text,
 )
-from surveillance_runtime.files import FileError
+from surveillance_runtime.files import RECORD, RECORDING, FileError
 from surveillance_runtime.parameters import ParameterError
 from surveillance_runtime.run_parameters import (
     BEHAVIOUR_NODE,
@@ -30,10 +30,8 @@ from surveillance_runtime.run_parameters import (
     run_layers,
 )
 
-RECORD = 'mission.jsonl'
 ONTOLOGIES = 'ontologies'
 STORE = 'armor_store'
-RECORDING = 'recording'
 
 
 def configuration(

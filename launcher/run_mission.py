@@ -14,15 +14,14 @@ from launcher import run_folder
 from launcher.instance_lock import claim
 from launcher.log_merge import MergedLog
 from launcher.run import NOT_RECORDED, Run, options_of
-from launcher.run_configuration import RECORD, check_assignments, configuration, with_mode_of
+from launcher.run_configuration import check_assignments, configuration, with_mode_of
 from launcher.run_processes import COMPOSED, node_environ, programs_of, ros_domain
 from launcher.supervisor import Supervisor
 from surveillance_behaviour.mission import mission_log
 from surveillance_runtime import node_table
-from surveillance_runtime.files import FileError
+from surveillance_runtime.files import PLACE, RECORD, TIMELINE, FileError
 from surveillance_runtime.run_parameters import BEHAVIOUR_NODE, place_file, write_parameters
 
-PLACE = 'place.yaml'
 NOTHING_RECORDED = 'Mission: nothing was recorded.'
 EXIT_NOTHING_DONE = 1
 """The exit code of a run that had all its time and in which the mission did not begin."""
@@ -139,13 +138,12 @@ def _supervised(
 
 def what_to_look_at(folder: Path) -> list[str]:
     """Write the report of a run; return where it is, and how to replay the run."""
-    from surveillance_operator.recording import timeline
     from surveillance_operator.report import write_report
 
     lines = []
     with contextlib.suppress(FileError):  # nothing was visited: the summary says so
         lines.append(f'report: {_short(write_report(folder))}')
-    if (folder / timeline.NAME).exists():
+    if (folder / TIMELINE).exists():
         lines.append(f'replay: python3 launch.py replay {_short(folder)}')
     return lines
 

@@ -24,9 +24,7 @@ from sensor_msgs.msg import CompressedImage, Image
 from surveillance_operator.conversions import jpeg_from
 from surveillance_operator.mission_feed import MissionFeed
 from surveillance_operator.polled_subscription import PolledSubscription
-from surveillance_operator.recording import timeline
 from surveillance_operator.recording.bag import (
-    NAME,
     BagWriter,
     TopicType,
     prune,
@@ -34,7 +32,7 @@ from surveillance_operator.recording.bag import (
 )
 from surveillance_operator.recording.schemas import definition, message_class
 from surveillance_operator.recording.timeline import TimelineWriter
-from surveillance_runtime.files import FileError
+from surveillance_runtime.files import RECORDING, TIMELINE, FileError
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.parameters import ParameterError
 from surveillance_runtime.process import run_node
@@ -81,7 +79,7 @@ class MissionRecorder(PatrolNode):
         seconds = self.parameter('segment_age', 3600.0, 'Seconds of a file.', minimum=1.0)
         path = Path(folder)
         self._bag = BagWriter(path, segment_bytes=int(megabytes * 1e6), segment_seconds=seconds)
-        self._timeline = TimelineWriter(path.with_name(timeline.NAME))
+        self._timeline = TimelineWriter(path.with_name(TIMELINE))
         self._waits_for_disk = False
         self._next_seal = self._next_line = self._next_prune = 0.0
         try:
@@ -95,13 +93,13 @@ class MissionRecorder(PatrolNode):
         self._unknown: set[str] = set()
         self._feed = MissionFeed(self, FEED_PERIOD)
         self.spawn(self._record, 'recording')
-        if path.name == NAME:
+        if path.name == RECORDING:
             self.spawn(self._repair, 'repair')
 
     def _repair(self) -> None:
         """Mend what earlier runs left torn."""
         own = self._bag.folder.resolve()
-        for folder in sorted(own.parents[1].glob(f'*/{NAME}')):
+        for folder in sorted(own.parents[1].glob(f'*/{RECORDING}')):
             if self.stopping.is_set():
                 return
             if folder.resolve() == own:
@@ -142,7 +140,7 @@ class MissionRecorder(PatrolNode):
                 self.get_logger().info('the recording goes on')
             self._find_topics()
             self._images.attend()
-        if now >= self._next_prune and self._bag.folder.name == NAME:
+        if now >= self._next_prune and self._bag.folder.name == RECORDING:
             self._next_prune = now + PRUNE_PERIOD
             prune(self._bag.folder.resolve().parents[1], self._keep * 1e9)
 

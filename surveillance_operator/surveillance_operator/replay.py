@@ -18,11 +18,10 @@ from typing import TYPE_CHECKING, Any
 
 from surveillance_operator.page.hub import Hub
 from surveillance_operator.page.server import Action, Page
-from surveillance_operator.recording import timeline
 from surveillance_operator.recording.runs import Recording, find_recording, run_parser
 from surveillance_operator.recording.timeline import MARKS, Timeline
 from surveillance_runtime.command_line import EXIT_BAD_INPUT
-from surveillance_runtime.files import FileError
+from surveillance_runtime.files import TIMELINE, FileError
 
 if TYPE_CHECKING:
     from surveillance_operator.recording.stored import RecordedSights
@@ -229,7 +228,7 @@ def open_player(recording: Recording, hub: Hub, stack: contextlib.ExitStack) -> 
         from surveillance_operator.recording.stored import Conversion
 
         folder = stack.enter_context(tempfile.TemporaryDirectory(prefix='replay-'))
-        path = Path(folder) / timeline.NAME
+        path = Path(folder) / TIMELINE
         conversion = Conversion(recording.messages, path, keep=recording.timeline)
         stack.callback(conversion.stop)
         conversion.start()

@@ -14,11 +14,11 @@ from pathlib import Path
 from surveillance_behaviour.mission import mission_log
 from surveillance_behaviour.mission.mission_log import Event
 from surveillance_operator.map_command import facts, graph_over_doors, in_words, run_of
-from surveillance_operator.recording import bag, timeline
-from surveillance_operator.recording.runs import PLACE, RECORD, find_run, run_parser
+from surveillance_operator.recording import bag
+from surveillance_operator.recording.runs import find_run, run_parser
 from surveillance_operator.recording.timeline import Timeline
 from surveillance_runtime.command_line import EXIT_BAD_INPUT
-from surveillance_runtime.files import FileError
+from surveillance_runtime.files import PLACE, RECORD, RECORDING, TIMELINE, FileError
 from surveillance_runtime.place import read_place_file
 from surveillance_runtime.place.drawing import Run, draw_place
 from surveillance_runtime.place.floor_plan import FloorPlan
@@ -150,7 +150,7 @@ def _fastest(events: Sequence[Event]) -> float:
 
 def _threshold(folder: Path) -> float | None:
     try:
-        line = Timeline(folder / timeline.NAME)
+        line = Timeline(folder / TIMELINE)
     except FileError:
         return None
     _, _, parts = line.at(math.inf)
@@ -290,7 +290,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     options = parser.parse_args(argv)
     try:
         folder = find_run(options.run, options.runs)
-        for line in bag.repair(folder / bag.NAME):
+        for line in bag.repair(folder / RECORDING):
             print(line)
         print(write_report(folder))
         if (picture := draw_picture(folder)) is not None:

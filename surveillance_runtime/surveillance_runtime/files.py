@@ -1,9 +1,14 @@
-"""Files of nodes and commands: one error for all of them, and replacing one in a single step."""
+"""Files that nodes and commands leave: what a run's are called, their error, two ways to write."""
 
 from __future__ import annotations
 
+import errno
 import os
 from pathlib import Path
+
+RECORD, PLACE = 'mission.jsonl', 'place.yaml'
+RECORDING, TIMELINE = 'recording', 'timeline.jsonl'
+"""In the folder of a run: the mission's record, the place, the recording and its time line."""
 
 
 class FileError(ValueError):
@@ -23,3 +28,41 @@ def replace_text(path: Path, text: str) -> None:
     draft = path.with_name(path.name + '.new')
     draft.write_text(text, encoding='utf-8')
     os.replace(draft, path)
+
+
+class LineFile:
+    """Appends lines to a file, each whole or not at all.
+
+    Args:
+        path: The file, made when missing. An unfinished last line is dropped.
+
+    Raises:
+        OSError: It cannot be opened for writing.
+    """
+
+    def __init__(self, path: Path) -> None:
+        flags = os.O_RDWR | os.O_CREAT | os.O_APPEND | os.O_CLOEXEC
+        self._descriptor = os.open(path, flags, 0o644)
+        content = path.read_bytes()
+        whole = content.rfind(b'\n') + 1
+        if whole != len(content):
+            os.ftruncate(self._descriptor, whole)
+
+    def append(self, line: bytes) -> int:
+        """Write a line, with its line break; return the size of the file.
+
+        Raises:
+            OSError: The file takes no more.
+        """
+        written = os.write(self._descriptor, line)
+        size = os.fstat(self._descriptor).st_size
+        if written != len(line):
+            os.ftruncate(self._descriptor, size - written)
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        return size
+
+    def close(self) -> None:
+        """Close the file; nothing is lost without it."""
+        if self._descriptor >= 0:
+            os.close(self._descriptor)
+            self._descriptor = -1

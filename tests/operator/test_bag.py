@@ -18,7 +18,6 @@ from rosbags.typesys import Stores, get_typestore
 from std_msgs.msg import String
 
 from surveillance_interfaces.msg import FactChange, FactChanges
-from surveillance_operator.recording import bag
 from surveillance_operator.recording.bag import (
     BagWriter,
     TopicType,
@@ -27,6 +26,7 @@ from surveillance_operator.recording.bag import (
     segments,
 )
 from surveillance_operator.recording.schemas import definition, message_class
+from surveillance_runtime.files import RECORDING
 from tests.operator.conftest import Disk
 
 TYPE = 'std_msgs/msg/String'
@@ -121,16 +121,16 @@ def test_a_recorder_that_was_killed_goes_on_in_the_same_folder(tmp_path: Path) -
 
 def test_the_oldest_files_are_deleted_first(tmp_path: Path) -> None:
     for run in ('1', '2'):
-        write(tmp_path / run / bag.NAME, ['word ' * 100] * 4, segment_bytes=10).close()
-        for number, path in enumerate(segments(tmp_path / run / bag.NAME)):
+        write(tmp_path / run / RECORDING, ['word ' * 100] * 4, segment_bytes=10).close()
+        for number, path in enumerate(segments(tmp_path / run / RECORDING)):
             os.utime(path, (int(run) * 100 + number,) * 2)
-    files = [path for run in ('1', '2') for path in segments(tmp_path / run / bag.NAME)]
+    files = [path for run in ('1', '2') for path in segments(tmp_path / run / RECORDING)]
     size = sum(path.stat().st_size for path in files)
     gone = prune(tmp_path, size * 0.4)
     assert gone == files[: len(gone)]
     assert len(gone) >= 4
-    assert not (tmp_path / '1' / bag.NAME).exists()
-    assert read(tmp_path / '2' / bag.NAME)
+    assert not (tmp_path / '1' / RECORDING).exists()
+    assert read(tmp_path / '2' / RECORDING)
 
 
 def test_definitions_name_all_that_a_type_uses() -> None:

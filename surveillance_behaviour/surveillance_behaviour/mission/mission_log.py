@@ -28,7 +28,7 @@ times and the battery's draw come from the record and from ``FILE.experience.jso
 
 from __future__ import annotations
 
-import errno
+import contextlib
 import glob
 import gzip
 import json
@@ -44,7 +44,7 @@ from types import TracebackType
 from typing import Any
 
 from surveillance_behaviour.decision import RECHARGE
-from surveillance_runtime.files import FileError
+from surveillance_runtime.files import FileError, LineFile
 
 EVENTS: Mapping[str, tuple[str, ...]] = {
     'start': ('machine', 'place', 'places'),
@@ -115,22 +115,13 @@ class MissionRecord:
             if self._next.exists() and not self.path.exists():
                 # A writer was killed between the two steps of a change of files.
                 os.replace(self._next, self.path)
-            self._file = os.open(self.path, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o644)
-            self._cut_torn_line()
+            self._file = LineFile(self.path)
+            content = self.path.read_bytes()
         except OSError as error:
             raise FileError(f'cannot write the mission record {path}: {error.strerror}') from None
-
-    def _cut_torn_line(self) -> None:
-        """Drop an unfinished last line, so that the next one starts on a line of its own."""
-        with open(self.path, 'rb') as reader:
-            content = reader.read()
-        complete = content.rfind(b'\n') + 1
-        if complete != len(content):
-            os.ftruncate(self._file, complete)
-        try:
-            self._account = account_of(_events(content[:complete], f'{self.path}'))
-        except FileError:
-            self._account = Account()  # Whoever reads it says which line is broken.
+        # A broken line is named by whoever reads the record.
+        with contextlib.suppress(FileError):
+            self._account = account_of(_events(content, f'{self.path}'))
 
     def write(self, name: str, time: float, **fields: object) -> None:
         """Append one event.
@@ -145,19 +136,14 @@ class MissionRecord:
         """
         _check(name, fields, f'{self.path}')
         line = json.dumps({'event': name, 'time': round(time, 3), **fields}) + '\n'
-        data = line.encode()
         try:
-            written = os.write(self._file, data)
-            if written != len(data):
-                # No line may begin behind half of one.
-                os.ftruncate(self._file, os.fstat(self._file).st_size - written)
-                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+            size = self._file.append(line.encode())
         except OSError as error:
             raise FileError(
                 f'cannot write the mission record {self.path}: {error.strerror}'
             ) from None
         self._account.take(Event(name, round(time, 3), json.loads(line)))
-        if os.fstat(self._file).st_size >= self._segment_bytes:
+        if size >= self._segment_bytes:
             self._begin_segment(time)
 
     def _begin_segment(self, time: float) -> None:
@@ -169,19 +155,17 @@ class MissionRecord:
             with open(self.path, 'rb') as old, gzip.open(packed, 'wb', 6) as new:
                 shutil.copyfileobj(old, new)
             self._next.write_text(json.dumps(snapshot) + '\n', encoding='utf-8')
-            file = os.open(self._next, os.O_RDWR | os.O_APPEND)
+            file = LineFile(self._next)
             os.replace(self._next, self.path)
         except OSError:
             packed.unlink(missing_ok=True)
             return
-        os.close(self._file)
+        self._file.close()
         self._file = file
 
     def close(self) -> None:
         """Close the file; nothing is lost without it."""
-        if self._file >= 0:
-            os.close(self._file)
-            self._file = -1
+        self._file.close()
 
     def __enter__(self) -> MissionRecord:
         return self

@@ -27,10 +27,8 @@ from mcap.records import Channel, Message, Schema
 from mcap.stream_reader import StreamReader
 from mcap.writer import CompressionType, Writer
 
-from surveillance_runtime.files import FileError
+from surveillance_runtime.files import RECORDING, FileError
 
-NAME = 'recording'
-"""The folder of a run that holds its recording, and the start of its segments' names."""
 METADATA = 'metadata.yaml'
 PROFILE, ENCODING, SCHEMA_ENCODING = 'ros2', 'cdr', 'ros2msg'
 LIBRARY = 'surveillance_operator'
@@ -220,7 +218,7 @@ def prune(runs: Path, keep_bytes: float) -> list[Path]:
     Returns:
         The deleted files.
     """
-    files = [path for folder in runs.glob(f'*/{NAME}') for path in segments(folder)]
+    files = [path for folder in runs.glob(f'*/{RECORDING}') for path in segments(folder)]
     files.sort(key=lambda path: path.stat().st_mtime)
     total = sum(path.stat().st_size for path in files)
     deleted = []

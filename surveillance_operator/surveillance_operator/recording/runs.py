@@ -5,15 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from surveillance_operator.recording import timeline
-from surveillance_operator.recording.bag import NAME
 from surveillance_operator.recording.reading import SUFFIX, files_of
 from surveillance_runtime.command_line import CommandParser
-from surveillance_runtime.files import FileError
+from surveillance_runtime.files import RECORD, RECORDING, TIMELINE, FileError
 
 LAST = 'last'
-RECORD = 'mission.jsonl'
-PLACE = 'place.yaml'
 
 
 def find_run(name: str, runs: Path) -> Path:
@@ -66,7 +62,7 @@ def find_recording(name: str, runs: Path) -> Recording:
     if given.is_dir() and not is_run(given) and not is_run(given.parent):
         return _foreign(given, files_of(given)[0].parent)
     folder = find_run(name, runs)
-    line, recorded = folder / timeline.NAME, folder / NAME
+    line, recorded = folder / TIMELINE, folder / RECORDING
     has_messages = recorded.is_dir() and any(recorded.glob(f'*{SUFFIX}'))
     if not line.is_file() and not has_messages:
         raise FileError(f'{folder}: nothing was recorded')
@@ -76,14 +72,14 @@ def find_recording(name: str, runs: Path) -> Recording:
 def _foreign(name: Path, messages: Path) -> Recording:
     """Return what another program recorded; the time line from an earlier look lies beside it."""
     whole = messages.resolve()
-    line = whole.with_name(f'{whole.name}.{timeline.NAME}')
+    line = whole.with_name(f'{whole.name}.{TIMELINE}')
     newest = max(path.stat().st_mtime for path in files_of(messages))
     return Recording(name, line, messages, line.is_file() and line.stat().st_mtime > newest)
 
 
 def is_run(folder: Path) -> bool:
     """Tell whether a folder holds what a run leaves."""
-    return any((folder / file).is_file() for file in (timeline.NAME, RECORD))
+    return any((folder / file).is_file() for file in (TIMELINE, RECORD))
 
 
 def run_parser(name: str, description: str) -> CommandParser:

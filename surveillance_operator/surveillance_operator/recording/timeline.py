@@ -8,18 +8,15 @@ reads little. A torn last line is ignored.
 from __future__ import annotations
 
 import bisect
-import errno
 import json
-import os
 import re
 from pathlib import Path
 from typing import Any
 
 from surveillance_operator.frames import Framer, Parts, lengthen
 from surveillance_operator.snapshot import Snapshot
-from surveillance_runtime.files import FileError
+from surveillance_runtime.files import FileError, LineFile
 
-NAME = 'timeline.jsonl'
 LEFT_OUT = frozenset({'scan', 'figures'})
 """Parts that change all the time: they are in the recording itself."""
 WHOLE_PERIOD = 60.0
@@ -38,7 +35,7 @@ class TimelineWriter:
 
     def __init__(self, path: Path) -> None:
         self._path = path
-        self._descriptor: int | None = None
+        self._file: LineFile | None = None
         self._framer = Framer(without=LEFT_OUT)
         self._whole = 0.0
         self._before: Snapshot | None = None
@@ -62,26 +59,20 @@ class TimelineWriter:
         line = json.dumps({'now': round(snapshot.now, 2), 'p': changed}, separators=(',', ':'))
         head = f'{{"t":{at:.3f},"k":{int(whole)},"e":"{self._event(snapshot)}",'
         try:
-            self._append((head + line[1:] + '\n').encode())
+            if self._file is None:
+                self._file = LineFile(self._path)
+            self._file.append((head + line[1:] + '\n').encode())
         except OSError:
             self._whole = 0.0
             self.close()
             raise
         self._before = snapshot
 
-    def _append(self, line: bytes) -> None:
-        if self._descriptor is None:
-            _cut_torn_line(self._path)
-            flags = os.O_WRONLY | os.O_CREAT | os.O_APPEND | os.O_CLOEXEC
-            self._descriptor = os.open(self._path, flags, 0o644)
-        if os.write(self._descriptor, line) != len(line):
-            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(self._path))
-
     def close(self) -> None:
         """Close the file; nothing is lost without it."""
-        if self._descriptor is not None:
-            os.close(self._descriptor)
-            self._descriptor = None
+        if self._file is not None:
+            self._file.close()
+            self._file = None
 
     def _event(self, snapshot: Snapshot) -> str:
         """Return the most important thing that happened since the last line."""
@@ -93,15 +84,6 @@ class TimelineWriter:
         if before is None or snapshot.number != before.number:
             return 'decision' if snapshot.decision is not None else ''
         return ''
-
-
-def _cut_torn_line(path: Path) -> None:
-    """Drop an unfinished last line, so that the next one starts on a line of its own."""
-    if path.exists():
-        content = path.read_bytes()
-        complete = content.rfind(b'\n') + 1
-        if complete != len(content):
-            os.truncate(path, complete)
 
 
 class Timeline:
