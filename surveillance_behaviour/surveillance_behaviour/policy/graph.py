@@ -107,6 +107,13 @@ class PatrolGraph:
         """
         return float(self.distances[self.index[start], self.index[goal]])
 
+    def move(self, start: str, goal: str) -> float:
+        """Return the seconds of a move: over the leg to a neighbour, even where a way round is
+        shorter; by the shortest way to any other place.
+        """
+        leg = self.legs[start].get(goal)
+        return self.seconds(start, goal) if leg is None else leg + self.dwell
+
     def route(self, start: str, goal: str) -> tuple[str, ...]:
         """Return the places on the shortest way, without ``start``, with ``goal``.
 

@@ -50,7 +50,7 @@ MOST_SECONDS = 2.0
 """Time of the processor for one choice at most; only a machine that is very slow comes to it."""
 MOST_WORK = 12_000.0
 """Work of simulations at one later choice at most; larger maps keep the first course."""
-WARM_WORK = 50_000.0
+WARM_WORK = 20_000.0
 """Work before the first choice of a plan that takes the place of another."""
 SLICE_WORK = 500.0
 """Work between two looks at the clock."""
@@ -82,12 +82,15 @@ class Course:
         skip: Targets visited more lately than this are skipped, seconds.
         patience: A target that may be entered only when it is URGENT is waited for so long, else
             skipped, seconds.
+        steps: Whether targets are the steps of a walk: a neighbour is entered by the leg to it,
+            even where the way round by another place is shorter.
     """
 
     targets: tuple[int, ...]
     back: int = 0
     skip: float = 0.0
     patience: float = 0.0
+    steps: bool = False
 
     def choose(self, rules: RuleMap, state: State) -> int:
         """Choose the next place on the way to the next target; see `rollout.Choice`.
@@ -98,7 +101,8 @@ class Course:
         allowed = rules.allowed(state)
         if not allowed:
             return state.place
-        hop = rules.hop(state.place, target)
+        is_step = self.steps and target in rules.legs[state.place]
+        hop = target if is_step else rules.hop(state.place, target)
         if hop in allowed:
             return hop
         legs, away = rules.legs[state.place], rules.away
@@ -267,7 +271,7 @@ class Plan:
         self._climb(iter(courses), work / 2.0)
         for walk in walks:
             if (back := walk.repeated_from(rules.count)) is not None:
-                self._try(Course(tuple(walk.walk), back, patience=math.inf))
+                self._try(Course(tuple(walk.walk), back, patience=math.inf, steps=True))
 
     def _think(self) -> None:
         """Go on with the search from where the robot is."""

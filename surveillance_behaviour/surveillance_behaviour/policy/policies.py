@@ -198,7 +198,7 @@ def _seconds_by_way_of(world: World, place: str) -> NDArray[np.float64]:
     """Return the seconds to each place when the robot first goes to ``place``, shape (n,)."""
     graph = world.graph
     seconds: NDArray[np.float64] = graph.distances[graph.index[place]]
-    return seconds + graph.seconds(world.place, place)
+    return seconds + graph.move(world.place, place)
 
 
 def _worth(idle: NDArray[np.float64], far: NDArray[np.float64]) -> NDArray[np.float64]:

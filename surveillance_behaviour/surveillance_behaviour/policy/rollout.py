@@ -41,12 +41,14 @@ class RuleMap:
     Attributes:
         legs: For each place, the seconds to each neighbour, dwell included.
         away: Seconds from each place to each other, shape (n, n).
+        overdue: A place that went unvisited for longer is URGENT, seconds.
     """
 
     def __init__(
         self, graph: PatrolGraph, threshold: float, ranks: Sequence[int], urgent: int
     ) -> None:
         self.graph, self.threshold = graph, threshold
+        self.overdue = threshold + HALF_OPEN / 2.0
         self.ranks, self.urgent = list(ranks), urgent
         self.count = len(graph.places)
         index = graph.index
@@ -145,7 +147,7 @@ class RuleMap:
     def allowed(self, state: State) -> list[int]:
         """Return the neighbours that the rules allow; empty: there are none at all."""
         seen, ranks, urgent = state.seen, self.ranks, self.urgent
-        limit = state.now - self.threshold
+        limit = state.now - self.overdue
         best, found = NEVER + 1, []
         ways: Iterable[int] = self.legs[state.place]
         if state.avoided:

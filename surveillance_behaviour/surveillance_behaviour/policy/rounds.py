@@ -143,7 +143,7 @@ class RoundSearch:
         breaches, now, place = list[Breach](), 0.0, walk[-1]
         seen[place] = 0.0
         for step, (other, then) in enumerate(zip(walk, times, strict=True)):
-            limit = now - rules.threshold
+            limit = now - rules.overdue
             rank = ranks[other]
             if rank > urgent and seen[other] < limit:
                 rank = urgent

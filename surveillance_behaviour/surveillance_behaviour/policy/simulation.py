@@ -20,6 +20,7 @@ from surveillance_behaviour.decision import (
 )
 from surveillance_behaviour.policy.battery_reserve import Battery, BatteryLimits, Draw
 from surveillance_behaviour.policy.graph import PatrolGraph
+from surveillance_behaviour.policy.rollout import HALF_OPEN
 from surveillance_behaviour.policy.world import Decision, PolicyMemory, World
 
 CORRIDOR, ROOM = 'CORRIDOR', 'ROOM'
@@ -114,7 +115,7 @@ class Patrol:
         urgent = {
             place: self._classes[place] | {URGENT}
             for place in reachable
-            if self.now - self.visited_at[place] > self.threshold
+            if self.now - self.visited_at[place] > self.threshold + HALF_OPEN / 2.0
         }
         return World(
             place=self.place,
@@ -157,7 +158,7 @@ class Patrol:
         return Battery() if charged and why_charge(world, battery, self._settings) else battery
 
     def _go(self, place: str) -> None:
-        seconds = self.graph.seconds(self.place, place)
+        seconds = self.graph.move(self.place, place)
         self.now += seconds
         if self.battery is not None:
             self.level -= self.battery.draw * seconds
