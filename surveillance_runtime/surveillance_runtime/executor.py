@@ -4,8 +4,9 @@ rclpy's `SingleThreadedExecutor` gathers every entity of every node anew before 
 a task and two coroutines for each callback: half of the processor time of a process with all the
 patrol's nodes (230 entities, 30 waits for each simulated second). Here the entities are gathered
 when one came or went, and a callback is simply called. While messages and timers alone keep the
-process busy, the rest (most of the entities) is looked at in every fifth wait, and the events of
-publishers and subscriptions in every hundredth.
+process busy, the rest (most of the entities) is looked at in every tenth wait, and the events of
+publishers and subscriptions in every hundredth; the waits between look only at what had a message
+lately.
 
 rclpy's own `EventsExecutor` waits for no set at all, but in Jazzy it leaves asynchronous service
 callbacks unanswered (rclpy 1613), asks a waiting coroutine again without pause, and may end the
@@ -16,7 +17,7 @@ from __future__ import annotations
 
 import inspect
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Container, Iterator
 from contextlib import ExitStack
 from typing import Any
 
@@ -36,10 +37,12 @@ from rclpy.waitable import NumberOfEntities
 
 _MOST_LISTS = 30
 """Wait lists that are kept: one for each set of callback groups that coroutines held at once."""
-_WORK_PERIOD = 5
-"""Of so many waits that find something at once, one looks at more than messages and timers."""
+_WORK_PERIOD = 10
+"""Of so many waits that find something at once, one looks at more than the messages and timers that
+keep the process busy."""
 _EVENTS_PERIOD = 100
-"""Of so many, one looks at the events of publishers and subscriptions, too."""
+"""Of so many, one looks at the events of publishers and subscriptions, too. Then it is chosen anew
+what keeps the process busy."""
 _BUSY_KINDS = ('timer', 'subscription')
 _KINDS = ('timer', 'subscription', 'guard_condition', 'client', 'service')
 
@@ -73,6 +76,7 @@ class _WaitList:
         )
         for waitable in self._waitables:
             count += waitable.get_num_entities()
+        self._looked_at = self._handles
         self._set = _rclpy.WaitSet(
             count.num_subscriptions,
             count.num_guard_conditions,
@@ -95,13 +99,20 @@ class _WaitList:
             return False
         return True
 
+    def look_only_at(self, entities: Container[Any]) -> None:
+        """Leave all others out of the waits: each handle is put into the set again every time."""
+        self._looked_at = {
+            kind: [each for each in handles if self._by_pointer[kind][each.pointer] in entities]
+            for kind, handles in self._handles.items()
+        }
+
     def wait(self, timeout: int) -> Iterator[tuple[str, Any]]:
         """Wait until something is ready; yield it, with its kind.
 
         Args:
             timeout: Nanoseconds; negative: without end.
         """
-        if not any(self._handles.values()):
+        if not any(self._looked_at.values()):
             return  # rcl does not wait for nothing
         wait_set = self._set
         wait_set.clear_entities()
@@ -112,7 +123,7 @@ class _WaitList:
             ('timer', wait_set.add_timer),
             ('guard_condition', wait_set.add_guard_condition),
         ):
-            for handle in self._handles[kind]:
+            for handle in self._looked_at[kind]:
                 add(handle)
         for waitable in self._waitables:
             waitable.add_to_wait_set(wait_set)
@@ -146,6 +157,7 @@ class PatrolExecutor(SingleThreadedExecutor):  # type: ignore[misc]  # rclpy has
             frozenset[CallbackGroup], tuple[_WaitList, _WaitList, _WaitList]
         ] = {}
         self._busy_waits = 0
+        self._lately_called: set[Any] = set()
         self._changed = True
         self._take: dict[str, Callable[[Any], Any]] = {
             'timer': _call_timer,
@@ -211,6 +223,9 @@ class PatrolExecutor(SingleThreadedExecutor):  # type: ignore[misc]  # rclpy has
         try:
             if self._busy_waits:
                 self._ready.extend((busy if self._busy_waits % _WORK_PERIOD else work).wait(0))
+            else:
+                busy.look_only_at(self._lately_called)
+                self._lately_called.clear()
             if not self._ready:
                 self._busy_waits = 0
                 for kind, entity in everything.wait(timeout):
@@ -239,6 +254,7 @@ class PatrolExecutor(SingleThreadedExecutor):  # type: ignore[misc]  # rclpy has
             for each in lists:
                 each.close()
         self._wait_lists.clear()
+        self._lately_called.clear()
 
     def _new_wait_lists(self) -> tuple[_WaitList, _WaitList, _WaitList]:
         """Return what may be waited for now: entities whose groups are not held."""
@@ -263,6 +279,7 @@ class PatrolExecutor(SingleThreadedExecutor):  # type: ignore[misc]  # rclpy has
             if kind == 'guard_condition':
                 entity.trigger()  # the wait has taken that away
             return
+        self._lately_called.add(entity)
         task = None
         try:
             if kind != 'timer' or _is_due(entity):

@@ -53,17 +53,22 @@ def uncertain_pose_to_ros(
     return message
 
 
-def odometry_to_ros(
-    pose: PlanePose, speed: float, turn_speed: float, frame: str, child: str, stamp: Time
-) -> Odometry:
-    """Convert odometry (metres, rad, m/s, rad/s) to a message."""
+def odometry_message(frame: str, child: str) -> Odometry:
+    """Return a message of odometry with its frames and covariances; see `set_odometry`."""
     message = Odometry(child_frame_id=child)
-    message.header.frame_id, message.header.stamp = frame, stamp
-    message.pose = pose_estimate(pose, 0.02, 0.02)
+    message.header.frame_id = frame
+    message.pose.covariance = message.twist.covariance = planar_covariance(0.02, 0.02)
+    return message
+
+
+def set_odometry(
+    message: Odometry, pose: PlanePose, speed: float, turn_speed: float, stamp: Time
+) -> None:
+    """Put odometry (metres, rad, m/s, rad/s) into a message."""
+    message.header.stamp = stamp
+    message.pose.pose = pose_message(pose)
     message.twist.twist.linear.x = float(speed)
     message.twist.twist.angular.z = float(turn_speed)
-    message.twist.covariance = planar_covariance(0.02, 0.02)
-    return message
 
 
 def transform_to_ros(pose: PlanePose, frame: str, child: str, stamp: Time) -> TransformStamped:

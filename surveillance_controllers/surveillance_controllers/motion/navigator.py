@@ -241,7 +241,7 @@ class Navigator:
             self._regions = PlaceRegions(self._grid, self._doors.values(), self._positions)
             self._candidate = None
 
-    def place_at(self, point: ArrayLike) -> str | None:
+    def place_at(self, point: Points) -> str | None:
         """Return the place that a point belongs to; None when it is in none, or there is no map
         yet.
         """

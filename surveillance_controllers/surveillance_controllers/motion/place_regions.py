@@ -8,12 +8,13 @@ region (no door drawn between them), the place with the nearest point is taken.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 
 import cv2
 import numpy as np
 from numpy.typing import ArrayLike
 
+from surveillance_controllers.geometry import Points
 from surveillance_controllers.planning.grid_map import GridMap, drawn_lines
 
 Segment = tuple[float, float, float, float]
@@ -68,24 +69,24 @@ class PlaceRegions:
         self._regions = region_of[nearest]
         self._places: dict[int, list[str]] = {}
         for name, point in self._points.items():
-            region = self._region(point)
+            region = self._region(*point)
             if region is not None:
                 self._places.setdefault(region, []).append(name)
         self._beside: dict[int, set[int]] = {}
         for door in doors:
-            first, second = (self._region(point) for point in _sides(door))
+            first, second = (self._region(*point) for point in _sides(door))
             if first is not None and second is not None and first != second:
                 self._beside.setdefault(first, set()).add(second)
                 self._beside.setdefault(second, set()).add(first)
 
-    def place_at(self, point: ArrayLike) -> str | None:
+    def place_at(self, point: Sequence[float] | Points) -> str | None:
         """Return the place that a point (x, y in metres) belongs to; None off the map.
 
         A room without a place (it was taken from the map, or never entered) belongs to the place
         that one comes into through its doors.
         """
-        xy = np.asarray(point, dtype=float)[:2]
-        region = self._region(xy)
+        xy = float(point[0]), float(point[1])
+        region = self._region(*xy)
         if region is None:
             return None
         seen, front = {region}, {region}
@@ -97,11 +98,17 @@ class PlaceRegions:
             seen |= front
         return None
 
-    def _region(self, point: np.ndarray) -> int | None:
-        cell = self._grid.cells_of(point)
-        if not np.isfinite(point).all() or not self._grid.contains(cell)[0]:
+    def _region(self, x: float, y: float) -> int | None:
+        if not (math.isfinite(x) and math.isfinite(y)):
             return None
-        return int(self._regions[cell[0, 0], cell[0, 1]])
+        # In plain numbers: this is asked with each scan, and for one point numpy takes ten times
+        # as long.
+        west, south = self._grid.origin
+        column = math.floor((x - west) / self._grid.resolution)
+        row = math.floor((y - south) / self._grid.resolution)
+        rows, columns = self._regions.shape
+        on_map = 0 <= row < rows and 0 <= column < columns
+        return int(self._regions[row, column]) if on_map else None
 
 
 def _sides(door: Segment) -> tuple[np.ndarray, np.ndarray]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from builtin_interfaces.msg import Time
@@ -27,6 +28,10 @@ except ImportError:  # the wheels on PyPI hold no tf2_msgs; an installed ROS 2 d
 
 SENSOR_DEPTH = 5
 """Sensors offer reliable delivery, so that subscribers of either kind are served (REP-2003)."""
+ARM_RESTS_AFTER = 1.0
+"""Joints are reported with each measurement until the arm has stood for so long, seconds."""
+REST_PERIOD = 0.5
+"""Time between two reports of joints that rest, seconds."""
 
 
 @dataclass(frozen=True)
@@ -48,6 +53,8 @@ class SensorFeed:
         self._drives_clock = drives_clock
         self._clock = node.create_publisher(Clock, '/clock', 1) if drives_clock else None
         self._odometry = node.create_publisher(Odometry, 'odom', SENSOR_DEPTH)
+        # One message for all measurements: making a new one takes longer than to publish it.
+        self._told_odometry = conversions.odometry_message('odom', 'base_link')
         self._scan = node.create_publisher(LaserScan, 'scan', SENSOR_DEPTH)
         self._joints = node.create_publisher(JointState, 'joint_states', SENSOR_DEPTH)
         self._truth = node.create_publisher(PoseStamped, 'ground_truth', SENSOR_DEPTH)
@@ -56,6 +63,7 @@ class SensorFeed:
         self._map = node.create_publisher(OccupancyGrid, 'map', STATE_QOS)
         self._tf = None if TFMessage is None else node.create_publisher(TFMessage, 'tf', 10)
         self._told_collisions = -1
+        self._rest_told = -math.inf
         options = node.declare_fields(PublishedOptions())
         grid = occupancy_grid.draw(robot.world.plan, options.map_resolution)
         self._map.publish(conversions.grid_to_ros(grid, 'map', Time()))
@@ -72,11 +80,10 @@ class SensorFeed:
         if self._clock is not None:
             self._clock.publish(Clock(clock=stamp))
         base = self._robot.base
-        self._odometry.publish(
-            conversions.odometry_to_ros(
-                base.odometry, base.speed, base.turn_speed, 'odom', 'base_link', stamp
-            )
+        conversions.set_odometry(
+            self._told_odometry, base.odometry, base.speed, base.turn_speed, stamp
         )
+        self._odometry.publish(self._told_odometry)
         if self._tf is not None:
             transform = conversions.transform_to_ros(base.odometry, 'odom', 'base_link', stamp)
             self._tf.publish(TFMessage(transforms=[transform]))
@@ -86,17 +93,24 @@ class SensorFeed:
                 conversions.scan_to_ros(ranges, self._robot.lidar, 'base_link', stamp)
             )
         if self._joints.get_subscription_count():
-            arm, now = self._robot.arm, self._robot.time
-            self._joints.publish(
-                conversions.joints_to_ros(
-                    arm.arm.names, arm.positions(now), arm.velocities(now), stamp
-                )
-            )
+            self._publish_joints(stamp)
         if self._truth.get_subscription_count():
             self._truth.publish(conversions.stamped_pose_to_ros(base.pose, 'map', stamp))
         if base.collisions != self._told_collisions:
             self._told_collisions = base.collisions
             self._collisions.publish(UInt32(data=base.collisions))
+
+    def _publish_joints(self, stamp: Time) -> None:
+        arm, now = self._robot.arm, self._robot.time
+        if arm.is_moving(now - ARM_RESTS_AFTER):
+            self._rest_told = -math.inf
+        elif 0.0 <= now - self._rest_told < REST_PERIOD - 1e-9:
+            return
+        else:
+            self._rest_told = now
+        self._joints.publish(
+            conversions.joints_to_ros(arm.arm.names, arm.positions(now), arm.velocities(now), stamp)
+        )
 
     def _announce_pose(self, node: PatrolNode) -> None:
         def on_match(matched: object) -> None:
