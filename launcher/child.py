@@ -14,6 +14,8 @@ import resource
 import signal
 import sys
 
+from surveillance_runtime import launch_protocol
+
 PR_SET_PDEATHSIG = 1  # linux/prctl.h
 
 
@@ -27,7 +29,7 @@ def end_with_parent(parent: int) -> None:
 
 def say_up() -> None:
     """Tell the launcher that the imports, most of the start, are done: the next one may begin."""
-    descriptor = os.environ.pop('LAUNCH_UP', None)
+    descriptor = os.environ.pop(launch_protocol.UP, None)
     if descriptor is not None:
         os.close(int(descriptor))
 
@@ -36,7 +38,7 @@ def limit_memory() -> None:
     """Have one huge allocation fail by itself: it costs the message that caused it, not the
     node.
     """
-    given = os.environ.pop('LAUNCH_MEMORY', None)
+    given = os.environ.pop(launch_protocol.MEMORY, None)
     if given is not None:
         most = int(given)
         resource.setrlimit(resource.RLIMIT_DATA, (most, most))

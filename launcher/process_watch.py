@@ -17,12 +17,6 @@ IDLE_AFTER = 1.0
 """Seconds without processor time after which a process does nothing, as far as one can see."""
 SILENT_START = 90.0
 """Seconds that a process may take until its first heartbeat."""
-BEAT = 'LAUNCH_HEARTBEAT'
-"""The environment variable with the descriptor that a process writes its heartbeats to."""
-FINISHED = b'F'
-"""Written instead of a heartbeat by a process that ends on purpose."""
-SLEPT = b'S'
-"""The same by one that did not run for so long that its peers may have forgotten it."""
 _PAGE = os.sysconf('SC_PAGE_SIZE')
 _LEAST_SHARE = 0.02
 

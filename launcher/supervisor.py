@@ -18,27 +18,21 @@ from dataclasses import dataclass, field
 from functools import partial
 
 from launcher.log_merge import MergedLog
-from launcher.process_watch import (
-    BEAT,
-    FINISHED,
-    IDLE_AFTER,
-    SLEPT,
-    Activity,
-    Heartbeats,
-    look_at,
-)
+from launcher.process_watch import IDLE_AFTER, Activity, Heartbeats, look_at
 from launcher.service import notify
+from surveillance_runtime.launch_protocol import (
+    FINISHED,
+    HEARTBEAT,
+    MEMORY,
+    RESTARTS,
+    SLEPT,
+    UP,
+)
 
 PAUSES = (0.0, 0.5, 1.0, 2.0, 4.0, 8.0, 15.0, 30.0)
 """Seconds before the first, second, ... restart in a row; the last one is kept."""
 START_WITHIN = 1.5
 """Seconds after which a process that did not say that it is up no longer holds the next one up."""
-UP = 'LAUNCH_UP'
-"""The environment variable with the descriptor that a process closes to say that it is up."""
-RESTARTS = 'LAUNCH_RESTARTS'
-"""The environment variable with how often a process has been started again."""
-MEMORY = 'LAUNCH_MEMORY'
-"""The environment variable with the bytes of data that a process may map."""
 STEADY_AFTER = 20.0
 """A process that ran this long, in seconds, starts again from the first pause."""
 STOP_LEADERS_WITHIN = 1.2
@@ -64,9 +58,8 @@ _STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 class Program:
     """A process to run.
 
-    It closes the descriptor in `UP` when the bulk of its start is done, and writes heartbeats to
-    the one in `process_watch.BEAT`. It is ended and started again when it hangs, and started again
-    when it ends without having said that it has finished.
+    It says when it is up, and writes heartbeats (`launch_protocol`). It is ended and started again
+    when it hangs, and started again when it ends without having said that it has finished.
 
     Attributes:
         name: in the log.
@@ -231,7 +224,7 @@ class Supervisor:
     def _start(self, child: Child) -> None:
         child.finished, child.ended_for = False, ''
         with self._pipe(self._when_up(child)) as up, self._pipe(self._when_it_beats(child)) as beat:
-            process = self._spawn(child, {UP: up, BEAT: beat})
+            process = self._spawn(child, {UP: up, HEARTBEAT: beat})
         child.process = process
         child.started = time.monotonic()
         child.starts += 1

@@ -234,6 +234,16 @@ class State:
         """Return the userdata keys the state writes."""
         return tuple(self._output_keys)
 
+    def fsm_take_over(self, callback: Any, *, outcomes: bool = True) -> bool:
+        """Add what a callback declares by itself, see `cb_interface`; tell whether it does."""
+        if not has_smach_interface(callback):
+            return False
+        self.register_input_keys(callback.get_registered_input_keys())
+        self.register_output_keys(callback.get_registered_output_keys())
+        if outcomes:
+            self.register_outcomes(callback.get_registered_outcomes())
+        return True
+
     def request_preempt(self) -> None:
         """Ask the state to stop; a `wait` under way, or the next one, ends at once."""
         with _preempt_lock:
@@ -365,11 +375,7 @@ class CBState(State):
         self._cb = cb
         self._cb_args = tuple(cb_args)
         self._cb_kwargs = dict(cb_kwargs or {})
-        if has_smach_interface(cb):
-            declared: Any = cb
-            self.register_input_keys(declared.get_registered_input_keys())
-            self.register_output_keys(declared.get_registered_output_keys())
-            self.register_outcomes(declared.get_registered_outcomes())
+        self.fsm_take_over(cb)
 
     @property
     def function(self) -> Callable[..., Any]:

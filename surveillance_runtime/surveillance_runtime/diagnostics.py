@@ -18,6 +18,7 @@ from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.clock import Clock, ClockType
 
 from surveillance_runtime.health import ERROR, OK, RECENT, WARN, Finding
+from surveillance_runtime.launch_protocol import BEAT, FINISHED, HEARTBEAT, RESTARTS, SLEPT
 from surveillance_runtime.node import PatrolNode
 
 TOPIC = '/diagnostics'
@@ -29,10 +30,6 @@ LATE = 0.5
 """Seconds by which an executor is late that are worth a warning."""
 HANGS = 3.0
 """Seconds by which an executor is late that are an error."""
-RESTARTS = 'LAUNCH_RESTARTS'
-"""The environment variable with how often the launcher has started the process again."""
-HEARTBEAT = 'LAUNCH_HEARTBEAT'
-"""The environment variable with the descriptor to which the launcher wants heartbeats."""
 BEAT_PERIOD = 0.25
 """Seconds of real time between two heartbeats."""
 SLEPT_AFTER = 18.0
@@ -74,20 +71,20 @@ class Heartbeat:
         now = self._now()
         self._late = max(self._late, now - self._last - BEAT_PERIOD)
         self._last = now
-        self._write(b'.')
+        self._write(BEAT)
 
     def take_lateness(self) -> float:
         """Return by how much a beat came late at most since this was asked last, seconds."""
         now = self._now()
         if now - self._asked > SLEPT_AFTER:
-            self._write(b'S')
+            self._write(SLEPT)
         self._asked = now
         late, self._late = self._late, 0.0
         return max(0.0, late, now - self._last - BEAT_PERIOD)
 
     def say_finished(self) -> None:
         """Say that the process ends on purpose, and is not to be started again."""
-        self._write(b'F')
+        self._write(FINISHED)
 
     def _write(self, word: bytes) -> None:
         if self._pipe is not None:

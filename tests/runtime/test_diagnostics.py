@@ -12,6 +12,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from surveillance_runtime import diagnostics, health
 from surveillance_runtime.diagnostics import DiagnosticsThread, Heartbeat
 from surveillance_runtime.health import ERROR, OK, WARN, Health
+from surveillance_runtime.launch_protocol import HEARTBEAT, RESTARTS
 from surveillance_runtime.node import PatrolNode, report_exception
 
 
@@ -44,7 +45,7 @@ def watched(graph: Any, monkeypatch: pytest.MonkeyPatch) -> Iterator[Watched]:
     monkeypatch.setattr(diagnostics, 'PERIOD', 0.05)
     monkeypatch.setattr(diagnostics, 'RECENT', 0.3)
     monkeypatch.setattr(health, 'RECENT', 0.3)
-    monkeypatch.setenv(diagnostics.RESTARTS, '2')
+    monkeypatch.setenv(RESTARTS, '2')
     made = Watched(graph)
     yield made
     made.thread.stop()
@@ -125,7 +126,7 @@ def test_a_process_that_did_not_run_for_long_says_that_it_slept(
 ) -> None:
     """An executor that alone was late for as long did not sleep: DDS went on beside it."""
     reader, writer = os.pipe()
-    monkeypatch.setenv(diagnostics.HEARTBEAT, str(writer))
+    monkeypatch.setenv(HEARTBEAT, str(writer))
     now, node = 0.0, BeatenByHand()
     heartbeat = Heartbeat(cast(Any, [node]), lambda: now)
     while now < 2 * diagnostics.SLEPT_AFTER:

@@ -45,11 +45,7 @@ class UserCallback:
         self.function = function
         self._args = tuple(args)
         self._kwargs = dict(kwargs or {})
-        self._declares = fsm.has_smach_interface(function)
-        if self._declares:
-            state.register_input_keys(function.get_registered_input_keys())
-            state.register_output_keys(function.get_registered_output_keys())
-            state.register_outcomes(function.get_registered_outcomes())
+        self._declares = state.fsm_take_over(function)
 
     def call(self, ud: Any, *message: Any) -> Any:
         """Call it with its view of userdata.

@@ -61,6 +61,21 @@ class RosState(fsm.State):
         super().__init__(outcomes, input_keys, output_keys, io_keys)
         self.node = node
 
+    def _take_condition(self, cond_cb: Any) -> None:
+        """Check a condition, and take over the userdata keys that it declares.
+
+        Raises:
+            InvalidStateError: It cannot be called.
+        """
+        if not callable(cond_cb):
+            raise fsm.InvalidStateError(f'cond_cb {cond_cb!r} cannot be called')
+        self.fsm_take_over(cond_cb, outcomes=False)
+
+    def _preempted(self) -> str:
+        """Serve the preempt; return the outcome for that."""
+        self.service_preempt()
+        return 'preempted'
+
 
 class ServiceState(RosState):
     """Calls a service and ends with ``succeeded``, ``aborted`` or ``preempted``.
@@ -132,15 +147,13 @@ class ServiceState(RosState):
     def execute(self, ud: Any) -> str:
         """Call the service."""
         if self.preempt_requested():
-            self.service_preempt()
-            return 'preempted'
+            return self._preempted()
         try:
             request = self._request.make(ud)
             response = self._caller.call(request, self._timeout, self.interrupt)
             return self._response.take(ud, response) or 'succeeded'
         except CallInterruptedError:
-            self.service_preempt()
-            return 'preempted'
+            return self._preempted()
         except (CallError, fsm.InvalidUserCodeError) as error:
             fsm.logerr(f"Service '{self._caller.name}': {error}")
             return 'aborted'
@@ -232,8 +245,7 @@ class SimpleActionState(RosState):
     def execute(self, ud: Any) -> str:
         """Run the action."""
         if self.preempt_requested():
-            self.service_preempt()
-            return 'preempted'
+            return self._preempted()
         try:
             goal = self._goal.make(ud)
             with self._watchdog.watched(self.interrupt) as interrupt:
@@ -252,8 +264,7 @@ class SimpleActionState(RosState):
             if not self.preempt_requested():
                 fsm.logerr(f"Action '{self._caller.name}': the node's executor does not spin")
                 return 'aborted'
-            self.service_preempt()
-            return 'preempted'
+            return self._preempted()
         except (CallError, fsm.InvalidUserCodeError) as error:
             fsm.logerr(f"Action '{self._caller.name}': {error}")
             return 'aborted'
@@ -274,19 +285,6 @@ class SimpleActionState(RosState):
                 fsm.logerr(f"Action '{self._caller.name}': {error}")
 
         return told
-
-
-def _declare_condition(state: RosState, cond_cb: Any) -> None:
-    """Check a condition, and declare the userdata keys that it declares itself.
-
-    Raises:
-        InvalidStateError: It cannot be called.
-    """
-    if not callable(cond_cb):
-        raise fsm.InvalidStateError(f'cond_cb {cond_cb!r} cannot be called')
-    if fsm.has_smach_interface(cond_cb):
-        state.register_input_keys(cond_cb.get_registered_input_keys())
-        state.register_output_keys(cond_cb.get_registered_output_keys())
 
 
 class MonitorState(RosState):
@@ -326,7 +324,7 @@ class MonitorState(RosState):
         qos: QoSProfile | int = 10,
     ) -> None:
         super().__init__(node, ['valid', 'invalid', 'preempted'], input_keys, output_keys, io_keys)
-        _declare_condition(self, cond_cb)
+        self._take_condition(cond_cb)
         self._topic = topic
         self._cond_cb = cond_cb
         self._max_checks = max_checks
@@ -367,8 +365,7 @@ class MonitorState(RosState):
         finally:
             remove()
         if verdict is None or self.preempt_requested():
-            self.service_preempt()
-            return 'preempted'
+            return self._preempted()
         return verdict
 
     def _wake(self) -> None:
@@ -425,7 +422,7 @@ class ConditionState(RosState):
         max_checks: int = 1,
     ) -> None:
         super().__init__(node, ['true', 'false', 'preempted'], input_keys)
-        _declare_condition(self, cond_cb)
+        self._take_condition(cond_cb)
         self._cond_cb = cond_cb
         if not isinstance(poll_rate, int | float) or not 0.0 < poll_rate < math.inf:
             raise fsm.InvalidStateError(f'poll_rate is {poll_rate!r}, expected hertz above 0')
@@ -453,8 +450,7 @@ class ConditionState(RosState):
                 if left <= 0.0:
                     return 'false'
             self._clock.sleep(left, self.interrupt)
-        self.service_preempt()
-        return 'preempted'
+        return self._preempted()
 
 
 class _ExecutorWatchdog:
