@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import copy
 import os
 import threading
 import time
@@ -163,14 +164,18 @@ class Graph:
             self._changed.notify_all()
 
     def listen(self, msg_type: Any, topic: str, qos: Any = 10) -> list[Any]:
-        """Subscribe; returns the list to which each message that arrives is appended."""
+        """Subscribe; returns the list to which each message is appended, however late."""
+        from rclpy.qos import QoSProfile
+
+        kept = copy.copy(qos) if isinstance(qos, QoSProfile) else QoSProfile(depth=qos)
+        kept.depth = 1000
         messages: list[Any] = []
 
         def arrived(message: Any) -> None:
             messages.append(message)
             self.touch()
 
-        self.node.create_subscription(msg_type, topic, arrived, qos)
+        self.node.create_subscription(msg_type, topic, arrived, kept)
         return messages
 
     def close(self) -> None:

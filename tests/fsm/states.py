@@ -87,7 +87,7 @@ class Background:
         except BaseException as error:
             self._error = error
 
-    def result(self, timeout: float = 90.0) -> Any:
+    def result(self, timeout: float = 240.0) -> Any:
         """Return the outcome; raises what the execution raised."""
         self._thread.join(timeout)
         assert not self._thread.is_alive(), 'still running'
@@ -96,7 +96,7 @@ class Background:
         return self._outcome
 
 
-def began(state: Any, timeout: float = 90.0) -> None:
+def began(state: Any, timeout: float = 240.0) -> None:
     """Wait until a `Waiter` or `Deaf` has begun to execute."""
     assert state.begun.acquire(timeout=timeout), 'it did not begin'
 

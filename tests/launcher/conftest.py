@@ -52,7 +52,7 @@ class Started:
         with self._changed:
             self._changed.notify_all()
 
-    def until(self, pattern: str, timeout: float = 90.0, after: int = 0) -> re.Match[str]:
+    def until(self, pattern: str, timeout: float = 240.0, after: int = 0) -> re.Match[str]:
         """Wait for a line that the pattern is found in, from line number `after` on."""
         deadline = time.monotonic() + timeout
         seen = after
@@ -82,7 +82,7 @@ class Started:
         self.process.stdin.write(line + '\n')
         self.process.stdin.flush()
 
-    def end(self, number: int | None = None, timeout: float = 90.0) -> tuple[int, float]:
+    def end(self, number: int | None = None, timeout: float = 240.0) -> tuple[int, float]:
         """Send a signal, if one is given, and wait; return the exit code and the seconds."""
         start = time.monotonic()
         if number is not None:
@@ -118,7 +118,7 @@ def is_alive(pid: int) -> bool:
         return False
 
 
-def gone(pids: Sequence[int], timeout: float = 90.0) -> bool:
+def gone(pids: Sequence[int], timeout: float = 240.0) -> bool:
     """Tell whether all processes end within the time; each is watched by the kernel's own means."""
     deadline = time.monotonic() + timeout
     for pid in pids:

@@ -39,7 +39,7 @@ class Terminal:
         )
         self.seen = b''
 
-    def until(self, pattern: bytes, timeout: float = 90.0) -> None:
+    def until(self, pattern: bytes, timeout: float = 240.0) -> None:
         deadline = time.monotonic() + timeout
         while not re.search(pattern, ESCAPES.sub(b'', self.seen)):
             readable, _, _ = select.select([self.ours], [], [], deadline - time.monotonic())

@@ -104,7 +104,7 @@ def test_whatever_planner_and_controller_answer_the_mission_goes_on(
         for key, value in parameters.items()
         if key.startswith('room_positions.')
     }
-    robot.be_impatient()
+    robot.configure('robot_behavior', deadline__plan=1.0, deadline__move=2.0)
     robot.configure('battery_controller', random_battery_time=[5000.0, 6000.0])
     robot.begin('planner_controller', 'motion_controller')
     motion = graph.add(ScriptedMotion, {'use_sim_time': True}, positions=positions)

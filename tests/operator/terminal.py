@@ -60,7 +60,7 @@ class Terminal:
         """Press keys."""
         os.write(self._ours, text.encode())
 
-    def until(self, *words: str, timeout: float = 90.0) -> str:
+    def until(self, *words: str, timeout: float = 240.0) -> str:
         """Wait until the screen shows all words; return what it shows."""
         deadline = time.monotonic() + timeout
         while True:
@@ -71,7 +71,7 @@ class Terminal:
             more = left > 0 and self._read(left)
             assert more, f'{words} not seen in:\n{shown}'
 
-    def ended(self, timeout: float = 90.0) -> int:
+    def ended(self, timeout: float = 240.0) -> int:
         """Return the exit code, once the program has ended."""
         deadline = time.monotonic() + timeout
         while self.process.poll() is None:

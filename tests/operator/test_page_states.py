@@ -24,7 +24,6 @@ from tests.operator.browser import CHROMIUM, DESK, DRIVER, MISSING, PHONE, Viewe
 
 pytestmark = [
     pytest.mark.skipif(not (CHROMIUM and DRIVER), reason=MISSING),
-    pytest.mark.timeout(180),
 ]
 HOSTILE = (
     '<img src=x onerror="window.broken=1">',

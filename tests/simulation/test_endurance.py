@@ -5,15 +5,12 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-import pytest
-
 ROOT = Path(__file__).parents[2]
 sys.path.insert(0, str(ROOT / 'benchmarks'))
 
 import endurance  # noqa: E402
 
 
-@pytest.mark.timeout(300)  # About 10 s of CPU, which a busy machine stretches.
 def test_minutes_of_trouble_cost_neither_collisions_nor_the_way_home() -> None:
     watch, trouble, _ = endurance.run(
         ROOT / 'config' / 'seven_rooms.yaml', 150.0, seed=3, pause=(8.0, 20.0), log_level='info'

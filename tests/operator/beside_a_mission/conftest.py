@@ -38,6 +38,6 @@ def mission(mission_domain: int, tmp_path_factory: pytest.TempPathFactory) -> It
     words += ['--domain', str(mission_domain), '--record', str(tmp_path_factory.mktemp('runs'))]
     words += ['-p', 'speed:=4.0', '--params', str(ROOT / 'config/fast.yaml')]
     started = Started([*LAUNCH, *words])
-    started.until('decision 1', timeout=90)
+    started.until('decision 1')
     yield started
     started.end(signal.SIGINT)

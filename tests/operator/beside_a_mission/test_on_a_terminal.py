@@ -11,8 +11,6 @@ from tests.launcher.conftest import Started
 from tests.operator.beside_a_mission.conftest import LAUNCH
 from tests.operator.terminal import Terminal
 
-pytestmark = pytest.mark.timeout(240)
-
 Open = Callable[..., Terminal]
 
 
@@ -83,9 +81,9 @@ def test_watch_fits_eighty_columns_and_its_keys_change_it(mission: Started, term
 def test_a_person_answers_the_requests_of_mode_manual(terminal: Open, tmp_path: Path) -> None:
     words = ('--mode', 'MANUAL', '--namespace', 'manual', '--record', str(tmp_path))
     manual = terminal(*words, columns=120, rows=60)
-    manual.until('New request: compute a path', timeout=120)
+    manual.until('New request: compute a path')
     manual.type('plan set [[7,9,0]]\r')
-    manual.until('New request: follow', timeout=60)
+    manual.until('New request: follow')
     manual.type('move 1 0\r')
     manual.until('arrived in')
     manual.type('battery set 10\r')

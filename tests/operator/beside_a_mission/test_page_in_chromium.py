@@ -13,13 +13,12 @@ from tests.operator.browser import CHROMIUM, DESK, DRIVER, MISSING, PHONE, Viewe
 
 pytestmark = [
     pytest.mark.skipif(not (CHROMIUM and DRIVER), reason=MISSING),
-    pytest.mark.timeout(180),
 ]
 
 
 @pytest.fixture(scope='module')
 def viewer(mission: Started) -> Iterator[Viewer]:
-    address = mission.until(r'the mission is shown at (\S+)', timeout=60)[1]
+    address = mission.until(r'the mission is shown at (\S+)')[1]
     viewer = Viewer(address)
     viewer.until(lambda: viewer.count('[data-place]') == 7, 60)
     yield viewer
