@@ -2,8 +2,10 @@
 """How long a start takes, and what the running robot needs.
 
 Warm: from the command to the first chosen room, each node its own process and all in one, beside
-the time of a bare `import rclpy` in the same run. `--cold` also measures a start from nothing, in a
-fresh copy of the checkout. Memory is the proportional set size (PSS): a page that several processes
+the time of a bare `import rclpy` in the same run, and the processor time that all processes have
+used by then, which other work on the machine changes little. `resumed`: the mission goes on after
+launcher and nodes were killed. `--cold` also measures a start from nothing, in a fresh copy of the
+checkout. Memory is the proportional set size (PSS): a page that several processes
 share is counted in part in each, so that the sum counts it once.
 
     .venv/bin/python benchmarks/startup.py --quick
@@ -24,9 +26,13 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-from surveillance_runtime.testing import claim_domain
-
 CHECKOUT = Path(__file__).resolve().parent.parent
+if str(CHECKOUT) not in sys.path:
+    sys.path.insert(0, str(CHECKOUT))
+
+from launcher.process_watch import look_at  # noqa: E402
+from surveillance_runtime.testing import claim_domain  # noqa: E402
+
 BASE_PYTHON = str(getattr(sys, '_base_executable', sys.executable))
 NO_EXPLORING = '/**/robot_behavior:\n  ros__parameters:\n    exploration_seconds: 0.0\n'
 CHOSEN = re.compile(r'robot_behavior +\| decision 1:')
@@ -36,9 +42,10 @@ LONGEST = 60.0
 
 @dataclass
 class Start:
-    """One start: seconds until the first chosen room, and each process's memory in MB."""
+    """One start: seconds and processor time until the first chosen room, memory of each in MB."""
 
     seconds: float
+    cpu: float
     memory: dict[str, float]
 
 
@@ -52,8 +59,8 @@ def own_environ() -> dict[str, str]:
     return environ
 
 
-def launch(checkout: Path, *options: str, longest: float = LONGEST) -> Start:
-    """Start the robot, waits for the first chosen room, looks at the memory, stops it."""
+def launch(checkout: Path, *options: str, longest: float = LONGEST, kill: bool = False) -> Start:
+    """Start the robot, wait for the first chosen room, look at its processes, stop or kill it."""
     begin = time.monotonic()
     process = subprocess.Popen(
         [BASE_PYTHON, str(checkout / 'launch.py'), '--for', str(longest), *options],
@@ -62,7 +69,7 @@ def launch(checkout: Path, *options: str, longest: float = LONGEST) -> Start:
         text=True,
         cwd=checkout,
     )
-    processes: dict[str, int] = {}
+    processes = {'launch.py': process.pid}
     assert process.stdout is not None
     lines = []
     try:
@@ -72,10 +79,12 @@ def launch(checkout: Path, *options: str, longest: float = LONGEST) -> Start:
                 processes[match[1]] = int(match[2])
             if CHOSEN.search(line):
                 seconds = time.monotonic() - begin
+                cpu = sum(look.cpu for pid in processes.values() if (look := look_at(pid)))
                 memory = {name: proportional_size(pid) for name, pid in processes.items()}
-                memory['launch.py'] = proportional_size(process.pid)
-                return Start(seconds, memory)
+                return Start(seconds, cpu, memory)
     finally:
+        for pid in reversed(processes.values()) if kill else ():
+            os.kill(pid, signal.SIGKILL)
         process.send_signal(signal.SIGINT)
         process.communicate()
     sys.exit(f'no room was chosen within {longest:.0f} s:\n' + ''.join(lines[-20:]))
@@ -95,15 +104,22 @@ def time_of(words: list[str], environ: dict[str, str]) -> float:
     return time.monotonic() - begin
 
 
-def cold_start() -> float:
-    """From a fresh copy without an environment to the first chosen room, seconds."""
+def resumed(words: list[str]) -> Start:
+    """Kill a mission with its launcher, and start it again."""
+    with tempfile.TemporaryDirectory() as runs:
+        launch(CHECKOUT, *words, '--record', runs, kill=True)
+        return launch(CHECKOUT, *words, '--record', runs, '--resume')
+
+
+def cold_start() -> Start:
+    """Start from a fresh copy without an environment."""
     with tempfile.TemporaryDirectory() as folder:
         copy = Path(folder, 'surveillance')
         ignored = shutil.ignore_patterns(
             '.venv', '.git', 'build', 'runs', '__pycache__', '.*_cache'
         )
         shutil.copytree(CHECKOUT, copy, ignore=ignored)
-        return launch(copy, longest=900.0).seconds
+        return launch(copy, longest=900.0)
 
 
 def main() -> None:
@@ -132,17 +148,16 @@ def main() -> None:
             kind: [launch(CHECKOUT, *words) for _ in range(repeats)]
             for kind, words in kinds.items()
         }
-    rows = [('import rclpy, bare', bare)]
-    rows += [
-        (f'warm, {kind}', statistics.median(start.seconds for start in done))
-        for kind, done in starts.items()
-    ]
+    starts['resumed'] = [resumed(domain) for _ in range(repeats)]
     if options.cold:
-        rows.append(('cold, from nothing', cold_start()))
+        starts['cold, from nothing'] = [cold_start()]
     print(f'from the command to the first chosen room, median of {repeats}')
-    print(f'{"start":<40} {"seconds":>8} {"x import":>9}')
-    for name, seconds in rows:
-        print(f'{name:<40} {seconds:>8.2f} {seconds / bare:>9.1f}')
+    print(f'{"start":<40} {"seconds":>8} {"x import":>9} {"processor s":>12}')
+    print(f'{"import rclpy, bare":<40} {bare:>8.2f} {1.0:>9.1f}')
+    for name, done in starts.items():
+        seconds = statistics.median(start.seconds for start in done)
+        cpu = statistics.median(start.cpu for start in done)
+        print(f'{name:<40} {seconds:>8.2f} {seconds / bare:>9.1f} {cpu:>12.2f}')
     print('\nmemory at that moment, PSS')
     print(f'{"process":<40} {"MB":>8}')
     for kind in ('processes', 'composed'):
