@@ -26,7 +26,13 @@ from surveillance_operator.console_commands import (
 from surveillance_operator.mission_actions import MissionActions
 from surveillance_operator.mission_feed import MissionFeed
 from surveillance_operator.snapshot import Snapshot, decision_line
-from surveillance_runtime.logging import print_lines
+from surveillance_runtime.logging import (
+    LINES_AT_ONCE,
+    LINES_PER_SECOND,
+    Allowance,
+    clean,
+    print_lines,
+)
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.process import run_node
 from surveillance_runtime.qos import STATE_QOS
@@ -54,6 +60,8 @@ class ConsoleNode(PatrolNode):
         self._timeout = timeout
         self._actions = MissionActions(self, timeout)
         self._feed = MissionFeed(self, FEED_PERIOD)
+        self._allowance = Allowance(LINES_PER_SECOND, LINES_AT_ONCE)
+        self._left_out = 0
         for name in CONTROLLED:
             self.create_subscription(
                 String, f'{name}/announcement', partial(self._on_announcement, name), STATE_QOS
@@ -70,7 +78,13 @@ class ConsoleNode(PatrolNode):
         return status_line(self._feed.snapshot)
 
     def _on_announcement(self, controller: str, message: String) -> None:
-        _tell(message.data, controller)
+        for line in message.data.splitlines():
+            if not self._allowance.take():
+                self._left_out += 1
+                continue
+            left_out, self._left_out = self._left_out, 0
+            note = f' ({left_out} lines left out before this one)' if left_out else ''
+            _tell(clean(line) + note, controller)
 
     def _read(self) -> None:
         if self._console.run() != 'stopped':

@@ -25,6 +25,7 @@ from surveillance_controllers.planner_controller_node import PlannerController
 from surveillance_fsm.ros import GoalCaller
 from surveillance_interfaces.action import ComputePath
 from surveillance_operator.console_node import ConsoleNode
+from surveillance_runtime.logging import LINES_AT_ONCE
 from surveillance_runtime.qos import STATE_QOS
 
 
@@ -146,3 +147,21 @@ def test_a_request_is_announced_once_with_its_controller_before_each_line(
     shown = [line for line in capfd.readouterr().out.splitlines() if 'Answer with' in line]
     assert len(shown) == 1
     assert shown[0].startswith('[planner_controller] ')
+
+
+def test_an_announcement_commands_no_terminal_and_is_no_flood(
+    graph: Any, operator: Any, capfd: Any
+) -> None:
+    graph.add(ConsoleNode, console_source=operator.source)
+    topic = 'battery_controller/announcement'
+    publisher = graph.node.create_publisher(String, topic, STATE_QOS)
+    publisher.publish(String(data='\x1b[2Jcleared\n' + 'more\n' * 1000))
+    shown: list[str] = []
+
+    def read() -> bool:
+        shown.extend(capfd.readouterr().out.splitlines())
+        return len(shown) >= LINES_AT_ONCE
+
+    graph.until(read)
+    assert '[battery_controller] \\x1b[2Jcleared' in shown
+    assert len(shown) < 500
