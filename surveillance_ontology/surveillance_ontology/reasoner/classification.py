@@ -75,8 +75,7 @@ class Classification:
         for name in (*classes, THING, NOTHING):
             if name not in (THING, NOTHING):
                 program.cls(name)
-        if any(existential.prop.kind == 'object' for existential in program.existentials):
-            spell_out_chains(program)
+        spell_out_chains(program)
         self._report_partial()
         labels = [program.labels[expression] for expression in asserted]
         fillers = [e.filler for e in program.existentials if isinstance(e.filler, Predicate)]

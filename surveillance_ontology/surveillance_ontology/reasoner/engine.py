@@ -35,7 +35,6 @@ from surveillance_ontology.reasoner.open_cases import OpenCases
 from surveillance_ontology.reasoner.program_change import ProgramChange
 from surveillance_ontology.reasoner.proofs import ProofSearch
 
-Conflict = tuple[str, str]
 Classes = Mapping[str, Iterable[str]]
 _MOST_VALUES = 20_000
 LEAST_VALUES = 2_000
@@ -61,7 +60,7 @@ class Engine:
         difference: Who is known to be different.
         spelling: A literal for each value, as some assertion wrote it.
         asserted: How many assertions state each fact.
-        conflicts: Pairs that must be the same, and are different.
+        conflicts: Merges of individuals that are different.
         proofs: Searches why a fact holds.
         changed: Where a log of one update is wanted: facts that came, went or changed their
             standing, with whether they were derived (and not asserted) before.
@@ -81,7 +80,7 @@ class Engine:
         self._queue: list[Fact] = []
         self._overdeleted: list[Fact] = []
         self._requests: dict[Merge, None] = {}
-        self.conflicts: dict[Conflict, Merge] = {}
+        self.conflicts: dict[Merge, None] = {}
         self._touched: dict[str, None] = {}
         self._removed: dict[Fact, None] = {}
         self._split_happened = False
@@ -259,12 +258,15 @@ class Engine:
         return found
 
     def _touch_before_removal(self, *individuals: str) -> None:
-        for one in self._related_by_difference(individuals):
+        related = self._related_by_difference(individuals)
+        for one in related:
             for touch in self._network.touch_delete:
                 touch(one)
-            if self.conflicts:
-                for pair in [pair for pair in self.conflicts if one in pair]:
-                    self._withdraw_conflict(pair)
+        find = self.equality.find
+        for merge in tuple(self.conflicts):
+            names = (merge.first, merge.second)
+            if any(name in related or find(name) in related for name in names):
+                self._withdraw_conflict(merge)
 
     # --- single facts ---
 
@@ -310,8 +312,8 @@ class Engine:
         if self.changed is not None:
             self.changed.setdefault(fact, True)
         if self.conflicts:
-            for pair in [p for p, merge in self.conflicts.items() if fact in merge.premises]:
-                self._withdraw_conflict(pair)
+            for merge in [merge for merge in self.conflicts if fact in merge.premises]:
+                self._withdraw_conflict(merge)
 
     def _follows(self, fact: Fact) -> bool:
         """Tell whether one step derives a fact from what holds."""
@@ -325,7 +327,7 @@ class Engine:
         if fact[0] is self.program.different:
             return self.difference.different(fact[1], fact[2])
         if fact[0] is self.program.same:
-            return (fact[1], fact[2]) in self.conflicts
+            return any((merge.first, merge.second) == fact[1:] for merge in self.conflicts)
         holds: bool = fact[0].holds(fact)
         return holds
 
@@ -347,23 +349,23 @@ class Engine:
     def _request(self, x: str, y: str, origin: Axiom | None, premises: Premises) -> None:
         self._requests[Merge(x, y, origin, premises)] = None
 
-    def _withdraw_conflict(self, pair: Conflict, again: bool = True) -> None:
-        merge = self.conflicts.pop(pair)
-        self._overdeleted.append((self._nothing, self.equality.find(pair[0])))
+    def _withdraw_conflict(self, merge: Merge, again: bool = True) -> None:
+        del self.conflicts[merge]
+        self._overdeleted.append((self._nothing, self.equality.find(merge.first)))
         if again:
             self._requests[merge] = None
 
     def _conflict_supports(self, x: str) -> Iterator[Premises]:
         find = self.equality.find
-        for first, second in self.conflicts:
-            if find(first) == x:
-                different = (self.program.different, x, find(second))
-                yield ((self.program.same, first, second), different)
+        for merge in self.conflicts:
+            if find(merge.first) == x:
+                different = (self.program.different, x, find(merge.second))
+                yield ((self.program.same, merge.first, merge.second), different)
 
     def _same_supports(self, first: str, second: str) -> Iterator[Premises]:
-        merge = self.conflicts.get((first, second))
-        if merge is not None:
-            yield tuple(map(self.current, merge.premises))
+        for merge in self.conflicts:
+            if (merge.first, merge.second) == (first, second):
+                yield tuple(map(self.current, merge.premises))
 
     def _state_same(self, axiom: SameIndividual) -> None:
         first, *others = sorted(axiom.individuals)
@@ -382,7 +384,7 @@ class Engine:
             if x == y or not all(self._holds(self.current(fact)) for fact in merge.premises):
                 continue
             if self.difference.different(x, y):
-                self.conflicts[merge.first, merge.second] = merge
+                self.conflicts[merge] = None
                 self._queue.append((self._nothing, x))
                 continue
             self._merge(merge)
@@ -434,9 +436,10 @@ class Engine:
             self._take(fact)
         members = self.equality.split(representative)
         self.difference.split(representative)
-        for pair in [pair for pair in self.conflicts if not members.isdisjoint(pair)]:
-            self._overdeleted.append((self._nothing, representative))
-            self._withdraw_conflict(pair)
+        for merge in tuple(self.conflicts):
+            if not members.isdisjoint((merge.first, merge.second)):
+                self._overdeleted.append((self._nothing, representative))
+                self._withdraw_conflict(merge)
         self.proofs.reset()
         axioms: dict[Axiom, None] = {}
         for member in sorted(members):
@@ -477,8 +480,8 @@ class Engine:
             if equality.members:
                 splitting.update(self._classes_of(axiom))
             if self.conflicts and isinstance(axiom, SameIndividual):
-                for pair in [p for p, merge in self.conflicts.items() if merge.origin == axiom]:
-                    self._withdraw_conflict(pair, again=False)
+                for merge in [merge for merge in self.conflicts if merge.origin == axiom]:
+                    self._withdraw_conflict(merge, again=False)
             fact = self.fact_of(axiom)
             if fact is not None:
                 self._unassert(fact)

@@ -165,7 +165,8 @@ class Reasons:
         if predicate is self._engine.program.different and not proof.premises:
             return self._stated_difference(proof.fact, text)
         if predicate is self._engine.program.same:
-            return self._merge(self._engine.conflicts[proof.fact[1], proof.fact[2]])
+            conflicts = self._engine.conflicts
+            return self._merge(next(m for m in conflicts if (m.first, m.second) == proof.fact[1:]))
         premises: list[Explanation] = []
         for premise in proof.premises:
             premises += self._premise(premise)

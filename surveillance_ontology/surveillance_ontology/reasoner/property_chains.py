@@ -37,7 +37,7 @@ _CIRCLE = 'its property chains depend on each other in a circle'
 
 
 def spell_out_chains(program: Program) -> None:
-    """Add the steps of every chain to a program's clauses."""
+    """Add the steps of every chain to a program's clauses, where classes relate their members."""
     _Spelling(program).run()
 
 
@@ -218,12 +218,24 @@ class _Spelling:
     # --- clauses ---
 
     def run(self) -> None:
-        if not self.chains:
+        if not self.chains or not self._relates_members():
             return
         for clause in tuple(self._program.clauses):
             if not clause.named_only:
                 self._extend(clause)
         self._individuals()
+
+    def _relates_members(self) -> bool:
+        """Tell whether a class relates its members to somebody unnamed, a name, or themselves."""
+        if any(existential.prop.kind == 'object' for existential in self._program.existentials):
+            return True
+        heads = (clause.head for clause in self._program.clauses if not clause.named_only)
+        return any(
+            isinstance(head, PredicateAtom)
+            and head.predicate.kind == 'object'
+            and (head.terms[0] == head.terms[1] or isinstance(head.terms[1], Constant))
+            for head in heads
+        )
 
     def _extend(self, clause: Clause) -> None:
         links = [

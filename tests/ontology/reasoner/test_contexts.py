@@ -120,6 +120,8 @@ def test_no_nested_class_ends_reasoning(required: ClassExpression) -> None:
         ([SubClassOf(A, some(P, B)), SubClassOf(A, some(P, C)), FunctionalObjectProperty(P), SubClassOf(some(P, ObjectIntersectionOf((B, C))), D)], {D}),
         ([SubClassOf(A, some(P, B)), SubClassOf(A, some(P, C)), DisjointClasses((B, C)), SubClassOf(ObjectMinCardinality(2, P), D)], {D}),
         ([SubClassOf(A, some(P, B)), SubClassOf(B, some(Q, C)), SubPropertyChainOf((P, Q), R), SubClassOf(some(R, C), D)], {D}),
+        ([SubClassOf(A, C), ReflexiveObjectProperty(P), SubPropertyChainOf((P, P), R), SubClassOf(some(R, C), D)], {C, D}),
+        ([SubClassOf(A, ObjectHasValue(P, 'x:i')), SubClassOf(ObjectOneOf(('x:i',)), ObjectIntersectionOf((ObjectHasSelf(Q), C))), SubPropertyChainOf((P, Q), R), SubClassOf(some(R, C), D)], {D}),
         ([SubClassOf(A, some(P, B)), SubClassOf(B, some(P, C)), TransitiveObjectProperty(P), SubClassOf(some(P, C), D)], {D}),
         ([SubClassOf(A, some(P, B)), SubClassOf(B, some(P, C)), TransitiveObjectProperty(P), SubClassOf(A, ObjectAllValuesFrom(P, E)), SubClassOf(some(P, some(P, E)), D)], {D}),
         ([SubClassOf(A, some(P, B)), SubClassOf(B, some(Q, C)), InverseObjectProperties(P, Q), InverseFunctionalObjectProperty(P)], {C}),

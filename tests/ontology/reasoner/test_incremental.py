@@ -21,11 +21,13 @@ from surveillance_ontology.owl.axioms import (
     Declaration,
     EquivalentClasses,
     FunctionalObjectProperty,
+    ObjectPropertyRange,
+    SameIndividual,
     SubDataPropertyOf,
     SymmetricObjectProperty,
     TransitiveObjectProperty,
 )
-from surveillance_ontology.owl.expressions import Literal
+from surveillance_ontology.owl.expressions import Literal, ObjectMaxCardinality
 from surveillance_ontology.reasoner import engine
 from surveillance_ontology.reasoner.datatypes import value_of
 from tests.ontology.reasoner.patrol_map import (
@@ -200,6 +202,29 @@ def test_a_long_chain_of_functional_values_is_walked_once(monkeypatch: pytest.Mo
     kb = KnowledgeBase(IRI, [FunctionalObjectProperty(n('p')), *ring])
     assert kb.reason()
     assert sum(walked) <= 2 * len(ring)
+
+
+def test_a_contradiction_with_two_reasons_outlives_one() -> None:
+    kb = KnowledgeBase(
+        IRI,
+        [
+            ObjectPropertyRange(n('q'), ObjectMaxCardinality(1, n('q'))),
+            SymmetricObjectProperty(n('q')),
+            SameIndividual(frozenset((n('j'), n('k')))),
+            different(['i', 'j', 'l', 'm']),
+            link('q', 'j', 'm'),
+            link('q', 'm', 'k'),
+            link('q', 'k', 'j'),
+        ],
+    )
+    assert not kb.reason()
+    kb.add(different(['j', 'k', 'm']))
+    assert not kb.reason()
+    for fact in (link('q', 'k', 'j'), link('q', 'm', 'k')):
+        kb.remove(fact)
+        assert not kb.reason()
+    kb.remove(different(['j', 'k', 'm']))
+    assert kb.reason()
 
 
 def test_facts_that_support_each_other_go_together() -> None:
