@@ -118,13 +118,13 @@ def map_from(
     size = f'{info.width} x {info.height}'
     if info.width * info.height > most_cells:
         raise ValueError(f'a map of {size} cells: expected at most {most_cells}')
+    cells = np.array(message.data, dtype=np.int8)
+    if cells.size != info.width * info.height or not cells.size:
+        raise ValueError(f'a map of {cells.size} cells: expected {size} of them')
     if not 1e-4 <= info.resolution <= 100.0:
         raise ValueError(
             f'a map of {info.resolution:g} m a cell: expected between 0.0001 and 100 m'
         )
-    cells = np.array(message.data, dtype=np.int8)
-    if cells.size != info.width * info.height or not cells.size:
-        raise ValueError(f'a map of {cells.size} cells: expected {size} of them')
     x, y, yaw = pose_from(info.origin)
     if abs(yaw) > 1e-6:
         raise ValueError(f'a map turned by {yaw:.3f} rad: expected one that is not turned')

@@ -141,7 +141,7 @@ def test_why_a_topic_cannot_be_used_is_known(graph: Any) -> None:
     say(graph, 'map', OccupancyGrid(data=[0, 0]))
     graph.until(lambda: {'battery_level', 'map'} <= view.snapshot.silent.keys())
     assert 'another DURABILITY' in view.snapshot.silent['battery_level']
-    assert '2 cells came' in view.snapshot.silent['map']
+    assert 'a map of 2 cells' in view.snapshot.silent['map']
 
 
 def test_the_next_mission_begins_with_an_empty_picture(graph: Any) -> None:
