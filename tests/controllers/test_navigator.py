@@ -153,6 +153,22 @@ def test_what_stands_for_long_stays_and_whoever_comes_later_may_leave(flat: Any)
     assert memory.stay.all()
 
 
+def test_what_stands_has_stood_as_long_on_the_side_that_is_seen_later(flat: Any) -> None:
+    memory = ObstacleMemory(flat.grid, settle=30.0, gap=5.0)
+    for moment in range(32):  # half way round a box; no side is in sight for 30 s
+        angle = math.pi + 0.1 * moment
+        pose = (2.5 + 0.9 * math.cos(angle), 1.5 + 0.9 * math.sin(angle), angle + math.pi)
+        memory.update(pose, flat.scan(pose, [(2.5, 1.5, 0.2)]), 1.0 * moment)
+    in_sight = memory.points[:, 0] > 2.6
+    assert in_sight.sum() > 3
+    assert memory.stay[in_sight].mean() > 0.8
+    somebody = [(2.5, 1.5, 0.2), (3.2, 1.0, 0.2)]
+    memory.update(pose, flat.scan(pose, somebody), 33.0)
+    beside = np.hypot(*(memory.points - (3.2, 1.0)).T) < 0.3
+    assert beside.sum() > 3
+    assert not memory.stay[beside].any()
+
+
 def test_obstacles_that_stay_unseen_are_forgotten_in_the_end(flat: Any) -> None:
     memory = ObstacleMemory(flat.grid, keep=10.0)
     pose = (1.0, 1.5, 0.0)

@@ -2,11 +2,13 @@
 
 A point counts when it lies well away from everything the map has occupied. It is forgotten when a
 ray goes through where it was, or when it has not been seen for a long time. It stays once it was
-seen to stand for longer than people rest; until then it may go away.
+seen to stand for longer than people rest; until then it may go away. Points beside each other are
+one thing: seen from another side, it has stood for as long.
 """
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -17,8 +19,14 @@ from numpy.typing import NDArray
 from surveillance_controllers.geometry import Points, Pose, Scan, composed, in_map
 from surveillance_controllers.planning.grid_map import GridMap, distance_to
 
+_Cell = tuple[int, int]
+"""Column and row."""
+_BESIDE = tuple(itertools.product(range(-2, 3), repeat=2))
+"""Steps to the cells that belong to the same thing, the cell itself included: rays that meet it far
+away leave gaps."""
 
-@dataclass
+
+@dataclass(frozen=True)
 class _Sight:
     """When a point was seen first and last, seconds."""
 
@@ -55,7 +63,7 @@ class ObstacleMemory:
         self._keep = keep
         self._settle = settle
         self._gap = gap
-        self._seen: dict[tuple[int, int], _Sight] = {}
+        self._seen: dict[_Cell, _Sight] = {}
         self.set_map(grid)
 
     def set_map(self, grid: GridMap) -> None:
@@ -123,13 +131,20 @@ class ObstacleMemory:
         if may_move is not None:
             new = new[~may_move(new)]
         for column, row in np.floor(new / self._cell).astype(int).tolist():
-            sight = self._seen.setdefault((column, row), _Sight(now, now))
-            if now - sight.last > self._gap and not self._stays(sight):
-                sight.since = now
-            sight.last = now
+            self._seen[column, row] = _Sight(self._stood_since(column, row, now), now)
         return self._standing() != before
 
-    def _standing(self) -> dict[tuple[int, int], bool]:
+    def _stood_since(self, column: int, row: int, now: float) -> float:
+        """Return since when the thing that is seen now in a cell has stood there, seconds."""
+        beside = (self._seen.get((column + right, row + up)) for right, up in _BESIDE)
+        known = (
+            sight.since
+            for sight in beside
+            if sight is not None and (now - sight.last <= self._gap or self._stays(sight))
+        )
+        return min(known, default=now)
+
+    def _standing(self) -> dict[_Cell, bool]:
         return {cell: self._stays(sight) for cell, sight in self._seen.items()}
 
     def _forget(self, pose: Pose, scan: Scan, now: float) -> None:
