@@ -20,6 +20,7 @@ stands, and changes it only for one that leaves less waiting from where the robo
 
 from __future__ import annotations
 
+import itertools
 import math
 import random
 import time
@@ -245,33 +246,54 @@ class Plan:
     def _begin(
         self, rounds: list[tuple[int, ...]], work: float, course: Course | None = None
     ) -> None:
-        """Find the first course, from one that is, rounds, and walks of the simple policies."""
+        """Find the first course.
+
+        Args:
+            rounds: Where the search for a round begins.
+            work: For rounds and for courses together.
+            course: One that is followed already; None: the best round is begun.
+        """
         rules, length = self._rules, self._rules.length(rounds[0])
         self._horizon = HORIZON * max(length, rules.threshold)
         simple = SIMPLE if rules.count <= SIMPLE_UP_TO else ()
         walks = [roll_out(rules, choose, self._state, self._horizon) for choose in simple]
         self._simple = min((walk.settled for walk in walks), default=math.inf)
-        starts = [rounds]
-        if length > rules.least_period:  # Else they wait by walking more.
-            starts += filter(None, ([*rules.laps(walk.walk)] for walk in walks))
-        self._search = RoundSearch(rules, starts)
-        filled = self._filled(starts, work / 4.0) if length < rules.least_period else ()
-        self._search_on(self._search, work / 4.0 if filled else work / 2.0)
+        filled = self._find_rounds(rounds, walks, work / 2.0)
         self._course = course or self._entered(self._phases()[0])
         self._outcome = self._followed(self._course, math.inf)
-        phases = [*self._phases(), *range(len(self._search.best.targets))]
-        courses = [self._entered(phase) for phase in phases]
-        courses[2:2] = [replace(course, targets=course.targets[::-1]) for course in courses[:2]]
-        courses[4:4] = [
-            replace(courses[0], skip=skip * self._bound, patience=patience)
-            for skip in SKIPS
-            for patience in (0.0, courses[0].patience, math.inf)
-        ]
-        courses[2:2] = [self._entered(phase, filled) for phase in range(len(filled))]
-        self._climb(iter(courses), work / 2.0)
+        self._climb(self._first_courses(filled), work / 2.0)
         for walk in walks:
             if (back := walk.repeated_from(rules.count)) is not None:
                 self._try(Course(tuple(walk.walk), back, patience=math.inf, steps=True))
+
+    def _find_rounds(
+        self, rounds: list[tuple[int, ...]], walks: list[Outcome], work: float
+    ) -> tuple[int, ...]:
+        """Search a short round; return one that is filled with visits where the robot would wait on
+        the short one, else nothing."""
+        rules = self._rules
+        waits = rules.length(rounds[0]) < rules.least_period
+        starts = [rounds]
+        if not waits:  # Else the simple policies wait by walking more.
+            starts += filter(None, ([*rules.laps(walk.walk)] for walk in walks))
+        self._search = RoundSearch(rules, starts)
+        filled = self._filled(starts, work / 2.0) if waits else ()
+        self._search_on(self._search, work / 2.0 if filled else work)
+        return filled
+
+    def _first_courses(self, filled: tuple[int, ...]) -> Iterator[Course]:
+        """Yield ways into the round that was found and the filled one, the likeliest first."""
+        phases = [*self._phases(), *range(len(self._search.best.targets))]
+        likeliest = [self._entered(phase) for phase in phases[:2]]
+        yield from likeliest
+        for phase in range(len(filled)):
+            yield self._entered(phase, filled)
+        for course in likeliest:
+            yield replace(course, targets=course.targets[::-1])
+        for skip, patience in itertools.product(SKIPS, (0.0, likeliest[0].patience, math.inf)):
+            yield replace(likeliest[0], skip=skip * self._bound, patience=patience)
+        for phase in phases[2:]:
+            yield self._entered(phase)
 
     def _think(self) -> None:
         """Go on with the search from where the robot is."""
