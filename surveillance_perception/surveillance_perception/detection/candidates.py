@@ -66,9 +66,10 @@ def dark_masks(
             mask for each, in their order. Wide ones, which only large markers need, are taken
             from the halved image.
         contrast: How many grey levels darker.
-        bridges: Lengths in pixels of gaps to close in the first mask, along columns and along
-            rows, each in a mask of its own: a marker seen at a flat angle has a border thinner
-            than a pixel, which breaks at white rows of its code.
+        bridges: Lengths in pixels of gaps to close in the narrowest window's mask, along columns
+            and along rows, each in a mask of its own: a marker seen at a flat angle has a border
+            thinner than a pixel, which breaks at white rows of its code. A wider window would not
+            part it from the wall beyond its margin.
 
     Yields:
         A mask for each window; one of what is darker than a quarter of white, and one split where
@@ -80,26 +81,36 @@ def dark_masks(
         (max(1, image.shape[1] // 2), max(1, image.shape[0] // 2)),
         interpolation=cv2.INTER_AREA,
     )
-    first: Grey | None = None
-    for window in windows:
-        wide = window >= _WIDE_WINDOW and first is not None
-        dark = cv2.adaptiveThreshold(
-            halved if wide else image,
-            255,
-            cv2.ADAPTIVE_THRESH_MEAN_C,
-            cv2.THRESH_BINARY_INV,
-            max(3, window // 4 * 2 + 1) if wide else window,
-            contrast,
-        )
-        first = dark if first is None else first
-        yield dark, 2 if wide else 1
-    split, _ = cv2.threshold(halved, 0, 255, cv2.THRESH_BINARY_INV + cv2.THRESH_OTSU)
     white = float(np.percentile(halved[::4, ::4], 98.0))
     yield cv2.threshold(image, white / 4.0, 255, cv2.THRESH_BINARY_INV)[1], 1
+    full_size: list[Grey] = []
+    for window in windows:
+        wide = window >= _WIDE_WINDOW and window > min(windows)
+        if wide:
+            yield _darker_than_around(halved, max(3, window // 4 * 2 + 1), contrast), 2
+        else:
+            full_size.append(_darker_than_around(image, window, contrast))
+            yield full_size[-1], 1
+    split, _ = cv2.threshold(halved, 0, 255, cv2.THRESH_BINARY_INV + cv2.THRESH_OTSU)
     yield cv2.threshold(halved, split, 255, cv2.THRESH_BINARY_INV)[1], 2
     for length in bridges:
-        for shape in ((length, 1), (1, length)):
-            yield cv2.morphologyEx(first, cv2.MORPH_CLOSE, np.ones(shape, np.uint8)), 1
+        for dark in full_size:
+            for shape in ((length, 1), (1, length)):
+                yield cv2.morphologyEx(dark, cv2.MORPH_CLOSE, np.ones(shape, np.uint8)), 1
+
+
+def _darker_than_around(image: Grey, window: int, contrast: float) -> Grey:
+    """Return where an image is darker than the mean of its neighbourhood, without specks.
+
+    Blobs of one or two pixels are noise, and each would cost an outline.
+    """
+    mask = cv2.boxFilter(image, -1, (window, window), borderType=cv2.BORDER_REPLICATE)
+    cv2.subtract(mask, image, dst=mask)
+    cv2.threshold(mask, contrast - 0.5, 255, cv2.THRESH_BINARY, dst=mask)
+    # each pixel of a larger blob has two more of its pixels within two steps
+    near = cv2.boxFilter(mask, -1, (5, 5))
+    cv2.threshold(near, 2.5 * 255 / 25, 255, cv2.THRESH_BINARY, dst=near)
+    return np.asarray(cv2.bitwise_and(mask, near, dst=near))
 
 
 def quads_around(
@@ -206,7 +217,7 @@ def _blobs_in(mask: Grey, length: float, width: float) -> _Blobs | None:
 def _scatter(x: Indices, y: Indices, counts: Indices) -> Array:
     """Return the scatter (k,) of polygons with so many corners (k,) each, (n,) in all."""
     starts = counts.cumsum() - counts
-    x, y = x.astype(float), y.astype(float)
+    x, y = x.astype(np.float32), y.astype(np.float32)
     u, v = np.roll(x, -1), np.roll(y, -1)
     u[starts + counts - 1], v[starts + counts - 1] = x[starts], y[starts]
     # moments of polygons by Green's theorem

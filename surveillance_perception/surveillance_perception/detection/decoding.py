@@ -29,6 +29,9 @@ _SHOWN = 0.5
 _LEAST_IF_SHOWN, _LEAST_IF_BLURRED = 0.65, 0.75
 _HYPOTHESIS_RATIO = 1.7
 _LEAST_ROUGH_CORRELATION = 0.76
+# over the code's own cells, before and after the likeliest codes are aligned: the border alone
+# makes much of the whole marker's correlation
+_LEAST_INNER, _LEAST_ROUGH_INNER = 0.6, 0.68
 _GOOD_CORRELATION = 0.98
 _STRONGER_BLURS = np.array([[1.6, 1.6], [2.4, 2.4], [0.8, 2.4], [2.4, 0.8]])
 
@@ -105,12 +108,14 @@ class MarkerReader:
             Those that look like a marker, at most m; None when there is none.
         """
         blur = np.full((len(homographies), 2), self._blur)
-        entries, correlation, patches, _ = self._score(
+        entries, correlation, patches, footprint = self._score(
             self._rough, pyramid, homographies, blur, None
         )
+        inner = self._rough.inner_correlations(patches, entries[:, :_HYPOTHESES], footprint)
         # blurred cells show little of their differences, but then the match is not far off
         shown = cells.correlation > _SHOWN
         likely = correlation[:, 0] > np.where(shown, _LEAST_IF_SHOWN, _LEAST_IF_BLURRED)
+        likely &= inner.max(axis=1) > _LEAST_INNER
         homographies, entries = homographies[likely], entries[likely]
         correlation, blur = correlation[likely], blur[likely]
         if not len(homographies):
@@ -121,12 +126,14 @@ class MarkerReader:
         aligned = self._rough.refine(
             pyramid, homographies[owner], entries[owner, column], blur[owner], _ROUGH_ITERATIONS
         )
-        entries, correlation, patches, _ = self._score(
+        entries, correlation, patches, footprint = self._score(
             self._rough, pyramid, aligned, blur[owner], None
         )
+        inner = self._rough.inner_correlations(patches, entries[:, :1], footprint)
         rank = np.lexsort((-correlation[:, 0], owner))
         best = rank[np.flatnonzero(np.diff(owner[rank], prepend=-1))]
         best = best[correlation[best, 0] > _LEAST_ROUGH_CORRELATION]
+        best = best[inner[best, 0] > _LEAST_ROUGH_INNER]
         if not len(best):
             return None
         blur = blur[owner[best]]

@@ -204,7 +204,7 @@ class MarkerDetector:
 
     def _candidates(self, prepared: PreparedImage, pyramid: ImagePyramid) -> Quads:
         settings = self.settings
-        contrast = max(settings.contrast, 2.5 * prepared.noise)
+        contrast = max(settings.contrast, 3.0 * prepared.noise)
         masks = dark_masks(prepared.smooth, settings.windows, contrast, settings.bridges)
         quads = quads_around(masks, min_length=settings.min_length, limit=settings.max_outlines)
         if not len(quads):
