@@ -12,6 +12,7 @@ that can be read does. A candidate costs 97 samples there and some thousands in 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple
 
@@ -117,7 +118,7 @@ def quads_around(
     masks: Iterable[tuple[Grey, int]],
     *,
     min_length: float = 8.0,
-    limit: int = 10**9,
+    limit: float = math.inf,
 ) -> Quads:
     """Quadrilaterals around the blobs of masks.
 

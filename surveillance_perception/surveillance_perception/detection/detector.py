@@ -53,6 +53,7 @@ _COVER = 0.7
 _CONTRADICTED = 0.4
 _FEW_SPARE_BITS = 12.0
 _STRICT_BITS = 4.0
+_FULL_WORK = 2e6
 # wrong ids that may be expected of one candidate
 _LARGEST_ERROR = 1e-5
 
@@ -68,8 +69,9 @@ class DetectorSettings:
             in which they are tried. Only a small one parts a thin border from what lies beyond its
             margin; in a crowd on a large image it sees so many outlines that it comes last.
         bridges: Gaps in pixels that are closed for markers seen at a flat angle.
-        max_outlines: Dark outlines after which only those near quadrilaterals are looked at, and
-            no further neighbourhood or bridge is tried.
+        max_outlines: Dark outlines in an image of two megapixels after which only those near
+            quadrilaterals are looked at, and no further neighbourhood or bridge is tried; in a
+            smaller one as many more as it has fewer pixels.
         max_candidates: Bound of an image's work: quadrilaterals that are read, the likeliest first.
         least_correlation: Correlation with the image that a reading needs, 0 to 1: of its cells'
             differences, or of the whole marker.
@@ -89,7 +91,7 @@ class DetectorSettings:
     min_length: float = parameter(8.0, 'Longer side of the smallest marker, pixels.', 4.0, 1000.0)
     max_outlines: int = parameter(
         250,
-        'Outlines after which only near quadrilaterals are looked at, in no further mask.',
+        'Outlines in two megapixels after which only near quadrilaterals are looked at.',
         1,
         100000,
     )
@@ -206,7 +208,8 @@ class MarkerDetector:
         settings = self.settings
         contrast = max(settings.contrast, 3.0 * prepared.noise)
         masks = dark_masks(prepared.smooth, settings.windows, contrast, settings.bridges)
-        quads = quads_around(masks, min_length=settings.min_length, limit=settings.max_outlines)
+        limit = settings.max_outlines * max(1.0, _FULL_WORK / prepared.grey.size)
+        quads = quads_around(masks, min_length=settings.min_length, limit=limit)
         if not len(quads):
             return quads
         correlation = self._border.correlation(pyramid, homographies_of(quads), contrast)
