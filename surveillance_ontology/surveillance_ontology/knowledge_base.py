@@ -764,10 +764,10 @@ class KnowledgeBase:
         return self._consistent
 
     def _fits(self, engine: Engine) -> bool:
-        """Tell whether the program knows every complex class and negated property that was
+        """Tell whether the program was made for every complex class and negated property that was
         added.
         """
-        return all(engine.understands(axiom) for axiom in self._told.added)
+        return all(map(engine.takes, self._told.added))
 
     def _classify(self) -> None:
         self.classified += 1

@@ -199,6 +199,16 @@ class Engine:
             return self.program.data(axiom.prop) in self.program.negatives
         return True
 
+    def takes(self, axiom: Axiom) -> bool:
+        """Tell whether the program keeps an assertion apart from others: it understands it, and a
+        complex class has a label that is no named class equal to it.
+        """
+        if not self.understands(axiom):
+            return False
+        if isinstance(axiom, ClassAssertion) and not isinstance(axiom.cls, str):
+            return not is_public(self.program.labels[axiom.cls])
+        return True
+
     def take_spelling(self, other: Engine) -> None:
         """Write derived values as another engine did."""
         self._values.update(other._values)

@@ -134,6 +134,15 @@ def test_classes_come_and_go_below_others_on_the_facts_that_are_there(made: list
     assert SubClassOf(A, IRI + 'D') in explanation.sources()
 
 
+def test_a_named_class_follows_from_an_equal_expression_that_is_asserted_later() -> None:
+    some = ObjectSomeValuesFrom(P, B)
+    kb = KnowledgeBase(IRI, [EquivalentClasses((A, some))])
+    kb.reason()
+    kb.add(ClassAssertion(some, IRI + 'x'))
+    kb.reason()
+    assert set(kb.derived_facts()) == {ClassAssertion(A, IRI + 'x')}
+
+
 def test_a_fact_of_a_property_without_axioms_outlives_a_change(made: list[Engine]) -> None:
     kb = KnowledgeBase(IRI, [ObjectPropertyAssertion(P, IRI + 'x', IRI + 'y')])
     kb.reason()
