@@ -341,16 +341,12 @@ class Fuzzer:
 
     def learn_names(self, name: str) -> None:
         """Let messages name the node's own parameters."""
-        answer = self._list_parameters(name)
+        answer = self.list_parameters(name)
         if answer is not None:
             self._generator.names = tuple(answer.result.names)
 
-    def _answer_time(self, name: str) -> float:
-        began = time.monotonic()
-        self._list_parameters(name)
-        return time.monotonic() - began
-
-    def _list_parameters(self, name: str) -> Any:
+    def list_parameters(self, name: str) -> Any:
+        """Return a node's answer to a request for its parameters; None: none came in time."""
         if self._lister is None:
             self._lister = self.node.create_client(ListParameters, f'/{name}/list_parameters')
         future = self._lister.call_async(ListParameters.Request())
@@ -379,7 +375,9 @@ class Fuzzer:
             # Lets the node keep up: what is lost is not tested. Each answer is a round of its
             # executor, which takes one message of each topic and service.
             for _ in range(ROUNDS):
-                report.slowest = max(report.slowest, self._answer_time(report.node))
+                asked = time.monotonic()
+                self.list_parameters(report.node)
+                report.slowest = max(report.slowest, time.monotonic() - asked)
             now = time.monotonic()
             if now - last >= 1.0 or number == count:
                 size, new = process.lines_after(size)
@@ -393,10 +391,6 @@ class Fuzzer:
                 last = now
         report.seconds += time.monotonic() - began
         report.memory = max(report.memory, process.memory())
-
-    def answers(self, name: str) -> bool:
-        """Tell whether the node answers a parameter request in time."""
-        return self._list_parameters(name) is not None
 
 
 def _type(text: str) -> Any:
@@ -426,7 +420,7 @@ def fuzz(name: str, count: int, seed: int, most: int, folder: Path, place: Path)
                 report.targets = len(targets)
                 fuzzer.run(process, targets, count - report.sent, report)
                 if process.process.poll() is None:
-                    report.answers = fuzzer.answers(name)
+                    report.answers = fuzzer.list_parameters(name) is not None
                     if process.process.poll() is not None:
                         report.deaths.append(f'at the end: {process.tail()}')
             finally:

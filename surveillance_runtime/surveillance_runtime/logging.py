@@ -37,9 +37,7 @@ def clean(text: str) -> str:
         left_out = len(text) - LONGEST
         half = LONGEST // 2
         text = f'{text[:half]} ... ({left_out} characters left out) ... {text[-half:]}'
-    if text.isprintable():
-        return text
-    return ''.join(each if each.isprintable() else _escaped(each) for each in text)
+    return without_controls(text, kept='')
 
 
 def print_lines(text: str) -> None:
@@ -51,17 +49,16 @@ def print_lines(text: str) -> None:
     sys.stdout.flush()
 
 
-def without_controls(text: str) -> str:
-    """Return a text of several lines, with its other control characters written as escapes."""
+def without_controls(text: str, kept: str = '\n\t') -> str:
+    """Return a text with its control characters written as escapes, but for those to be kept."""
     if text.isprintable():
         return text
     return ''.join(
-        each if each.isprintable() or each in '\n\t' else _escaped(each) for each in text
+        each
+        if each.isprintable() or each in kept
+        else each.encode('unicode_escape').decode('ascii')
+        for each in text
     )
-
-
-def _escaped(character: str) -> str:
-    return character.encode('unicode_escape').decode('ascii')
 
 
 class Allowance:

@@ -115,13 +115,9 @@ class ParameterSpec:
         return text
 
     def _element(self, element: Any, kind: type, whole: Any) -> Any:
-        if kind is float and isinstance(element, int) and not isinstance(element, bool):
+        if kind is float and type(element) is int:
             element = float(element)
-        if kind is float:
-            fits = isinstance(element, float)
-        else:
-            fits = type(element) is kind
-        if not fits:
+        if not isinstance(element, kind) or (kind is int and isinstance(element, bool)):
             raise self.error(whole)
         if self.choices:
             element = self._choice(element, whole)
