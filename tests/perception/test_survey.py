@@ -178,6 +178,13 @@ def test_after_the_deadline_what_was_found_has_to_do():
     assert camera.time < 40.0
 
 
+def test_the_deadline_does_not_end_the_first_look_all_around():
+    camera = ScriptedCamera(Survey('E'), {1: (11, 12)}, by_scan=[range(13, 17)], seconds=20.0)
+    report, _ = look(camera, deadline=45.0)
+    assert rooms(report) == ['C1', 'C2', 'E', 'R1', 'R2', 'R3']
+    assert camera.did == [1, 2, 3, 4, ('scan', 0.12, 0.3, 0.5), 'home']
+
+
 def test_without_anything_to_patrol_looking_does_not_end_at_the_deadline():
     camera = ScriptedCamera(Survey('E'), {}, by_scan=[(), (), (), (), (), (), (), (11, 12)])
     report, said = look(camera, deadline=10.0)

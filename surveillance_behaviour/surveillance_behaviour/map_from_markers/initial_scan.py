@@ -3,6 +3,9 @@
 First the arm's poses; then whole scans around the horizon, each with more overlap, a further reach
 up and down and a longer rest than the one before, so that a marker missed at the edge of a picture,
 at a flat angle or in poor light has another chance from a slightly different view.
+
+The deadline counts once the camera has looked all around: how long that takes is the matter of the
+arm, the detector and the rate of time.
 """
 
 from __future__ import annotations
@@ -52,11 +55,16 @@ class InitialScan:
     """How to scan.
 
     Attributes:
-        deadline: Seconds after which what was found has to do; may change while it runs.
+        deadline: Seconds after which what was found has to do, when the camera has looked all
+            around; may change while it runs.
     """
 
     poses: Sequence[int] = parameter((1, 2, 3, 4), "The arm's poses for looking around.", 1, 4)
-    deadline: float = parameter(45.0, 'Seconds after which what was found has to do.', 0.0)
+    deadline: float = parameter(
+        45.0,
+        'Seconds after which what was found has to do, when the camera has looked all around.',
+        0.0,
+    )
     dwell: float = parameter(0.5, 'Rest at each view of a scan, seconds.', 0.0)
 
     def run(
@@ -82,6 +90,7 @@ class InitialScan:
         """
         progress = progress or Progress()
         begin = now() - progress.seconds
+        looked_around = False
 
         def late() -> bool:
             return now() - begin >= self.deadline
@@ -93,7 +102,8 @@ class InitialScan:
                 progress.poses += [pose] if pose is not None else []
                 progress.seconds = now() - begin
                 keep()
-            return stopping() or report.complete or (late() and bool(report.places))
+            will_do = looked_around and late() and bool(report.places)
+            return stopping() or report.complete or will_do
 
         begun_before = bool(progress.poses)
         for number in self.poses:
@@ -108,6 +118,7 @@ class InitialScan:
             for sentence in judge().sentences():
                 say(f'looking on: {sentence}')
             camera.scan(overlap, reach, dwell, enough)
+            looked_around = True
             overlap = min(overlap + _OVERLAP, 0.5)
             reach = min(reach * 1.5, 1.2)
             dwell = min(dwell * 2.0, 4.0 * self.dwell)
