@@ -26,13 +26,7 @@ from surveillance_operator.console_commands import (
 from surveillance_operator.mission_actions import MissionActions
 from surveillance_operator.mission_feed import MissionFeed
 from surveillance_operator.snapshot import Snapshot, decision_line
-from surveillance_runtime.logging import (
-    LINES_AT_ONCE,
-    LINES_PER_SECOND,
-    Allowance,
-    clean,
-    print_lines,
-)
+from surveillance_runtime.logging import clean, print_lines
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.process import run_node
 from surveillance_runtime.qos import STATE_QOS
@@ -60,7 +54,6 @@ class ConsoleNode(PatrolNode):
         self._timeout = timeout
         self._actions = MissionActions(self, timeout)
         self._feed = MissionFeed(self, FEED_PERIOD)
-        self._allowance = Allowance(LINES_PER_SECOND, LINES_AT_ONCE)
         self._left_out = 0
         for name in CONTROLLED:
             self.create_subscription(
@@ -78,8 +71,9 @@ class ConsoleNode(PatrolNode):
         return status_line(self._feed.snapshot)
 
     def _on_announcement(self, controller: str, message: String) -> None:
+        allowance = self.get_logger().lines
         for line in message.data.splitlines():
-            if not self._allowance.take():
+            if not allowance.take():
                 self._left_out += 1
                 continue
             left_out, self._left_out = self._left_out, 0

@@ -90,12 +90,17 @@ class Allowance:
 
 
 class CleanLogger(rcutils.RcutilsLogger):  # type: ignore[misc]
-    """A logger whose lines cannot be forged, grow without bound, or come without end."""
+    """A logger whose lines cannot be forged, grow without bound, or come without end.
+
+    Attributes:
+        lines: How much of what is no warning may be said; what a node prints past its logger is
+            counted here, too.
+    """
 
     def __init__(self, name: str) -> None:
         super().__init__(name)
         self._lock = threading.Lock()
-        self._lines = Allowance(LINES_PER_SECOND, LINES_AT_ONCE)
+        self.lines = Allowance(LINES_PER_SECOND, LINES_AT_ONCE)
         self._warnings = Allowance(WARNINGS_PER_SECOND, WARNINGS_AT_ONCE)
         self._left_out = 0
 
@@ -104,7 +109,7 @@ class CleanLogger(rcutils.RcutilsLogger):  # type: ignore[misc]
         if not self.is_enabled_for(severity):
             return False
         with self._lock:
-            allowance = self._warnings if severity >= LoggingSeverity.WARN else self._lines
+            allowance = self._warnings if severity >= LoggingSeverity.WARN else self.lines
             limited = LoggingSeverity.DEBUG < severity < LoggingSeverity.FATAL
             if limited and not allowance.take():
                 self._left_out += 1

@@ -160,7 +160,7 @@ def test_an_announcement_commands_no_terminal_and_is_no_flood(
 
     def read() -> bool:
         shown.extend(capfd.readouterr().out.splitlines())
-        return len(shown) >= LINES_AT_ONCE
+        return len(shown) >= LINES_AT_ONCE / 2
 
     graph.until(read)
     assert '[battery_controller] \\x1b[2Jcleared' in shown
