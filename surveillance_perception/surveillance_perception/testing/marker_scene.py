@@ -14,9 +14,9 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 import numpy.typing as npt
-from scipy.special import ndtr
 
 from surveillance_perception.detection.camera_model import Array, CameraModel
+from surveillance_runtime.uneven_light import glare, shadow, vignette
 
 ImageArray = npt.NDArray[np.uint8]
 
@@ -172,24 +172,14 @@ def degrade(
 
 
 def _lit(scene: npt.NDArray[np.float32], degradation: Degradation) -> npt.NDArray[np.float32]:
-    if not (degradation.shadows or degradation.glares or degradation.vignette):
-        return scene
-    height, width = scene.shape
-    y, x = np.mgrid[:height, :width].astype(np.float32)
-    light = np.ones_like(scene)
-    for shadow in degradation.shadows:
-        across = math.cos(shadow.direction), math.sin(shadow.direction)
-        depth = (x - shadow.through[0]) * across[0] + (y - shadow.through[1]) * across[1]
-        dark = ndtr(depth / max(shadow.softness, 0.3))
-        light *= 1.0 - (1.0 - shadow.brightness) * dark
+    shape = scene.shape[0], scene.shape[1]
+    for each in degradation.shadows:
+        scene = scene * shadow(shape, each.through, each.direction, each.brightness, each.softness)
     if degradation.vignette:
-        radius = np.hypot(x - width / 2.0, y - height / 2.0) / math.hypot(width / 2.0, height / 2.0)
-        light *= 1.0 - degradation.vignette * radius**2
-    added = np.zeros_like(scene)
-    for glare in degradation.glares:
-        square = (x - glare.centre[0]) ** 2 + (y - glare.centre[1]) ** 2
-        added += glare.strength * np.exp(-square / (2.0 * glare.deviation**2))
-    return np.asarray(scene * light + added, dtype=np.float32)
+        scene = scene * vignette(shape, degradation.vignette)
+    for spot in degradation.glares:
+        scene = scene + glare(shape, spot.centre, spot.deviation, spot.strength)
+    return scene
 
 
 def backdrop_of(

@@ -1,4 +1,4 @@
-"""Uneven light on a picture: shadows' edges, a reflection, a lens that darkens the corners.
+"""The lights that a simulated camera may take its pictures in.
 
 Shadow and reflection lie elsewhere in each picture, so that a camera that turns meets them anywhere
 on a marker.
@@ -12,7 +12,10 @@ from collections.abc import Callable
 import numpy as np
 import numpy.typing as npt
 
+from surveillance_runtime.uneven_light import Light, glare, shadow, vignette
+
 Scene = npt.NDArray[np.float32]
+Shape = tuple[int, int]
 
 _SHADE = 0.4
 _HARD, _SOFT = 0.3, 12.0
@@ -27,47 +30,31 @@ def lit(scene: Scene, lighting: str, rng: np.random.Generator) -> Scene:
         KeyError: There is no light of that name.
     """
     light = _LIGHTS[lighting]
-    return scene if light is None else light(scene, rng)
+    if light is None:
+        return scene
+    shape = scene.shape[0], scene.shape[1]
+    cast = light(shape, rng)[:, :, None]
+    return np.asarray(scene + cast if lighting == 'glare' else scene * cast)
 
 
-def _shadow(scene: Scene, rng: np.random.Generator, softness: float) -> Scene:
-    from scipy.special import ndtr  # takes 0.1 s, which a simulator in even light does without
-
-    x, y = _pixels(scene)
+def _shadow(shape: Shape, rng: np.random.Generator, softness: float) -> Light:
     direction = rng.uniform(0.0, 2.0 * math.pi)
-    through = rng.uniform(0.25, 0.75, 2) * (scene.shape[1], scene.shape[0])
-    depth = (x - through[0]) * math.cos(direction) + (y - through[1]) * math.sin(direction)
-    light = 1.0 - (1.0 - _SHADE) * ndtr(depth / softness)
-    return np.asarray(scene * light[:, :, None], dtype=np.float32)
+    rows, columns = shape
+    through = columns * rng.uniform(0.25, 0.75), rows * rng.uniform(0.25, 0.75)
+    return shadow(shape, through, direction, _SHADE, softness)
 
 
-def _vignette(scene: Scene, _rng: np.random.Generator) -> Scene:
-    x, y = _pixels(scene)
-    rows, columns = scene.shape[:2]
-    radius = np.hypot(x - columns / 2, y - rows / 2) / math.hypot(columns / 2, rows / 2)
-    return np.asarray(scene * (1.0 - _VIGNETTE * radius**2)[:, :, None], dtype=np.float32)
+def _glare(shape: Shape, rng: np.random.Generator) -> Light:
+    rows, columns = shape
+    middle = columns * rng.uniform(0.0, 1.0), rows * rng.uniform(0.0, 1.0)
+    return glare(shape, middle, _GLARE_REACH * columns, _GLARE)
 
 
-def _glare(scene: Scene, rng: np.random.Generator) -> Scene:
-    x, y = _pixels(scene)
-    rows, columns = scene.shape[:2]
-    middle = rng.uniform(0.0, 1.0, 2) * (columns, rows)
-    reach = _GLARE_REACH * columns
-    added = _GLARE * np.exp(-((x - middle[0]) ** 2 + (y - middle[1]) ** 2) / (2.0 * reach**2))
-    return np.asarray(scene + added[:, :, None], dtype=np.float32)
-
-
-def _pixels(scene: Scene) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.float32]]:
-    """Return columns (1, n) and rows (m, 1) of a scene's pixels."""
-    rows, columns = scene.shape[:2]
-    return np.arange(columns, dtype=np.float32)[None], np.arange(rows, dtype=np.float32)[:, None]
-
-
-_LIGHTS: dict[str, Callable[[Scene, np.random.Generator], Scene] | None] = {
+_LIGHTS: dict[str, Callable[[Shape, np.random.Generator], Light] | None] = {
     'even': None,
-    'hard shadow': lambda scene, rng: _shadow(scene, rng, _HARD),
-    'soft shadow': lambda scene, rng: _shadow(scene, rng, _SOFT),
-    'vignette': _vignette,
+    'hard shadow': lambda shape, rng: _shadow(shape, rng, _HARD),
+    'soft shadow': lambda shape, rng: _shadow(shape, rng, _SOFT),
+    'vignette': lambda shape, _rng: vignette(shape, _VIGNETTE),
     'glare': _glare,
 }
 
