@@ -20,8 +20,7 @@ import numpy as np
 
 from surveillance_behaviour.map_from_markers.assembly import PlaceNote, SurveyReport
 from surveillance_behaviour.map_from_markers.initial_scan import InitialScan
-from surveillance_perception.arm.kinematics import direction_of, look_at
-from surveillance_perception.arm.scan import ScanPlan
+from surveillance_perception.arm.scan import ScanPlan, aim_at, from_nearer_end
 from surveillance_perception.arm.trajectory import ArmState, motion_to
 from surveillance_perception.detection import MarkerStream, StreamSettings
 from surveillance_perception.marker_registry import read_registry
@@ -35,8 +34,6 @@ PICTURE_PERIOD, PICTURES = 0.1, 6
 """Seconds from picture to picture, and pictures that are looked at where the arm rests."""
 PANS = (math.pi / 2, 0.0, -math.pi / 2, math.pi)
 """The arm's poses 1 to 4, rad."""
-FAR = 20.0
-"""Distance of the points that the camera looks at in a scan, metres."""
 
 
 class ArmCamera:
@@ -70,10 +67,9 @@ class ArmCamera:
     def scan(self, overlap: float, reach: float, dwell: float, done: Callable[[], bool]) -> None:
         """Look all around, `reach` rad above and below the horizon."""
         vertical = 2.0 * math.atan(math.tan(math.radians(30.0)) * 480 / 640)
-        shoulder = ARM.camera_frame(ARM.home)[:3, 3]
-        for view in ScanPlan(math.radians(60.0), vertical, overlap, -reach, reach).views:
-            target = shoulder + FAR * direction_of(view.azimuth, view.elevation)
-            self._look(look_at(ARM, target, self._positions).positions)
+        plan = ScanPlan(math.radians(60.0), vertical, overlap, -reach, reach)
+        for view in from_nearer_end(ARM, plan.views, self._positions):
+            self._look(aim_at(ARM, view, self._positions))
             self.now += max(0.0, dwell - PICTURES * PICTURE_PERIOD)
             if done():
                 return

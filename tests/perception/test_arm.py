@@ -17,6 +17,7 @@ from surveillance_perception.arm.kinematics import (
     direction_of,
     look_at,
 )
+from surveillance_perception.arm.scan import ScanPlan, aim_at, from_nearer_end
 from surveillance_perception.arm.trajectory import (
     ArmState,
     motion_to,
@@ -71,6 +72,15 @@ def test_point_at_the_lens_is_refused():
     lens = ARM.camera_frame(HOME)[:3, 3]
     with pytest.raises(ArmMotionError):
         look_at(ARM, lens, HOME)
+
+
+@pytest.mark.parametrize('pan', [-math.pi, math.pi])
+def test_scan_begins_at_the_end_that_the_arm_is_near(pan):
+    posture = np.array([pan, *ARM.home[1:]])
+    plan = ScanPlan(math.radians(60), math.radians(47), 0.1, -0.3, 0.3)
+    views = from_nearer_end(ARM, plan.views, posture)
+    assert set(views) == set(plan.views)
+    assert abs(aim_at(ARM, views[0], posture)[0] - pan) < 0.6
 
 
 @LIMITED

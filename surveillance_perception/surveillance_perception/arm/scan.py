@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+
+import numpy as np
 
 from surveillance_perception.arm.driver import ArmDriver
 from surveillance_perception.arm.kinematics import ArmMotionError, direction_of, look_at
 from surveillance_perception.arm.view_coverage import View, coverage, views_covering
-from surveillance_runtime.robot_arm import Array
+from surveillance_runtime.robot_arm import Arm, Array
 
 _FAR = 20.0
 
@@ -71,7 +74,7 @@ def scan(
     tell: Callable[[int, View, bool], None],
     ended: Callable[[], bool],
 ) -> ScanOutcome:
-    """Look in each direction in turn.
+    """Look in each direction in turn, from the end of the plan that is nearer to the arm.
 
     Args:
         driver: The arm.
@@ -82,9 +85,9 @@ def scan(
     """
     outcome = ScanOutcome()
     rested: list[View] = []
-    for index, view in enumerate(plan.views):
+    for index, view in enumerate(from_nearer_end(driver.arm, plan.views, driver.posture)):
         try:
-            positions = _aim(driver, view)
+            positions = aim_at(driver.arm, view, driver.posture)
         except ArmMotionError:
             outcome.unreachable += 1
             continue
@@ -102,8 +105,27 @@ def scan(
     return outcome
 
 
-def _aim(driver: ArmDriver, view: View) -> Array:
-    arm = driver.arm
+def from_nearer_end(arm: Arm, views: Sequence[View], posture: Array) -> Sequence[View]:
+    """Return the views in their order or backwards: the first is what the arm is nearer to.
+
+    An arm with a stop behind it would otherwise begin with a swing all around.
+    """
+
+    def travel(view: View) -> float:
+        try:
+            return float(np.abs(aim_at(arm, view, posture) - posture).max())
+        except ArmMotionError:
+            return math.inf
+
+    return views[::-1] if travel(views[-1]) < travel(views[0]) else views
+
+
+def aim_at(arm: Arm, view: View, posture: Array) -> Array:
+    """Return joint positions (n,) that look in a view's direction, near a posture (n,).
+
+    Raises:
+        ArmMotionError: The joints' limits forbid it.
+    """
     shoulder = arm.camera_frame(arm.home)[:3, 3]
     target = shoulder + _FAR * direction_of(view.azimuth, view.elevation)
-    return look_at(arm, target, driver.posture).positions
+    return look_at(arm, target, posture).positions
