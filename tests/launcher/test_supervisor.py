@@ -35,10 +35,9 @@ def test_a_stop_signal_ends_all_and_counts_as_wanted(start, number):
     pids = [int(launch.until(rf'started {n} \(process (\d+)\)')[1]) for n in ('one', 'two')]
     launch.until(r'one +\| up')
     launch.until(r'two +\| up')
-    code, seconds = launch.end(number)
-    assert code == 0
-    assert seconds < 3
+    assert launch.end(number)[0] == 0
     assert gone(pids, 0)
+    assert 'killed' not in '\n'.join(launch.lines)
     assert f'{number.name}: stopping' in '\n'.join(launch.lines)
 
 
@@ -86,7 +85,7 @@ def test_another_ctrl_c_ends_at_once_but_not_the_echo_of_the_first(start):
         launch.process.wait(2 * STOP_AGAIN_AFTER)
     code, seconds = launch.end(signal.SIGINT)
     assert code == 0
-    assert seconds < STOP_AT_MOST / 2
+    assert seconds < 0.8 * STOP_AT_MOST
     assert 'Traceback' not in '\n'.join(launch.lines)
 
 

@@ -69,13 +69,13 @@ def test_start_from_pixels_to_ontology_with_one_marker_covered_until_later(graph
     covered = SetMarker.Request(name='m13', state=SetMarker.Request.COVERED)
     assert marker.call(covered, 60.0).success
     done = started(graph)
-    graph.until(lambda: len(ids) == 6, timeout=90.0)
+    graph.until(lambda: len(ids) == 6, timeout=300.0)
     assert not done.done()
 
     setter = ServiceCaller(graph.node, SetParameters, 'initial_state/set_parameters')
     deadline = Parameter('deadline', value=0.0).to_parameter_msg()
     assert setter.call(SetParameters.Request(parameters=[deadline]), 60.0).results[0].successful
-    graph.until(done.done, timeout=60.0)
+    graph.until(done.done)
     reference = ServiceCaller(graph.node, ReferenceName, 'ontology_map/reference_name')
     name = reference.call(ReferenceName.Request(), 60.0).name
     armor = ArmorClient(graph.node, 'test', name, timeout=60.0)
