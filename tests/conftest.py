@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import copy
+import gc
 import os
 import threading
 import time
@@ -48,6 +49,12 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
             item.add_marker(pytest.mark.nodes)
         else:
             item.add_marker(pytest.mark.unit)
+
+
+def pytest_collection_finish() -> None:
+    """Keep modules and tests out of the garbage collector's way: a tenth of all processor time."""
+    gc.collect()
+    gc.freeze()
 
 
 NODE_FIXTURES = {'graph', 'ros_domain'}

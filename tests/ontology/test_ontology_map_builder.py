@@ -258,7 +258,7 @@ def test_an_ontology_that_cannot_be_loaded_ends_the_builder(graph: Any, tmp_path
     graph.add(ArmorServer, {'ontologies_folder': str(tmp_path)})
     broken = tmp_path / 'broken.owl'
     broken.write_text('<rdf:RDF>\n<oops')
-    for path in (broken, tmp_path / 'none.owl'):
+    for path in (broken, tmp_path / ('a' * 80 + '.owl')):
         builder = graph.add(OntologyMapBuilder, {**PLACE, 'ontology_path': str(path)})
         graph.until(lambda builder=builder: builder.failure)
         assert builder.failure.startswith('cannot build the map: ')

@@ -133,10 +133,10 @@ class SafePaths:
         allowed = (self._writable, *self._readable)
         candidates = [_resolved(base, text) for base in allowed]
         path = next((path for path in candidates if path.exists()), candidates[0])
-        _check_inside(path, allowed, f'path {shown(text)} may not be read')
+        _check_inside(path, allowed, f'{_named(text)} may not be read')
         if not path.is_file():
             what = 'is not a file' if path.exists() else 'does not exist'
-            raise DirectiveError(f'path {shown(text)} {what}')
+            raise DirectiveError(f'{_named(text)} {what}')
         return path
 
     def to_write(self, text: str, endings: tuple[str, ...]) -> Path:
@@ -151,26 +151,31 @@ class SafePaths:
                 a dot, something else than a regular file there, or in no directory.
         """
         path = _resolved(self._writable, text)
-        _check_inside(path, (self._writable,), f'path {shown(text)} may not be written')
+        _check_inside(path, (self._writable,), f'{_named(text)} may not be written')
         if path.exists() and not path.is_file():
             kind = 'a directory' if path.is_dir() else 'a device or pipe'
-            raise DirectiveError(f'path {shown(text)} is {kind}, expected a file')
+            raise DirectiveError(f'{_named(text)} is {kind}, expected a file')
         if path.suffix.lower() not in endings:
             expected = ', '.join(endings)
             raise DirectiveError(
-                f'path {shown(text)} may not be written; expected a name that ends in {expected}'
+                f'{_named(text)} may not be written; expected a name that ends in {expected}'
             )
         if any(part.startswith('.') for part in path.relative_to(self._writable).parts):
             raise DirectiveError(
-                f'path {shown(text)} may not be written; expected no name that begins with a dot'
+                f'{_named(text)} may not be written; expected no name that begins with a dot'
             )
         try:
             self._writable.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise DirectiveError(f'{self._writable}: {error.strerror}') from None
         if not path.parent.is_dir():
-            raise DirectiveError(f'path {shown(text)}: directory {path.parent} does not exist')
+            raise DirectiveError(f'{_named(text)}: directory {path.parent} does not exist')
         return path
+
+
+def _named(text: str) -> str:
+    """Return a path for a message; its last part says most, so it is cut only when very long."""
+    return f'path {shown(text, limit=1000)}'
 
 
 def _check_inside(path: Path, allowed: tuple[Path, ...], problem: str) -> None:
@@ -182,12 +187,12 @@ def _resolved(base: Path, text: str) -> Path:
     if not text:
         raise DirectiveError('path is empty, expected a file')
     if len(text) > MAX_PATH or _CONTROL.search(text):
-        raise DirectiveError(f'path {shown(text)} is not a path')
+        raise DirectiveError(f'{_named(text)} is not a path')
     try:
         path = (base / Path(text).expanduser()).resolve()
         path.exists()
     except OSError as error:
-        raise DirectiveError(f'path {shown(text)}: {error.strerror}') from None
+        raise DirectiveError(f'{_named(text)}: {error.strerror}') from None
     except (RuntimeError, ValueError) as error:
-        raise DirectiveError(f'path {shown(text)}: {error}') from None
+        raise DirectiveError(f'{_named(text)}: {error}') from None
     return path
