@@ -16,10 +16,10 @@ from launcher import run_folder
 from launcher.system import LaunchError
 from surveillance_runtime import node_table
 from surveillance_runtime.configuration import Configuration, file_layer
+from surveillance_runtime.discovery import LAST_DOMAIN
 from surveillance_runtime.files import FileError
 from surveillance_runtime.parameters import ParameterError
 from surveillance_runtime.place import read_place_file
-from surveillance_runtime.testing import LAST_DOMAIN
 
 NOT_RECORDED = 'off'
 RECORDER, MARKERS, PAGE = 'mission_recorder', 'mission_markers', 'mission_page'

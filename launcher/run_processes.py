@@ -13,9 +13,8 @@ from launcher.run import MARKERS, PAGE, RECORDER, Run
 from launcher.supervisor import Program
 from launcher.system import LaunchError
 from surveillance_runtime import node_table
-from surveillance_runtime.discovery import launched_nodes
+from surveillance_runtime.discovery import LAST_DOMAIN, launched_nodes
 from surveillance_runtime.run_parameters import BEHAVIOUR_NODE
-from surveillance_runtime.testing import LAST_DOMAIN
 
 CHILD = Path(__file__).with_name('child.py')
 COMPOSED = 'composed'

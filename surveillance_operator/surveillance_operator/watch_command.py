@@ -12,7 +12,7 @@ from rclpy.validate_namespace import validate_namespace
 
 from surveillance_operator import console_node, mission_view_node
 from surveillance_runtime.command_line import CommandParser
-from surveillance_runtime.testing import LAST_DOMAIN
+from surveillance_runtime.discovery import LAST_DOMAIN
 
 
 def _mission_parser(name: str, description: str) -> CommandParser:

@@ -10,6 +10,8 @@ import os
 from collections.abc import Mapping
 from pathlib import Path
 
+LAST_DOMAIN = 101
+"""The highest ROS domain whose ports lie below those that Linux gives to clients."""
 _RANGE, _PROFILE = 'ROS_AUTOMATIC_DISCOVERY_RANGE', 'FASTRTPS_DEFAULT_PROFILES_FILE'
 _QUICK = {
     _PROFILE: str(Path(__file__).with_name('discovery.xml')),

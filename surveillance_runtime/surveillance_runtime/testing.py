@@ -8,8 +8,7 @@ from __future__ import annotations
 
 import socket
 
-LAST_DOMAIN = 101
-"""The highest ROS domain whose ports lie below those that Linux gives to clients."""
+from surveillance_runtime.discovery import LAST_DOMAIN
 
 _held: list[socket.socket] = []
 

@@ -9,7 +9,8 @@ from collections.abc import Iterator
 
 import pytest
 
-from surveillance_runtime.testing import LAST_DOMAIN, claim_domain
+from surveillance_runtime.discovery import LAST_DOMAIN
+from surveillance_runtime.testing import claim_domain
 from tests.launcher.conftest import ROOT, Started
 
 LAUNCH = [str(ROOT / '.venv/bin/python'), str(ROOT / 'launch.py')]
