@@ -57,7 +57,7 @@ def test_a_leg_costs_few_round_trips(
     robot.begin()
     robot.until(60.0)
     before, legs = asked.total(), len(robot.decisions())
-    robot.until(400.0)
+    robot.until(200.0)
     legs = len(robot.decisions()) - legs
     assert legs > 10
     assert (asked.total() - before) / legs < TRIPS[behaviour] + 0.5, asked

@@ -53,7 +53,7 @@ class Viewer:
         query = 'return document.querySelector(arguments[0])?.getAttribute(arguments[1])'
         return str(self.js(query, selector, name) or '')
 
-    def until(self, what: Callable[[], Any], seconds: float = 60.0) -> Any:
+    def until(self, what: Callable[[], Any], seconds: float = 120.0) -> Any:
         from selenium.webdriver.support.wait import WebDriverWait
 
         return WebDriverWait(self.driver, seconds, 0.1).until(lambda _: what())
@@ -61,7 +61,7 @@ class Viewer:
     def click(self, selector: str) -> None:
         self.js('document.querySelector(arguments[0]).click()', selector)
 
-    def changes(self, look: Callable[[], Any], seconds: float = 60.0) -> None:
+    def changes(self, look: Callable[[], Any], seconds: float = 120.0) -> None:
         before = look()
         self.until(lambda: look() != before, seconds)
 
