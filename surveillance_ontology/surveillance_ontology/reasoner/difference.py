@@ -50,13 +50,6 @@ class Difference:
         self.evidence: list[Evidence] = []
         self.through: list[EvidenceOfValues] = []
 
-    def clear(self) -> None:
-        """Forget every stated difference."""
-        self._own.clear()
-        self._merged.clear()
-        self._numbers.clear()
-        self._axioms.clear()
-
     # --- stated differences ---
 
     def state(self, axiom: DifferentIndividuals) -> None:

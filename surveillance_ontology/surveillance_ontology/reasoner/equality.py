@@ -33,13 +33,6 @@ class Equality:
         self._merges: dict[str, list[Merge]] = {}
         self._used: dict[Fact, set[str]] = {}
 
-    def clear(self) -> None:
-        """Every individual stands for itself again."""
-        self.representative.clear()
-        self.members.clear()
-        self._merges.clear()
-        self._used.clear()
-
     def find(self, individual: str) -> str:
         """Return the representative."""
         return self.representative.get(individual, individual)
