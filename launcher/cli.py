@@ -17,6 +17,7 @@ from launcher.instance_lock import claim
 from launcher.options import make_parser, shared_options
 from surveillance_runtime import node_table
 from surveillance_runtime.command_line import EXIT_BAD_INPUT, CommandParser
+from surveillance_runtime.files import in_one_line
 from surveillance_runtime.suggestions import nearest
 
 if TYPE_CHECKING:
@@ -64,8 +65,7 @@ def main(argv: Sequence[str]) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
     except OSError as error:  # a full disk, a folder that is not ours
-        what = f'{error.filename}: ' if error.filename else ''
-        print(f'launch.py: {what}{error.strerror or error}', file=sys.stderr)
+        print(f'launch.py: {in_one_line(error)}', file=sys.stderr)
         return EXIT_BAD_INPUT
     except KeyboardInterrupt:
         signal.signal(signal.SIGINT, signal.SIG_IGN)  # one is enough

@@ -98,10 +98,10 @@ class Reasoner(PatrolNode):
             self._next = None
         try:
             decision = self._decider.decide(self._wait.now(), self._interrupt, self._avoided)
+        except CallInterruptedError:  # the node ends
+            return ''
         except (CallError, NowhereToGoError) as error:
             self.get_logger().warn(f'no place to name: {error}')
-            return ''
-        except CallInterruptedError:
             return ''
         self._decisions.publish(decision)
         return decision.place

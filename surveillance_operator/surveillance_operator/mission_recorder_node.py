@@ -11,6 +11,7 @@ simulated one draws no image until somebody does.
 
 from __future__ import annotations
 
+import errno
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -32,7 +33,7 @@ from surveillance_operator.recording.bag import (
 )
 from surveillance_operator.recording.schemas import definition, message_class
 from surveillance_operator.recording.timeline import TimelineWriter
-from surveillance_runtime.files import RECORDING, TIMELINE, FileError
+from surveillance_runtime.files import RECORDING, TIMELINE, in_one_line
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.parameters import ParameterError
 from surveillance_runtime.process import run_node
@@ -42,6 +43,7 @@ DRAIN_PERIOD, SEAL_PERIOD, FEED_PERIOD = 0.15, 0.6, 0.4
 PRUNE_PERIOD = 60.0
 RETRY_PERIOD = 3.0
 """Seconds after which a recording that could not be written is tried again."""
+DISK_FULL = errno.ENOSPC, errno.EDQUOT
 QUEUE = 2000
 """Messages of one topic that may come within `DRAIN_PERIOD`; a latched topic brings its own."""
 RAW, COMPRESSED = 'sensor_msgs/msg/Image', 'sensor_msgs/msg/CompressedImage'
@@ -84,10 +86,9 @@ class MissionRecorder(PatrolNode):
         self._next_seal = self._next_line = self._next_prune = 0.0
         try:
             self._bag.seal()
-        except FileError as error:
-            raise ParameterError(str(error)) from error
-        except OSError:
-            pass  # the disk is full: it is tried again
+        except OSError as error:
+            if error.errno not in DISK_FULL:  # else it is tried again
+                raise ParameterError(f'parameter folder: {in_one_line(error)}') from error
         self._images = ImageRecorder(self, self._bag, image_period)
         self._subscriptions_by_topic: dict[str, PolledSubscription] = {}
         self._unknown: set[str] = set()
@@ -119,10 +120,10 @@ class MissionRecorder(PatrolNode):
         """Write; what fails is said once, and tried again after a pause."""
         try:
             work()
-        except (FileError, OSError) as error:
+        except OSError as error:
             if not self._waits_for_disk:
                 self._waits_for_disk = True
-                self.get_logger().warn(f'nothing is recorded at present: {error}')
+                self.get_logger().warn(f'nothing is recorded at present: {in_one_line(error)}')
             self._next_line = self._next_seal = 0.0
             self.stopping.wait(RETRY_PERIOD)
 

@@ -1,4 +1,4 @@
-"""Files that nodes and commands leave: what a run's are called, their error, two ways to write."""
+"""Files that nodes and commands leave: their names in a run, their errors, two ways to write."""
 
 from __future__ import annotations
 
@@ -13,6 +13,12 @@ RECORDING, TIMELINE = 'recording', 'timeline.jsonl'
 
 class FileError(ValueError):
     """A file cannot be read, written or understood; one line that says which, and often where."""
+
+
+def in_one_line(error: OSError) -> str:
+    """Return one line for a user: the file, where it is known, and what is wrong with it."""
+    what = f'{error.filename}: ' if error.filename else ''
+    return f'{what}{error.strerror or error}'
 
 
 def replace_text(path: Path, text: str) -> None:
@@ -41,10 +47,11 @@ class LineFile:
     """
 
     def __init__(self, path: Path) -> None:
-        flags = os.O_RDWR | os.O_CREAT | os.O_APPEND | os.O_CLOEXEC
-        self._descriptor = os.open(path, flags, 0o644)
-        content = path.read_bytes()
+        self._path = path
+        content = path.read_bytes() if path.exists() else b''
         whole = content.rfind(b'\n') + 1
+        flags = os.O_WRONLY | os.O_CREAT | os.O_APPEND | os.O_CLOEXEC
+        self._descriptor = os.open(path, flags, 0o644)
         if whole != len(content):
             os.ftruncate(self._descriptor, whole)
 
@@ -52,13 +59,16 @@ class LineFile:
         """Write a line, with its line break; return the size of the file.
 
         Raises:
-            OSError: The file takes no more.
+            OSError: The file takes no more; the error has its name.
         """
-        written = os.write(self._descriptor, line)
-        size = os.fstat(self._descriptor).st_size
-        if written != len(line):
-            os.ftruncate(self._descriptor, size - written)
-            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        try:
+            written = os.write(self._descriptor, line)
+            size = os.fstat(self._descriptor).st_size
+            if written != len(line):
+                os.ftruncate(self._descriptor, size - written)
+                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        except OSError as error:
+            raise OSError(error.errno, error.strerror, str(self._path)) from None
         return size
 
     def close(self) -> None:

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from surveillance_fsm import Interrupt
-from surveillance_runtime.files import replace_text
+from surveillance_runtime.files import in_one_line, replace_text
 from surveillance_runtime.node import PatrolNode
 
 WRITE_PERIOD = 0.2
@@ -82,7 +82,7 @@ class StateFile:
         try:
             replace_text(self._path, json.dumps(state) + '\n')
         except OSError as error:
-            self._complain(f'parameter state_file: {error}; the state is not kept')
+            self._complain(f'parameter state_file: {in_one_line(error)}; the state is not kept')
         else:
             self._complaint = ''
 

@@ -7,7 +7,7 @@ from typing import Any
 
 from surveillance_behaviour.policy.world import Decision
 from surveillance_behaviour.reasoner_node import Reasoner
-from surveillance_fsm.exceptions import CallError
+from surveillance_fsm.exceptions import CallError, CallInterruptedError
 from surveillance_interfaces.srv import Reason
 
 
@@ -70,3 +70,16 @@ def test_a_choice_that_begins_at_once_is_given_once(graph: Any, monkeypatch: Any
         answer = client.call_async(Reason.Request())
         graph.until(answer.done)
         assert answer.result().point == place
+
+
+def test_a_choice_that_ends_with_its_node_is_no_failure(graph: Any, monkeypatch: Any) -> None:
+    reasoner = graph.add(Reasoner)
+    warned: list[str] = []
+
+    def interrupted(*_: Any) -> None:
+        raise CallInterruptedError
+
+    monkeypatch.setattr(reasoner.get_logger(), 'warn', warned.append)
+    monkeypatch.setattr(reasoner._decider, 'decide', interrupted)
+    assert reasoner._choose() == ''
+    assert not warned

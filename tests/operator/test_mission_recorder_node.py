@@ -89,6 +89,8 @@ def test_a_full_disk_is_waited_for(
     graph.until(lambda: sum('goes on' in line.msg for line in said) == 2)
     graph.remove(recorder)
     assert recorder.failure is None
+    complaint = f'nothing is recorded at present: {folder}: No space left on device'
+    assert complaint in [line.msg for line in said]
     assert len([line for line in said if line.name == 'mission_recorder']) <= 5
     assert [topic for topic, _, _ in Messages(folder).in_order()].count('/words') <= 1
 

@@ -9,7 +9,7 @@ from rclpy.callback_groups import ReentrantCallbackGroup
 
 from surveillance_behaviour.decider import Decider
 from surveillance_fsm import Interrupt
-from surveillance_fsm.exceptions import CallError, CallInterruptedError
+from surveillance_fsm.exceptions import CallError
 from surveillance_interfaces.srv import GoTo, WhyNot
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.waiting import AwaitedWork
@@ -51,7 +51,7 @@ class DecisionServices:
                 told = self._decider.why_not(
                     request.place, self._now(), self._interrupt, self._avoided()
                 )
-            except (ValueError, CallError, CallInterruptedError) as error:
+            except (ValueError, CallError) as error:
                 response.success, response.message = False, str(error)
                 return
             response.success, response.message = True, told.sentence

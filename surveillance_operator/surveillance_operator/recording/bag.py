@@ -8,7 +8,6 @@ sealed as a chunk, so that a killed process loses no more; `repair` gives such a
 from __future__ import annotations
 
 import contextlib
-import errno
 import fcntl
 import json
 import os
@@ -27,7 +26,7 @@ from mcap.records import Channel, Message, Schema
 from mcap.stream_reader import StreamReader
 from mcap.writer import CompressionType, Writer
 
-from surveillance_runtime.files import RECORDING, FileError
+from surveillance_runtime.files import RECORDING
 
 METADATA = 'metadata.yaml'
 PROFILE, ENCODING, SCHEMA_ENCODING = 'ros2', 'cdr', 'ros2msg'
@@ -89,8 +88,8 @@ class BagWriter:
         folder: Where to; made when it is missing, continued with a new segment when it exists.
         segment_bytes, segment_seconds: Limits of a segment in size and age.
 
-    Its methods raise `FileError` when a file cannot be written, `OSError` for want of space
-    (ENOSPC, EDQUOT). The next call tries again, with a new segment.
+    Its methods raise `OSError` with the folder's name when a file cannot be written. The next call
+    tries again, with a new segment.
     """
 
     def __init__(
@@ -152,9 +151,7 @@ class BagWriter:
                 with contextlib.suppress(OSError):
                     self._file.close()
             self._file = self._closed = None
-            if error.errno in (errno.ENOSPC, errno.EDQUOT):
-                raise OSError(error.errno, error.strerror, str(self.folder)) from None
-            raise FileError(f'{self.folder}: cannot be written: {error.strerror}') from None
+            raise OSError(error.errno, error.strerror, str(self.folder)) from None
 
     def _begin_segment(self) -> BufferedWriter:
         if self._closed is None:

@@ -40,7 +40,7 @@ from surveillance_operator.topics import (
     read_message,
     with_fact,
 )
-from surveillance_runtime.files import FileError
+from surveillance_runtime.files import FileError, in_one_line
 
 CLOCK = '/clock'
 WINDOW = 0.4
@@ -128,7 +128,7 @@ class Conversion:
         try:
             self._convert()
         except OSError as error:
-            print(f'replay: the time line cannot be written: {error}', file=sys.stderr)
+            print(f'replay: the time line cannot be written: {in_one_line(error)}', file=sys.stderr)
         finally:
             self._begun.set()
 
