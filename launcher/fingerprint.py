@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 import sys
 import tomllib
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
+
+from surveillance_runtime.files import replace_text
 
 JOURNAL = 'surveillance-setup.json'
 INTERFACES = 'surveillance_interfaces'
@@ -45,10 +46,7 @@ class Journal:
             return cls()
 
     def write(self, venv: Path) -> None:
-        target = venv / JOURNAL
-        draft = target.with_suffix('.tmp')
-        draft.write_text(json.dumps(asdict(self), indent=1) + '\n', encoding='utf-8')
-        os.replace(draft, target)
+        replace_text(venv / JOURNAL, json.dumps(asdict(self), indent=1) + '\n')
 
 
 def requirements(checkout: Path, extras: Iterable[str]) -> list[str]:

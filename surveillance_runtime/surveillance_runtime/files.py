@@ -29,11 +29,14 @@ def replace_text(path: Path, text: str) -> None:
         text: What it is to hold.
 
     Raises:
-        OSError: It cannot be written; the old file is whole.
+        OSError: It cannot be written; the error has its name, and the old file is whole.
     """
     draft = path.with_name(path.name + '.new')
-    draft.write_text(text, encoding='utf-8')
-    os.replace(draft, path)
+    try:
+        draft.write_text(text, encoding='utf-8')
+        os.replace(draft, path)
+    except OSError as error:
+        raise OSError(error.errno, error.strerror, str(path)) from None
 
 
 class LineFile:

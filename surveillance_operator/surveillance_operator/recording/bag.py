@@ -26,7 +26,7 @@ from mcap.records import Channel, Message, Schema
 from mcap.stream_reader import StreamReader
 from mcap.writer import CompressionType, Writer
 
-from surveillance_runtime.files import RECORDING
+from surveillance_runtime.files import RECORDING, replace_text
 
 METADATA = 'metadata.yaml'
 PROFILE, ENCODING, SCHEMA_ENCODING = 'ros2', 'cdr', 'ros2msg'
@@ -282,9 +282,7 @@ def write_metadata(folder: Path, closed: Sequence[_Segment]) -> None:
             'ros_distro': 'jazzy',
         }
     }
-    temporary = folder / (METADATA + '.tmp')
-    temporary.write_text(yaml.safe_dump(content, sort_keys=False), encoding='utf-8')
-    temporary.replace(folder / METADATA)
+    replace_text(folder / METADATA, yaml.safe_dump(content, sort_keys=False))
 
 
 def _qos(topic: TopicType) -> dict[str, Any]:
