@@ -52,7 +52,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 
 def pytest_collection_finish() -> None:
-    """Keep modules and tests out of the garbage collector's way: a tenth of all processor time."""
+    """Keep modules and tests out of the garbage collector's way."""
     gc.collect()
     gc.freeze()
 

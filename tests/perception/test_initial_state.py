@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from pathlib import Path
 from typing import Any
 
@@ -104,9 +105,11 @@ def test_later_markers_extend_the_map(graph: Any) -> None:
 def test_a_map_that_is_not_complete_is_looked_at_again_on_patrol(graph: Any) -> None:
     robot = Robot(graph, {1: [11, 12, 13, 14, 15, 16]})
     arm = graph.add(PatrolNode, name='arm')
+    in_view = threading.Event()
 
     def look(_goal: Any, _run: Any) -> Any:
-        robot.show(17)
+        if in_view.is_set():
+            robot.show(17)
         return ScanSurroundings.Result()
 
     GoalServer(arm, ScanSurroundings, 'scan_surroundings', look, lambda _goal: True)
@@ -114,7 +117,9 @@ def test_a_map_that_is_not_complete_is_looked_at_again_on_patrol(graph: Any) -> 
     options = {'robot_room': 'E', 'patience': 0.1, 'deadline': 0.0, 'look_again': 0.2}
     graph.add(InitialState, parameters=options)
     graph.until(robot.start().done)
-    assert 'R4' not in {place.name for place in robot.maps[0].places}
+    graph.until(lambda: robot.maps)
+    assert 'R4' not in robot.rooms()
+    in_view.set()
     graph.until(lambda: 'R4' in robot.rooms())
 
 
