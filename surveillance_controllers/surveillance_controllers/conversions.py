@@ -83,8 +83,6 @@ def battery_state(battery: Battery, *, charging: bool) -> BatteryState:
     return message
 
 
-FARTHEST = 1e6
-"""No coordinate of a place is larger, metres."""
 MOST_CELLS = 100_000_000
 """Cells of the largest map that is taken."""
 MOST_RAYS = 100_000

@@ -119,8 +119,10 @@ def map_from(
     if info.width * info.height > most_cells:
         raise ValueError(f'a map of {size} cells: expected at most {most_cells}')
     cells = np.array(message.data, dtype=np.int8)
-    if cells.size != info.width * info.height or not cells.size:
+    if cells.size != info.width * info.height:
         raise ValueError(f'a map of {cells.size} cells: expected {size} of them')
+    if not cells.size:
+        raise ValueError(f'a map of {size} cells: expected at least one')
     if not 1e-4 <= info.resolution <= 100.0:
         raise ValueError(
             f'a map of {info.resolution:g} m a cell: expected between 0.0001 and 100 m'

@@ -91,6 +91,8 @@ def test_a_map_is_read_row_by_row_from_its_south_west_corner() -> None:
 def test_unsound_maps_are_refused() -> None:
     with pytest.raises(ValueError, match='a map of 5 cells: expected 3 x 2 of them'):
         conversions.grid_from(grid_message(3, 2, 5))
+    with pytest.raises(ValueError, match='a map of 0 x 2 cells: expected at least one'):
+        conversions.grid_from(grid_message(0, 2, 0))
     turned = grid_message(3, 2, 6)
     turned.info.origin.orientation.z, turned.info.origin.orientation.w = 1.0, 0.0
     with pytest.raises(ValueError, match=r'a map turned by 3\.142 rad'):

@@ -190,3 +190,12 @@ def test_free_cells_of_the_map_are_free_in_the_world() -> None:
 def test_a_generator_refuses_an_odd_ring() -> None:
     with pytest.raises(ValueError, match='ring of 5 rooms: expected an even number'):
         place_generation.ring(5)
+
+
+def test_a_wrong_option_of_the_generator_is_one_line(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit, match='2'):
+        place_generation.main(['grid', '--colums', '3'])
+    assert capsys.readouterr().err.splitlines() == [
+        "place_generation: unknown option '--colums': expected '--columns' "
+        '(see place_generation --help)'
+    ]

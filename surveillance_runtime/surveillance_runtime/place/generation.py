@@ -9,13 +9,14 @@ is generated here can be written to a file and be checked and changed by hand af
 
 from __future__ import annotations
 
-import argparse
 import math
 import random
 import sys
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
+
+from surveillance_runtime.command_line import CommandParser
 
 Rectangle = tuple[float, float, float, float]
 """West, south, east and north edge, metres."""
@@ -233,7 +234,7 @@ def _joined(pieces: list[tuple[float, float]]) -> list[tuple[float, float]]:
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Print a generated place as a parameter file."""
-    parser = argparse.ArgumentParser(
+    parser = CommandParser(
         prog='place_generation', description='Write a regular place as a parameter file.'
     )
     parser.add_argument('kind', choices=['office', 'grid', 'ring', 'tree'])
