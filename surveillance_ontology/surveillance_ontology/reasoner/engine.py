@@ -29,7 +29,7 @@ from surveillance_ontology.owl.vocabulary import NOTHING, THING, local_name
 from surveillance_ontology.reasoner.clauses import AtMost, Fact, Predicate, Premises, Program
 from surveillance_ontology.reasoner.datatypes import Value, literal_of, value_of
 from surveillance_ontology.reasoner.difference import Difference
-from surveillance_ontology.reasoner.equality import Equality, Merge
+from surveillance_ontology.reasoner.equality import Conflicts, Equality, Merge, individuals_in
 from surveillance_ontology.reasoner.network import Network
 from surveillance_ontology.reasoner.open_cases import OpenCases
 from surveillance_ontology.reasoner.program_change import ProgramChange
@@ -80,7 +80,7 @@ class Engine:
         self._queue: list[Fact] = []
         self._overdeleted: list[Fact] = []
         self._requests: dict[Merge, None] = {}
-        self.conflicts: dict[Merge, None] = {}
+        self.conflicts = Conflicts()
         self._touched: dict[str, None] = {}
         self._removed: dict[Fact, None] = {}
         self._split_happened = False
@@ -272,11 +272,8 @@ class Engine:
         for one in related:
             for touch in self._network.touch_delete:
                 touch(one)
-        find = self.equality.find
-        for merge in tuple(self.conflicts):
-            names = (merge.first, merge.second)
-            if any(name in related or find(name) in related for name in names):
-                self._withdraw_conflict(merge)
+        for merge in self._conflicts_about(related):
+            self._withdraw_conflict(merge)
 
     # --- single facts ---
 
@@ -321,8 +318,8 @@ class Engine:
         self._removed[fact] = None
         if self.changed is not None:
             self.changed.setdefault(fact, True)
-        if self.conflicts:
-            for merge in [merge for merge in self.conflicts if fact in merge.premises]:
+        for merge in self._conflicts_about(individuals_in(fact)):
+            if fact in map(self.current, merge.premises):
                 self._withdraw_conflict(merge)
 
     def _follows(self, fact: Fact) -> bool:
@@ -337,7 +334,7 @@ class Engine:
         if fact[0] is self.program.different:
             return self.difference.different(fact[1], fact[2])
         if fact[0] is self.program.same:
-            return any((merge.first, merge.second) == fact[1:] for merge in self.conflicts)
+            return bool(self.conflicts.between(fact[1], fact[2]))
         holds: bool = fact[0].holds(fact)
         return holds
 
@@ -359,23 +356,31 @@ class Engine:
     def _request(self, x: str, y: str, origin: Axiom | None, premises: Premises) -> None:
         self._requests[Merge(x, y, origin, premises)] = None
 
+    def _conflicts_about(self, individuals: Iterable[str]) -> list[Merge]:
+        """Return the conflicts that mention individuals under one of their names."""
+        if not self.conflicts:
+            return []
+        members = self.equality.members
+        return self.conflicts.mentioning(
+            name for one in individuals for name in (one, *members.get(one, ()))
+        )
+
     def _withdraw_conflict(self, merge: Merge, again: bool = True) -> None:
-        del self.conflicts[merge]
+        self.conflicts.discard(merge)
         self._overdeleted.append((self._nothing, self.equality.find(merge.first)))
         if again:
             self._requests[merge] = None
 
     def _conflict_supports(self, x: str) -> Iterator[Premises]:
         find = self.equality.find
-        for merge in self.conflicts:
+        for merge in self._conflicts_about((x,)):
             if find(merge.first) == x:
                 different = (self.program.different, x, find(merge.second))
                 yield ((self.program.same, merge.first, merge.second), different)
 
     def _same_supports(self, first: str, second: str) -> Iterator[Premises]:
-        for merge in self.conflicts:
-            if (merge.first, merge.second) == (first, second):
-                yield tuple(map(self.current, merge.premises))
+        for merge in self.conflicts.between(first, second):
+            yield tuple(map(self.current, merge.premises))
 
     def _state_same(self, axiom: SameIndividual) -> None:
         first, *others = sorted(axiom.individuals)
@@ -385,7 +390,7 @@ class Engine:
     def _run_requests(self) -> None:
         pending = tuple(self._requests)
         self._requests.clear()
-        equality = self.equality
+        equality, merged = self.equality, False
         for merge in pending:
             origin = merge.origin
             if isinstance(origin, SameIndividual) and origin not in self.told.axioms:
@@ -394,10 +399,13 @@ class Engine:
             if x == y or not all(self._holds(self.current(fact)) for fact in merge.premises):
                 continue
             if self.difference.different(x, y):
-                self.conflicts[merge] = None
+                self.conflicts.add(merge)
                 self._queue.append((self._nothing, x))
                 continue
             self._merge(merge)
+            merged = True
+        if merged:
+            self._after_merges()
 
     def _merge(self, merge: Merge) -> None:
         self.renamed = True
@@ -411,6 +419,10 @@ class Engine:
             if self.changed is not None:
                 self.changed.setdefault(fact, fact not in self.asserted)
             self._queue.append(fact)
+        self._touched[kept] = None
+
+    def _after_merges(self) -> None:
+        """Put the queued facts under the names of the representatives."""
         # Nothing ceased to hold: what the removal hooks named holds of the representative.
         self._overdeleted.clear()
         for place, fact in enumerate(self._queue):
@@ -427,7 +439,6 @@ class Engine:
             index.settle()
         for run in self._network.naming:
             run()
-        self._touched[kept] = None
 
     def _split(self, representative: str, fresh: list[Fact]) -> None:
         """Take away everything about a class of individuals, and state its members' assertions
@@ -446,10 +457,9 @@ class Engine:
             self._take(fact)
         members = self.equality.split(representative)
         self.difference.split(representative)
-        for merge in tuple(self.conflicts):
-            if not members.isdisjoint((merge.first, merge.second)):
-                self._overdeleted.append((self._nothing, representative))
-                self._withdraw_conflict(merge)
+        for merge in self.conflicts.mentioning(members):
+            self._overdeleted.append((self._nothing, representative))
+            self._withdraw_conflict(merge)
         self.proofs.reset()
         axioms: dict[Axiom, None] = {}
         for member in sorted(members):
@@ -461,7 +471,7 @@ class Engine:
             if isinstance(axiom, SameIndividual):
                 self._state_same(axiom)
             stated = self.fact_of(axiom)
-            if stated is not None and not members.isdisjoint(_individuals_in(stated)):
+            if stated is not None and not members.isdisjoint(individuals_in(stated)):
                 self._assert(stated)
             if self.program.uses_thing:
                 for individual in individuals_of(axiom) & members:
@@ -489,9 +499,10 @@ class Engine:
         for axiom in removed:
             if equality.members:
                 splitting.update(self._classes_of(axiom))
-            if self.conflicts and isinstance(axiom, SameIndividual):
-                for merge in [merge for merge in self.conflicts if merge.origin == axiom]:
-                    self._withdraw_conflict(merge, again=False)
+            if isinstance(axiom, SameIndividual):
+                for merge in self.conflicts.mentioning(axiom.individuals):
+                    if merge.origin == axiom:
+                        self._withdraw_conflict(merge, again=False)
             fact = self.fact_of(axiom)
             if fact is not None:
                 self._unassert(fact)
@@ -765,10 +776,6 @@ class Engine:
 def individuals_of(axiom: Axiom) -> set[str]:
     """Return the individuals that an axiom mentions."""
     return {name for kind, name in entities_of(axiom) if kind == 'individual'}
-
-
-def _individuals_in(fact: Fact) -> tuple[str, ...]:
-    return fact[1:2] if fact[0].kind == 'data' else fact[1:]
 
 
 def is_public(predicate: Predicate) -> bool:

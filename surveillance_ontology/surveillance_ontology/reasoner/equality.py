@@ -1,4 +1,4 @@
-"""Which individuals are known to be the same, and since when that is justified by what."""
+"""Which individuals are known to be the same or would have to be, and what justifies that."""
 
 from __future__ import annotations
 
@@ -17,6 +17,52 @@ class Merge:
     second: str
     origin: Axiom | None
     premises: Premises
+
+
+def individuals_in(fact: Fact) -> tuple[str, ...]:
+    """Return the individuals that a fact is about."""
+    return fact[1:2] if fact[0].kind == 'data' else fact[1:]
+
+
+class Conflicts:
+    """Merges of individuals that are known to be different, found by the individuals that they
+    mention.
+    """
+
+    def __init__(self) -> None:
+        self._mentioning: dict[str, dict[Merge, None]] = {}
+
+    def __bool__(self) -> bool:
+        return bool(self._mentioning)
+
+    def add(self, merge: Merge) -> None:
+        """Take up a merge."""
+        for name in self._mentioned(merge):
+            self._mentioning.setdefault(name, {})[merge] = None
+
+    def discard(self, merge: Merge) -> None:
+        """Forget a merge."""
+        for name in self._mentioned(merge):
+            merges = self._mentioning[name]
+            del merges[merge]
+            if not merges:
+                del self._mentioning[name]
+
+    def mentioning(self, names: Iterable[str]) -> list[Merge]:
+        """Return the merges of these individuals and those justified by facts about them."""
+        found: dict[Merge, None] = {}
+        for name in names:
+            found.update(self._mentioning.get(name, {}))
+        return list(found)
+
+    def between(self, first: str, second: str) -> list[Merge]:
+        """Return the merges of two individuals, as the merges name them."""
+        merges = self._mentioning.get(first, ())
+        return [merge for merge in merges if (merge.first, merge.second) == (first, second)]
+
+    @staticmethod
+    def _mentioned(merge: Merge) -> set[str]:
+        return {merge.first, merge.second}.union(*map(individuals_in, merge.premises))
 
 
 class Equality:
@@ -78,7 +124,7 @@ class Equality:
         mentions.
         """
         found: set[str] = set()
-        for argument in fact[1:2] if fact[0].kind == 'data' else fact[1:]:
+        for argument in individuals_in(fact):
             if argument in self.members:
                 found.add(argument)
         if self._used:

@@ -165,8 +165,7 @@ class Reasons:
         if predicate is self._engine.program.different and not proof.premises:
             return self._stated_difference(proof.fact, text)
         if predicate is self._engine.program.same:
-            conflicts = self._engine.conflicts
-            return self._merge(next(m for m in conflicts if (m.first, m.second) == proof.fact[1:]))
+            return self._merge(self._engine.conflicts.between(*proof.fact[1:])[0])
         premises: list[Explanation] = []
         for premise in proof.premises:
             premises += self._premise(premise)

@@ -22,12 +22,19 @@ from surveillance_ontology.owl.axioms import (
     EquivalentClasses,
     FunctionalObjectProperty,
     ObjectPropertyRange,
+    Rule,
     SameIndividual,
     SubDataPropertyOf,
     SymmetricObjectProperty,
     TransitiveObjectProperty,
 )
-from surveillance_ontology.owl.expressions import Literal, ObjectMaxCardinality
+from surveillance_ontology.owl.expressions import (
+    Literal,
+    ObjectMaxCardinality,
+    ObjectPropertyAtom,
+    SameIndividualAtom,
+    Variable,
+)
 from surveillance_ontology.reasoner import engine
 from surveillance_ontology.reasoner.datatypes import value_of
 from tests.ontology.reasoner.patrol_map import (
@@ -225,6 +232,38 @@ def test_a_contradiction_with_two_reasons_outlives_one() -> None:
         assert not kb.reason()
     kb.remove(different(['j', 'k', 'm']))
     assert kb.reason()
+
+
+@pytest.mark.parametrize(('stated', 'other'), [('a', 'b'), ('b', 'a')])
+def test_a_contradiction_goes_when_its_reason_has_been_renamed(stated: str, other: str) -> None:
+    x, y, z = (Variable(f'urn:swrl#{name}') for name in 'xyz')
+    body = (ObjectPropertyAtom(n('p'), x, y), ObjectPropertyAtom(n('q'), x, z))
+    reason = link('p', stated, 'c')
+    kb = KnowledgeBase(IRI, [Rule(body, (SameIndividualAtom(y, z),)), different(['c', 'd'])])
+    for axiom in (reason, link('q', stated, 'd'), SameIndividual(frozenset((n('a'), n('b'))))):
+        kb.add(axiom)
+        kb.reason()
+    assert not kb.consistent
+    kb.change([link('p', other, 'c')], [reason])
+    assert not kb.reason()
+    kb.remove(link('p', other, 'c'))
+    assert kb.reason()
+
+
+def test_many_individuals_become_the_same_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    renamed: list[object] = []
+    current = engine.Engine.current
+
+    def counted(self: engine.Engine, fact: engine.Fact) -> engine.Fact:
+        renamed.append(fact)
+        return current(self, fact)
+
+    monkeypatch.setattr(engine.Engine, 'current', counted)
+    links = [link('p', f's{one}', f'{end}{one}') for one in range(300) for end in 'xy']
+    kb = KnowledgeBase(IRI, [FunctionalObjectProperty(n('p')), *links])
+    assert kb.reason()
+    assert kb.holds(SameIndividual(frozenset((n('x7'), n('y7')))))
+    assert len(renamed) <= 20 * len(links)
 
 
 def test_facts_that_support_each_other_go_together() -> None:
