@@ -100,7 +100,7 @@ class MissionRecorder(PatrolNode):
     def _repair(self) -> None:
         """Mend what earlier runs left torn."""
         own = self._bag.folder.resolve()
-        for folder in sorted(own.parents[1].glob(f'*/{RECORDING}')):
+        for folder in sorted(own.parent.parent.glob(f'*/{RECORDING}')):
             if self.stopping.is_set():
                 return
             if folder.resolve() == own:
@@ -143,7 +143,7 @@ class MissionRecorder(PatrolNode):
             self._images.attend()
         if now >= self._next_prune and self._bag.folder.name == RECORDING:
             self._next_prune = now + PRUNE_PERIOD
-            prune(self._bag.folder.resolve().parents[1], self._keep * 1e9)
+            prune(self._bag.folder.resolve().parent.parent, self._keep * 1e9)
 
     def _end(self) -> None:
         self._drain()
