@@ -13,7 +13,7 @@ IJCAR 2010.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from itertools import combinations
 from typing import Any, NamedTuple, TypeAlias
 
@@ -498,15 +498,17 @@ class CaseSearch:
         model = self.model
         found: dict[int, int] = {}
         seen: dict[Any, int] = {}
+        cores = {y: None for y in self._chosen if y not in self._put_off}
         for x in model.alive():
             parent = model.parent[x]
             if parent is None:
                 continue
             if parent in found:
                 found[x] = found[parent]
+                cores.pop(x, None)
                 continue
             if x in self._put_off:
-                core = self._core_blocker(x, found)
+                core = self._core_blocker(x, found, cores)
                 if core is not None:
                     found[x] = core
                 continue
@@ -519,6 +521,7 @@ class CaseSearch:
             first = seen.setdefault(sign, x)
             if first != x:
                 found[x] = first
+                cores.pop(x, None)
         return found
 
     def _needs_no_choice(self, x: int) -> bool:
@@ -526,16 +529,16 @@ class CaseSearch:
         if self.rules.has_inverse:
             return False
         is_known = x in self._put_off or self.model.parent[x] in self.blocked
-        return is_known or self._core_blocker(x, self.blocked) is not None
+        return is_known or self._core_blocker(x, self.blocked, self._chosen) is not None
 
-    def _core_blocker(self, x: int, blocked: dict[int, int]) -> int | None:
-        """Return an earlier individual that is all that x is, and that x may be."""
+    def _core_blocker(self, x: int, blocked: dict[int, int], cores: Iterable[int]) -> int | None:
+        """Return an earlier individual, of these, that is all that x is, and that x may be."""
         model, put_off, nominals = self.model, self._put_off, self.rules.nominals.keys()
         own, known = model.labels[x].keys(), self.blocked.get(x)
         parent = model.parent[x]
         assert parent is not None
         unwanted, conditions = self._conditions(self._sign(parent), tuple(model.out[parent][x]))
-        for y in self._chosen if known is None else (known, *self._chosen):
+        for y in cores if known is None else (known, *cores):
             if y in blocked or y in put_off or y >= x or model.is_gone(y):
                 continue
             other = model.labels[y].keys()
