@@ -169,6 +169,22 @@ def test_what_stands_has_stood_as_long_on_the_side_that_is_seen_later(flat: Any)
     assert not memory.stay[beside].any()
 
 
+def test_who_stops_beside_what_stands_has_not_stood_there_as_long(flat: Any) -> None:
+    memory = ObstacleMemory(flat.grid, settle=30.0, gap=5.0)
+    pose = (1.0, 1.5, 0.0)
+    box = (2.5, 1.0, 0.2)
+    for moment in range(40):
+        memory.update(pose, flat.scan(pose, [box]), 1.0 * moment)
+    assert memory.stay.mean() > 0.5
+    for moment in range(40, 60):  # walks slowly up to the box and away from it
+        somebody = (2.5, 1.45 + 0.03 * abs(50 - moment), 0.2)
+        memory.update(pose, flat.scan(pose, [box, somebody]), 1.0 * moment)
+        theirs = memory.points[:, 1] > 1.3
+        assert theirs.sum() > 3
+        assert not memory.stay[theirs].any()
+    assert memory.stay.any()
+
+
 def test_obstacles_that_stay_unseen_are_forgotten_in_the_end(flat: Any) -> None:
     memory = ObstacleMemory(flat.grid, keep=10.0)
     pose = (1.0, 1.5, 0.0)

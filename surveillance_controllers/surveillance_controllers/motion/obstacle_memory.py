@@ -3,14 +3,15 @@
 A point counts when it lies well away from everything the map has occupied. It is forgotten when a
 ray goes through where it was, or when it has not been seen for a long time. It stays once it was
 seen to stand for longer than people rest; until then it may go away. Points beside each other are
-one thing: seen from another side, it has stood for as long.
+one thing: seen from another side, it has stood for as long. Where a ray went through in the
+meantime, somebody came who stands beside it.
 """
 
 from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,8 +23,7 @@ from surveillance_controllers.planning.grid_map import GridMap, distance_to
 _Cell = tuple[int, int]
 """Column and row."""
 _BESIDE = tuple(itertools.product(range(-2, 3), repeat=2))
-"""Steps to the cells that belong to the same thing, the cell itself included: rays that meet it far
-away leave gaps."""
+"""Steps to the cells of the same thing: rays that meet it far away leave gaps."""
 
 
 @dataclass(frozen=True)
@@ -64,6 +64,8 @@ class ObstacleMemory:
         self._settle = settle
         self._gap = gap
         self._seen: dict[_Cell, _Sight] = {}
+        # Of the cells beside what is seen: when a ray went through last, seconds.
+        self._free: dict[_Cell, float] = {}
         self.set_map(grid)
 
     def set_map(self, grid: GridMap) -> None:
@@ -131,18 +133,28 @@ class ObstacleMemory:
         if may_move is not None:
             new = new[~may_move(new)]
         for column, row in np.floor(new / self._cell).astype(int).tolist():
-            self._seen[column, row] = _Sight(self._stood_since(column, row, now), now)
+            cell = column, row
+            sight = self._seen.get(cell)
+            if sight is None:
+                for beside in _beside(cell):
+                    self._free.setdefault(beside, -math.inf)
+            if sight is not None and self._is_same(sight, now):
+                since = sight.since
+            else:
+                since = self._stood_since(cell, now)
+            self._seen[cell] = _Sight(since, now)
         return self._standing() != before
 
-    def _stood_since(self, column: int, row: int, now: float) -> float:
-        """Return since when the thing that is seen now in a cell has stood there, seconds."""
-        beside = (self._seen.get((column + right, row + up)) for right, up in _BESIDE)
-        known = (
-            sight.since
-            for sight in beside
-            if sight is not None and (now - sight.last <= self._gap or self._stays(sight))
-        )
-        return min(known, default=now)
+    def _is_same(self, sight: _Sight, now: float) -> bool:
+        """Tell whether what was seen then has certainly stood there until now."""
+        return now - sight.last <= self._gap or self._stays(sight)
+
+    def _stood_since(self, cell: _Cell, now: float) -> float:
+        """Return since when the thing that is now seen for the first time in a cell has stood
+        there, seconds."""
+        beside = (self._seen.get(each) for each in _beside(cell))
+        known = (each.since for each in beside if each is not None and self._is_same(each, now))
+        return max(min(known, default=now), self._free[cell])
 
     def _standing(self) -> dict[_Cell, bool]:
         return {cell: self._stays(sight) for cell, sight in self._seen.items()}
@@ -150,9 +162,8 @@ class ObstacleMemory:
     def _forget(self, pose: Pose, scan: Scan, now: float) -> None:
         if not self._seen:
             return
-        cells = list(self._seen)
         pose = composed(pose, scan.mount)
-        away = (np.array(cells, dtype=float) + 0.5) * self._cell - pose[:2]
+        away = (np.array(list(self._free), dtype=float) + 0.5) * self._cell - pose[:2]
         distance = np.hypot(away[:, 0], away[:, 1])
         bearing = np.arctan2(away[:, 1], away[:, 0]) - pose[2]
         count = len(scan.angles)
@@ -162,7 +173,19 @@ class ObstacleMemory:
         beyond = np.minimum(scan.ranges, scan.range_max)
         # The neighbours too: a thin obstacle between two rays is not gone.
         around = [beyond[np.clip(ray + offset, 0, count - 1)] for offset in (-1, 0, 1)]
-        gone = (ray < count) & (np.minimum.reduce(around) > distance + 2 * self._cell)
-        for cell, is_gone in zip(cells, gone, strict=True):
-            if is_gone or now - self._seen[cell].last > self._keep:
-                del self._seen[cell]
+        free = (ray < count) & (np.minimum.reduce(around) > distance + 2 * self._cell)
+        self._free |= {cell: now for cell in itertools.compress(self._free, free)}
+        kept = {
+            cell: sight
+            for cell, sight in self._seen.items()
+            if self._free[cell] < now and now - sight.last <= self._keep
+        }
+        if len(kept) < len(self._seen):
+            self._seen = kept
+            near = {beside for cell in kept for beside in _beside(cell)}
+            self._free = {cell: at for cell, at in self._free.items() if cell in near}
+
+
+def _beside(cell: _Cell) -> Iterator[_Cell]:
+    """Yield the cells that belong to the same thing, the cell itself included."""
+    return ((cell[0] + right, cell[1] + up) for right, up in _BESIDE)
