@@ -123,9 +123,9 @@ def test_nothing_can_be_patrolled_while_the_robots_place_is_unknown():
 class ScriptedCamera:
     """Shows given ids at each pose and scan."""
 
-    def __init__(self, survey, by_pose, by_scan=(), seconds=3.0):
+    def __init__(self, survey, by_pose, by_scan=(), seconds=3.0, rate=1.0):
         self.survey, self.by_pose, self.by_scan = survey, by_pose, list(by_scan)
-        self.time, self.seconds = 0.0, seconds
+        self.time, self.seconds, self.rate = 0.0, seconds, rate
         self.did = []
 
     def _show(self, ids):
@@ -149,7 +149,12 @@ def look(camera, deadline=30.0):
     said = []
     looking = InitialScan(deadline=deadline, dwell=0.5)
     report = looking.run(
-        camera, camera.survey.report, lambda: camera.time, said.append, lambda: False
+        camera,
+        camera.survey.report,
+        lambda: camera.time,
+        said.append,
+        lambda: False,
+        real=lambda: camera.time / camera.rate,
     )
     return report, said
 
@@ -179,10 +184,19 @@ def test_after_the_deadline_what_was_found_has_to_do():
 
 
 def test_the_deadline_does_not_end_the_first_look_all_around():
-    camera = ScriptedCamera(Survey('E'), {1: (11, 12)}, by_scan=[range(13, 17)], seconds=20.0)
+    found = {1: (11, 12)}, [range(13, 17)]
+    camera = ScriptedCamera(Survey('E'), *found, seconds=200.0, rate=10.0)
     report, _ = look(camera, deadline=45.0)
     assert rooms(report) == ['C1', 'C2', 'E', 'R1', 'R2', 'R3']
     assert camera.did == [1, 2, 3, 4, ('scan', 0.12, 0.3, 0.5), 'home']
+
+
+@pytest.mark.parametrize('rate', [1.0, 10.0])
+def test_an_arm_that_does_not_answer_holds_the_first_look_up_for_two_deadlines_at_most(rate):
+    camera = ScriptedCamera(Survey('E'), {1: (11, 12)}, seconds=30.0 * rate, rate=rate)
+    report, _ = look(camera, deadline=30.0)
+    assert report.places
+    assert camera.did == [1, 2, 'home']
 
 
 def test_without_anything_to_patrol_looking_does_not_end_at_the_deadline():

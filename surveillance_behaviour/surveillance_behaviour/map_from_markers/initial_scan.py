@@ -5,11 +5,13 @@ up and down and a longer rest than the one before, so that a marker missed at th
 at a flat angle or in poor light has another chance from a slightly different view.
 
 The deadline counts once the camera has looked all around: how long that takes is the matter of the
-arm, the detector and the rate of time.
+arm, the detector and the rate of time. An arm that does not answer must not hold it up for long:
+the first look takes at most two deadlines of real time, whatever the rate.
 """
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
@@ -19,6 +21,8 @@ from surveillance_runtime.parameters import parameter
 
 _OVERLAP = 0.12
 _REACH = 0.3
+_FIRST_LOOK = 2.0
+"""Deadlines of real time that the first look all around takes at most."""
 
 
 class Camera(Protocol):
@@ -76,6 +80,7 @@ class InitialScan:
         stopping: Callable[[], bool],
         progress: Progress | None = None,
         keep: Callable[[], None] = lambda: None,
+        real: Callable[[], float] = time.monotonic,
     ) -> SurveyReport:
         """Look until everything fits, the deadline has passed and there is something to patrol.
 
@@ -87,9 +92,10 @@ class InitialScan:
             stopping: Tells whether to give up.
             progress: How far it has come before; kept up to date.
             keep: Called whenever there is progress worth keeping.
+            real: Seconds of real time.
         """
         progress = progress or Progress()
-        begin = now() - progress.seconds
+        begin, real_begin = now() - progress.seconds, real()
         looked_around = False
 
         def late() -> bool:
@@ -102,7 +108,8 @@ class InitialScan:
                 progress.poses += [pose] if pose is not None else []
                 progress.seconds = now() - begin
                 keep()
-            will_do = looked_around and late() and bool(report.places)
+            is_long = looked_around or real() - real_begin >= _FIRST_LOOK * self.deadline
+            will_do = is_long and late() and bool(report.places)
             return stopping() or report.complete or will_do
 
         begun_before = bool(progress.poses)
