@@ -4,9 +4,8 @@ rclpy's `SingleThreadedExecutor` gathers every entity of every node anew before 
 a task and two coroutines for each callback: half of the processor time of a process with all the
 patrol's nodes (230 entities, 30 waits for each simulated second). Here the entities are gathered
 when one came or went, and a callback is simply called. While messages and timers alone keep the
-process busy, the rest (most of the entities) is looked at in every tenth wait, and the events of
-publishers and subscriptions in every hundredth; the waits between look only at what had a message
-lately.
+process busy, the rest (most of the entities) is looked at every 10 ms, and the events of publishers
+and subscriptions every 100 ms; the waits between look only at what had a message lately.
 
 rclpy's own `EventsExecutor` waits for no set at all, but in Jazzy it leaves asynchronous service
 callbacks unanswered (rclpy 1613), asks a waiting coroutine again without pause, and may end the
@@ -16,6 +15,7 @@ process where a publisher with event callbacks is destroyed (rclpy 1644).
 from __future__ import annotations
 
 import inspect
+import time
 from collections import deque
 from collections.abc import Callable, Container, Iterator
 from contextlib import ExitStack
@@ -37,12 +37,13 @@ from rclpy.waitable import NumberOfEntities
 
 _MOST_LISTS = 30
 """Wait lists that are kept: one for each set of callback groups that coroutines held at once."""
-_WORK_PERIOD = 10
-"""Of so many waits that find something at once, one looks at more than the messages and timers that
-keep the process busy."""
-_EVENTS_PERIOD = 100
-"""Of so many, one looks at the events of publishers and subscriptions, too. Then it is chosen anew
-what keeps the process busy."""
+_WORK_PERIOD = 0.01
+"""Seconds of real time between two looks at more than the messages and timers that keep the process
+busy."""
+_EVENTS_PERIOD = 0.1
+"""Seconds between two looks at the events of publishers and subscriptions, too."""
+_CHOICE_PERIOD = 1.0
+"""Seconds after which it is chosen anew what keeps the process busy."""
 _BUSY_KINDS = ('timer', 'subscription')
 _KINDS = ('timer', 'subscription', 'guard_condition', 'client', 'service')
 
@@ -156,7 +157,7 @@ class PatrolExecutor(SingleThreadedExecutor):  # type: ignore[misc]  # rclpy has
         self._wait_lists: dict[
             frozenset[CallbackGroup], tuple[_WaitList, _WaitList, _WaitList]
         ] = {}
-        self._busy_waits = 0
+        self._work_due = self._events_due = self._choice_due = 0.0
         self._lately_called: set[Any] = set()
         self._changed = True
         self._take: dict[str, Callable[[Any], Any]] = {
@@ -219,18 +220,23 @@ class PatrolExecutor(SingleThreadedExecutor):  # type: ignore[misc]  # rclpy has
                 self._close_wait_lists()
             self._wait_lists[held] = self._new_wait_lists()
         busy, work, everything = self._wait_lists[held]
-        self._busy_waits = (self._busy_waits + 1) % _EVENTS_PERIOD
+        now = time.monotonic()
         try:
-            if self._busy_waits:
-                self._ready.extend((busy if self._busy_waits % _WORK_PERIOD else work).wait(0))
-            else:
+            if now >= self._choice_due:
                 busy.look_only_at(self._lately_called)
                 self._lately_called.clear()
+                self._choice_due = now + _CHOICE_PERIOD
+            if now < self._work_due:
+                self._ready.extend(busy.wait(0))
+            elif now < self._events_due:
+                self._ready.extend(work.wait(0))
+                self._work_due = now + _WORK_PERIOD
             if not self._ready:
-                self._busy_waits = 0
                 for kind, entity in everything.wait(timeout):
                     if entity.callback_group is not None:  # as the executor's own guards have
                         self._ready.append((kind, entity))
+                now = time.monotonic()
+                self._work_due, self._events_due = now + _WORK_PERIOD, now + _EVENTS_PERIOD
         except _rclpy.InvalidHandle:
             self._changed = True  # another thread has just destroyed something
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Iterator
+from types import SimpleNamespace
 
 import pytest
 import rclpy
@@ -273,6 +274,28 @@ def test_a_service_answers_while_messages_keep_the_executor_busy(spun: Spun) -> 
     echo.publish(Int32())
     answer = caller.call_async(Trigger.Request())
     spun.until(answer.done)
+
+
+def test_slow_callbacks_delay_what_is_rarely_called_by_one_of_them(
+    spun: Spun, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    calls = 0
+    asked, late = 0, list[int]()
+    now = [0.0]
+    monkeypatch.setattr(executor, 'time', SimpleNamespace(monotonic=lambda: now[0]))
+    guard = spun.nodes[1].create_guard_condition(lambda: late.append(calls - asked))
+
+    def slow() -> None:
+        nonlocal calls, asked
+        calls += 1
+        now[0] += 0.02
+        if calls % 33 == 0:
+            asked = calls
+            guard.trigger()
+
+    spun.nodes[0].create_timer(0.0, slow)
+    spun.until(lambda: len(late) == 20)
+    assert max(late) <= 1
 
 
 def test_events_are_told_while_messages_keep_the_executor_busy(spun: Spun) -> None:
