@@ -8,6 +8,7 @@ running goal can be cancelled), and only then takes ROS down.
 from __future__ import annotations
 
 import contextlib
+import faulthandler
 import os
 import signal
 import sys
@@ -42,6 +43,8 @@ from surveillance_runtime.parameters import ParameterError
 STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM)
 EXIT_CANNOT_START = 2
 """The exit code of a node whose configuration does not let it start."""
+END_SECONDS = 30.0
+"""Time for the threads and ROS to end once the nodes have stopped."""
 
 
 def run_node(factory: Callable[[], PatrolNode], args: Sequence[str] | None = None) -> int:
@@ -64,7 +67,8 @@ def run_nodes(
     """Run several nodes in this process on one executor; otherwise as `run_node`.
 
     Where threads have not ended in time, this ends the process: the interpreter would take apart
-    what they use, and die of a signal.
+    what they use, and die of a signal. Where ROS does not end in `END_SECONDS`, the process says on
+    stderr what each thread waits for, and ends with exit code 1.
     """
     code = _run_nodes(factories, args)
     if any(thread.daemon for thread in threading.enumerate()):
@@ -118,6 +122,8 @@ def _run_nodes(factories: Sequence[Callable[[], PatrolNode]], args: Sequence[str
         give_arguments(None)
         for node in reversed(nodes):
             node.stop()
+        # Its watchdog needs neither the interpreter nor a lock; it tells where each thread hangs.
+        faulthandler.dump_traceback_later(END_SECONDS, exit=True, file=2)
         if diagnostics is not None:
             diagnostics.stop()
         # What a callback that has not ended uses is not taken away from under it.
@@ -125,6 +131,7 @@ def _run_nodes(factories: Sequence[Callable[[], PatrolNode]], args: Sequence[str
             for node in reversed(nodes):
                 node.destroy_node()
             rclpy.try_shutdown()
+        faulthandler.cancel_dump_traceback_later()
     if spinner.error is not None:
         traceback.print_exception(spinner.error)
         code = 1

@@ -152,6 +152,30 @@ def test_a_process_whose_threads_do_not_end_ends_all_the_same() -> None:
     assert 'one, two did not end in 0.1 s' in done.stderr
 
 
+HANGING = """
+import sys, threading
+from surveillance_runtime import node, process
+
+process.END_SECONDS = 0.5
+process.DiagnosticsThread.stop = lambda self: threading.Event().wait()
+
+class Hanging(node.PatrolNode):
+    def __init__(self):
+        super().__init__('hanging')
+        self.create_timer(0.0, self.finish)
+
+sys.exit(process.run_node(Hanging, []))
+"""
+
+
+def test_a_process_that_ros_does_not_let_end_ends_and_tells_where_it_hung() -> None:
+    done = subprocess.run(
+        [sys.executable, '-c', HANGING], capture_output=True, text=True, timeout=60
+    )
+    assert done.returncode == 1
+    assert 'in _run_nodes' in done.stderr
+
+
 LEFT_BEHIND = """
 import warnings
 warnings.simplefilter('error')
