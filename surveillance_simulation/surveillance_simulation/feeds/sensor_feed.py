@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 from builtin_interfaces.msg import Time
@@ -28,10 +27,6 @@ except ImportError:  # the wheels on PyPI hold no tf2_msgs; an installed ROS 2 d
 
 SENSOR_DEPTH = 5
 """Sensors offer reliable delivery, so that subscribers of either kind are served (REP-2003)."""
-ARM_RESTS_AFTER = 1.0
-"""Joints are reported with each measurement until the arm has stood for so long, seconds."""
-REST_PERIOD = 0.5
-"""Time between two reports of joints that rest, seconds."""
 
 
 @dataclass(frozen=True)
@@ -63,7 +58,6 @@ class SensorFeed:
         self._map = node.create_publisher(OccupancyGrid, 'map', STATE_QOS)
         self._tf = None if TFMessage is None else node.create_publisher(TFMessage, 'tf', 10)
         self._told_collisions = -1
-        self._rest_told = -math.inf
         options = node.declare_fields(PublishedOptions())
         grid = occupancy_grid.draw(robot.world.plan, options.map_resolution)
         self._map.publish(conversions.grid_to_ros(grid, 'map', Time()))
@@ -93,24 +87,17 @@ class SensorFeed:
                 conversions.scan_to_ros(ranges, self._robot.lidar, 'base_link', stamp)
             )
         if self._joints.get_subscription_count():
-            self._publish_joints(stamp)
+            arm, now = self._robot.arm, self._robot.time
+            self._joints.publish(
+                conversions.joints_to_ros(
+                    arm.arm.names, arm.positions(now), arm.velocities(now), stamp
+                )
+            )
         if self._truth.get_subscription_count():
             self._truth.publish(conversions.stamped_pose_to_ros(base.pose, 'map', stamp))
         if base.collisions != self._told_collisions:
             self._told_collisions = base.collisions
             self._collisions.publish(UInt32(data=base.collisions))
-
-    def _publish_joints(self, stamp: Time) -> None:
-        arm, now = self._robot.arm, self._robot.time
-        if arm.is_moving(now - ARM_RESTS_AFTER):
-            self._rest_told = -math.inf
-        elif 0.0 <= now - self._rest_told < REST_PERIOD - 1e-9:
-            return
-        else:
-            self._rest_told = now
-        self._joints.publish(
-            conversions.joints_to_ros(arm.arm.names, arm.positions(now), arm.velocities(now), stamp)
-        )
 
     def _announce_pose(self, node: PatrolNode) -> None:
         def on_match(matched: object) -> None:
