@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import math
 from pathlib import Path
@@ -28,6 +29,7 @@ from surveillance_interfaces.srv import (
     SetMarker,
     SlipOdometry,
 )
+from surveillance_runtime.conversions import seconds_of
 from surveillance_runtime.parameters import ParameterError
 from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
 from surveillance_simulation.simulator_node import Simulator
@@ -177,8 +179,10 @@ def test_a_trajectory_it_cannot_follow_leaves_the_arm(graph: Any) -> None:
     graph.until(lambda: errors)
     assert errors == ['arm/joint_trajectory: point 1: arm_pan at 9 rad: expected -3.2 to 3.2']
     count = len(joints)
-    graph.until(lambda: len(joints) > count)
+    graph.until(lambda: len(joints) > count + 15)
     assert joints[-1].position[0] == 0.0
+    times = [seconds_of(each.header.stamp) for each in joints[-5:]]
+    assert min(b - a for a, b in itertools.pairwise(times)) == pytest.approx(0.1)
 
 
 def test_doors_and_obstacles_are_seen_by_the_lidar(graph: Any) -> None:
