@@ -174,7 +174,7 @@ class ObstacleMemory:
         # The neighbours too: a thin obstacle between two rays is not gone.
         around = [beyond[np.clip(ray + offset, 0, count - 1)] for offset in (-1, 0, 1)]
         free = (ray < count) & (np.minimum.reduce(around) > distance + 2 * self._cell)
-        self._free |= {cell: now for cell in itertools.compress(self._free, free)}
+        self._free |= dict.fromkeys(itertools.compress(self._free, free), now)
         kept = {
             cell: sight
             for cell, sight in self._seen.items()
