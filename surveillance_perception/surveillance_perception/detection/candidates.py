@@ -126,15 +126,17 @@ def quads_around(
         masks: Images (height, width), blobs are not 0, and by how much each is smaller than the
             image itself. A blob with the same upright box as one before is left out.
         min_length: Longer side in pixels of the smallest blob's upright box.
-        limit: Once so many blobs were looked at, only those that are nearly quadrilaterals are,
-            and no further mask.
+        limit: Once so many blobs were looked at, in the first mask or in all others, only those
+            that are nearly quadrilaterals are; after the others, no further mask.
 
     Returns:
         (n, 4, 2) corners in pixels, clockwise as seen.
     """
     found: list[Quads] = []
     seen: set[tuple[int, ...]] = set()
-    for mask, scale in masks:
+    for order, (mask, scale) in enumerate(masks):
+        if order == 1:
+            seen.clear()
         if len(seen) > limit:
             break
         blobs = _blobs_in(mask, min_length / scale, _LEAST_WIDTH)

@@ -10,8 +10,8 @@ import numpy.typing as npt
 
 from surveillance_perception.detection.image_sampling import Grey
 
-# fewer pixels of every fourth row than the smallest marker has are not taken for black and white
-_FEW_PIXELS = 4
+# fewer pixels than the smallest marker has are not taken for the image's black and white
+_FEW_PIXELS = 16
 _FAINT_RANGE = 160
 _STRETCHED = (25.0, 230.0)
 _LARGEST_GAIN = 16.0
@@ -59,9 +59,8 @@ def prepare(image: npt.NDArray[np.uint8]) -> PreparedImage:
 
 def _stretched(grey: Grey) -> Grey:
     """Return a faint image, dark or washed out, with nearly the full range of grey levels."""
-    rows = grey[::4]
-    darker = np.cumsum(cv2.calcHist([rows], [0], None, [256], [0, 256]), dtype=float)
-    dark, bright = np.searchsorted(darker, (_FEW_PIXELS, rows.size - _FEW_PIXELS)).tolist()
+    darker = np.cumsum(cv2.calcHist([grey], [0], None, [256], [0, 256]), dtype=float)
+    dark, bright = np.searchsorted(darker, (_FEW_PIXELS, grey.size - _FEW_PIXELS)).tolist()
     if bright - dark > _FAINT_RANGE:
         return grey
     gain = min((_STRETCHED[1] - _STRETCHED[0]) / max(bright - dark, 1), _LARGEST_GAIN)
