@@ -71,15 +71,18 @@ class Heartbeats:
 
     Args:
         now: Steady time, seconds.
+
+    Attributes:
+        begun: Whether the process came through its start: there was a heartbeat.
     """
 
     def __init__(self, now: float) -> None:
-        self._beats = 0
+        self.begun = False
         self.excuse(now)
 
     def beat(self, now: float) -> None:
         """Note a heartbeat."""
-        self._beats += 1
+        self.begun = True
         self.excuse(now)
 
     def excuse(self, now: float) -> None:
@@ -99,7 +102,7 @@ class Heartbeats:
             return ''
         if look.state == 'T':
             return f'was stopped {quiet:.1f} s ago'
-        if not self._beats:
+        if not self.begun:
             return f'did not come up in {SILENT_START:g} s' if quiet >= SILENT_START else ''
         idle = self._activity.idle(now, look)
         stuck = quiet >= STUCK_AFTER and idle >= IDLE_AFTER

@@ -19,6 +19,7 @@ from functools import partial
 
 from launcher.log_merge import MergedLog
 from launcher.process_watch import IDLE_AFTER, Activity, Heartbeats, look_at
+from launcher.restarts import PAUSES, Restarts
 from launcher.service import notify
 from surveillance_runtime.launch_protocol import (
     FINISHED,
@@ -29,12 +30,8 @@ from surveillance_runtime.launch_protocol import (
     UP,
 )
 
-PAUSES = (0.0, 0.5, 1.0, 2.0, 4.0, 8.0, 15.0, 30.0)
-"""Seconds before the first, second, ... restart in a row; the last one is kept."""
 START_WITHIN = 1.5
 """Seconds after which a process that did not say that it is up no longer holds the next one up."""
-STEADY_AFTER = 20.0
-"""A process that ran this long, in seconds, starts again from the first pause."""
 STOP_LEADERS_WITHIN = 1.2
 """Seconds that the processes which use the others have before those are told to stop as well."""
 STOP_WITHIN, STOP_AT_MOST = 2.5, 12.0
@@ -46,8 +43,6 @@ TICK = 0.1
 """Seconds that a round of the loop takes at most."""
 LOOK_PERIOD = 0.5
 """Seconds between two looks at the heartbeats and the memory of the processes."""
-TROUBLE_AFTER = 5
-"""Deaths in a row after which somebody is called."""
 EXIT_UNUSABLE = 2
 """The exit code with which a node says that its configuration does not let it start."""
 _LONGEST_LINE = 64 * 1024
@@ -82,11 +77,11 @@ class Child:
     """A program's present process and its history."""
 
     program: Program
+    restarts: Restarts
     process: subprocess.Popen[bytes] | None = None
     started: float = 0.0
     starts: int = 0
     restart_at: float | None = None
-    deaths: int = 0
     told_to_stop: bool = False
     killed: bool = False
     coming_up: bool = False
@@ -110,7 +105,7 @@ class Supervisor:
     Args:
         programs: in start order.
         log: where their output goes.
-        pauses: seconds before a restart, see `PAUSES`.
+        pauses: seconds before a restart, see `restarts.PAUSES`.
         at_once: how many may come up at the same time; default: one more than there are
             processors, for each waits at times.
         on_trouble: called with one line when a program dies again and again.
@@ -127,11 +122,10 @@ class Supervisor:
         at_once: int | None = None,
         on_trouble: Callable[[str], None] = lambda _text: None,
     ) -> None:
-        self.children = {program.name: Child(program) for program in programs}
+        self.children = {program.name: Child(program, Restarts(pauses)) for program in programs}
         self._to_start: list[Child] = []
         self._at_once = at_once or (os.cpu_count() or 1) + 1
         self._log = log
-        self._pauses = tuple(pauses)
         self._on_trouble = on_trouble
         self._look_at = 0.0
         self._selector = selectors.DefaultSelector()
@@ -305,8 +299,8 @@ class Supervisor:
             code = process.wait()
             self._close(child, process)
             child.process = None
-            child.heartbeats = None
             self._after_death(child, code)
+            child.heartbeats = None
 
     def _close(self, child: Child, process: subprocess.Popen[bytes]) -> None:
         """Take what a dead process still printed, then let its pipes go."""
@@ -324,7 +318,6 @@ class Supervisor:
 
     def _after_death(self, child: Child, code: int) -> None:
         name = child.program.name
-        lived = time.monotonic() - child.started
         if self._stopping_since is not None:
             if code not in (0, -signal.SIGTERM) and not child.killed:
                 self._log.warn(f'{name} ended with {describe_exit(code)}')
@@ -332,18 +325,19 @@ class Supervisor:
         if child.finished:
             self._log.say(f'{name} has ended by itself')
             return
-        if code == EXIT_UNUSABLE and not child.deaths:
+        if code == EXIT_UNUSABLE and child.starts == 1:
             self._log.error(f'{name} cannot start as it is configured: stopping')
             self.stop(EXIT_UNUSABLE)
             return
-        child.deaths = 1 if lived >= STEADY_AFTER else child.deaths + 1
-        pause = self._pauses[min(child.deaths, len(self._pauses)) - 1]
-        child.restart_at = time.monotonic() + pause
+        now = time.monotonic()
+        worked = child.heartbeats is not None and child.heartbeats.begun
+        pause = child.restarts.died(now, now - child.started, worked=worked)
+        child.restart_at = now + pause
         why = child.ended_for or describe_exit(code)
         when = f' in {pause:g} s' if pause else ''
         self._log.warn(f'{name} died ({why}): starting it again{when}')
-        if child.deaths == TROUBLE_AFTER:
-            text = f'{name} died {child.deaths} times in a row, last: {why}'
+        if trouble := child.restarts.trouble(now):
+            text = f'{name} {trouble}, last: {why}'
             self._log.error(f'{text}: somebody should have a look')
             self._on_trouble(text)
 
