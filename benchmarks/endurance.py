@@ -337,9 +337,12 @@ def run(
         except KeyboardInterrupt:
             print('ended early')
         finally:
+            ended = watch.now
             watch.close()
             stack.close()
-        return watch, trouble, summarize(read_all(record))
+        # The drive that the end of the run cuts off has neither arrived nor failed.
+        events = (event for event in read_all(record) if event.time <= ended)
+        return watch, trouble, summarize(events)
 
 
 def _patrol(
