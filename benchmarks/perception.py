@@ -39,19 +39,18 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from benchmarks.backdrops import BACKDROPS, backdrop_of
 from benchmarks.photographs import AS_TAKEN, VARIATIONS, Photograph, photographs_in
 from surveillance_perception.detection.camera_model import CameraModel
 from surveillance_perception.detection.detector import DetectorSettings, MarkerDetector
 from surveillance_perception.detection.dictionaries import dictionary_named
 from surveillance_perception.detection.preprocessing import grey_of
 from surveillance_perception.testing.marker_scene import (
-    BACKDROPS,
     Degradation,
     Glare,
     ImageArray,
     Panel,
     Shadow,
-    backdrop_of,
     corners_in_image,
     image_of,
 )
@@ -516,7 +515,7 @@ def print_node(count: int) -> None:
 
 def print_fuzz(count: int) -> None:
     """Send damaged messages through conversions and detector; whatever escapes ends the program."""
-    from surveillance_perception.testing.damaged_messages import damaged, taken
+    from benchmarks.damaged_messages import damaged, taken
 
     generator = np.random.default_rng(6)
     detector = MarkerDetector()

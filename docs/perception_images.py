@@ -10,9 +10,12 @@ from __future__ import annotations
 
 import math
 import queue
+import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
+
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 import cv2
 import numpy as np
@@ -22,6 +25,7 @@ import yaml
 from rclpy.parameter import Parameter
 from sensor_msgs.msg import Image
 
+from benchmarks.backdrops import backdrop_of
 from surveillance_fsm.ros import ServiceCaller
 from surveillance_interfaces.srv import MarkerRoutine, PointCamera
 from surveillance_perception.arm_controller_node import ArmController
@@ -34,7 +38,6 @@ from surveillance_perception.detection.dictionaries import dictionary_named
 from surveillance_perception.testing.marker_scene import (
     Degradation,
     Panel,
-    backdrop_of,
     image_of,
 )
 from surveillance_runtime.node import PatrolNode

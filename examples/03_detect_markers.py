@@ -20,7 +20,6 @@ from surveillance_perception.testing.marker_scene import (
     Degradation,
     Panel,
     Shadow,
-    backdrop_of,
     image_of,
 )
 
@@ -33,7 +32,7 @@ def drawn_room(camera: CameraModel) -> np.ndarray:
     generator = np.random.default_rng(1)
     panels = [Panel(11, 2.0, 0.4, offset=(-120.0, 0.0)), Panel(14, 3.0, 0.2, offset=(100.0, 20.0))]
     shade = Degradation(shadows=(Shadow((420.0, 260.0), 0.6),))
-    wall = backdrop_of('clouds', camera, generator)
+    wall = np.full((camera.height, camera.width), 150.0, np.float32)
     return image_of(panels, camera, dictionary_named(DICTIONARY), wall, shade, generator)
 
 

@@ -13,7 +13,7 @@ What others may use, by module:
 - `waiting`: `AwaitedWork` and `AwaitedEvent` for callbacks. `state_file`: `StateFile`, what
   outlives a killed process.
 - `place`: `Place`, `FloorPlan`, `read_place_file`, without ROS.
-- `qos`, `conversions`, `logging`, `yaml_file`, `robot_arm`, `settled_frames`, `uneven_light`,
+- `qos`, `conversions`, `logging`, `yaml_file`, `robot_arm`, `settled_frames`, `image_effects`,
   `testing`.
 
 The modules are imported by themselves, so that a program without ROS can use those that need none.

@@ -8,8 +8,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from benchmarks.damaged_messages import damaged, taken
 from surveillance_perception import MarkerDetector
-from surveillance_perception.testing.damaged_messages import damaged, taken
 
 
 @pytest.mark.parametrize('seed', range(4))

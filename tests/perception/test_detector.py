@@ -8,16 +8,15 @@ import cv2
 import numpy as np
 import pytest
 
+from benchmarks.backdrops import BACKDROPS, backdrop_of
 from surveillance_perception.detection.camera_model import CameraModel
 from surveillance_perception.detection.detector import DetectorSettings, MarkerDetector
 from surveillance_perception.detection.dictionaries import DICTIONARY_NAMES, dictionary_named
 from surveillance_perception.testing.marker_scene import (
-    BACKDROPS,
     Degradation,
     Glare,
     Panel,
     Shadow,
-    backdrop_of,
     corners_in_image,
     image_of,
 )

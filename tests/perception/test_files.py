@@ -10,6 +10,7 @@ import cv2
 import numpy as np
 import pytest
 
+from benchmarks.backdrops import backdrop_of
 from surveillance_perception.detect_command import main
 from surveillance_perception.detection.camera_model import CameraModel
 from surveillance_perception.detection.dictionaries import dictionary_named
@@ -19,7 +20,6 @@ from surveillance_perception.stream.video import open_source
 from surveillance_perception.testing.marker_scene import (
     Degradation,
     Panel,
-    backdrop_of,
     image_of,
 )
 from surveillance_runtime.files import FileError

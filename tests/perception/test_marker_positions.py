@@ -14,6 +14,7 @@ from nav_msgs.msg import Odometry
 from sensor_msgs.msg import Image, JointState
 from std_msgs.msg import Header
 
+from benchmarks.backdrops import backdrop_of
 from surveillance_interfaces.msg import MarkerDetection, MarkerDetectionArray
 from surveillance_perception import aruco_detector_node
 from surveillance_perception.arm_controller_node import ArmController
@@ -25,7 +26,6 @@ from surveillance_perception.marker_server_node import MarkerServer
 from surveillance_perception.testing.marker_scene import (
     Degradation,
     Panel,
-    backdrop_of,
     image_of,
 )
 from surveillance_runtime.qos import SENSOR_QOS

@@ -16,6 +16,7 @@ from sensor_msgs.msg import CameraInfo, CompressedImage, Image, JointState
 from std_msgs.msg import Bool, Header, Int32
 from trajectory_msgs.msg import JointTrajectory
 
+from benchmarks.backdrops import backdrop_of
 from surveillance_fsm import Interrupt
 from surveillance_fsm.ros import CallInterruptedError, GoalCaller, ServiceCaller
 from surveillance_interfaces.action import ScanSurroundings
@@ -30,7 +31,6 @@ from surveillance_perception.marker_server_node import MarkerServer
 from surveillance_perception.testing.marker_scene import (
     Degradation,
     Panel,
-    backdrop_of,
     image_of,
 )
 from surveillance_perception.video_source_node import VideoSource

@@ -12,7 +12,7 @@ from collections.abc import Callable
 import numpy as np
 import numpy.typing as npt
 
-from surveillance_runtime.uneven_light import Light, glare, shadow, vignette
+from surveillance_runtime.image_effects import Light, glare, shadow, vignette
 
 Scene = npt.NDArray[np.float32]
 Shape = tuple[int, int]

@@ -12,6 +12,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from surveillance_runtime.image_effects import streak
 from surveillance_runtime.parameters import parameter
 from surveillance_simulation.camera.lighting import LIGHTINGS, lit
 
@@ -118,20 +119,10 @@ def expose(
     if conditions.blur > 0:
         taken = cv2.GaussianBlur(taken, (0, 0), conditions.blur)
     if conditions.motion > 1:
-        taken = cv2.filter2D(taken, -1, _streak(conditions.motion, conditions.motion_angle))
+        taken = cv2.filter2D(taken, -1, streak(conditions.motion, conditions.motion_angle))
     if conditions.light != 1.0:
         taken = taken * np.float32(conditions.light)
     if conditions.noise > 0:
         grain = rng.standard_normal(taken.shape, dtype=np.float32)
         taken = cv2.scaleAdd(grain, conditions.noise, taken)
     return np.asarray(cv2.convertScaleAbs(np.maximum(taken, 0.0)), dtype=np.uint8)
-
-
-def _streak(length: float, angle: float) -> npt.NDArray[np.float32]:
-    """Return a kernel that averages along a line of the given length (pixels)."""
-    half = math.ceil(length / 2)
-    kernel = np.zeros((2 * half + 1, 2 * half + 1), np.float32)
-    samples = np.linspace(-length / 2, length / 2, 8 * half + 1)
-    columns, rows = half + samples * math.cos(angle), half + samples * math.sin(angle)
-    np.add.at(kernel, (np.rint(rows).astype(int), np.rint(columns).astype(int)), 1.0)
-    return np.asarray(kernel / kernel.sum(), dtype=np.float32)

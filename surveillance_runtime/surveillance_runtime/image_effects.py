@@ -1,7 +1,8 @@
-"""Uneven light on an image: the edge of a shadow, a lens that darkens the corners, a reflection.
+"""What light and motion do to an image: a shadow's edge, dark corners, a reflection, a streak.
 
-Shared by the simulated camera and by the renderer that detectors are measured with. All are
-arrays (rows, columns): the first two are factors on the brightness, a reflection adds to it.
+Shared by the simulated camera and by the renderer that detectors are measured with. Lights are
+arrays (rows, columns): shadow and vignette are factors on the brightness, a reflection adds to it.
+A streak is a kernel to filter the image with.
 """
 
 from __future__ import annotations
@@ -55,6 +56,23 @@ def glare(
     x, y = _pixels(shape)
     square = (x - middle[0]) ** 2 + (y - middle[1]) ** 2
     return np.asarray(strength * np.exp(-square / (2.0 * deviation**2)), dtype=np.float32)
+
+
+def streak(length: float, direction: float) -> Light:
+    """Return the kernel that averages along a line.
+
+    Args:
+        length: Length of the line, pixels.
+        direction: Its angle, rad, from x towards y.
+    """
+    half = math.ceil(length / 2)
+    pixels = np.arange(-half, half + 1)[:, None]
+    along = np.linspace(-length / 2, length / 2, 16 * half + 1)
+    # each point of the line counts for the four pixels around it, by its distance from them
+    rows = np.maximum(1.0 - np.abs(pixels - along * math.sin(direction)), 0.0)
+    columns = np.maximum(1.0 - np.abs(pixels - along * math.cos(direction)), 0.0)
+    kernel = rows @ columns.T
+    return np.asarray(kernel / kernel.sum(), dtype=np.float32)
 
 
 def _pixels(shape: tuple[int, int]) -> tuple[Light, Light]:

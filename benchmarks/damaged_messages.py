@@ -1,4 +1,4 @@
-"""Camera messages as a broken or hostile driver sends them, for tests and benchmarks."""
+"""Camera messages as a broken or hostile driver sends them."""
 
 from __future__ import annotations
 
