@@ -60,13 +60,13 @@ def main(argv: Sequence[str]) -> int:
             raise
     except ValueError as error:
         print(f'launch.py: {error}', file=sys.stderr)
-        return EXIT_BAD_INPUT
+        return os.EX_TEMPFAIL if isinstance(error, system.NotNowError) else EXIT_BAD_INPUT
     except BrokenPipeError:  # as when the output goes to `head`
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
     except OSError as error:  # a full disk, a folder that is not ours
         print(f'launch.py: {in_one_line(error)}', file=sys.stderr)
-        return EXIT_BAD_INPUT
+        return os.EX_TEMPFAIL
     except KeyboardInterrupt:
         signal.signal(signal.SIGINT, signal.SIG_IGN)  # one is enough
         ready = Environment(CHECKOUT).ready()

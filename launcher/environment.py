@@ -20,7 +20,7 @@ from pathlib import Path
 from launcher import system
 from launcher.fingerprint import INTERFACES, Journal, complete, requirements
 from launcher.progress import Output, Step
-from launcher.system import LaunchError
+from launcher.system import NotNowError
 
 CHECKOUT = Path(__file__).resolve().parent.parent
 PACKAGES = (
@@ -73,7 +73,8 @@ class Environment:
         """Bring the environment up to date; do nothing when it is.
 
         Raises:
-            LaunchError: a step failed, or the machine lacks something that only its owner can give.
+            NotNowError: a step failed.
+            LaunchError: the machine lacks something that only its owner can give.
         """
         if self.ready():
             return
@@ -127,7 +128,7 @@ class Environment:
         if journal.interfaces != wanted.interfaces or journal.working == INTERFACES_STEP:
             titles.append(INTERFACES_STEP)
         if fresh and (free := shutil.disk_usage(self.checkout).free) < SPACE:
-            raise LaunchError(
+            raise NotNowError(
                 f'{self.venv}: the set-up needs {SPACE // 10**6} MB, {free // 10**6} MB are free '
                 f'on the disk of {self.checkout}'
             )
@@ -265,11 +266,11 @@ class _Command:
         """Show what it does until it ends.
 
         Raises:
-            LaunchError: It failed.
+            NotNowError: It failed.
         """
         last = deque(self._output.lines(step), maxlen=400)
         if self._process.wait() != 0:
-            raise LaunchError(self._failure(list(last)))
+            raise NotNowError(self._failure(list(last)))
 
     def _failure(self, output: list[str]) -> str:
         with suppress(OSError):  # the disk may be full

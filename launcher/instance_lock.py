@@ -13,7 +13,7 @@ import tempfile
 from collections.abc import Iterable
 from pathlib import Path
 
-from launcher.system import LaunchError
+from launcher.system import NotNowError
 from surveillance_runtime.node_table import RUN_NODES, Node
 
 
@@ -32,7 +32,7 @@ def claim(
         Descriptors that hold the claims as long as they are open.
 
     Raises:
-        LaunchError: some of them are claimed already; then none is claimed.
+        NotNowError: some of them are claimed already; then none is claimed.
     """
     folder = folder or runtime_folder() / 'nodes'
     held: list[int] = []
@@ -61,7 +61,7 @@ def claim(
         os.close(descriptor)
     who = f' (process {holder})' if holder else ''
     where = f'ROS domain {domain}' + (f', namespace {namespace}' if namespace else '')
-    raise LaunchError(
+    raise NotNowError(
         f'already running in {where}{who}: {", ".join(taken)}; '
         'expected another --domain or --namespace, or --without these'
     )

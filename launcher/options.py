@@ -203,10 +203,12 @@ def _add_recording_options(group: argparse._ArgumentGroup) -> None:
         const='',
         metavar='RUN',
         help='go on with this run (default: the last one), its record, ontology and levels; done '
-        'by itself after a launcher that was killed',
+        'by itself where that had not come to its end',
     )
     group.add_argument(
-        '--fresh', action='store_true', help='begin anew also after a launcher that was killed'
+        '--fresh',
+        action='store_true',
+        help='begin anew also where the last run had not come to its end',
     )
 
 

@@ -50,7 +50,7 @@ class Run:
         web_address: where, as HOST:PORT, None for the page's own choice.
         memory: megabytes that a node may hold before it is started again; 0: any.
         alarm: a command that is run, with one line as its argument, when somebody is needed.
-        fresh: do not go on with a run whose launcher was killed.
+        fresh: do not go on with a run that had not come to its end.
         network: whether nodes of other machines are heard.
     """
 

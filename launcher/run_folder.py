@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from launcher.system import LaunchError
+from launcher.system import LaunchError, NotNowError
 
 STATE = 'run.json'
 
@@ -48,7 +48,7 @@ class RunState:
         options: What the run is asked for, as JSON can hold it.
 
     Raises:
-        LaunchError: Another launcher works in the folder.
+        NotNowError: Another launcher works in the folder.
     """
 
     def __init__(self, folder: Path, options: Mapping[str, Any]) -> None:
@@ -59,13 +59,14 @@ class RunState:
             fcntl.flock(self._descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError:
             os.close(self._descriptor)
-            raise LaunchError(f'{folder}: this run is still going on') from None
+            raise NotNowError(f'{folder}: this run is still going on') from None
         self._write(ended=False)
 
-    def end(self) -> None:
-        """Note that the launcher came to its end, and let go of the folder."""
-        with contextlib.suppress(OSError):  # on a full disk the next launcher goes on with it
-            self._write(ended=True)
+    def end(self, *, ended: bool = True) -> None:
+        """Let go of the folder; where the run has not ended, the next launcher goes on with it."""
+        if ended:
+            with contextlib.suppress(OSError):  # a full disk
+                self._write(ended=True)
         os.close(self._descriptor)
 
     def _write(self, *, ended: bool) -> None:
@@ -78,7 +79,7 @@ def make_folder(runs: Path) -> Path:
     """Make a new folder for what a run leaves behind.
 
     Raises:
-        LaunchError: It cannot be made.
+        NotNowError: It cannot be made.
     """
     stamp = time.strftime('%Y%m%d-%H%M%S')
     for suffix in ('', *(f'-{number}' for number in range(2, 100))):
@@ -88,9 +89,9 @@ def make_folder(runs: Path) -> Path:
         except FileExistsError:
             continue
         except OSError as error:
-            raise LaunchError(f'{folder}: cannot be made: {error.strerror}') from None
+            raise NotNowError(f'{folder}: cannot be made: {error.strerror}') from None
         return folder
-    raise LaunchError(f'{folder}: a hundred runs began in this second')
+    raise NotNowError(f'{folder}: a hundred runs began in this second')
 
 
 def look_into(folder: Path) -> Found | None:
@@ -123,7 +124,8 @@ def find(runs: Path, name: str) -> Found:
     """Return the run of a name (or path), or the one that began last where the name is empty.
 
     Raises:
-        LaunchError: There is none, or it is still going on.
+        LaunchError: There is none.
+        NotNowError: It is still going on.
     """
     if name:
         folder = Path(name) if Path(name).is_dir() else runs / name
@@ -134,7 +136,7 @@ def find(runs: Path, name: str) -> Found:
         expected = 'the name of a folder there' if name else 'a run that can be gone on with'
         raise LaunchError(f'--resume: no run in {folder}: expected {expected}')
     if found.running:
-        raise LaunchError(f'--resume: {found.folder}: this run is still going on')
+        raise NotNowError(f'--resume: {found.folder}: this run is still going on')
     return found
 
 

@@ -16,6 +16,7 @@ from launcher.log_merge import MergedLog
 from launcher.run import NOT_RECORDED, Run, options_of
 from launcher.run_configuration import check_assignments, configuration, with_mode_of
 from launcher.run_processes import COMPOSED, node_environ, programs_of, ros_domain
+from launcher.service import is_service
 from launcher.supervisor import Supervisor
 from surveillance_behaviour.mission import mission_log
 from surveillance_runtime import node_table
@@ -65,11 +66,13 @@ def run_mission(run: Run, config: Path, runs: Path, resume: Path | None = None) 
     log.say(f'watch it in a second terminal: {watch_command(run)}')
     call = alarm_caller(run.alarm, log)
     log.listen(lambda name, text: call(text) if name == BEHAVIOUR_NODE and HELP in text else None)
-    code = _supervised(run, nodes, Supervisor(programs, log, on_trouble=call), folder, log)
+    supervisor = Supervisor(programs, log, on_trouble=call)
+    code = _supervised(run, nodes, supervisor, folder, log)
     for line in what_to_look_at(folder):
         log.plain(line)
     log.close()
-    state.end()
+    # A service is stopped with its machine, and goes on with it.
+    state.end(ended=supervisor.time_is_over or not is_service())
     for descriptor in claims:
         os.close(descriptor)
     return code
@@ -83,7 +86,7 @@ def _chosen_folder(run: Run, runs: Path, resume: Path | None) -> tuple[Path, str
     if found is not None and not found.ended and not found.running:
         same = {**found.options, 'seconds': None} == {**options_of(run), 'seconds': None}
         if same:
-            how = 'whose launcher was killed; --fresh begins anew'
+            how = 'which had not come to its end; --fresh begins anew'
             return found.folder, f'going on with {_short(found.folder)}, {how}'
     return run_folder.make_folder(runs), ''
 

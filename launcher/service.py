@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 UNIT = 'surveillance.service'
+_SOCKET = 'NOTIFY_SOCKET'
 _TEXT = """\
 # Written by: python3 launch.py service
 [Unit]
@@ -24,7 +25,7 @@ ExecStart={command}
 WorkingDirectory={folder}
 WatchdogSec=30
 Restart=always
-RestartSec=5
+RestartSec=1
 # A configuration that cannot work does not get better by itself.
 RestartPreventExitStatus=2
 SuccessExitStatus=130
@@ -47,8 +48,8 @@ def unit_text(checkout: Path, arguments: Sequence[str], memory: int) -> str:
         memory: Megabytes that the whole service may hold.
     """
     words = [sys.executable, str(checkout / 'launch.py'), 'run', *arguments]
-    # systemd reads % as a specifier and $ as a variable.
-    command = shlex.join(words).replace('%', '%%').replace('$', '$$')
+    # Also within quotes systemd reads a backslash as C does, % as a specifier, $ as a variable.
+    command = shlex.join(words).replace('\\', '\\\\').replace('%', '%%').replace('$', '$$')
     folder = str(checkout).replace('%', '%%')
     return _TEXT.format(command=command, folder=folder, memory=memory)
 
@@ -59,10 +60,16 @@ def unit_path() -> Path:
     return Path(home, 'systemd', 'user', UNIT)
 
 
+def is_service() -> bool:
+    """Tell whether systemd keeps this process running, and wants to be told of it."""
+    return os.environ.get(_SOCKET, '')[:1] in ('/', '@')
+
+
 def notify(text: str) -> None:
     """Tell systemd something, such as `READY=1`; nothing happens where it does not listen."""
-    address = os.environ.get('NOTIFY_SOCKET', '')
-    if address[:1] not in ('/', '@'):
+    if not is_service():
         return
-    with contextlib.suppress(OSError), socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as sender:
+    address = os.environ[_SOCKET]
+    kind = socket.SOCK_DGRAM | socket.SOCK_NONBLOCK  # a systemd that hangs is not waited for
+    with contextlib.suppress(OSError), socket.socket(socket.AF_UNIX, kind) as sender:
         sender.sendto(text.encode(), address.replace('@', '\0', 1))

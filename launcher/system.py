@@ -33,6 +33,10 @@ class LaunchError(ValueError):
     """What was asked for cannot be done; the message says why, and what would mend it."""
 
 
+class NotNowError(LaunchError):
+    """What was asked for can be done later without a change: the machine or a run is in the way."""
+
+
 @dataclass(frozen=True)
 class Machine:
     """What decides how this machine gets its ROS."""

@@ -67,7 +67,7 @@ def test_a_folder_that_cannot_be_written_is_one_line(monkeypatch, capsys):
         raise PermissionError(13, 'Permission denied', '/some/where')
 
     monkeypatch.setattr('launcher.cli._dispatch', full)
-    assert main([]) == 2
+    assert main([]) == os.EX_TEMPFAIL
     assert capsys.readouterr().err == 'launch.py: /some/where: Permission denied\n'
 
 

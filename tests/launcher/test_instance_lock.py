@@ -61,7 +61,7 @@ def test_a_second_launch_says_that_the_first_is_there(start, tmp_path, ros_domai
     first.until('started armor_server')
     second = start(*options)
     code, _ = second.end()
-    assert code == 2
+    assert code == os.EX_TEMPFAIL
     (complaint,) = second.lines
     assert f'already running in ROS domain {ros_domain} (process {first.process.pid})' in complaint
     assert first.end(signal.SIGINT)[0] == 0

@@ -5,6 +5,7 @@ from __future__ import annotations
 import configparser
 import os
 import shutil
+import signal
 import socket
 import subprocess
 from pathlib import Path
@@ -13,18 +14,19 @@ import pytest
 
 from launcher.cli import main
 from launcher.service import notify, unit_path, unit_text
+from tests.launcher.conftest import ROOT, USER_ENVIRON
 
-ROOT = Path(__file__).resolve().parents[2]
+MISSION = str(Path(__file__).with_name('mission_process.py'))
 
 
 def test_the_unit_runs_the_command_line_that_was_asked_for():
-    text = unit_text(Path('/home/a b/50%'), ['--mode', 'RANDOM', '--alarm', 'mail $ME'], 4096)
+    text = unit_text(Path('/home/a b/50%'), ['--mode', 'RANDOM', '--alarm', 'mail $ME \\t'], 4096)
     parser = configparser.RawConfigParser(strict=False)
     parser.optionxform = str
     parser.read_string(text)
     service = parser['Service']
     assert service['ExecStart'].endswith(
-        "'/home/a b/50%%/launch.py' run --mode RANDOM --alarm 'mail $$ME'"
+        "'/home/a b/50%%/launch.py' run --mode RANDOM --alarm 'mail $$ME \\\\t'"
     )
     assert service['MemoryMax'] == '4096M'
     assert int(service['WatchdogSec']) >= 10
@@ -52,6 +54,21 @@ def test_the_command_writes_it_into_the_users_folder(tmp_path, monkeypatch, caps
     assert 'systemctl --user' in capsys.readouterr().out
     with pytest.raises(SystemExit, match='2'):
         main(['service', '--print', '--memory', '5'])
+
+
+def test_a_service_that_is_stopped_with_its_machine_goes_on_later(start, tmp_path, ros_domain):
+    runs = tmp_path / 'runs'
+    words = (MISSION, str(runs), '--only', 'armor_server', '--domain', str(ros_domain))
+    for socket_name in ('first', 'second'):
+        address = str(tmp_path / socket_name)
+        with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as listener:
+            listener.bind(address)
+            listener.settimeout(60.0)
+            service = start(*words, environ={**USER_ENVIRON, 'NOTIFY_SOCKET': address})
+            assert [listener.recv(100) for _ in range(3)] == [b'READY=1', *2 * [b'WATCHDOG=1']]
+            assert service.end(signal.SIGTERM)[0] == 0
+    (folder,) = runs.iterdir()
+    assert f'going on with {folder}, which had not come' in '\n'.join(service.lines)
 
 
 def test_systemd_is_told_where_it_listens(tmp_path, monkeypatch):
