@@ -55,7 +55,8 @@ test = []
 PREPARE = """
 import sys
 from pathlib import Path
-from launcher.environment import Environment, LaunchError
+from launcher.environment import Environment
+from launcher.system import LaunchError
 environment = Environment(Path(sys.argv[1]))
 try:
     environment.prepare()
