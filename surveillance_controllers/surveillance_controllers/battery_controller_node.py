@@ -13,11 +13,13 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any, TextIO
 
+from builtin_interfaces.msg import Duration
 from geometry_msgs.msg import PoseWithCovarianceStamped
 from rclpy.callback_groups import ReentrantCallbackGroup
-from sensor_msgs.msg import BatteryState, JointState
+from sensor_msgs.msg import BatteryState
 from std_msgs.msg import Bool, Float32, UInt8
 from std_srvs.srv import Empty
+from trajectory_msgs.msg import JointTrajectory
 
 from surveillance_controllers import conversions, stimuli
 from surveillance_controllers.battery.model import Battery
@@ -30,10 +32,10 @@ from surveillance_controllers.controller_parameters import (
 from surveillance_controllers.manual.commands import BATTERY, BATTERY_SET, ParsedCommand
 from surveillance_controllers.manual.requests import CommandConsole
 from surveillance_fsm.ros import ClockWait
-from surveillance_runtime.conversions import pose_from
+from surveillance_runtime.conversions import pose_from, seconds_of
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.process import run_node
-from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
+from surveillance_runtime.qos import STATE_QOS
 from surveillance_runtime.state_file import StateFile
 from surveillance_runtime.waiting import AwaitedEvent
 
@@ -159,7 +161,7 @@ class RobotBattery:
     """Lets a battery drain and charge with the robot, in SIMULATED mode.
 
     Reads `amcl_pose` (how far the robot drove, and whether it stands at the station),
-    `joint_states` (whether its arm moves) and `battery_drain`; publishes `battery_state`.
+    `arm/joint_trajectory` (how long its arm moves) and `battery_drain`; publishes `battery_state`.
 
     Args:
         node: The battery controller's node.
@@ -187,7 +189,7 @@ class RobotBattery:
         self._use = BatteryInUse(battery, settings.station, settings.dock_reach, since)
         self._states = node.create_publisher(BatteryState, 'battery_state', STATE_QOS)
         node.create_subscription(PoseWithCovarianceStamped, 'amcl_pose', self._on_pose, STATE_QOS)
-        node.create_subscription(JointState, 'joint_states', self._on_joints, SENSOR_QOS)
+        node.create_subscription(JointTrajectory, 'arm/joint_trajectory', self._on_trajectory, 1)
         node.create_subscription(Float32, 'battery_drain', self._on_drain, 10)
         node.create_timer(settings.update_period, self._update)
 
@@ -199,8 +201,9 @@ class RobotBattery:
         with conversions.refusing(self._node, 'amcl_pose'):
             self._use.see_pose(pose_from(message.pose.pose), self._wait.elapsed())
 
-    def _on_joints(self, message: JointState) -> None:
-        self._use.see_joints(message.position)
+    def _on_trajectory(self, message: JointTrajectory) -> None:
+        end = message.points[-1].time_from_start if message.points else Duration()
+        self._use.move_arm(seconds_of(end), self._wait.elapsed())
 
     def _on_drain(self, message: Float32) -> None:
         # What is no number drains nothing.

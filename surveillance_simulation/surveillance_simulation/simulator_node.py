@@ -102,8 +102,7 @@ class Simulator(PatrolNode):
         rate = replace(rate, look_window=self._camera.period + rate.step)
         self._rate = ClockRate(rate, time.monotonic())
         FaultServices(self, self.robot, self._changing, self._changed)
-        self._is_monitored = False
-        self.create_subscription(Twist, 'cmd_vel', self._on_command, 1)
+        self._unmonitored = self.create_subscription(Twist, 'cmd_vel', self._obey, 1)
         self.create_subscription(Twist, 'cmd_vel_monitored', self._on_monitored, 1)
         self.create_subscription(
             PoseWithCovarianceStamped, 'amcl_pose', self._on_estimate, STATE_QOS
@@ -186,13 +185,9 @@ class Simulator(PatrolNode):
             )
         self._told_of_clock = others > 0
 
-    def _on_command(self, message: Twist) -> None:
-        if not self._is_monitored:
-            self._obey(message)
-
     def _on_monitored(self, message: Twist) -> None:
-        """Obey the collision monitor; who commands past it is not obeyed from now on."""
-        self._is_monitored = True
+        """Obey the collision monitor; who commands past it is not heard from now on."""
+        self.destroy_subscription(self._unmonitored)  # does nothing the second time
         self._obey(message)
 
     def _obey(self, message: Twist) -> None:

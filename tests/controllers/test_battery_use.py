@@ -44,14 +44,16 @@ def test_a_correction_of_the_estimate_is_no_way_driven() -> None:
 
 def test_the_arm_is_paid_for_while_it_moves() -> None:
     battery, use = in_use()
-    use.see_joints([0.0, 0.0])
     use.advance(1.0)
     assert battery.energy == 0.5
-    use.see_joints([0.0, 0.1])
+    use.move_arm(5.0, now=1.0)
     use.advance(2.0)
     assert battery.energy == pytest.approx(0.49)
-    use.advance(3.0)
-    assert battery.energy == pytest.approx(0.49)
+    use.move_arm(0.5, now=2.5)
+    use.advance(4.0)
+    assert battery.energy == pytest.approx(0.48)
+    use.advance(5.0)
+    assert battery.energy == pytest.approx(0.48)
 
 
 def test_it_charges_at_the_station_only_and_says_why_not_elsewhere() -> None:

@@ -8,7 +8,6 @@ driven, so the counted way and turn are held to what the robot's top speeds allo
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 
 from surveillance_controllers.battery.model import Battery
 from surveillance_controllers.geometry import Pose, angle_between
@@ -44,8 +43,9 @@ class BatteryInUse:
         self.pose: Pose | None = None
         self._seen_at = 0.0
         self._metres = self._radians = 0.0
-        self._joints: tuple[float, ...] | None = None
-        self._arm_moved = False
+        self._arm_seconds = 0.0
+        # When the arm moves: since when that was not counted yet, and until when.
+        self._arm_moves = 0.0, 0.0
 
     @property
     def docked(self) -> bool:
@@ -64,11 +64,15 @@ class BatteryInUse:
             self._radians += min(turn, TOP_TURN * passed)
         self.pose, self._seen_at = pose, now
 
-    def see_joints(self, positions: Sequence[float]) -> None:
-        """Take the joints of the arm, radians."""
-        joints = tuple(positions)
-        self._arm_moved |= self._joints is not None and joints != self._joints
-        self._joints = joints
+    def move_arm(self, seconds: float, now: float) -> None:
+        """Take that the arm moves from `now` on, instead of what it did before; seconds."""
+        self._count_arm(now)
+        self._arm_moves = now, now + seconds
+
+    def _count_arm(self, now: float) -> None:
+        since, until = self._arm_moves
+        self._arm_seconds += max(0.0, min(now, until) - since)
+        self._arm_moves = now, until
 
     def advance(self, now: float) -> None:
         """Let time pass up to `now` (seconds): draw, and charge at the station."""
@@ -76,9 +80,9 @@ class BatteryInUse:
         self._last = now
         if not 0.0 <= passed <= LONGEST_AWAY:
             passed = 0.0  # Another clock.
-        self._battery.draw(passed, self._metres, self._radians, passed if self._arm_moved else 0.0)
-        self._metres = self._radians = 0.0
-        self._arm_moved = False
+        self._count_arm(now)
+        self._battery.draw(passed, self._metres, self._radians, min(self._arm_seconds, passed))
+        self._metres = self._radians = self._arm_seconds = 0.0
         if self.docked:
             self._battery.charge(passed)
 

@@ -96,12 +96,13 @@ class ObstacleMemory:
     def is_unknown(self, points: Points, apart: float) -> NDArray[np.bool_]:
         """Tell which points, shape (n, 2), lie on the map and further than `apart` metres from
         what it has."""
-        # Most points are the map's: within a cell the distance changes by its diagonal at most.
+        # Most points are the map's: within a cell the distance is less than a cell's side greater
+        # than at its centre.
         row, column = self._grid.cells_of(points).T
         rows, columns = self._framed.shape
         row, column = np.minimum(row + 1, rows - 1), np.minimum(column + 1, columns - 1)
         near = self._framed.ravel().take(row * columns + column)
-        unknown: NDArray[np.bool_] = near > apart - 2.0 * self._grid.resolution
+        unknown: NDArray[np.bool_] = near > apart - self._grid.resolution
         if unknown.any():
             unknown[unknown] = self._grid.interpolated(self._known, points[unknown]) > apart
         return unknown

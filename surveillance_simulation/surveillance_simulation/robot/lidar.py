@@ -70,25 +70,18 @@ def scan(
 
 
 def _to_boxes(solid: boxes.Array, x: float, y: float, direction: boxes.Array) -> boxes.Array:
-    if not len(solid):
-        return np.full(direction.shape[1], np.inf)
-    dx, dy = x - solid[:, 0, None], y - solid[:, 1, None]
-    cos, sin = solid[:, 2, None], solid[:, 3, None]
-    first = _slab(dx * cos + dy * sin, cos * direction[0] + sin * direction[1], solid[:, 4, None])
-    second = _slab(dy * cos - dx * sin, cos * direction[1] - sin * direction[0], solid[:, 5, None])
-    enter = np.maximum(first[0], second[0])
-    leave = np.minimum(first[1], second[1])
-    hit = (leave >= enter) & (leave >= 0.0)
-    return np.asarray(np.where(hit, np.maximum(enter, 0.0), np.inf).min(axis=0))
-
-
-def _slab(
-    origin: boxes.Array, slope: boxes.Array, half: boxes.Array
-) -> tuple[boxes.Array, boxes.Array]:
+    # Seen in the frame of each box: where the rays begin (n, 2), and where they go (n, 2, rays).
+    cos, sin = solid[:, 2], solid[:, 3]
+    axes = np.array([[cos, sin], [-sin, cos]]).transpose(2, 0, 1)
+    begin = np.einsum('nij,nj->ni', axes, (x, y) - solid[:, :2])[..., None]
+    slope = axes @ direction
     inverse = 1.0 / np.where(np.abs(slope) < _PARALLEL, _PARALLEL, slope)
-    middle = -origin * inverse
-    reach = half * np.abs(inverse)
-    return middle - reach, middle + reach
+    middle, reach = -begin * inverse, solid[:, 4:6, None] * np.abs(inverse)
+    enter = (middle - reach).max(axis=1)
+    leave = (middle + reach).min(axis=1)
+    hit = (leave >= enter) & (leave >= 0.0)
+    distance = np.where(hit, np.maximum(enter, 0.0), np.inf)
+    return np.asarray(distance.min(axis=0, initial=np.inf))
 
 
 def _to_discs(discs: boxes.Array, x: float, y: float, direction: boxes.Array) -> boxes.Array:
