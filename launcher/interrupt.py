@@ -8,6 +8,7 @@ callback, as there are many in an import, and up to 3.11 makes another one of it
 from __future__ import annotations
 
 import signal
+import sys
 from typing import NoReturn
 
 _came = False
@@ -17,6 +18,13 @@ def raise_at_stop_signals() -> None:
     """Have each of them raise KeyboardInterrupt in the main thread."""
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, _raise)
+    sys.unraisablehook = _say_unraisable
+
+
+def _say_unraisable(dropped: sys.UnraisableHookArgs) -> None:
+    # Python's own hook prints a traceback of the Ctrl-C that `raise_if_lost` raises again.
+    if dropped.exc_type is not KeyboardInterrupt:
+        sys.__unraisablehook__(dropped)
 
 
 def _raise(_number: int, _frame: object) -> NoReturn:

@@ -68,6 +68,7 @@ def test_a_ctrl_c_that_python_drops_is_raised_before_the_next_step():
         [sys.executable, '-c', program], cwd=ROOT, capture_output=True, text=True, check=True
     )
     assert done.stdout == 'dropped\nraised\n'
+    assert done.stderr == ''
 
 
 def test_a_ctrl_c_that_python_makes_another_error_of_is_one_line():
