@@ -25,7 +25,7 @@ from surveillance_controllers.motion.path_following import (
     Velocity,
     room_ahead,
 )
-from surveillance_controllers.motion.sampled_planning import SampledPlanner, is_safe
+from surveillance_controllers.motion.sampled_planning import SampledPlanner
 from surveillance_controllers.motion.tracking import Mover
 
 
@@ -87,9 +87,6 @@ class RecoveryParameters:
 
 _STANDS = 0.004
 """A robot that moves less than this between two steps, metres or rad, stands."""
-
-_MOVER_RIM = 0.15
-"""Points this near to something that moves are its own, metres."""
 
 SPIN_SPEED, SPIN_ACCELERATION = 1.0, 3.0
 """Of one turn on the spot, rad/s and rad/s^2."""
@@ -256,16 +253,9 @@ class Drive:
         if not movers:
             self._local.forget()
             return self._follower.step(pose, seen, dt)
-        gaps = [np.hypot(seen[:, 0] - each.x, seen[:, 1] - each.y) - each.radius for each in movers]
-        stands = seen[np.min(gaps, axis=0) > _MOVER_RIM]
 
         def choose(way: Points, last: Velocity) -> Velocity:
-            wanted = self._local.step(way, stands, movers, last, dt)
-            for share in (1.0, 0.7, 0.4, 0.2):
-                slower = Velocity(wanted.speed * share, wanted.turn)
-                if is_safe(slower, movers, self._robot):
-                    return slower
-            return Velocity(0.0, wanted.turn)
+            return self._local.step(way, seen, movers, last, dt)
 
         return self._follower.step_with(choose, pose, seen, dt)
 

@@ -5,7 +5,7 @@ reinforcement learning", ICRA 2017): sequences of velocities are drawn around th
 rolled out through the next seconds, priced, and the plan becomes their mean, weighted by their
 prices. Prices know the path, what stands (the scan) and what moves (at constant velocity). What
 counts against a sequence is to move near somebody, not to stand near: a robot that can do nothing
-better stands still.
+better stands still. What comes of it is checked once more by itself (`is_safe`).
 
 Everything is in the robot's frame at the moment of planning.
 """
@@ -25,6 +25,11 @@ from surveillance_controllers.motion.path_following import DriveParameters, Velo
 from surveillance_controllers.motion.tracking import Mover
 
 Floats = NDArray[np.float32]
+
+MOVER_RIM = 0.15
+"""Points this near to something that moves are its own, metres."""
+SLOWER = (1.0, 0.7, 0.4, 0.2)
+"""Parts of the planned speed that are tried, so that the robot can stand before anybody."""
 
 
 @dataclass(frozen=True)
@@ -106,49 +111,49 @@ class SampledPlanner:
     def step(
         self,
         path: Points,
-        stands: Points,
+        seen: Points,
         movers: Sequence[Mover],
         velocity: Velocity,
         dt: float,
     ) -> Velocity:
         """Return the velocity for the next moment.
 
+        From it, the robot can stand before anybody comes whom it moves towards.
+
         Args:
             path: The way ahead at equal distances, shape (n, 2), n of at least 2, metres.
-            stands: What the lidar sees of what does not move, shape (m, 2), metres.
+            seen: What the lidar sees, shape (m, 2), metres.
             movers: What moves.
             velocity: The velocity commanded last.
             dt: Time since the last step, seconds.
         """
-        p = self._parameters
         self._shift(dt)
+        away = self._away_from(_standing(seen, movers))
         controls = self._drawn(velocity, path)
-        poses = _rolled_out(controls, p.step)
-        prices = (
-            self._of_standing(poses, controls, stands)
-            + self._of_moving(poses, controls, movers)
-            + self._of_way(poses, path)
-            + self._of_effort(controls)
-        )
-        weights = np.exp(-(prices - prices.min()) / p.temperature)
+        prices = self._prices(controls, path, away, movers)
+        weights = np.exp(-(prices - prices.min()) / self._parameters.temperature)
         weights /= weights.sum()
         self._plan = np.tensordot(weights, controls, axes=1).astype(np.float32)
         # The mean of two good ways around somebody can be a bad one.
-        mean = self._priced(self._plan[None], path, stands, movers)
-        if mean > prices.min() + 2.0:
+        if self._prices(self._plan[None], path, away, movers)[0] > prices.min() + 2.0:
             self._plan = controls[int(prices.argmin())].copy()
-        speed, turn = self._plan[0]
-        return Velocity(float(speed), float(turn))
+        speed, turn = (float(each) for each in self._plan[0])
+        for share in SLOWER:
+            slower = Velocity(speed * share, turn)
+            if is_safe(slower, movers, self._robot):
+                return slower
+        return Velocity(0.0, turn)
 
-    def _priced(
-        self, controls: Floats, path: Points, stands: Points, movers: Sequence[Mover]
-    ) -> float:
+    def _prices(
+        self, controls: Floats, path: Points, away: Floats, movers: Sequence[Mover]
+    ) -> Floats:
+        """Return what sequences cost, shape (samples,); `away` as of `_away_from`."""
         poses = _rolled_out(controls, self._parameters.step)
-        return float(
-            self._of_standing(poses, controls, stands)[0]
-            + self._of_moving(poses, controls, movers)[0]
-            + self._of_way(poses, path)[0]
-            + self._of_effort(controls)[0]
+        return (
+            self._of_standing(poses, controls, away)
+            + self._of_moving(poses, controls, movers)
+            + self._of_way(poses, path)
+            + self._of_effort(controls)
         )
 
     def _shift(self, dt: float) -> None:
@@ -188,20 +193,24 @@ class SampledPlanner:
             last = controls[:, moment]
         return np.asarray(controls, np.float32)
 
-    def _of_standing(self, poses: Floats, controls: Floats, stands: Points) -> Floats:
-        """Return what coming near to what stands costs, shape (samples,)."""
+    def _away_from(self, stands: Points) -> Floats:
+        """Return how far the cells around the robot are from what stands, metres.
+
+        Returns:
+            Shape (side, side), the robot in the middle, rows along y.
+        """
         p = self._parameters
-        if not len(stands):
-            return np.zeros(len(poses), np.float32)
         side = 2 * math.ceil(p.reach / p.cell)
         near = stands[(np.abs(stands) < p.reach - p.cell).all(axis=1)]
+        column, row = ((near + p.reach) / p.cell).astype(np.intp).T
         open_cells = np.ones((side, side), np.uint8)
-        cells = ((near + p.reach) / p.cell).astype(np.intp)
-        open_cells[cells[:, 1], cells[:, 0]] = 0
-        if not len(near):
-            return np.zeros(len(poses), np.float32)
-        away = cv2.distanceTransform(open_cells, cv2.DIST_L2, 3) * p.cell
-        at = np.clip((poses[..., :2] + p.reach) / p.cell, 0, side - 1).astype(np.intp)
+        open_cells[row, column] = 0
+        return np.asarray(cv2.distanceTransform(open_cells, cv2.DIST_L2, 3) * np.float32(p.cell))
+
+    def _of_standing(self, poses: Floats, controls: Floats, away: Floats) -> Floats:
+        """Return what coming near to what stands costs, shape (samples,)."""
+        p = self._parameters
+        at = np.clip((poses[..., :2] + p.reach) / p.cell, 0, len(away) - 1).astype(np.intp)
         gaps = away[at[..., 1], at[..., 0]] - self._robot.radius
         moving = np.abs(controls[..., 0]) > 0.02
         touched = (gaps < self._robot.margin + p.cell / 2) & moving
@@ -245,6 +254,12 @@ class SampledPlanner:
         back = np.maximum(-controls[..., 0], 0.0).sum(axis=1)
         rough = np.abs(np.diff(controls, axis=1)).sum(axis=(1, 2))
         return np.asarray(1.5 * back + 0.15 * rough, np.float32)
+
+
+def _standing(seen: Points, movers: Sequence[Mover]) -> Points:
+    """Return the points that belong to nothing that moves, shape (n, 2)."""
+    gaps = [np.hypot(seen[:, 0] - each.x, seen[:, 1] - each.y) - each.radius for each in movers]
+    return np.asarray(seen[np.min(gaps, axis=0, initial=np.inf) > MOVER_RIM])
 
 
 def _rolled_out(controls: Floats, step: float) -> Floats:
