@@ -115,7 +115,7 @@ def _own_parameters(parameters: Mapping[str, Mapping[str, Any]]) -> dict[str, An
     sections: dict[str, dict[str, Any]] = {'/**': {'use_sim_time': True}}
     for node in node_table.NODES:
         sections[f'/**/{node.name}'] = {}
-        if node.console:
+        if node.has_modes:
             sections[f'/**/{node.name}'] = {'execution_mode': 'SIMULATED', 'console': False}
     sections['/**/simulator'] = {'speed': 0.0}
     for name, values in parameters.items():

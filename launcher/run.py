@@ -111,7 +111,7 @@ class Run:
         chosen = node_table.select(
             self.mode or node_table.DEFAULT_MODE, self.behaviour, self.only, self.without
         )
-        asks = self.mode == 'MANUAL' and any(node.console for node in chosen)
+        asks = self.mode == 'MANUAL' and any(node.has_modes for node in chosen)
         # First, so that it is there for what is typed at once.
         return (node_table.find(node_table.CONSOLE), *chosen) if asks else chosen
 

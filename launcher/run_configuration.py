@@ -144,7 +144,7 @@ def with_mode_of(run: Run, merged: Configuration) -> Run:
         return run
     modes = set()
     for node in node_table.NODES:
-        if node.name in node_table.RUN_NODES and node.console:
+        if node.name in node_table.RUN_NODES and node.has_modes:
             setting = merged.resolve(node.name, full_name(run.namespace, node.name)).get(
                 'execution_mode'
             )

@@ -21,141 +21,68 @@ class Node:
     Attributes:
         name: the node's ROS name, its executable's name and its name in the log.
         package: the ROS package, which is also the Python package.
-        class_name: the node's class in `<package>.<name>_node`.
         purpose: one line for `launch.py list`.
-        console: the first word of the operator's commands in MANUAL mode, empty without a console.
     """
 
     name: str
     package: str
-    class_name: str
     purpose: str
-    console: str = ''
 
     @property
     def module(self) -> str:
+        """The module with the node's class."""
         return f'{self.package}.{self.name}_node'
+
+    @property
+    def class_name(self) -> str:
+        """The node's class: `ArmorServer`; `ConsoleNode` where the name itself is taken."""
+        camel = self.name.title().replace('_', '')
+        return f'{camel}Node' if self.name in (CONSOLE, 'mission_view') else camel
+
+    @property
+    def has_modes(self) -> bool:
+        """Whether the node has an execution mode, and in MANUAL mode commands of its own."""
+        return self.name in ('battery_controller', 'planner_controller', 'motion_controller')
 
 
 # In start order: what the first decision waits for comes first, so that it is ready first.
-NODES = (
-    Node(
-        'armor_server',
-        'surveillance_ontology',
-        'ArmorServer',
-        'ontologies and their reasoner, behind the ARMOR interface',
-    ),
-    Node(
-        'ontology_map_builder',
-        'surveillance_ontology',
-        'OntologyMapBuilder',
-        'loads the ontology and builds the map in it',
-    ),
-    Node(
-        'robot_behavior',
-        'surveillance_behaviour',
-        'RobotBehavior',
-        'the state machine that patrols',
-    ),
-    Node(
-        'battery_controller',
-        'surveillance_controllers',
-        'BatteryController',
-        'the battery: level, low warning, recharge',
-        console='battery',
-    ),
-    Node(
-        'planner_controller',
-        'surveillance_controllers',
-        'PlannerController',
-        'paths between points and to places',
-        console='plan',
-    ),
-    Node(
-        'motion_controller',
-        'surveillance_controllers',
-        'MotionController',
-        'follows a path with the base',
-        console='move',
-    ),
-    Node(
-        'collision_monitor',
-        'surveillance_controllers',
-        'CollisionMonitor',
-        'lets no command through to the base that the lidar does not allow',
-    ),
-    Node(
-        CONSOLE,
-        'surveillance_operator',
-        'ConsoleNode',
-        'one prompt for a mission: answers, doors, rooms, why, go',
-    ),
-    Node(
-        'reasoner',
-        'surveillance_behaviour',
-        'Reasoner',
-        'answers which place comes next',
-    ),
-    Node(
-        'initial_state',
-        'surveillance_behaviour',
-        'InitialState',
-        'looks around for markers and builds the ontology from them',
-    ),
-    Node(
-        'mission_view',
-        'surveillance_operator',
-        'MissionViewNode',
-        'shows a running mission in the terminal',
-    ),
-    Node(
-        'mission_markers',
-        'surveillance_operator',
-        'MissionMarkers',
-        'shows a running mission to RViz, Foxglove and rqt',
-    ),
-    Node(
-        'mission_page',
-        'surveillance_operator',
-        'MissionPage',
-        'shows a running mission in browsers',
-    ),
-    Node(
-        'mission_recorder',
-        'surveillance_operator',
-        'MissionRecorder',
-        'writes a recording that Foxglove and ros2 bag open',
-    ),
-    Node(
-        'simulator',
-        'surveillance_simulation',
-        'Simulator',
-        'the simulated place: base, lidar, arm, camera, doors',
-    ),
-    Node(
-        'aruco_detector',
-        'surveillance_perception',
-        'ArucoDetector',
-        'finds ArUco markers in the camera picture',
-    ),
-    Node(
-        'marker_server',
-        'surveillance_perception',
-        'MarkerServer',
-        'tells what place a marker stands for',
-    ),
-    Node(
-        'arm_controller',
-        'surveillance_perception',
-        'ArmController',
-        'moves the arm that carries the camera',
-    ),
-    Node(
-        'video_source',
-        'surveillance_perception',
-        'VideoSource',
-        'a webcam, a video or pictures as the camera topic',
-    ),
+_PURPOSES = {
+    'surveillance_ontology': {
+        'armor_server': 'ontologies and their reasoner, behind the ARMOR interface',
+        'ontology_map_builder': 'loads the ontology and builds the map in it',
+    },
+    'surveillance_behaviour': {
+        'robot_behavior': 'the state machine that patrols',
+        'reasoner': 'answers which place comes next',
+        'initial_state': 'looks around for markers and builds the ontology from them',
+    },
+    'surveillance_controllers': {
+        'battery_controller': 'the battery: level, low warning, recharge',
+        'planner_controller': 'paths between points and to places',
+        'motion_controller': 'follows a path with the base',
+        'collision_monitor': 'lets no command through to the base that the lidar does not allow',
+    },
+    'surveillance_operator': {
+        CONSOLE: 'one prompt for a mission: answers, doors, rooms, why, go',
+        'mission_view': 'shows a running mission in the terminal',
+        'mission_markers': 'shows a running mission to RViz, Foxglove and rqt',
+        'mission_page': 'shows a running mission in browsers',
+        'mission_recorder': 'writes a recording that Foxglove and ros2 bag open',
+    },
+    'surveillance_simulation': {
+        'simulator': 'the simulated place: base, lidar, arm, camera, doors',
+    },
+    'surveillance_perception': {
+        'aruco_detector': 'finds ArUco markers in the camera picture',
+        'marker_server': 'tells what place a marker stands for',
+        'arm_controller': 'moves the arm that carries the camera',
+        'video_source': 'a webcam, a video or pictures as the camera topic',
+    },
+}
+NODES = tuple(
+    Node(name, package, purpose)
+    for package, purposes in _PURPOSES.items()
+    for name, purpose in purposes.items()
 )
 BY_NAME = {node.name: node for node in NODES}
 

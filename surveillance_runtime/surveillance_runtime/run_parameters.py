@@ -75,7 +75,7 @@ def mode_entries(mode: str, *, prompts: bool) -> Iterator[Entry]:
         prompts: Whether each of them may ask at a prompt of its own.
     """
     for node in NODES:
-        if node.console:
+        if node.has_modes:
             yield for_node(node.name, 'execution_mode', mode, f'--mode {mode}')
             yield for_node(node.name, 'console', prompts, f'--mode {mode}')
 

@@ -268,7 +268,7 @@ def as_float(value):
 
 @given(PATTERNS, NAMES, VALUES, st.booleans())
 @example('/**', 'battery.capacity', 9_007_199_254_740_993, False)
-@settings(max_examples=1000, suppress_health_check=list(HealthCheck))
+@settings(max_examples=300, suppress_health_check=list(HealthCheck))
 def test_every_value_takes_effect_or_costs_one_line(tmp_path, pattern, name, chosen, as_argument):
     path = tmp_path / 'own.yaml'
     shown = yaml.safe_dump(chosen, default_flow_style=True, allow_unicode=True)
@@ -352,7 +352,7 @@ def read_by_ros(tmp_path_factory, ros_domain):
 @example('\0')
 @example(5e-324)
 @example('\x85\u2028 "it\\is"\n')
-@settings(max_examples=300, suppress_health_check=list(HealthCheck))
+@settings(max_examples=100, suppress_health_check=list(HealthCheck))
 def test_a_node_reads_what_was_resolved(read_by_ros, chosen):
     entry = Entry('/**', 'map.R1', chosen, 'a test')
     try:

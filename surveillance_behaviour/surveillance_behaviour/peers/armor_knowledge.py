@@ -6,7 +6,6 @@ import threading
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from typing import Protocol
 
 import surveillance_fsm as fsm
 from surveillance_fsm.exceptions import CallError, CallInterruptedError, UnavailableError
@@ -18,16 +17,6 @@ from surveillance_ontology.armor.client import (
     Transport,
 )
 from surveillance_ontology.patrol_ontology import OntologyNotReadyError, PatrolOntology, Snapshot
-
-
-class Wake(Protocol):
-    """The interrupt that the transport heeds."""
-
-    def set(self) -> None:
-        """End the call that is under way."""
-
-    def clear(self) -> None:
-        """Let the next call run."""
 
 
 class Whereabouts:
@@ -100,7 +89,7 @@ class ArmorKnowledge:
         self,
         client_id: str,
         transport: Transport,
-        wake: Wake,
+        wake: fsm.Interrupt,
         reference: Callable[[fsm.Interrupt], str],
         whereabouts: Whereabouts | None = None,
         patience: float = 0.0,

@@ -66,7 +66,10 @@ class Places(Protocol):
 
 
 class Decisions(Protocol):
-    """Who decides where the robot goes: a `Decider`, here or in another process."""
+    """Who decides where the robot goes: a `Decider`, here or in another process.
+
+    A class need not define the methods that return nothing: it is then told in vain.
+    """
 
     @property
     def places(self) -> frozenset[str]:
@@ -97,18 +100,23 @@ class Decisions(Protocol):
 
     def send_to_charge(self, why: str) -> None:
         """Have the robot charge before anything else."""
+        return
 
     def saw(self, place: str, now: float) -> None:
         """Note that the robot is in ``place``."""
+        return
 
     def arrived(self, place: str, now: float, metres: float | None = None) -> None:
         """Note that the robot has come to ``place`` over a path of so many metres."""
+        return
 
     def disturbed(self) -> None:
         """Note that the present drive is no example of how long a leg takes."""
+        return
 
     def charged(self) -> None:
         """Note that the battery was charged."""
+        return
 
     def route_round(self, start: str, goal: str) -> tuple[str, ...]:
         """Return the places of another way between two neighbours, ``goal`` included; empty:

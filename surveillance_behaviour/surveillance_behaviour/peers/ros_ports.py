@@ -21,7 +21,7 @@ from surveillance_behaviour.charging import BatteryMonitor
 from surveillance_behaviour.decision import ANY, RECHARGE
 from surveillance_behaviour.peers.announcing import MissionClock
 from surveillance_behaviour.peers.armor_knowledge import ArmorKnowledge, Whereabouts
-from surveillance_behaviour.peers.ports import Ontology, Point, UnknownPlaceError
+from surveillance_behaviour.peers.ports import Decisions, Ontology, Point, UnknownPlaceError
 from surveillance_behaviour.policy.world import Decision
 from surveillance_fsm import Interrupt
 from surveillance_fsm.ros import (
@@ -192,8 +192,10 @@ class RosMotion:
         return driven
 
 
-class RosReasoner:
+class RosReasoner(Decisions):
     """Decides over the service `reason`; the topic `decision` tells by which rule.
+
+    It need not be told what happens: the reasoner hears that on `mission_status`.
 
     Args:
         node: The node.
@@ -270,23 +272,8 @@ class RosReasoner:
         battery = self._battery
         return f'the battery is low ({battery.level_text()})' if battery.low else ''
 
-    def send_to_charge(self, why: str) -> None:
-        """Nothing: the reasoner remembers that itself."""
-
-    def saw(self, place: str, now: float) -> None:
-        """Nothing: the reasoner is told by `mission_status`, like of all that follows."""
-
-    def arrived(self, place: str, now: float, metres: float | None = None) -> None:
-        """Nothing."""
-
-    def disturbed(self) -> None:
-        """Nothing."""
-
-    def charged(self) -> None:
-        """Nothing."""
-
     def route_round(self, start: str, goal: str) -> tuple[str, ...]:
-        """Nothing: the planner of `motion/planner` goes round by itself."""
+        """Return nothing: the planner of `motion/planner` goes round by itself."""
         return ()
 
 

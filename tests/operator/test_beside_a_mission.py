@@ -1,23 +1,154 @@
-"""The page in a real Chromium, beside a real mission: everything on it is seen to change."""
+"""One whole mission, looked at from outside: console and watch on a terminal, the page in Chromium.
+
+Tests without it come first, and those in the browser last, which draws for as long as it is open.
+"""
 
 from __future__ import annotations
 
+import contextlib
 import os
 import signal
-from collections.abc import Iterator
+import socket
+from collections.abc import Callable, Iterator
+from pathlib import Path
 
 import pytest
 
-from tests.launcher.conftest import Started
+from surveillance_runtime.discovery import LAST_DOMAIN
+from surveillance_runtime.testing import claim_domain
+from tests.launcher.conftest import ROOT, Started
 from tests.operator.browser import CHROMIUM, DESK, DRIVER, MISSING, PHONE, Viewer
+from tests.operator.terminal import Terminal
 
-pytestmark = [
-    pytest.mark.skipif(not (CHROMIUM and DRIVER), reason=MISSING),
-]
+LAUNCH = [str(ROOT / '.venv/bin/python'), str(ROOT / 'launch.py')]
+Open = Callable[..., Terminal]
+
+
+def free_port(domain: int) -> int:
+    """Return a port that nobody else asks for: of the domain, and none that clients are given."""
+    for port in range(20000 + domain, 32768, LAST_DOMAIN + 1):
+        with contextlib.suppress(OSError), socket.socket() as free:
+            free.bind(('127.0.0.1', port))
+            return port
+    raise RuntimeError('no port is free')
+
+
+@pytest.fixture(scope='module')
+def mission_domain() -> int:
+    """Provide a ROS domain that no test in this process uses."""
+    return claim_domain()
+
+
+@pytest.fixture(scope='module')
+def mission(mission_domain: int, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Started]:
+    """Provide a patrol at four times real time, with a page that may control it."""
+    port = free_port(mission_domain)  # a page that is started again keeps its address
+    words = ['--composed', '--web-control', '--web-address', f'127.0.0.1:{port}']
+    words += ['--domain', str(mission_domain), '--record', str(tmp_path_factory.mktemp('runs'))]
+    words += ['-p', 'speed:=4.0', '--params', str(ROOT / 'config/fast.yaml')]
+    started = Started([*LAUNCH, *words])
+    started.until('decision 1')
+    yield started
+    started.end(signal.SIGINT)
+
+
+@pytest.fixture
+def terminal(mission_domain: int, tmp_path: Path) -> Iterator[Open]:
+    opened: list[Terminal] = []
+
+    def start(*words: str, columns: int = 80, rows: int = 40) -> Terminal:
+        environ = {'XDG_STATE_HOME': str(tmp_path)}
+        command = [*LAUNCH, *words, '--domain', str(mission_domain)]
+        opened.append(Terminal(command, columns, rows, environ))
+        return opened[-1]
+
+    yield start
+    for each in opened:
+        each.close()
+
+
+def test_a_person_answers_the_requests_of_mode_manual(terminal: Open, tmp_path: Path) -> None:
+    words = ('--mode', 'MANUAL', '--namespace', 'manual', '--record', str(tmp_path))
+    manual = terminal(*words, columns=120, rows=60)
+    manual.until('New request: compute a path')
+    manual.type('plan set [[7,9,0]]\r')
+    manual.until('New request: follow')
+    manual.type('move 1 0\r')
+    manual.until('arrived in')
+    manual.type('battery set 10\r')
+    manual.until('battery low: 10 %')
+    manual.type('status\r')
+    manual.until('The battery is at 10 %')
+    manual.type('exit\r')
+    assert manual.ended() == 0
+
+
+def test_the_arm_is_moved_from_the_terminal_of_mode_manual(terminal: Open, tmp_path: Path) -> None:
+    words = ('--mode', 'MANUAL', '--behaviour', 'patrol', '--namespace', 'arm')
+    words += ('--only', 'console,simulator,arm_controller', '--record', str(tmp_path))
+    manual = terminal(*words, columns=120, rows=60)
+    manual.until(*(f'{name:<14} | ready' for name in ('arm_controller', 'simulator', 'console')))
+    manual.type('arm up\r')
+    manual.until("arm: 'up': expected left, home, right, back")
+    manual.type('arm left\r')
+    manual.until('at pose left')
+    manual.type('exit\r')
+    assert manual.ended() == 0
+
+
+def test_the_console_answers_completes_remembers_and_ends(mission: Started, terminal: Open) -> None:
+    console = terminal('console')
+    console.until('why not ROOM', 'console>')
+    console.until('· in ', 'battery')  # the status line
+    console.type('why\r')
+    console.until('decision')
+    console.type('why n\t')  # completion
+    console.until('console> why not')
+    console.type(' R77\r')
+    console.until("no place 'R77'", 'expected')
+    console.type('door close D4\r')
+    console.until('D4 is closed')
+    console.type('\x1b[A\x1b[A\x7f\x7f\x7fR4\r')  # history: the line before the last, changed
+    console.until('console> why not R4', 'R4')
+    console.type('door open D4\r')
+    console.until('D4 is open')
+    console.type('pause\r')
+    console.until('paused', 'PAUSED')
+    console.type('resume\r')
+    console.until('going on')
+    assert all(len(line) <= 80 for line in console.lines)
+    console.type('\x04')  # the end of the input
+    assert console.ended() == 0
+
+    again = terminal('console')
+    again.until('console>')
+    again.type('\x1b[A')  # the history outlives the console
+    again.until('console> resume')
+    again.type('\x03')  # Ctrl-C
+    assert again.ended() == 0
+
+
+def test_watch_fits_eighty_columns_and_its_keys_change_it(mission: Started, terminal: Open) -> None:
+    watch = terminal('watch', rows=30)
+    shown = watch.until('q quit', 'e events', 'battery', 'decision', 'R1')
+    assert '…' not in shown.splitlines()[0]
+    assert shown.rstrip().endswith('e events')
+    watch.type('d')
+    watch.until('policy tour', 'chosen')
+    watch.type('n')
+    watch.until('armor_server', 'up')
+    watch.type('e')
+    watch.until('arrived in')
+    watch.type('ep')
+    watch.until('HELD')
+    watch.type('q')
+    assert watch.ended() == 0
 
 
 @pytest.fixture(scope='module')
 def viewer(mission: Started) -> Iterator[Viewer]:
+    if not (CHROMIUM and DRIVER):
+        pytest.skip(MISSING)
     address = mission.until(r'the mission is shown at (\S+)')[1]
     viewer = Viewer(address)
     viewer.until(lambda: viewer.count('[data-place]') == 7)
