@@ -18,8 +18,8 @@ from surveillance_runtime.logging import without_controls
 
 PlanarPose = tuple[float, float, float]
 """x, y in metres and yaw in radians."""
-FARTHEST = 1e6
-"""A pose farther from the origin than this is none, metres."""
+FARTHEST = 2e7
+"""A pose farther from the origin than this is none, metres: northings of UTM go up to 1e7."""
 
 
 def clean_texts(message: Any) -> None:

@@ -84,6 +84,10 @@ def test_where_a_marker_is_cannot_be_told_from_a_moving_camera(messages: list[An
     assert len(known.detections) == 1
 
 
+def test_a_pose_in_utm_is_known() -> None:
+    assert told(('amcl_pose', pose(499_000.5, 9_999_000.25))).pose == (499_000.5, 9_999_000.25, 0.0)
+
+
 def test_facts_come_and_go() -> None:
     snapshot = Snapshot()
     for text in ('URGENT(R1)', 'connectedTo(R1, C1)', 'visitedAt(R1, "7"^^xsd:long)', 'ROBOT(x)'):

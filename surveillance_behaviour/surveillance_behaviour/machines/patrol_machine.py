@@ -21,7 +21,6 @@ from surveillance_behaviour.machines.shared_states import (
     Recover,
     WaitForHelp,
     add,
-    charge_here,
     check_arrival,
     check_path,
     path_length,
@@ -178,7 +177,7 @@ class Recharge(MissionState):
         self.charging = True
         ud.target = mission.place
         mission.say(f'charging in {mission.place} ({mission.battery.level_text()})')
-        charge_here(mission, interrupt, routine_of(mission).recharge)
+        mission.charge(interrupt, routine_of(mission).recharge)
         return 'battery_full'
 
     def goal(self, ud: Any) -> str | None:

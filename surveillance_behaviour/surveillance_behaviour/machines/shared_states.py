@@ -8,7 +8,6 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import surveillance_fsm as fsm
-from surveillance_behaviour.charging import charge
 from surveillance_behaviour.decision import NowhereToGoError
 from surveillance_behaviour.mission.mission import Mission
 from surveillance_behaviour.mission.recovery import Step
@@ -148,25 +147,6 @@ class WaitForHelp(MissionState):
                 return False
             seconds -= LOOK_PERIOD
         return True
-
-
-def charge_here(
-    mission: Mission,
-    interrupt: fsm.Interrupt,
-    recharge: Callable[[fsm.Interrupt], None] | None = None,
-) -> None:
-    """Charge at the station where the robot is, and note it; see `charging.charge`."""
-    began = mission.now()
-    charge(
-        mission.battery,
-        mission.charged_enough,
-        mission.clock,
-        interrupt,
-        stall_seconds=mission.settings.charge_stall_seconds,
-        settle_seconds=mission.settings.settle_seconds,
-        recharge=recharge,
-    )
-    mission.charged(mission.now() - began)
 
 
 def add(

@@ -17,7 +17,6 @@ from surveillance_behaviour.machines.shared_states import (
     Recover,
     WaitForHelp,
     add,
-    charge_here,
     check_arrival,
     check_path,
     path_length,
@@ -96,7 +95,7 @@ class RechargeTask(MissionState):
         mission = self.mission
         why = mission.ports.decisions.why_charge()
         mission.say(f'charging in {mission.place} ({mission.battery.level_text()}, {why})')
-        charge_here(mission, interrupt)
+        mission.charge(interrupt)
         return 'recharged'
 
     def goal(self, ud: Any) -> str | None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
-from surveillance_behaviour.charging import BatteryMonitor
+from surveillance_behaviour.charging import BatteryMonitor, charge
 from surveillance_behaviour.decision import DecisionSettings
 from surveillance_behaviour.mission.mission_log import CutOff, MissionRecord, is_other_simulation
 from surveillance_behaviour.mission.recovery import Failure, Recovery, RecoveryLimits
@@ -210,8 +210,21 @@ class Mission:
         points = [] if motion is None else motion.driven()
         return {'driven': _rounded(points)} if points else {}
 
-    def charged(self, seconds: float) -> None:
-        """Note that the battery was charged."""
+    def charge(
+        self, interrupt: Interrupt, recharge: Callable[[Interrupt], None] | None = None
+    ) -> None:
+        """Charge at the station where the robot is, and note it; see `charging.charge`."""
+        began = self.now()
+        charge(
+            self.battery,
+            self.charged_enough,
+            self.clock,
+            interrupt,
+            stall_seconds=self.settings.charge_stall_seconds,
+            settle_seconds=self.settings.settle_seconds,
+            recharge=recharge,
+        )
+        seconds = self.now() - began
         self.ports.decisions.charged()
         self.recovery.charged(self.place)
         self.failure = None
