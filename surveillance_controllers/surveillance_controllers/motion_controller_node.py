@@ -9,7 +9,7 @@ writes it into the ontology.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any, TextIO
+from typing import Any, TextIO
 
 import numpy as np
 
@@ -20,7 +20,7 @@ from surveillance_controllers.manual import commands
 from surveillance_controllers.manual.commands import MOTION, ParsedCommand
 from surveillance_controllers.manual.requests import CommandConsole, RequestQueue
 from surveillance_controllers.map_knowledge import MapKnowledge
-from surveillance_controllers.motion.arrival import MotionFailedError, place_reached
+from surveillance_controllers.motion.arrival import Motion, MotionFailedError, place_reached
 from surveillance_controllers.motion.place_recording import PlaceRecorder
 from surveillance_controllers.stimuli import glide
 from surveillance_fsm.ros import GoalAbortedError, GoalRun, GoalServer
@@ -29,9 +29,6 @@ from surveillance_ontology.patrol_ontology import OntologyNotReadyError
 from surveillance_runtime.conversions import FARTHEST, point_message
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.process import run_node
-
-if TYPE_CHECKING:
-    from surveillance_controllers.motion.docking import Motion
 
 
 class MotionController(PatrolNode):

@@ -1,14 +1,31 @@
-"""How a motion ends: in a place, or not where it should."""
+"""What a way to move the robot offers, and how a motion ends: in a place, or not as it should."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from typing import Protocol
 
 import numpy as np
 
 from surveillance_controllers.geometry import Points
 from surveillance_controllers.manual import commands
+from surveillance_fsm.ros import GoalRun
+
+
+class Motion(Protocol):
+    """What drives the robot: `NavigationMotion`, `Nav2Motion`, either with docking."""
+
+    def follow(self, path: Points, run: GoalRun, report: Callable[[Points], None]) -> Points:
+        """Drive along a path; return where the robot is then, or raise `MotionFailedError`."""
+
+    def place_reached(self, goal: Points, end: Points, run: GoalRun) -> str:
+        """Return the place the robot is in; raises `MotionFailedError` when it is not the
+        goal's.
+        """
+
+    def look_around(self, run: GoalRun) -> None:
+        """Look around in the place."""
 
 
 class MotionFailedError(Exception):

@@ -7,32 +7,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any, Protocol
+from typing import Any
 
 from geometry_msgs.msg import PoseStamped
 
 from surveillance_controllers.controller_parameters import MotionSettings
 from surveillance_controllers.geometry import Points
-from surveillance_controllers.motion.arrival import MotionFailedError
+from surveillance_controllers.motion.arrival import Motion, MotionFailedError
 from surveillance_fsm.ros import CallError, GoalCaller, GoalRun
 from surveillance_runtime.conversions import pose_message
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.parameters import ParameterError
-
-
-class Motion(Protocol):
-    """What drives the robot: `NavigationMotion` or `Nav2Motion`."""
-
-    def follow(self, path: Points, run: GoalRun, report: Callable[[Points], None]) -> Points:
-        """Drive along a path; return where the robot is then, or raise `MotionFailedError`."""
-
-    def place_reached(self, goal: Points, end: Points, run: GoalRun) -> str:
-        """Return the place the robot is in; raises `MotionFailedError` when it is not the
-        goal's.
-        """
-
-    def look_around(self, run: GoalRun) -> None:
-        """Look around in the place."""
 
 
 def docking_actions() -> tuple[Any, Any]:
