@@ -17,7 +17,7 @@ import argparse
 import sys
 import tempfile
 import time
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -30,6 +30,7 @@ from surveillance_ontology.owl.axioms import (  # noqa: E402
     Axiom,
     ClassAssertion,
     DataPropertyAssertion,
+    Declaration,
     DifferentIndividuals,
     DisjointClasses,
     DisjointUnion,
@@ -40,12 +41,7 @@ from surveillance_ontology.owl.axioms import (  # noqa: E402
 )
 from surveillance_ontology.owl.expressions import ObjectUnionOf  # noqa: E402
 from surveillance_ontology.owl.vocabulary import NOTHING  # noqa: E402
-from tests.ontology.reasoner.wide_ontologies import (  # noqa: E402
-    CLASSES,
-    INDIVIDUALS,
-    OBJECTS,
-    WideOntology,
-)
+from tests.ontology.reasoner.wide_ontologies import DenseOntology, WideOntology  # noqa: E402
 
 IRI = 'http://example.org/wide'
 COLUMNS = ('ontologies', 'refused', 'no answer', 'inconsistent', 'questions', 'right', 'settled')
@@ -55,19 +51,23 @@ FAULTS = ('named', 'silent', 'unsound', 'false inconsistency', 'crash')
 def questions(axioms: list[Axiom]) -> Iterator[Axiom]:
     """Yield every fact that could follow."""
     values = {(a.prop, a.literal) for a in axioms if isinstance(a, DataPropertyAssertion)}
-    for one in INDIVIDUALS:
-        for cls in CLASSES:
+    names = defaultdict(list)
+    for axiom in axioms:
+        if isinstance(axiom, Declaration):
+            names[axiom.kind].append(axiom.iri)
+    for one in names['individual']:
+        for cls in names['class']:
             yield ClassAssertion(cls, one)
         for prop, value in sorted(values, key=repr):
             yield DataPropertyAssertion(prop, one, value)
-        for other in INDIVIDUALS:
-            for prop in OBJECTS:
+        for other in names['individual']:
+            for prop in names['object_property']:
                 yield ObjectPropertyAssertion(prop, one, other)
             if one < other:
                 yield SameIndividual(frozenset((one, other)))
                 yield DifferentIndividuals(frozenset((one, other)))
-    for sub in CLASSES:
-        for sup in (*CLASSES, NOTHING):
+    for sub in names['class']:
+        for sup in (*names['class'], NOTHING):
             if sub != sup:
                 yield SubClassOf(sub, sup)
 
@@ -94,7 +94,10 @@ def words_for(fact: Axiom) -> tuple[str, ...]:
 
 
 def drawn_axioms(seed: int, cases: float = 0.2, special: float = 0.0) -> list[Axiom]:
-    """Return the random ontology of a seed."""
+    """Return the random ontology of a seed; with negative `cases` a dense one."""
+    if cases < 0:
+        dense = DenseOntology(seed)
+        return dense.ontology(dense.random.randrange(1, 9), dense.random.randrange(2, 9))
     drawn = WideOntology(seed, cases, special)
     return drawn.ontology(drawn.random.randrange(1, 13), drawn.random.randrange(3, 14))
 

@@ -20,7 +20,6 @@ from functools import cache
 from typing import Any, TypeAlias
 from xml.etree import ElementTree
 
-from surveillance_ontology.owl import expressions as ex
 from surveillance_ontology.owl.expressions import (
     DataComplementOf,
     DataIntersectionOf,
@@ -30,7 +29,7 @@ from surveillance_ontology.owl.expressions import (
     DataUnionOf,
     Literal,
 )
-from surveillance_ontology.owl.vocabulary import OWL, RDF, RDFS, TOP_LITERAL, XSD, local_name
+from surveillance_ontology.owl.vocabulary import OWL, RDF, RDFS, XSD, local_name
 from surveillance_ontology.reasoner import moments
 from surveillance_ontology.reasoner.moments import moment_of, text_of
 
@@ -434,61 +433,6 @@ def range_test(data_range: DataRange) -> Test | None:
         return lambda value: any(test(value) for test in known)
     assert isinstance(data_range, (DataIntersectionOf, DatatypeRestriction))
     return lambda value: all(test(value) for test in known)
-
-
-def includes(outer: ex.DataRange, inner: ex.DataRange) -> bool:
-    """Tell whether every value of `inner` is known to be in `outer` (sound, not complete)."""
-    if outer in (inner, TOP_LITERAL):
-        return True
-    if isinstance(inner, ex.DatatypeRestriction):
-        return includes(outer, inner.datatype)
-    if isinstance(inner, ex.DataOneOf):
-        test = range_test(outer)
-        return test is not None and all(test(value_of(literal)) for literal in inner.literals)
-    if isinstance(inner, ex.DataUnionOf):
-        return all(includes(outer, operand) for operand in inner.operands)
-    if isinstance(inner, ex.DataIntersectionOf):
-        return any(includes(outer, operand) for operand in inner.operands)
-    if isinstance(outer, ex.DataUnionOf):
-        return any(includes(operand, inner) for operand in outer.operands)
-    if isinstance(outer, str) and isinstance(inner, str):
-        return outer in _WIDER.get(inner, ())
-    return False
-
-
-def _wider() -> dict[str, set[str]]:
-    below = {
-        'decimal': ('integer',),
-        'integer': ('nonPositiveInteger', 'long', 'nonNegativeInteger'),
-        'nonPositiveInteger': ('negativeInteger',),
-        'long': ('int', 'unsignedInt'),
-        'int': ('short', 'unsignedShort'),
-        'short': ('byte', 'unsignedByte'),
-        'nonNegativeInteger': ('positiveInteger', 'unsignedLong'),
-        'unsignedLong': ('unsignedInt',),
-        'unsignedInt': ('unsignedShort',),
-        'unsignedShort': ('unsignedByte',),
-        'string': ('normalizedString',),
-        'normalizedString': ('token',),
-        'token': ('language', 'NMTOKEN', 'Name'),
-        'Name': ('NCName',),
-        'dateTime': ('dateTimeStamp',),
-    }
-    wider: dict[str, set[str]] = {}
-
-    def mark(name: str, above: set[str]) -> None:
-        wider.setdefault(XSD + name, set()).update(above)
-        for child in below.get(name, ()):
-            mark(child, above | {XSD + name})
-
-    for name in below:
-        mark(name, set())
-    for name in ('decimal', 'integer'):
-        wider.setdefault(XSD + name, set()).update((OWL + 'real', OWL + 'rational'))
-    return wider
-
-
-_WIDER = _wider()
 
 
 def unfolded(

@@ -26,7 +26,7 @@ _FORM = re.compile(
 _DAY = 86_400
 _CYCLE_YEARS, _CYCLE_DAYS = 400, 146_097
 """The calendar repeats itself; Python's dates know the years 1 to 9999 only."""
-_LARGEST_OFFSET = 14 * 3600
+LARGEST_OFFSET = 14 * 3600
 _CALENDAR = {
     'date': ('', '', 'T00:00:00'),
     'time': ('', '1972-12-31T', ''),
@@ -67,7 +67,7 @@ def moment_of(text: str) -> Moment:
     offset = 0
     if zone != 'Z':
         offset = int(zone[1:3]) * 3600 + int(zone[4:6]) * 60
-        if int(zone[4:6]) > 59 or offset > _LARGEST_OFFSET:
+        if int(zone[4:6]) > 59 or offset > LARGEST_OFFSET:
             raise ValueError(f'{text!r} has no such zone')
         offset = offset if zone[0] == '+' else -offset
     return ('dateTime', 'utc', seconds - offset, offset)
@@ -99,7 +99,7 @@ def order(first: Moment, second: Moment) -> int | None:
     A moment without a zone may be up to 14 hours earlier or later (XML Schema 1.1 part 2, D.2.1).
     """
     away = first[2] - second[2]
-    if first[1] != second[1] and abs(away) <= _LARGEST_OFFSET:
+    if first[1] != second[1] and abs(away) <= LARGEST_OFFSET:
         return None
     return int(away > 0) - int(away < 0)
 

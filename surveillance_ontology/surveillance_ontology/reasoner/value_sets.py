@@ -1,10 +1,10 @@
 """Sets of data values: the algebra of data ranges, with emptiness, inclusion and size.
 
-Ordered spaces (numbers, floats) are unions of intervals: numbers lie in four layers that
-share no value (whole, other decimal, other rational, other real), so that every boolean combination
-of XML Schema's numeric ranges is again a union of intervals for each layer. The other spaces hold
-finite sets, sets of all but finitely many, and tests (patterns, lengths, string types,
-moments) that are decided on single values only.
+Ordered spaces (numbers, floats, moments) are unions of intervals: numbers lie in four layers that
+share no value (whole, other decimal, other rational, other real), moments in two (with a zone and
+without), so that every boolean combination of XML Schema's ranges is again a union of intervals for
+each layer. The other spaces hold finite sets, sets of all but finitely many, all values of some
+lengths, and tests (patterns, string types) that are decided on single values only.
 
 Source of the value spaces: OWL 2 Structural Specification, section 4, and XML Schema 1.1 part 2.
 """
@@ -27,18 +27,18 @@ from surveillance_ontology.reasoner.datatypes import (
     Value,
     comparable,
     facet_test,
-    includes,
     is_decimal,
     range_test,
     value_of,
 )
+from surveillance_ontology.reasoner.moments import LARGEST_OFFSET
 
 _NUMBERS = ('whole', 'decimal', 'rational', 'real')
-_ORDERED = (*_NUMBERS, 'float', 'double')
-_PLAIN = (
-    *('string', 'langString', 'boolean', 'dateTime'),
-    *('anyURI', 'hexBinary', 'base64Binary', 'other'),
-)
+_MOMENTS = ('utc', 'local')
+_ORDERED = (*_NUMBERS, 'float', 'double', *_MOMENTS)
+_OCTETS = ('hexBinary', 'base64Binary')
+_WITH_LENGTH = ('string', 'anyURI', *_OCTETS)
+_PLAIN = (*_WITH_LENGTH, 'langString', 'boolean', 'other')
 _BOOLEANS = frozenset([('boolean', True), ('boolean', False)])
 
 
@@ -61,6 +61,8 @@ def _above(key: Any) -> _End:
 _LOW, _HIGH = _End(-1, 0, 0), _End(1, 0, 0)
 _Intervals: TypeAlias = 'tuple[tuple[_End, _End], ...]'
 _EVERY: _Intervals = ((_LOW, _HIGH),)
+_LENGTHS: _Intervals = ((_below(0), _HIGH),)
+"""All lengths of texts."""
 
 
 def _union(parts: Iterable[tuple[_End, _End]]) -> _Intervals:
@@ -95,30 +97,51 @@ def _outside(parts: _Intervals) -> _Intervals:
 
 @dataclass(frozen=True, slots=True)
 class _Conjunction:
-    """Values of one plain space: listed (None: any), not excluded, that pass the tests.
+    """Values of one plain space: listed (None: any), not excluded, that pass the tests and have
+    one of the lengths.
 
-    A test is (data range, whether values are in it).
+    A test is (data range, whether values are in it). Where values are listed, nothing else is said.
     """
 
-    listed: frozenset[Value] | None
-    excluded: frozenset[Value]
-    tests: frozenset[tuple[DataRange, bool]]
+    listed: frozenset[Value] | None = None
+    excluded: frozenset[Value] = frozenset()
+    tests: frozenset[tuple[DataRange, bool]] = frozenset()
+    lengths: _Intervals = _LENGTHS
 
 
 _Part: TypeAlias = 'tuple[_Conjunction, ...]'
-_ANY: _Part = (_Conjunction(None, frozenset(), frozenset()),)
+_ANY: _Part = (_Conjunction(),)
 
 
 def _listed(values: Iterable[Value]) -> _Part:
     found = frozenset(values)
-    return (_Conjunction(found, frozenset(), frozenset()),) if found else ()
+    return (_Conjunction(found),) if found else ()
 
 
 def _tested(data_range: DataRange) -> _Part:
-    return (_Conjunction(None, frozenset(), frozenset([(data_range, True)])),)
+    return (_Conjunction(tests=frozenset([(data_range, True)])),)
 
 
-def _both(first: _Part, second: _Part) -> _Part:
+def _of_length(space: str, lengths: _Intervals) -> frozenset[Value] | None:
+    """Return the values of the given lengths; None where there are more than 257."""
+    is_octets = space in _OCTETS
+    longest = 1 if is_octets else 0
+    short = [length for length in range(longest + 1) if _is_in(length, lengths)]
+    if sum(_count('whole', *each) for each in lengths) > len(short):
+        return None
+    if not is_octets:
+        return frozenset('' if space == 'string' else (space, '') for _ in short)
+    octets = [b'', *(bytes([octet]) for octet in range(256))]
+    return frozenset((space, value) for value in octets if len(value) in short)
+
+
+def _is_in(key: Any, intervals: _Intervals) -> bool:
+    return any(low <= _below(key) and _above(key) <= high for low, high in intervals)
+
+
+def _both(space: str, first: _Part, second: _Part) -> _Part:
+    if second is _ANY:
+        return first
     found: dict[_Conjunction, None] = {}
     for one in first:
         for other in second:
@@ -128,26 +151,36 @@ def _both(first: _Part, second: _Part) -> _Part:
             elif other.listed is not None:
                 listed &= other.listed
             excluded, tests = one.excluded | other.excluded, one.tests | other.tests
-            if listed is not None:
-                listed = frozenset(v for v in listed if v not in excluded and _passes(v, tests))
-                excluded, tests = frozenset(), frozenset()
-            if listed is None or listed:
-                found[_Conjunction(listed, excluded, tests)] = None
+            lengths = _common(one.lengths, other.lengths)
+            if listed is None:
+                listed = _of_length(space, lengths)
+            if listed is None:
+                found[_Conjunction(None, excluded, tests, lengths)] = None
+                continue
+            kept = (v for v in listed - excluded if _has_length(v, lengths) and _passes(v, tests))
+            found.update(dict.fromkeys(_listed(kept)))
     return tuple(found)
 
 
-def _not(part: _Part) -> _Part:
+def _has_length(value: Any, lengths: _Intervals) -> bool:
+    text = value if isinstance(value, str) else value[1]
+    return lengths == _LENGTHS or _is_in(len(text), lengths)
+
+
+def _not(space: str, part: _Part) -> _Part:
     result = _ANY
     for one in part:
         choices: list[_Conjunction] = []
         if one.listed is not None:
-            choices.append(_Conjunction(None, one.listed, frozenset()))
+            choices.append(_Conjunction(excluded=one.listed))
         choices += _listed(one.excluded)
         choices += [
-            _Conjunction(None, frozenset(), frozenset([(data_range, not inside)]))
+            _Conjunction(tests=frozenset([(data_range, not inside)]))
             for data_range, inside in one.tests
         ]
-        result = _both(result, tuple(choices))
+        if one.lengths != _LENGTHS:
+            choices.append(_Conjunction(lengths=_common(_outside(one.lengths), _LENGTHS)))
+        result = _both(space, result, tuple(choices))
     return result
 
 
@@ -162,7 +195,21 @@ def _passes(value: Value, tests: Iterable[tuple[DataRange, bool]]) -> bool:
 def _impossible(tests: frozenset[tuple[DataRange, bool]]) -> bool:
     inside = [data_range for data_range, wanted in tests if wanted]
     outside = [data_range for data_range, wanted in tests if not wanted]
-    return any(includes(outer, inner) for outer in outside for inner in inside)
+    return any(_includes(outer, inner) for outer in outside for inner in inside)
+
+
+_STRING_TYPES = ('string', 'normalizedString', 'token', 'NMTOKEN', 'Name', 'NCName')
+"""Each is within all before it."""
+
+
+def _includes(outer: DataRange, inner: DataRange) -> bool:
+    """Tell whether all texts of a string type or a pattern are known to be in another."""
+    if isinstance(inner, ex.DatatypeRestriction):
+        return outer == inner or _includes(outer, inner.datatype)
+    wider = [XSD + name for name in _STRING_TYPES]
+    if inner == XSD + 'language':
+        return outer in (inner, *wider[: wider.index(XSD + 'Name')])
+    return outer == inner or (inner in wider and outer in wider[: wider.index(inner)])
 
 
 class ValueSet:
@@ -192,7 +239,7 @@ class ValueSet:
                 if name in other.intervals
             },
             {
-                name: _both(found, other.parts[name])
+                name: _both(name, found, other.parts[name])
                 for name, found in self.parts.items()
                 if name in other.parts
             },
@@ -215,8 +262,8 @@ class ValueSet:
 
     @cached_property
     def _complement(self) -> ValueSet:
-        parts = {name: _not(self.parts.get(name, ())) for name in _PLAIN}
-        parts['boolean'] = _both(parts['boolean'], _listed(_BOOLEANS))
+        parts = {name: _not(name, self.parts.get(name, ())) for name in _PLAIN}
+        parts['boolean'] = _both('boolean', parts['boolean'], _listed(_BOOLEANS))
         intervals = {name: _outside(self.intervals.get(name, ())) for name in _ORDERED}
         return ValueSet(intervals, parts)
 
@@ -282,6 +329,9 @@ def _count(layer: str, low: _End, high: _End) -> float:
         return int(max(0, last - first + 1))
     if layer in ('float', 'double'):
         return _count_floats(layer, low, high)
+    if layer in _MOMENTS:
+        same_instant = low.key[0] == high.key[0]
+        return sum(1 for _ in _between_moments(layer, low, high)) if same_instant else math.inf
     if low.key != high.key:
         return math.inf
     return int(_layer_of(low.key) == layer)
@@ -300,8 +350,21 @@ def _between(layer: str, low: _End, high: _End) -> Iterator[Value]:
         for _ in range(number):
             yield layer, key
             key = _next_float(layer, key)
+    elif layer in _MOMENTS:
+        yield from _between_moments(layer, low, high)
     elif number:
         yield low.key
+
+
+def _between_moments(layer: str, low: _End, high: _End) -> Iterator[Value]:
+    """Return the moments of the first end's instant, in all zones, that lie between two ends."""
+    seconds, parts = low.key[0], ((low, high),)
+    if layer == 'utc':
+        for offset in range(-LARGEST_OFFSET, LARGEST_OFFSET + 1, 60):
+            if _is_in((seconds, offset), parts):
+                yield ('dateTime', 'utc', seconds, offset)
+    elif _is_in((seconds, 0), parts):
+        yield ('dateTime', 'local', seconds)
 
 
 def _next_float(layer: str, key: float) -> float:
@@ -353,6 +416,10 @@ def point(value: Value) -> ValueSet:
     space = value[0]
     if space in ('float', 'double') and len(value) == 2 and value[1] != 'NaN':
         return ValueSet({space: ((_below(key), _above(key)),)}, {})
+    if space == 'dateTime':
+        _, layer, seconds, *zone = value
+        key = (seconds, *(zone or [0]))
+        return ValueSet({layer: ((_below(key), _above(key)),)}, {})
     return ValueSet({}, {space if space in _PLAIN else 'other': _listed([value])})
 
 
@@ -374,8 +441,9 @@ def _datatype(datatype: str) -> ValueSet | None:
         return ValueSet({'whole': (ends,)}, {})
     if name in ('float', 'double'):
         return ValueSet({name: _EVERY}, {'other': _listed([(name, 'NaN'), (name, 0.0, '-')])})
-    if name == 'dateTimeStamp':
-        return ValueSet({}, {'dateTime': _tested(datatype)})
+    if name in ('dateTime', 'dateTimeStamp'):
+        layers_of_moments = _MOMENTS if name == 'dateTime' else _MOMENTS[:1]
+        return ValueSet(dict.fromkeys(layers_of_moments, _EVERY), {})
     if name == 'boolean':
         return ValueSet({}, {'boolean': _listed(_BOOLEANS)})
     if name in _PLAIN:
@@ -407,10 +475,40 @@ def _facet(datatype: str, facet: str, bound: ex.Literal) -> ValueSet | None:
             zero = (space, 0.0, '-')
             others = [zero] if test is not None and test(zero) else []
             return ValueSet({space: (ends(key),)}, {'other': _listed(others)})
-    if facet_test(facet, bound) is None:
+        if kind == 'dateTime':
+            return _moments(name, key)
+    values = _datatype(datatype)
+    if facet_test(facet, bound) is None or values is None:
         return None
+    if ends is None and values.intervals:
+        return None  # Numbers and moments have no patterns and lengths.
+    if name in ('length', 'minLength', 'maxLength'):
+        size = value_of(bound)
+        low = _below(size) if name != 'maxLength' else _LENGTHS[0][0]
+        high = _above(size) if name != 'minLength' else _HIGH
+        given = (_Conjunction(lengths=_common(((low, high),), _LENGTHS)),)
+        return ValueSet({}, {space: _both(space, _ANY, given) for space in _WITH_LENGTH})
     tested = _tested(ex.DatatypeRestriction(datatype, ((facet, bound),)))
     return ValueSet({}, {space: tested for space in _PLAIN if space != 'boolean'})
+
+
+def _moments(facet: str, bound: tuple[Any, ...]) -> ValueSet:
+    """Return the moments on one side of a bound.
+
+    Their keys are (seconds, offset of the zone). Moments of the other layer are known to lie there
+    only where they are further away than any zone could make up for.
+    """
+    layer, seconds = bound[:2]
+    low, high = (
+        end if end.beyond else _End(0, (end.key, end.side * math.inf), end.side)
+        for end in _ENDS[facet](seconds)
+    )
+    if facet.startswith('min'):
+        others = (_above((seconds + LARGEST_OFFSET, math.inf)), _HIGH)
+    else:
+        others = (_LOW, _below((seconds - LARGEST_OFFSET, -math.inf)))
+    other_layer = 'local' if layer == 'utc' else 'utc'
+    return ValueSet({layer: ((low, high),), other_layer: (others,)}, {})
 
 
 @cache

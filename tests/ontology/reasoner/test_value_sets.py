@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import random
 
 import pytest
@@ -26,9 +27,18 @@ LITERALS = [
     *(Literal(text) for text in ('a', 'b c', '1x')),
     Literal('true', XSD + 'boolean'),
     *(Literal(text, XSD + 'float') for text in ('1.0', 'NaN', '-0')),
-    Literal('2020-01-01T00:00:00Z', XSD + 'dateTime'),
+    *(Literal(text) for text in ('', 'ab')),
+    *(Literal(text, XSD + 'hexBinary') for text in ('', '00', '0001')),
+    *(
+        Literal(f'2020-01-0{day}T{hour}:00:00{zone}', XSD + 'dateTime')
+        for day, hour in ((1, '00'), (1, '09'), (2, '00'))
+        for zone in ('Z', '+01:00', '')
+    ),
 ]
-TYPES = ('integer', 'decimal', 'byte', 'string', 'boolean', 'float', 'NCName', 'token', 'dateTime')
+TYPES = (
+    *('integer', 'decimal', 'byte', 'string', 'boolean', 'float', 'NCName', 'token'),
+    *('dateTime', 'dateTimeStamp', 'hexBinary'),
+)
 FACETS = ('minInclusive', 'maxExclusive', 'maxInclusive', 'minExclusive')
 
 
@@ -40,12 +50,33 @@ def drawn(rng: random.Random, depth: int) -> DataRange:
         return DataOneOf(tuple(rng.sample(LITERALS, rng.randrange(1, 4))))
     if choice == 2:
         bound = Literal(str(rng.randrange(-2, 4)), XSD + 'integer')
+        shape = rng.random()
+        if shape < 0.2:
+            return DatatypeRestriction(
+                XSD + rng.choice(('string', 'hexBinary', 'anyURI')),
+                ((XSD + rng.choice(('length', 'minLength', 'maxLength')), bound),),
+            )
+        if shape < 0.4:
+            moments = [literal for literal in LITERALS if literal.datatype == XSD + 'dateTime']
+            facet = XSD + rng.choice(FACETS)
+            return DatatypeRestriction(XSD + 'dateTime', ((facet, rng.choice(moments)),))
         kind = XSD + rng.choice(('integer', 'decimal'))
         return DatatypeRestriction(kind, ((XSD + rng.choice(FACETS), bound),))
     if choice == 3:
         return DataComplementOf(drawn(rng, depth - 1))
     kind = DataUnionOf if choice == 6 else DataIntersectionOf
     return kind((drawn(rng, depth - 1), drawn(rng, depth - 1)))
+
+
+def of_length(datatype: str, facet: str, length: int) -> DataRange:
+    bound = Literal(str(length), XSD + 'integer')
+    return DatatypeRestriction(XSD + datatype, ((XSD + facet, bound),))
+
+
+def between(first: str, last: str) -> DataRange:
+    bounds = (('minInclusive', first), ('maxInclusive', last))
+    facets = tuple((XSD + facet, Literal(text, XSD + 'dateTime')) for facet, text in bounds)
+    return DatatypeRestriction(XSD + 'dateTime', facets)
 
 
 def values_of(data_range: DataRange) -> ValueSet:
@@ -67,6 +98,9 @@ def test_sets_agree_with_single_values() -> None:
         theirs = {value for value in values if other_test(value)}
         assert mine == {value for value in values if first.contains(value)}
         assert first.size >= len(mine)
+        if first.size < 300:
+            assert all(map(test, first.members()))
+            assert len(set(first.members())) == first.size
         assert not (first.within(second) and mine - theirs)
 
 
@@ -80,9 +114,24 @@ def test_sets_agree_with_single_values() -> None:
         (DataIntersectionOf((XSD + 'integer', XSD + 'string')), 0),
         (DataIntersectionOf((XSD + 'integer', DataComplementOf(XSD + 'decimal'))), 0),
         (DataIntersectionOf((XSD + 'NCName', DataComplementOf(XSD + 'token'))), 0),
+        (of_length('string', 'maxLength', 0), 1),
+        (of_length('string', 'length', 1), math.inf),
+        (of_length('hexBinary', 'maxLength', 1), 257),
+        (
+            DataIntersectionOf(
+                (of_length('string', 'minLength', 3), of_length('string', 'length', 2))
+            ),
+            0,
+        ),
+        (between('2020-01-01T00:00:00', '2020-01-01T00:00:00'), 1),
+        (between('2020-01-01T00:00:00Z', '2020-01-01T00:00:00Z'), 28 * 60 + 1),
+        (between('2020-01-01T00:00:00Z', '2020-01-01T00:00:01Z'), math.inf),
+        (between('2020-01-01T00:00:00', '2020-01-01T00:00:00-14:00'), 0),
+        (between('2020-01-01T00:00:00', '2020-01-01T00:00:00.001-14:00'), math.inf),
+        (DataIntersectionOf((XSD + 'dateTimeStamp', DataComplementOf(XSD + 'dateTime'))), 0),
     ],
 )
-def test_sizes(data_range: DataRange, size: int) -> None:
+def test_sizes(data_range: DataRange, size: float) -> None:
     assert values_of(data_range).size == size
 
 
