@@ -110,9 +110,9 @@ class Classification:
                 if not any(atom.predicate is label for atom in atoms):
                     continue
                 head = clause.head
-                if not isinstance(head, PredicateAtom) or _is_part(head.predicate, label):
+                if isinstance(head, PredicateAtom) and _is_part(head.predicate, label):
                     continue
-                if head.predicate.kind == 'class':
+                if isinstance(head, PredicateAtom) and head.predicate.kind == 'class':
                     context = contexts.context(self._implied(atoms, head.terms[0]) - {label})
                     if context.clash or head.predicate in context.tokens:
                         continue
