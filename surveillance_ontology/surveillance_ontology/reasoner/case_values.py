@@ -116,7 +116,7 @@ class CaseValues:
             if values.is_empty:
                 raise ClashError(choices)
             if not values.decided:
-                self.gaps['whether values suit a pattern, a length or a moment'] = None
+                self.gaps['whether values suit a pattern or a type of strings'] = None
             only = values.only
             if only is None:
                 continue

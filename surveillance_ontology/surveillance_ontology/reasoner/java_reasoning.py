@@ -1,7 +1,7 @@
 """A Java reasoner beside the native one, for ontologies outside the native one's fragment.
 
 owlready2 brings HermiT and Pellet as Java archives and runs them in a JVM for each reasoning, which
-takes seconds. Both are sound, so what either reasoner derives is shown. HermiT refuses rules with
+takes seconds. Both are sound, so what either reasoner derives holds: the engine takes the facts as it takes those found by cases. HermiT refuses rules with
 built-ins; the Pellet of owlready2 0.50 and later needs Java 25. Both need ``java`` on the path.
 """
 
@@ -9,14 +9,14 @@ from __future__ import annotations
 
 import importlib.util
 import io
-import itertools
 import shutil
 import threading
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
-from surveillance_ontology.knowledge_base import Changes, Fact, KnowledgeBase
+from surveillance_ontology.knowledge_base import KnowledgeBase
 from surveillance_ontology.owl.axioms import (
     Axiom,
     ClassAssertion,
@@ -26,7 +26,10 @@ from surveillance_ontology.owl.axioms import (
 )
 from surveillance_ontology.owl.expressions import Literal
 from surveillance_ontology.owl.vocabulary import OWL, RDF, RDFS, THING
-from surveillance_ontology.reasoner.datatypes import value_of
+from surveillance_ontology.reasoner.classification import Classification
+from surveillance_ontology.reasoner.clauses import closure
+from surveillance_ontology.reasoner.completion import Completion
+from surveillance_ontology.reasoner.engine import Engine
 from surveillance_ontology.reasoner.explanation import Explanation
 
 KINDS = ('hermit', 'pellet')
@@ -48,7 +51,7 @@ def absent() -> str:
 
 
 class JavaKnowledgeBase(KnowledgeBase):
-    """A `KnowledgeBase` that shows what a Java reasoner derives as well.
+    """A `KnowledgeBase` in which what a Java reasoner derives holds as well.
 
     Args:
         iri: The ontology's IRI.
@@ -59,10 +62,6 @@ class JavaKnowledgeBase(KnowledgeBase):
     def __init__(self, iri: str, axioms: Iterable[Axiom] = (), kind: str = 'hermit') -> None:
         super().__init__(iri, axioms)
         self._kind = kind
-        self._java: frozenset[Axiom] = frozenset()
-        self._java_consistent = True
-        self._reasoned = False
-        self._java_told: list[Callable[[Changes], None]] = []
 
     def reason(self) -> bool:
         """Bring what is derived up to date; whether the ontology is consistent.
@@ -70,146 +69,88 @@ class JavaKnowledgeBase(KnowledgeBase):
         Raises:
             JavaReasonerError: The Java reasoner failed; what the native one derives is up to date.
         """
-        if self._reasoned and not self.stale:
-            return self.consistent
-        self._reasoned = False
-        before, self._java = self._java, frozenset()
-        if super().reason():
-            found = self._further()
-            self._java_consistent = found is not None
-            self._java = found or frozenset()
-        self._reasoned = True
-        come = tuple((axiom, True) for axiom in self._java - before)
-        gone = tuple((axiom, True) for axiom in before - self._java)
-        if come or gone:
-            for tell in tuple(self._java_told):
-                tell(Changes(0, come, gone, self.consistent))
-        return self.consistent
+        consistent = super().reason()
+        assert isinstance(self._completion, _JavaCompletion)
+        if self._completion.failure:
+            raise JavaReasonerError(self._completion.failure)
+        return consistent
 
-    def subscribe(self, callback: Callable[[Changes], None]) -> Callable[[], None]:
-        """Call back once per batch of assertions and once per reasoner that changed derived facts.
-
-        Returns:
-            A function that ends the subscription.
-        """
-        numbers = itertools.count(1)
-
-        def tell(changes: Changes) -> None:
-            number = next(numbers)
-            callback(replace(changes, sequence=number, consistent=self.consistent))
-
-        unsubscribe = super().subscribe(tell)
-        self._java_told.append(tell)
-
-        def end() -> None:
-            unsubscribe()
-            if tell in self._java_told:
-                self._java_told.remove(tell)
-
-        return end
-
-    def _further(self) -> frozenset[Axiom] | None:
-        """Return what holds beyond the native derivations; None: there is a contradiction."""
-        found = infer(self._kind, self.iri, self.axioms())
-        if found is None:
-            return None
-        # What Java derives has consequences of its own, for example in superclasses.
-        both = KnowledgeBase(self.iri, [*self.axioms(), *found])
-        if not both.reason():
-            return None
-        native = set(super().facts())
-        facts = (fact for fact in both.facts() if fact not in native)
-        return frozenset([*facts, *(axiom for axiom in found if isinstance(axiom, SubClassOf))])
-
-    @property
-    def consistent(self) -> bool:
-        """Whether neither reasoner found a contradiction."""
-        return super().consistent and self._java_consistent
-
-    @property
-    def unsupported(self) -> tuple[str, ...]:
-        """Nothing: what the native reasoner does not use, the Java one does."""
-        return ()
-
-    def instances(self, cls: str) -> frozenset[str]:
-        """Return individuals of a class, direct and indirect."""
-        more = (a.individual for a in self._of(ClassAssertion) if a.cls == cls)
-        return super().instances(cls) | frozenset(more)
-
-    def types(self, individual: str) -> set[str]:
-        """Named classes of an individual, direct and indirect, without owl:Thing."""
-        more = {a.cls for a in self._of(ClassAssertion) if a.individual == individual}
-        return super().types(individual) | more
-
-    def subclasses(self, cls: str) -> set[str]:
-        """Named classes strictly below, direct and indirect."""
-        return super().subclasses(cls) | self._linked(cls, 'sup', 'sub')
-
-    def superclasses(self, cls: str) -> set[str]:
-        """Named classes strictly above, direct and indirect."""
-        return super().superclasses(cls) | self._linked(cls, 'sub', 'sup')
-
-    def object_values(self, prop: str, individual: str) -> set[str]:
-        """Return what an individual is related to by an object property."""
-        return super().object_values(prop, individual) | {
-            a.object
-            for a in self._of(ObjectPropertyAssertion)
-            if a.prop == prop and a.subject == individual
-        }
-
-    def data_values(self, prop: str, individual: str) -> set[Literal]:
-        """Return values of a data property."""
-        found = super().data_values(prop, individual)
-        values = {value_of(literal) for literal in found}
-        return found | {
-            a.literal
-            for a in self._of(DataPropertyAssertion)
-            if a.prop == prop and a.subject == individual and value_of(a.literal) not in values
-        }
-
-    def object_properties_of(self, individual: str) -> set[str]:
-        """Return object properties with at least one value for the individual."""
-        more = {a.prop for a in self._of(ObjectPropertyAssertion) if a.subject == individual}
-        return super().object_properties_of(individual) | more
-
-    def data_properties_of(self, individual: str) -> set[str]:
-        """Return data properties with at least one value for the individual."""
-        more = {a.prop for a in self._of(DataPropertyAssertion) if a.subject == individual}
-        return super().data_properties_of(individual) | more
-
-    def derived_facts(self) -> Iterator[Fact]:
-        """Yield the facts about individuals that follow and are not asserted."""
-        yield from super().derived_facts()
-        for kind in (ClassAssertion, ObjectPropertyAssertion, DataPropertyAssertion):
-            yield from self._of(kind)
+    def _completion_of(self, engine: Engine) -> Completion:
+        assert self._classification is not None
+        infer_from = partial(infer, self._kind, self.iri)
+        return _JavaCompletion(self._classification, engine, tuple(self._told.schema), infer_from)
 
     def explain(self, fact: Axiom) -> Explanation | None:
         """Return why a fact holds; of what only the Java reasoner derives no more is known than
         that.
         """
         explanation = super().explain(fact)
-        if explanation is None and fact in self._java:
-            text = f'{self._kind} infers it'
-            return Explanation(str(fact), 'axiom', text)
+        if explanation is not None and not explanation.sources():
+            return replace(explanation, because=f'{self._kind} infers it')
         return explanation
 
     def copy(self) -> JavaKnowledgeBase:
         """Another one with the same assertions, nothing derived yet and no subscribers."""
         return JavaKnowledgeBase(self.iri, self.axioms(), self._kind)
 
-    def _of(self, kind: type) -> Iterator[Any]:
-        return (axiom for axiom in self._java if type(axiom) is kind)
 
-    def _linked(self, cls: str, known: str, wanted: str) -> set[str]:
-        found: set[str] = set()
-        queue = [cls]
-        while queue:
-            current = queue.pop()
-            for axiom in self._of(SubClassOf):
-                if getattr(axiom, known) == current and getattr(axiom, wanted) not in found:
-                    found.add(getattr(axiom, wanted))
-                    queue.append(getattr(axiom, wanted))
-        return found - {cls, THING}
+class _JavaCompletion(Completion):
+    """Adds to an engine what a Java reasoner derives, too.
+
+    Attributes:
+        failure: Why the Java reasoner did not answer the last time; '' where it did.
+    """
+
+    def __init__(
+        self,
+        classification: Classification,
+        engine: Engine,
+        schema: Iterable[Axiom],
+        infer_from: Callable[[Iterable[Axiom]], frozenset[Axiom] | None],
+    ) -> None:
+        super().__init__(classification, engine, schema)
+        self._infer_from = infer_from
+        self.failure = ''
+
+    def run(self, axioms: Iterable[Axiom]) -> None:
+        """Add what follows from everything that is asserted now."""
+        self._forget_classes()
+        super().run(axioms)
+        self.unsupported, self.failure = (), ''
+        if not self._engine.consistent:
+            return
+        try:
+            found = self._infer_from(axioms)
+        except JavaReasonerError as error:
+            self.failure = str(error)
+            return
+        if found is None:
+            self._engine.take_from_cases(None)
+        else:
+            self._take(found)
+
+    def _take(self, found: Iterable[Axiom]) -> None:
+        known, engine = self._classification, self._engine
+        parents: dict[str, set[str]] = {}
+        facts: list[Axiom] = []
+        for axiom in found:
+            if isinstance(axiom, SubClassOf):
+                parents.setdefault(str(axiom.sub), set()).add(str(axiom.sup))
+            else:
+                facts.append(axiom)
+        pairs = [
+            (cls, sup)
+            for cls in known.classes()
+            for sup in closure(cls, lambda one: {*known.superclasses(one), *parents.get(one, ())})
+            if sup not in (cls, THING) and not known.below_by_itself(cls, sup)
+        ]
+        known.complete(pairs)
+        self._compared = True
+        while facts:
+            engine.take_from_cases(facts)
+            members = ((sup, x) for cls, sup in pairs for x in engine.program.cls(cls).members)
+            facts = [ClassAssertion(sup, x) for sup, x in members]
+            facts = [fact for fact in facts if not engine.holds(fact)]
 
 
 def infer(kind: str, iri: str, axioms: Iterable[Axiom]) -> frozenset[Axiom] | None:

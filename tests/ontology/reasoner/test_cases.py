@@ -336,6 +336,14 @@ def test_a_number_on_the_left_is_not_lost_where_the_right_side_counts_too() -> N
     assert not reasoned(SubClassOf(none, some), ax.DataPropertyRange(T, nothing)).consistent
 
 
+def test_what_is_recognised_by_a_count_alone_may_be_a_single_individual() -> None:
+    """Nobody has more than the three of two individuals: everybody is one and the same."""
+    few = ex.ObjectMaxCardinality(3, P, ex.ObjectOneOf((i, k)))
+    everybody_is_i = SubClassOf(few, ex.ObjectOneOf((i,)))
+    assert not reasoned(everybody_is_i, differ(j, k)).consistent
+    assert reasoned(everybody_is_i, ClassAssertion(A, j)).types(i) == {A}
+
+
 def test_a_class_of_one_individual_is_empty_where_that_individual_is_no_member() -> None:
     apart = ax.DisjointClasses((A, C))
     kb = reasoned(apart, SubClassOf(A, ex.ObjectOneOf((i,))), ClassAssertion(C, i))
