@@ -1,8 +1,9 @@
 """A Java reasoner beside the native one, for ontologies outside the native one's fragment.
 
 owlready2 brings HermiT and Pellet as Java archives and runs them in a JVM for each reasoning, which
-takes seconds. Both are sound, so what either reasoner derives holds: the engine takes the facts as it takes those found by cases. HermiT refuses rules with
-built-ins; the Pellet of owlready2 0.50 and later needs Java 25. Both need ``java`` on the path.
+takes seconds. Both are sound: the engine takes what they derive as it takes what reasoning by cases
+finds. HermiT refuses rules with built-ins; the Pellet of owlready2 0.50 and later needs Java 25.
+Both need ``java`` on the path.
 """
 
 from __future__ import annotations
