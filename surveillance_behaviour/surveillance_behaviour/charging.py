@@ -20,51 +20,39 @@ LONG = 1e6
 
 
 class BatteryMonitor:
-    """What came in last of the battery. Safe to use from several threads."""
+    """What came in last of the battery. Safe to use from several threads.
+
+    Attributes:
+        level: Charge in percent; None: not heard yet.
+        low: Whether the battery's own warning is up.
+        charging: Whether the battery is being charged; None: nobody said.
+    """
 
     def __init__(self) -> None:
+        self.level: float | None = None
+        self.low = False
+        self.charging: bool | None = None
         self._lock = threading.Lock()
-        self._level: float | None = None
-        self._low = False
-        self._charging: bool | None = None
         self._watchers: list[Callable[[], object]] = []
-
-    @property
-    def level(self) -> float | None:
-        """Charge in percent; None: not heard yet."""
-        return self._level
-
-    @property
-    def low(self) -> bool:
-        """Whether the battery's own warning is up."""
-        return self._low
-
-    @property
-    def charging(self) -> bool | None:
-        """Whether the battery is being charged; None: nobody said."""
-        return self._charging
 
     def level_text(self) -> str:
         """Return the charge in words."""
-        return Battery(self._level).level_text()
+        return Battery(self.level).level_text()
 
     def set_level(self, percent: float) -> None:
         """Take a level that came in."""
-        with self._lock:
-            self._level = percent
+        self.level = percent
         self._tell()
 
     def set_low(self, low: bool) -> None:
         """Take the battery's own warning, or its end."""
-        with self._lock:
-            self._low = low
+        self.low = low
         self._tell()
 
     def set_charging(self, charging: bool | None) -> None:
         """Take whether the battery is being charged; None: that is not known."""
-        with self._lock:
-            changed, self._charging = charging != self._charging, charging
-        if changed:
+        if charging != self.charging:
+            self.charging = charging
             self._tell()
 
     def watch(self, callback: Callable[[], object]) -> Callable[[], None]:

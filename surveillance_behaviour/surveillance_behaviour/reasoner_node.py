@@ -18,9 +18,8 @@ from surveillance_behaviour.charging import BatteryMonitor
 from surveillance_behaviour.decider import Decider, MemorySettings
 from surveillance_behaviour.decision import DecisionSettings, NowhereToGoError
 from surveillance_behaviour.peers.announcing import DecisionTopic
-from surveillance_behaviour.peers.decision_services import DecisionServices
+from surveillance_behaviour.peers.decision_services import offer_decision_services
 from surveillance_behaviour.peers.ros_ports import Deadlines, RosPlaces, hear_battery, ros_ontology
-from surveillance_fsm import Interrupt
 from surveillance_fsm.exceptions import CallError, CallInterruptedError
 from surveillance_fsm.ros import ClockWait
 from surveillance_interfaces.msg import MissionStatus
@@ -60,14 +59,14 @@ class Reasoner(PatrolNode):
         self._work = AwaitedWork(self, 1)
         self._next: Future | None = None
         self._sharing = threading.Lock()
-        self._interrupt = Interrupt()
-        self.stopping.subscribe(self._interrupt.set)
         hear_battery(self, battery)
         self.create_subscription(MissionStatus, 'mission_status', self._on_status, STATE_QOS)
         self.create_service(
             Reason, 'reason', self._on_reason, callback_group=ReentrantCallbackGroup()
         )
-        DecisionServices(self, self._decider, self._wait.now, lambda: self._avoided, self._work)
+        offer_decision_services(
+            self, self._decider, self._wait.now, lambda: self._avoided, self._work
+        )
 
     def _on_status(self, status: MissionStatus) -> None:
         self._avoided = frozenset(status.avoided)
@@ -97,7 +96,7 @@ class Reasoner(PatrolNode):
             # The lock is held until the request that began this choice has noted it as the next.
             self._next = None
         try:
-            decision = self._decider.decide(self._wait.now(), self._interrupt, self._avoided)
+            decision = self._decider.decide(self._wait.now(), self.stopping, self._avoided)
         except CallInterruptedError:  # the node ends
             return ''
         except (CallError, NowhereToGoError) as error:

@@ -24,7 +24,7 @@ from surveillance_behaviour.machines import MACHINES
 from surveillance_behaviour.mission.mission import Mission, MissionSettings
 from surveillance_behaviour.mission.mission_log import CutOff, MissionRecord, cut_off, read
 from surveillance_behaviour.peers.announcing import DecisionTopic, MissionClock, RosAnnouncer
-from surveillance_behaviour.peers.decision_services import DecisionServices
+from surveillance_behaviour.peers.decision_services import offer_decision_services
 from surveillance_behaviour.peers.ports import Ports
 from surveillance_behaviour.peers.ros_ports import (
     Deadlines,
@@ -110,7 +110,7 @@ class RobotBehavior(PatrolNode):
             memory,
         )
         self._work = AwaitedWork(self, 1)
-        DecisionServices(
+        offer_decision_services(
             self,
             decider,
             clock.now,

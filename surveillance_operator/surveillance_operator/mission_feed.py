@@ -135,16 +135,7 @@ class MissionFeed:
             if new is old:
                 return
             if self._over and begins:
-                self._over = False
-                self._facts.forget()
-                if not self._node.count_publishers('/clock'):
-                    self._clock_time = None
-                # What follows the ontology tells what goes, too.
-                kept = {
-                    name: getattr(old, name)
-                    for name in ('events', 'visited_at', 'urgent', 'links', 'restarts')
-                }
-                old = replace(self._empty, **kept)
+                old = self._begin_anew()
                 new = change(old)
             # Nothing passes after a mission's end.
             now = old.now if self._over else self._now()
@@ -152,6 +143,16 @@ class MissionFeed:
             self._over = self._over or bool(old.nodes and not new.nodes)
             self._snapshot = new
         self._on_change(new, told)
+
+    def _begin_anew(self) -> Snapshot:
+        """Return what is still known when another mission begins."""
+        self._over = False
+        self._facts.forget()
+        if not self._node.count_publishers('/clock'):
+            self._clock_time = None
+        # What follows the ontology tells what goes, too.
+        kept = ('events', 'visited_at', 'urgent', 'links', 'restarts')
+        return replace(self._empty, **{name: getattr(self._snapshot, name) for name in kept})
 
     def _run(self) -> None:
         stopping = self._node.stopping
@@ -220,12 +221,11 @@ class MissionFeed:
 
     def _look_at_topics(self, processes: Mapping[str, set[str]]) -> None:
         """Note which nodes there are, and whose topics cannot be heard."""
-        node, old = self._node, self._snapshot
-        names = set(self._facts.servers())
-        silent = dict(old.silent)
+        old = self._snapshot
+        names, silent = set(self._facts.servers()), dict(old.silent)
         for topic, subscription in self._topics:
-            for info in node.get_publishers_info_by_topic(subscription.topic):
-                if not info.node_name.startswith('_') and topic.name[0] != '/':
+            for info in self._node.get_publishers_info_by_topic(subscription.topic):
+                if not topic.name.startswith('/') and not info.node_name.startswith('_'):
                     names.add(info.node_name)
                 fits, reason = qos_check_compatible(info.qos_profile, subscription.qos)
                 if fits == QoSCompatibility.ERROR:
@@ -233,12 +233,12 @@ class MissionFeed:
         if names:  # there is a mission: all its nodes count, also those that tell nothing of it
             names |= {name for name in processes if not name.startswith(('_', *OBSERVERS))}
         nodes = {name: frozenset(processes.get(name, ())) for name in names}
-        if nodes != old.nodes or silent != old.silent:
-            ended = old.ended.union(old.nodes).difference(nodes)
-            self.update(
-                lambda old: replace(old, nodes=nodes, ended=ended, silent=silent),
-                begins=bool(nodes),
-            )
+        if nodes == old.nodes and silent == old.silent:
+            return
+        ended = old.ended.union(old.nodes).difference(nodes)
+        self.update(
+            lambda old: replace(old, nodes=nodes, ended=ended, silent=silent), begins=bool(nodes)
+        )
 
     def _note_silent(self) -> None:
         """Mark the nodes whose own reports have ceased, and forget those that may go."""
@@ -282,12 +282,13 @@ class _Facts:
         self._armor: ArmorClient | None = None
         self._places: set[str] = set()
         self._without_position: set[str] = set()
-        self._answered: set[str] = set()
+        self._questions = (self._ask_doors, self._ask_behaviour, self._ask_reference)
+        self._unanswered = set(self._questions)
         self._asking = False
 
     def forget(self) -> None:
         """Ask anew: another mission may have another map."""
-        self._answered.clear()
+        self._unanswered = set(self._questions)
         self._without_position = set(self._places)
 
     def servers(self) -> frozenset[str]:
@@ -297,32 +298,20 @@ class _Facts:
 
     def ask(self) -> None:
         """Ask for what is missing, if it is not being asked for; call it now and then."""
-        missing = self._without_position or len(self._answered) < len(self._questions())
+        missing = self._unanswered or self._without_position
         if missing and not self._asking and self._node.executor is not None:
             self._asking = True
             self._node.executor.create_task(self._ask)
 
-    def _questions(self) -> dict[str, Callable[[], Any]]:
-        return {
-            'doors': self._ask_doors,
-            'behaviour': self._ask_behaviour,
-            'reference': self._ask_reference,
-        }
-
     async def _ask(self) -> None:
         try:
-            questions = [
-                (name, question)
-                for name, question in self._questions().items()
-                if name not in self._answered
-            ]
-            for name, question in (*questions, ('positions', self._ask_positions)):
-                try:
-                    await question()
-                    if name != 'positions':
-                        self._answered.add(name)
-                except CallError as error:
-                    self._node.get_logger().debug(str(error))
+            for question in (*self._questions, self._ask_positions):
+                if question in self._unanswered or question == self._ask_positions:
+                    try:
+                        await question()
+                        self._unanswered.discard(question)
+                    except CallError as error:
+                        self._node.get_logger().debug(str(error))
         finally:
             self._asking = False
 

@@ -128,7 +128,9 @@ class DiagnosticsThread:
         late = self._lateness()
         figures = {'restarts': str(self._restarts), 'late_ms': f'{1e3 * late:.0f}', **_process()}
         for node, publisher in self._publishers:
-            status = DiagnosticStatus(name=_name(node), hardware_id=_robot(node))
+            name = node.get_fully_qualified_name().removeprefix('/')
+            robot = node.get_namespace().strip('/') or 'surveillance_robot'
+            status = DiagnosticStatus(name=name, hardware_id=robot)
             found = [*node.health.findings(), *self._of_process(late)]
             if node.failure is not None:
                 found.insert(0, (ERROR, node.failure))
@@ -150,14 +152,6 @@ class DiagnosticsThread:
         if self._restarts and time.monotonic() - self._began < RECENT:
             found.append((WARN, f'was started again ({self._restarts} times so far)'))
         return found
-
-
-def _name(node: PatrolNode) -> str:
-    return str(node.get_fully_qualified_name()).removeprefix('/')
-
-
-def _robot(node: PatrolNode) -> str:
-    return str(node.get_namespace()).strip('/') or 'surveillance_robot'
 
 
 def _restarts() -> int:

@@ -52,19 +52,16 @@ def run_layers(
     """
     layers = [file_layer(config / 'parameters.yaml')]
     layers.append(file_layer(place_file(config, behaviour, place)))
+    asked = []
     if behaviour == 'patrol':
         # The place's file is for the simulator: the robot learns its map from the markers.
         origin = '--behaviour patrol'
         layers.append(Layer(origin, (Entry('/**', 'map_source', 'markers', origin),)))
+        asked.append(for_node(BEHAVIOUR_NODE, 'behaviour', behaviour, origin))
     layers.append(Layer('this run', tuple(chosen)))
     layers += [file_layer(path.resolve()) for path in files]
-    layers.append(Layer('options', (*_behaviour_entries(behaviour), *options)))
+    layers.append(Layer('options', (*asked, *options)))
     return tuple(layers)
-
-
-def _behaviour_entries(behaviour: str) -> Iterator[Entry]:
-    if behaviour != 'surveillance':
-        yield for_node(BEHAVIOUR_NODE, 'behaviour', behaviour, f'--behaviour {behaviour}')
 
 
 def mode_entries(mode: str, *, prompts: bool) -> Iterator[Entry]:

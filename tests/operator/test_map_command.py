@@ -136,20 +136,6 @@ def test_bad_input_is_one_line_and_exit_code_2(
     assert error.count('\n') == 1
 
 
-def test_closed_doors_and_obstacles_change_the_picture() -> None:
-    world = read_world(CONFIG / 'seven_rooms.yaml')
-    before = np.asarray(draw_place(world.plan, 'a', 'b'), dtype=int)
-    world.set_door('D5', False)
-    world.place_obstacle('box', 4.0, 8.0, 0.3)
-    closed, discs = world.closed_doors, world.discs.tolist()
-    drawn = draw_place(world.plan, 'a', 'b', closed=closed, obstacles=discs)
-    after = np.asarray(drawn, dtype=int)
-    rows, columns = np.nonzero(np.abs(after - before).sum(axis=2) > 60)
-    assert len(rows) > 200
-    # Only around the door and the obstacle.
-    assert columns.max() - columns.min() < 0.6 * before.shape[1]
-
-
 def test_a_canvas_puts_metres_where_they_belong() -> None:
     canvas = Canvas((0.0, 0.0, 4.0, 2.0), 50.0, (10, 20, 30, 40), '#ffffff')
     assert canvas.size == (240, 160)

@@ -175,8 +175,6 @@ def test_the_map_shows_walls_as_occupied_and_doors_as_free() -> None:
     assert grid.cells[grid.cell_of(3.0, 1.0)] == occupancy_grid.FREE
     assert grid.cells[grid.cell_of(3.0, 0.2)] == occupancy_grid.OCCUPIED
     assert grid.cells[grid.cell_of(-0.3, 1.0)] == occupancy_grid.UNKNOWN
-    closed = occupancy_grid.draw(plan, closed_doors=['D'])
-    assert closed.cells[closed.cell_of(3.0, 1.0)] == occupancy_grid.OCCUPIED
 
 
 def test_free_cells_of_the_map_are_free_in_the_world() -> None:

@@ -195,8 +195,8 @@ def moving(mission: Mission, *, heeds_battery: bool) -> fsm.StateMachine:
     )
     controlling = step('controlling', follow_path, 'reached', input_keys=('target', 'via_points'))
     with machine:
-        add('Pointing', pointing, {'pointed': 'Controlling', **leave})
-        add('Controlling', controlling, {'reached': 'reached', **leave})
+        add('Pointing', pointing, pointed='Controlling', **leave)
+        add('Controlling', controlling, reached='reached', **leave)
     return machine
 
 
@@ -208,24 +208,20 @@ def recharge_routine(mission: Mission) -> fsm.StateMachine:
         add(
             'Recharge',
             Recharge(mission),
-            {'battery_full': 'battery_full', 'not_at_dock': 'Moving', FAILED: 'Recover'},
+            battery_full='battery_full',
+            not_at_dock='Moving',
+            failed='Recover',
         )
-        add(
-            'Moving',
-            moving(mission, heeds_battery=False),
-            {'reached': 'Recharge', FAILED: 'Recover'},
-        )
+        add('Moving', moving(mission, heeds_battery=False), reached='Recharge', failed='Recover')
         add(
             'Recover',
             Recover(mission, steps=steps),
-            {
-                'choose_anew': 'Recharge',
-                'another_path': 'Moving',
-                'another_place': 'Recharge',
-                'wait_for_help': 'WaitForHelp',
-            },
+            choose_anew='Recharge',
+            another_path='Moving',
+            another_place='Recharge',
+            wait_for_help='WaitForHelp',
         )
-        add('WaitForHelp', WaitForHelp(mission), {'try_again': 'Recharge'})
+        add('WaitForHelp', WaitForHelp(mission), try_again='Recharge')
     return machine
 
 
@@ -235,30 +231,32 @@ def patrol_machine(mission: Mission) -> fsm.StateMachine:
     machine.set_name('patrol')
     machine.set_clock(mission.clock)
     with machine:
-        add('Initial', Initial(mission), {'start': 'Reasoning', FAILED: 'WaitForStart'})
-        add('WaitForStart', WaitForHelp(mission), {'try_again': 'Initial'})
+        add('Initial', Initial(mission), start='Reasoning', failed='WaitForStart')
+        add('WaitForStart', WaitForHelp(mission), try_again='Initial')
         add(
             'Reasoning',
             Reasoning(mission),
-            {'reasoned': 'Moving', BATTERY_LOW: 'RechargeRoutine', FAILED: 'Recover'},
+            reasoned='Moving',
+            battery_low='RechargeRoutine',
+            failed='Recover',
         )
         add(
             'Moving',
             moving(mission, heeds_battery=True),
-            {'reached': 'Reasoning', BATTERY_LOW: 'RechargeRoutine', FAILED: 'Recover'},
+            reached='Reasoning',
+            battery_low='RechargeRoutine',
+            failed='Recover',
         )
-        add('RechargeRoutine', recharge_routine(mission), {'battery_full': 'Reasoning'})
+        add('RechargeRoutine', recharge_routine(mission), battery_full='Reasoning')
         add(
             'Recover',
             Recover(mission),
-            {
-                'choose_anew': 'Reasoning',
-                'another_path': 'Moving',
-                'another_place': 'Reasoning',
-                'go_back': 'GoBack',
-                'wait_for_help': 'WaitForHelp',
-            },
+            choose_anew='Reasoning',
+            another_path='Moving',
+            another_place='Reasoning',
+            go_back='GoBack',
+            wait_for_help='WaitForHelp',
         )
-        add('GoBack', GoBack(mission), {'returned': 'Reasoning', FAILED: 'WaitForHelp'})
-        add('WaitForHelp', WaitForHelp(mission), {'try_again': 'Reasoning'})
+        add('GoBack', GoBack(mission), returned='Reasoning', failed='WaitForHelp')
+        add('WaitForHelp', WaitForHelp(mission), try_again='Reasoning')
     return machine

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 import surveillance_fsm as fsm
@@ -149,16 +149,12 @@ class WaitForHelp(MissionState):
         return True
 
 
-def add(
-    label: str,
-    state: fsm.State,
-    transitions: Mapping[str, str],
-    remapping: Mapping[str, str] | None = None,
-) -> None:
-    """Add a state to the open machine; ``preempted`` leaves the machine unless bound."""
-    bound: dict[str, str | None] = {PREEMPTED: PREEMPTED}
-    bound.update(transitions)
-    fsm.StateMachine.add(label, state, bound, remapping)
+def add(label: str, state: fsm.State, **transitions: str) -> None:
+    """Add a state to the open machine: each outcome with what it leads to.
+
+    ``preempted`` leaves the machine unless it is bound.
+    """
+    fsm.StateMachine.add(label, state, {PREEMPTED: PREEMPTED, **transitions})
 
 
 def path_length(path: list[Point]) -> float:

@@ -183,10 +183,11 @@ def surveillance_machine(mission: Mission) -> fsm.StateMachine:
         add(
             'CHOOSE_ROOM_TASK',
             ChooseRoomTask(mission),
-            {'recharge': 'RECHARGE_TASK', 'explore': 'EXPLORE_TASK'},
+            recharge='RECHARGE_TASK',
+            explore='EXPLORE_TASK',
         )
-        add('EXPLORE_TASK', ExploreTask(mission), {'explored': 'explored'})
-        add('RECHARGE_TASK', RechargeTask(mission), {'recharged': 'recharged', FAILED: FAILED})
+        add('EXPLORE_TASK', ExploreTask(mission), explored='explored')
+        add('RECHARGE_TASK', RechargeTask(mission), recharged='recharged', failed=FAILED)
 
     machine = fsm.StateMachine([PREEMPTED])
     machine.set_name('surveillance')
@@ -195,42 +196,46 @@ def surveillance_machine(mission: Mission) -> fsm.StateMachine:
         add(
             'INITIALIZATION',
             Initialization(mission),
-            {'initialized': 'PERFORM_ROOM_TASKS', FAILED: 'WAIT_FOR_ONTOLOGY'},
+            initialized='PERFORM_ROOM_TASKS',
+            failed='WAIT_FOR_ONTOLOGY',
         )
-        add('WAIT_FOR_ONTOLOGY', WaitForHelp(mission), {'try_again': 'INITIALIZATION'})
+        add('WAIT_FOR_ONTOLOGY', WaitForHelp(mission), try_again='INITIALIZATION')
         add(
             'PERFORM_ROOM_TASKS',
             tasks,
-            {'explored': 'CHOOSE_NEXT_ROOM', 'recharged': 'CHOOSE_NEXT_ROOM', FAILED: 'RE_DOCK'},
+            explored='CHOOSE_NEXT_ROOM',
+            recharged='CHOOSE_NEXT_ROOM',
+            failed='RE_DOCK',
         )
-        add('RE_DOCK', ReDock(mission), {'again': 'MOVE_TO_NEXT_ROOM', 'give_up': 'WAIT_FOR_HELP'})
+        add('RE_DOCK', ReDock(mission), again='MOVE_TO_NEXT_ROOM', give_up='WAIT_FOR_HELP')
         add(
             'CHOOSE_NEXT_ROOM',
             ChooseNextRoom(mission),
-            {'chosen': 'MOVE_TO_NEXT_ROOM', FAILED: 'RECOVER'},
+            chosen='MOVE_TO_NEXT_ROOM',
+            failed='RECOVER',
         )
         add(
             'MOVE_TO_NEXT_ROOM',
             MoveToNextRoom(mission),
-            {'moved': 'PERFORM_ROOM_TASKS', FAILED: 'RECOVER'},
+            moved='PERFORM_ROOM_TASKS',
+            failed='RECOVER',
         )
         add(
             'RECOVER',
             Recover(mission),
-            {
-                'choose_anew': 'CHOOSE_NEXT_ROOM',
-                'another_path': 'MOVE_TO_NEXT_ROOM',
-                'another_place': 'CHOOSE_NEXT_ROOM',
-                'go_back': 'RETURN_TO_LAST_PLACE',
-                'wait_for_help': 'WAIT_FOR_HELP',
-            },
+            choose_anew='CHOOSE_NEXT_ROOM',
+            another_path='MOVE_TO_NEXT_ROOM',
+            another_place='CHOOSE_NEXT_ROOM',
+            go_back='RETURN_TO_LAST_PLACE',
+            wait_for_help='WAIT_FOR_HELP',
         )
         add(
             'RETURN_TO_LAST_PLACE',
             ReturnToLastPlace(mission),
-            {'returned': 'CHOOSE_NEXT_ROOM', FAILED: 'WAIT_FOR_HELP'},
+            returned='CHOOSE_NEXT_ROOM',
+            failed='WAIT_FOR_HELP',
         )
-        add('WAIT_FOR_HELP', WaitForHelp(mission), {'try_again': 'PERFORM_ROOM_TASKS'})
+        add('WAIT_FOR_HELP', WaitForHelp(mission), try_again='PERFORM_ROOM_TASKS')
     return machine
 
 

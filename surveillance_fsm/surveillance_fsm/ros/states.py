@@ -29,12 +29,6 @@ from surveillance_fsm.ros.exchange import (
 )
 from surveillance_fsm.ros.waiting import ClockWait
 
-_STATUS = {
-    'succeeded': GoalStatus.STATUS_SUCCEEDED,
-    'aborted': GoalStatus.STATUS_ABORTED,
-    'canceled': GoalStatus.STATUS_CANCELED,
-}
-
 
 class RosState(fsm.State):
     """Base of states that have a node.
@@ -259,7 +253,8 @@ class SimpleActionState(RosState):
             if end.status == 'rejected':
                 fsm.logerr(f"Action '{self._caller.name}': the server rejected the goal")
                 return 'aborted'
-            outcome = self._result.take(ud, _STATUS[end.status], end.result)
+            status = getattr(GoalStatus, f'STATUS_{end.status.upper()}')
+            outcome = self._result.take(ud, status, end.result)
         except CallInterruptedError:
             if not self.preempt_requested():
                 fsm.logerr(f"Action '{self._caller.name}': the node's executor does not spin")

@@ -7,7 +7,7 @@ place waited) comes as `Run`.
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import cv2
@@ -21,7 +21,7 @@ from surveillance_runtime.place.regions import Regions
 
 _PAPER, _INK, _SOFT = '#fbfaf7', '#2f3742', '#7d8794'
 _ROOM, _CORRIDOR, _HOME = '#f6ecd9', '#e3ebf3', '#dff0dc'
-_WALL, _LEAF, _CLOSED = '#3a4350', '#b08a57', '#c0392b'
+_WALL, _LEAF, _ALARM = '#3a4350', '#b08a57', '#c0392b'
 _GRAPH, _SIGN, _SIGN_HOME = '#7fa3c7', '#2c5d8f', '#2f8a4c'
 _DRIVEN, _PLANNED, _CALM, _LATE = '#14717f', '#8a7fb8', '#fdf9f0', '#f2b287'
 _LONGEST_SIDE = 1180.0
@@ -53,15 +53,7 @@ class Run:
     summary: str = ''
 
 
-def draw_place(
-    plan: FloorPlan,
-    title: str,
-    facts: str,
-    run: Run | None = None,
-    *,
-    closed: Collection[str] = (),
-    obstacles: Iterable[Sequence[float]] = (),
-) -> Image.Image:
+def draw_place(plan: FloorPlan, title: str, facts: str, run: Run | None = None) -> Image.Image:
     """Return the picture of a place.
 
     Args:
@@ -69,8 +61,6 @@ def draw_place(
         title: Its name.
         facts: One line about it.
         run: A run through it, if there was one.
-        closed: Names of the doors drawn closed.
-        obstacles: x, y and radius of each, metres.
     """
     west, south, east, north = plan.bounds
     scale = min(64.0, _LONGEST_SIDE / max(east - west, north - south))
@@ -85,10 +75,8 @@ def draw_place(
     if run is None:
         picture.graph()
     picture.walls()
-    picture.doors(closed)
+    picture.doors()
     picture.markers()
-    for x, y, radius in obstacles:
-        canvas.disc((x, y), radius * scale, _CLOSED)
     if run is not None:
         canvas.traces(run.planned, _PLANNED, max(1.2, scale / 40), 0.7)
         canvas.traces(run.driven, _DRIVEN, max(1.5, scale / 26), 0.5)
@@ -152,21 +140,18 @@ class _Picture:
                 corner = np.array([[*end, 1.0, 0.0, half, half]])
                 self._canvas.polygon(boxes.corners(corner)[0].tolist(), _WALL)
 
-    def doors(self, closed: Collection[str]) -> None:
+    def doors(self) -> None:
         for door in self._plan.doors.values():
             thin = max(1.0, self._canvas.scale / 40)
-            first, last = door.ends
-            if door.name in closed:
-                self._canvas.line([first, last], _CLOSED, thin * 3)
-            else:
-                start = door.yaw + (0.0 if self._swings_left(door) else -math.pi / 2)
-                open_at = door.yaw + (math.pi / 2 if self._swings_left(door) else -math.pi / 2)
-                tip = (
-                    first[0] + door.width * math.cos(open_at),
-                    first[1] + door.width * math.sin(open_at),
-                )
-                self._canvas.arc(first, door.width, start, start + math.pi / 2, _LEAF, thin * 0.7)
-                self._canvas.line([first, tip], _LEAF, thin * 1.8)
+            hinge, _ = door.ends
+            start = door.yaw + (0.0 if self._swings_left(door) else -math.pi / 2)
+            open_at = door.yaw + (math.pi / 2 if self._swings_left(door) else -math.pi / 2)
+            tip = (
+                hinge[0] + door.width * math.cos(open_at),
+                hinge[1] + door.width * math.sin(open_at),
+            )
+            self._canvas.arc(hinge, door.width, start, start + math.pi / 2, _LEAF, thin * 0.7)
+            self._canvas.line([hinge, tip], _LEAF, thin * 1.8)
             if self._canvas.scale > 20:
                 x, y = self._canvas.at((door.x, door.y))
                 side = -1.0 if self._swings_left(door) else 1.0
@@ -233,7 +218,7 @@ class _Picture:
                 self._point(x - reach, y - side * reach),
                 self._point(x + reach, y + side * reach),
             ]
-            self._canvas.line(ends, _CLOSED, 3.0)
+            self._canvas.line(ends, _ALARM, 3.0)
 
     def _point(self, x: float, y: float) -> tuple[float, float]:
         """Return the point in metres of a place on the canvas."""
@@ -339,6 +324,6 @@ class _Picture:
             canvas.text((left + _PANEL - 16, y), visits, size, _SOFT, anchor='rm')
         if threshold:
             end = top + 24 + len(ranked) * step + 4
-            canvas.box(urgent - 0.8, top + 18, urgent + 0.8, end, _CLOSED)
+            canvas.box(urgent - 0.8, top + 18, urgent + 0.8, end, _ALARM)
             words = f'urgent after {threshold:.0f} s'
-            canvas.text((left + 44, end + 6), words, 12, _CLOSED)
+            canvas.text((left + 44, end + 6), words, 12, _ALARM)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -51,28 +50,22 @@ class Grid:
         return 0 <= row < int(rows) and 0 <= column < int(columns)
 
 
-def draw(
-    plan: FloorPlan,
-    resolution: float = 0.05,
-    *,
-    closed_doors: Iterable[str] = (),
-    margin: float = 0.5,
-) -> Grid:
+def draw(plan: FloorPlan, resolution: float = 0.05, margin: float = 0.5) -> Grid:
     """Return the occupancy grid of a place.
 
-    A cell is occupied when its centre lies within half a cell of a wall or a closed door, unknown
-    when no place reaches it, else free.
+    A cell is occupied when its centre lies within half a cell of a wall, unknown when no place
+    reaches it, else free.
 
     Args:
         plan: The place.
         resolution: Side of a cell, metres.
-        closed_doors: Doors drawn as walls.
         margin: Width of the unknown border around the walls, metres.
     """
     import cv2  # takes 0.2 s, and a node that only needs the rooms does without
 
-    lines = plan.wall_pieces() + [plan.doors[name].ends for name in closed_doors]
-    solid = _filled(plan, boxes.boxes_around(lines, WALL_THICKNESS), resolution, margin)
+    solid = _filled(
+        plan, boxes.boxes_around(plan.wall_pieces(), WALL_THICKNESS), resolution, margin
+    )
     free = (solid.cells == FREE).astype(np.uint8)
     reached = cv2.connectedComponents(free, connectivity=4)[1]
     inside = {reached[solid.cell_of(x, y)] for x, y, _ in plan.place.positions.values()} - {0}
