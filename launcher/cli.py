@@ -264,8 +264,6 @@ def _test(argv: list[str]) -> int:
         return 0
     _enter(['test', *argv], extras=('test',))
     spread = any(a.startswith(('-n', '--numprocesses', '--pdb')) or 'no:xdist' in a for a in argv)
-    # Hundreds of processes are started: each would compile every module anew.
-    os.environ.pop('PYTHONDONTWRITEBYTECODE', None)
     # On two cores three are a seventh faster than two: many tests wait for other processes.
     _exec(['-m', 'pytest', *([] if spread else ['-n', '3', '--dist', 'loadfile']), *argv])
     return 0

@@ -33,10 +33,10 @@ from surveillance_runtime.robot_base import ROBOT_RADIUS
 from surveillance_runtime.suggestions import nearest
 from surveillance_runtime.yaml_file import (
     UNREADABLE,
+    RosLoader,
     YamlFile,
     parameters_of,
     read_yaml_file,
-    with_exponent,
 )
 
 SCHEMA = Path(__file__).with_name('parameter_schema.json')
@@ -226,9 +226,7 @@ def argument_layer(assignments: Iterable[str]) -> Layer:
 def _argument_value(text: str) -> Any:
     if len(text) > 1_000_000 or text.count('[') + text.count('{') > 1000:
         raise ValueError('too large')
-    value = with_exponent(yaml.safe_load(text))
-    if isinstance(value, list):
-        value = [with_exponent(each) for each in value]
+    value = yaml.load(text, RosLoader)
     if isinstance(value, Mapping):
         raise ValueError('a mapping')
     return text if value is None else value

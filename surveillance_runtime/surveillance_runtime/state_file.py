@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from surveillance_fsm import Interrupt
-from surveillance_runtime.files import in_one_line, replace_text
+from surveillance_runtime.files import in_one_line, read_file, replace_text
 from surveillance_runtime.node import PatrolNode
 
 WRITE_PERIOD = 0.2
@@ -90,10 +90,8 @@ class StateFile:
         if self._path is None or not self._path.exists():
             return {}
         try:
-            with open(self._path, encoding='utf-8') as file:
-                text = file.read(LARGEST + 1)
-            state = json.loads(text) if len(text) <= LARGEST else None
-        except (OSError, ValueError):
+            state = json.loads(read_file(self._path, LARGEST))
+        except ValueError:
             state = None
         if not isinstance(state, dict):
             self._complain(f'parameter state_file: {self._path} holds no state; it begins anew')

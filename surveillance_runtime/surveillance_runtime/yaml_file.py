@@ -8,7 +8,6 @@ line. `read_yaml_file` reads any mapping, `read_parameter_file` the form of ROS 
 from __future__ import annotations
 
 import re
-import stat
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,26 +15,42 @@ from typing import Any
 
 import yaml
 
-from surveillance_runtime.files import FileError
+from surveillance_runtime.files import FileError, read_file
 
 MAX_BYTES = 4_000_000
 MAX_DEPTH = 30
 MAX_VALUES = 200_000
 _SMALL = 30_000
-# libyaml's parser is ten times as fast; PyYAML may have been built without it.
-_Loader = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)
-_KINDS = {
-    stat.S_IFDIR: 'a folder',
-    stat.S_IFIFO: 'a pipe',
-    stat.S_IFCHR: 'a device',
-    stat.S_IFBLK: 'a device',
-    stat.S_IFSOCK: 'a socket',
-}
 _INT64 = 2**63
-_EXPONENT = re.compile(r'[-+]?(\d+\.?\d*|\.\d+)[eE][-+]?\d+\Z', re.ASCII)
+_INT, _FLOAT = 'tag:yaml.org,2002:int', 'tag:yaml.org,2002:float'
+_NUMBERS = {
+    _INT: r'[-+]?(0x[0-9a-fA-F]+|0[0-7]*|[1-9]\d*)\Z',
+    _FLOAT: r'[-+]?(\d+\.\d*|\.\d+)([eE][-+]?\d+)?\Z|[-+]?\d+[eE][-+]?\d+\Z'
+    r'|[-+]?\.(inf|Inf|INF)\Z|\.(nan|NaN|NAN)\Z',
+}
 KeyPath = tuple[str, ...]
 UNREADABLE = (yaml.YAMLError, ValueError, LookupError, TypeError, AttributeError)
 """What PyYAML raises for a value; the last three for a tag like `!!int` before something else."""
+
+
+def _as_ros(kind: Any) -> Any:
+    """Return a loader that takes for a number what ROS takes for one (`rcl_yaml_param_parser`).
+
+    `1e3` is a number, `010` is 8 as in C; `1:30` and `1_000`, numbers of YAML 1.1, are texts.
+    """
+    loader: Any = type(kind.__name__, (kind,), {})
+    loader.yaml_implicit_resolvers = {
+        first: [(tag, pattern) for tag, pattern in resolvers if tag not in _NUMBERS]
+        for first, resolvers in kind.yaml_implicit_resolvers.items()
+    }
+    for tag, pattern in _NUMBERS.items():
+        loader.add_implicit_resolver(tag, re.compile(pattern, re.ASCII), list('-+.0123456789'))
+    return loader
+
+
+RosLoader = _as_ros(yaml.SafeLoader)
+# libyaml's parser is ten times as fast; PyYAML may have been built without it.
+_FastLoader = _as_ros(getattr(yaml, 'CSafeLoader', yaml.SafeLoader))
 
 
 @dataclass(frozen=True)
@@ -85,20 +100,12 @@ def read_yaml_file(path: str | Path) -> YamlFile:
 
 def _compose(path: Path) -> yaml.Node | None:
     try:
-        found = path.stat()
-        if not stat.S_ISREG(found.st_mode):
-            raise FileError(f'{path}: expected a file, got {_KINDS[stat.S_IFMT(found.st_mode)]}')
-        if found.st_size > MAX_BYTES:
-            raise FileError(f'{path}: {found.st_size} bytes, at most {MAX_BYTES} are read')
-        with path.open('rb') as stream:  # files of /proc say that they are empty
-            text = stream.read(MAX_BYTES).decode('utf-8')
-    except OSError as error:
-        raise FileError(f'{path}: {error.strerror or error}') from None
+        text = read_file(path, MAX_BYTES).decode('utf-8')
     except UnicodeDecodeError as error:
         raise FileError(f'{path}: not UTF-8 text (byte {error.start})') from None
     try:
         # PyYAML says better than libyaml where a mistake is.
-        loader_kind: Any = yaml.SafeLoader if len(text) < _SMALL else _Loader
+        loader_kind = RosLoader if len(text) < _SMALL else _FastLoader
         _look_over(text, loader_kind)
         loader = loader_kind(text)
         try:
@@ -176,16 +183,9 @@ class _Reader:
             raise FileError(
                 f"{self.path}:{line}: '{node.value}' cannot be read as a value; quote it"
             ) from None
-        if isinstance(node, yaml.ScalarNode) and node.style is None:
-            value = with_exponent(value)
         if isinstance(value, int) and not -_INT64 <= value < _INT64:
             raise FileError(f'{self.path}:{line}: {node.value:.40}: expected a 64-bit number')
         return value
-
-
-def with_exponent(value: Any) -> Any:
-    """Return a plain text like `1e-3` as the number that ROS reads, other values as they are."""
-    return float(value) if isinstance(value, str) and _EXPONENT.match(value) else value
 
 
 def twice(path: Path, where: KeyPath, line: int, first: int) -> FileError:

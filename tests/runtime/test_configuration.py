@@ -199,6 +199,31 @@ def test_places_that_a_robot_cannot_use_are_refused_with_file_and_line(tmp_path)
         wide.place('simulator')
 
 
+@pytest.mark.parametrize(
+    ('written', 'value'),
+    [
+        ('010', 8),  # C's strtol and strtod, which ROS asks
+        ('-0x1F', -31),
+        ('1e3', 1000.0),
+        ('-.5e-3', -0.0005),
+        ('.inf', float('inf')),
+        ('1:30', '1:30'),  # a number of YAML 1.1
+        ('1:30.5', '1:30.5'),
+        ('1_000', '1_000'),
+        ('08', '08'),
+    ],
+)
+def test_a_number_is_what_ros_takes_for_one(tmp_path, written, value):
+    for filler in ('', '# ' + 'x' * 40_000):  # two readers
+        path = tmp_path / 'file.yaml'
+        path.write_text(f'{filler}\n/**:\n  ros__parameters:\n    a: {written}\n    b: [{written}]')
+        assert [entry.value for entry in file_layer(path).entries] == [value, [value]]
+    assert [e.value for e in argument_layer([f'a:={written}', f'a:=[{written}]']).entries] == [
+        value,
+        [value],
+    ]
+
+
 @pytest.mark.parametrize('path', ['/dev/zero', '/dev/null', '/', '/proc/self/mem'])
 def test_devices_and_folders_are_no_parameter_files(path):
     with pytest.raises(FileError) as caught:

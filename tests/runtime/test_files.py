@@ -2,11 +2,40 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import pytest
 
-from surveillance_runtime.files import LineFile, in_one_line, replace_text
+from surveillance_runtime.files import FileError, LineFile, in_one_line, read_file, replace_text
+
+
+@pytest.mark.parametrize('kind', ['a pipe', 'a folder', 'a device'])
+def test_what_is_no_file_is_neither_read_nor_replaced(tmp_path: Path, kind: str) -> None:
+    """The link keeps a real device out of reach of a failing test."""
+    path = tmp_path / 'path'
+    {
+        'a pipe': lambda: os.mkfifo(path),
+        'a folder': path.mkdir,
+        'a device': lambda: path.symlink_to('/dev/full'),
+    }[kind]()
+    with pytest.raises(FileError, match=f'^{path}: expected a file, got {kind}$'):
+        read_file(path, 100)
+    for write in (lambda: replace_text(path, 'new'), lambda: LineFile(path)):
+        with pytest.raises(OSError, match=f'expected a file, got {kind}'):
+            write()
+    assert not path.is_file()
+
+
+def test_a_file_is_read_up_to_a_bound(tmp_path: Path) -> None:
+    path = tmp_path / 'path'
+    path.write_bytes(b'12345')
+    assert read_file(path, 5) == b'12345'
+    assert read_file(Path('/proc/self/stat'), 10) != b''
+    with pytest.raises(FileError, match='5 bytes, at most 4 are read'):
+        read_file(path, 4)
+    with pytest.raises(FileError, match='none: No such file'):
+        read_file(tmp_path / 'none', 4)
 
 
 def test_a_file_that_cannot_be_replaced_is_named_and_stays_whole(tmp_path: Path) -> None:

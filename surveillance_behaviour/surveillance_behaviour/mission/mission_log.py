@@ -43,7 +43,7 @@ from pathlib import Path
 from typing import Any
 
 from surveillance_behaviour.decision import RECHARGE
-from surveillance_runtime.files import FileError, LineFile
+from surveillance_runtime.files import FileError, LineFile, read_file
 
 EVENTS: Mapping[str, tuple[str, ...]] = {
     'start': ('machine', 'place', 'places'),
@@ -63,6 +63,8 @@ A_DATE = 1e9
 """From here on, in seconds, a time is a date of a machine's clock; a simulation counts from 0."""
 SEGMENT_BYTES = 4_000_000
 """Size from which on a record's file is packed away and a new one begun."""
+LARGEST = 1_000_000_000
+"""Bytes of a record's file that are read at most."""
 
 
 @dataclass(frozen=True)
@@ -188,9 +190,9 @@ def read(path: str | Path) -> list[Event]:
         FileError: The file cannot be read, or a finished line is not an event.
     """
     try:
-        content = Path(path).read_bytes()
-    except OSError as error:
-        raise FileError(f'cannot read the mission record {path}: {error.strerror}') from None
+        content = read_file(Path(path), LARGEST)
+    except FileError as error:
+        raise FileError(f'cannot read the mission record {error}') from None
     return list(_events(content, f'{path}'))
 
 
