@@ -125,13 +125,13 @@ def cold_start() -> Start:
 def main() -> None:
     """Measure and print the tables."""
     parser = argparse.ArgumentParser(description=(__doc__ or '').partition('\n')[0])
-    parser.add_argument('--quick', action='store_true', help='two starts of each kind')
+    parser.add_argument('--quick', action='store_true', help='one start of each kind')
     parser.add_argument('--cold', action='store_true', help='also a start from nothing (minutes)')
     options = parser.parse_args()
-    repeats = 2 if options.quick else 5
+    repeats = 1 if options.quick else 5
     python = str(CHECKOUT / '.venv' / 'bin' / 'python')
     bare = statistics.median(
-        time_of([python, '-c', 'import rclpy'], own_environ()) for _ in range(2 * repeats)
+        time_of([python, '-c', 'import rclpy'], own_environ()) for _ in range(2 + repeats)
     )
     with tempfile.NamedTemporaryFile('w', suffix='.yaml') as parameters:
         parameters.write(NO_EXPLORING)
