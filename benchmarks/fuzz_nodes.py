@@ -12,8 +12,9 @@ wrong everywhere is refused at its first field.
 
 A node fails when its process ends, or when it does not answer a parameter request at the end. The
 table prints the deaths, the log lines a second (on average of the node's life, and of the minute
-with most lines; 0 for a run of less than a minute), the highest memory and the slowest
-answer. The exit code is 1 when a node died.
+with most lines; 0 for a run of less than a minute), the highest memory and the slowest answer. What
+`mission_view` prints for its reader, a line for each change, is no log and not counted. The exit
+code is 1 when a node died.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ import importlib
 import math
 import os
 import random
+import re
 import resource
 import signal
 import subprocess
@@ -75,6 +77,8 @@ ARRAY_CODES = {
 """The codes of Python's arrays for the numbers of messages."""
 WINDOW = 60.0
 """Seconds over which the log lines of a node are counted."""
+SCREEN = 'mission_view'
+_LOGGED = re.compile(rb'^\[(?:DEBUG|INFO|WARN|ERROR|FATAL)\] ', re.MULTILINE)
 FEW = 20
 """How many different values a long array has."""
 STARTED_WITHIN = 120.0
@@ -225,6 +229,7 @@ class NodeProcess:
         start = f'import sys; from {node.module} import main; sys.exit(main())'
         words = [sys.executable, '-c', start, *ros_arguments(place, folder, PARAMETERS)]
         environ = {**os.environ, 'ROS_DOMAIN_ID': str(domain)}
+        self._shows = name == SCREEN
         self.output = folder / f'{name}.log'
         self._file = self.output.open('ab')
         self.process = subprocess.Popen(
@@ -242,11 +247,12 @@ class NodeProcess:
         return int(peak[0].split()[1]) / 1024 if peak else 0.0
 
     def lines_after(self, position: int) -> tuple[int, int]:
-        """Return the present end of the output, and how many lines came after a position."""
+        """Return the present end of the output, and how many log lines came after a position."""
         with self.output.open('rb') as file:
             file.seek(position)
             new = file.read()
-        return position + len(new), new.count(b'\n')
+        lines = _LOGGED.findall(new) if self._shows else new.splitlines()
+        return position + len(new), len(lines)
 
     def tail(self) -> str:
         """Return the last line that says something."""
