@@ -13,7 +13,6 @@ import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from functools import partial
 from typing import Any
 
 from geometry_msgs.msg import PoseWithCovarianceStamped
@@ -215,9 +214,13 @@ class MissionFeed:
             self._look_at_topics(processes)
         self._note_silent()
         self._facts.ask()
-        if self._others is not None:
-            for robot in self._others.find():
-                self.update(partial(_without_robot, robot=robot), begins=False)
+        if self._others is not None and (gone := self._others.find()):
+            self.update(
+                lambda old: replace(
+                    old, others={name: at for name, at in old.others.items() if name not in gone}
+                ),
+                begins=False,
+            )
 
     def _look_at_topics(self, processes: Mapping[str, set[str]]) -> None:
         """Note which nodes there are, and whose topics cannot be heard."""
@@ -419,10 +422,6 @@ def _mismatch(reason: str) -> str:
 
 def _with_position(place: str, point: tuple[float, float]) -> Callable[[Snapshot], Snapshot]:
     return lambda old: replace(old, positions={**old.positions, place: point})
-
-
-def _without_robot(snapshot: Snapshot, robot: str) -> Snapshot:
-    return replace(snapshot, others=without(snapshot.others, robot))
 
 
 def _door_line(x: float, y: float, yaw: float, width: float) -> tuple[float, float, float, float]:

@@ -184,7 +184,7 @@ def test_doors_close_and_open(armor: ArmorClient, call: Caller, built: OntologyM
     assert reach(armor) == ['C1', 'C2']
     refused = call('set_door', door='D9', open=True)
     assert not refused.success
-    assert refused.message.startswith('door.D9: no such door; the doors are D1')
+    assert refused.message.startswith('door.D9: no such door, expected one of D1')
 
 
 def test_rooms_join_and_leave(armor: ArmorClient, call: Caller, built: OntologyMapBuilder) -> None:

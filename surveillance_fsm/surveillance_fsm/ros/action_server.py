@@ -259,7 +259,9 @@ class ActionServerWrapper:
         self._expand_goal_slots = expand_goal_slots
         self._pack_result_slots = pack_result_slots
         self._run: GoalRun | None = None
-        wrapped_container.register_transition_cb(self._on_transition)
+        wrapped_container.register_transition_cb(
+            lambda userdata, _: self.publish_feedback(userdata)
+        )
 
     def run_server(self) -> None:
         """Start to serve; does not block."""
@@ -277,9 +279,6 @@ class ActionServerWrapper:
             if key in userdata:
                 setattr(feedback, slot, userdata[key])
         run.feedback(feedback)
-
-    def _on_transition(self, userdata: fsm.UserData, _active_states: list[str]) -> None:
-        self.publish_feedback(userdata)
 
     def _execute(self, goal: Any, run: GoalRun) -> Any:
         container, userdata = self.wrapped_container, self.userdata

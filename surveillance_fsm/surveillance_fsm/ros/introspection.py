@@ -105,17 +105,18 @@ class IntrospectionServer:
         self._smach_status = publisher(SmachContainerStatus, status, CONTAINERS)
         node.create_subscription(SmachContainerInitialStatusCmd, init, self._on_initial_state, 10)
         control = state.control
-        for name, action in (
-            ('pause', control.pause),
-            ('resume', control.resume),
-            ('step', control.step),
+        for kind, name, action in (
+            (Trigger, 'pause', lambda _: control.pause()),
+            (Trigger, 'resume', lambda _: control.resume()),
+            (Trigger, 'step', lambda _: control.step()),
+            (ForceOutcome, 'force_outcome', lambda r: control.force_outcome(r.path, r.outcome)),
+            (
+                SetInitialState,
+                'set_initial_state',
+                lambda r: self._set_initial(r.path, r.initial_states, r.userdata),
+            ),
         ):
-            node.create_service(Trigger, f'{fsm_names}/{name}', partial(self._trigger, action))
-        for kind, name, serve in (
-            (ForceOutcome, 'force_outcome', self._force_outcome),
-            (SetInitialState, 'set_initial_state', self._set_initial_state),
-        ):
-            node.create_service(kind, f'{fsm_names}/{name}', serve)
+            node.create_service(kind, f'{fsm_names}/{name}', partial(self._serve, action))
 
     def start(self) -> None:
         """Draw the machine in the log, on level debug, and begin to publish."""
@@ -183,29 +184,15 @@ class IntrospectionServer:
         container.set_initial_state(list(labels), userdata_from(userdata))
         return container
 
-    def _trigger(self, action: Callable[[], object], _request: Any, response: Any) -> Any:
-        return self._answer(response, action)
-
-    def _force_outcome(self, request: Any, response: Any) -> Any:
-        return self._answer(
-            response, lambda: self._root.control.force_outcome(request.path, request.outcome)
-        )
-
-    def _set_initial_state(self, request: Any, response: Any) -> Any:
-        return self._answer(
-            response,
-            lambda: self._set_initial(request.path, request.initial_states, request.userdata),
-        )
-
-    def _answer(self, response: Any, action: Callable[[], object]) -> Any:
+    def _serve(self, action: Callable[[Any], object], request: Any, response: Any) -> Any:
+        """Do what a request asks for, and answer whether it was done, or why not."""
         try:
-            action()
+            action(request)
         except (fsm.SmachError, KeyError) as error:
-            response.success = False
-            response.message = _said(error)
-            return response
-        response.success = True
-        self._publish_status()
+            response.success, response.message = False, _said(error)
+        else:
+            response.success = True
+            self._publish_status()
         return response
 
 

@@ -13,6 +13,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+from surveillance_runtime.suggestions import nearest
 from surveillance_runtime.yaml_file import KeyPath
 
 PLACE_KEYS = ('map', 'room_positions', 'robot_room', 'recharge_rooms')
@@ -116,7 +117,7 @@ class Place:
         """
         where = ('map', name)
         if name not in self.rooms:
-            raise PlaceError(where, f'no such room; {_known("rooms", self.rooms)}')
+            raise PlaceError(where, f'no such room, expected {nearest(name, self.rooms)}')
         if name in self.recharge_rooms:
             raise PlaceError(where, 'holds a charging station and cannot be removed')
         if len(self.rooms) == 1:
@@ -138,7 +139,7 @@ class Place:
             PlaceError: No room has such a door.
         """
         if door not in self._sides:
-            raise PlaceError(('door', door), f'no such door; {_known("doors", self._sides)}')
+            raise PlaceError(('door', door), f'no such door, expected {nearest(door, self._sides)}')
         closed = self.closed - {door} if is_open else self.closed | {door}
         return replace(self, closed=closed)
 
@@ -208,9 +209,8 @@ def _positions(positions: Any, rooms: Mapping[str, Any]) -> dict[str, Position]:
         raise PlaceError(('room_positions',), f'expected room: [x, y], got {_shown(positions)}')
     for room in positions:
         if room not in rooms:
-            raise PlaceError(
-                ('room_positions', str(room)), f'no such room; {_known("rooms", rooms)}'
-            )
+            expected = nearest(str(room), rooms)
+            raise PlaceError(('room_positions', str(room)), f'no such room, expected {expected}')
     checked: dict[str, Position] = {}
     for room in rooms:
         if room not in positions:
@@ -246,7 +246,7 @@ def _check_graph(place: Place) -> None:
 
 def _member(where: KeyPath, room: Any, rooms: Mapping[str, Any]) -> str:
     if not isinstance(room, str) or room not in rooms:
-        raise PlaceError(where, f'no room {_shown(room)}; {_known("rooms", rooms)}')
+        raise PlaceError(where, f'no room {_shown(room)}, expected {nearest(str(room), rooms)}')
     return room
 
 
@@ -278,12 +278,6 @@ def _first_duplicate(names: Sequence[str]) -> str | None:
 def _shown(value: Any) -> str:
     text = repr(value)
     return text if len(text) <= 60 else text[:57] + '...'
-
-
-def _known(what: str, names: Iterable[str], limit: int = 12) -> str:
-    listed = list(names)
-    more = f' and {len(listed) - limit} more' if len(listed) > limit else ''
-    return f'the {what} are {", ".join(listed[:limit])}{more}'
 
 
 def _list(what: str, names: Sequence[str]) -> str:
