@@ -8,6 +8,7 @@ import os
 import signal
 import sys
 from collections.abc import Callable, Sequence
+from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -125,14 +126,8 @@ def wanted_run(options: argparse.Namespace) -> Run:
     """Return what the options of `run`, or those that `node` has of them, ask for."""
     from launcher.run import Run
 
-    given = vars(options)
-    renamed = {'map': 'place', 'params': 'parameters'}
-    values = {
-        renamed.get(name, name): given[name]
-        for name in given
-        if name not in ('name', 'rest', 'write', 'resume', 'print')
-    }
-    return Run(**values)
+    wanted = {field.name for field in fields(Run)}
+    return Run(**{name: value for name, value in vars(options).items() if name in wanted})
 
 
 def _node(argv: list[str]) -> int:
@@ -150,8 +145,8 @@ def _node(argv: list[str]) -> int:
         help='to the end of the line, as with ros2 run: -p PARAMETER:=VALUE, -r FROM:=TO, '
         '--params-file FILE',
     )
-    own, rest = _split(argv, '--ros-args')
-    options = parser.parse_args(own)
+    at = argv.index('--ros-args') if '--ros-args' in argv else len(argv)
+    options, rest = parser.parse_args(argv[:at]), argv[at:]
     node = node_table.find(options.name)
     _enter(['node', *argv])
     from launcher import run_configuration, run_processes
@@ -174,11 +169,6 @@ def _node(argv: list[str]) -> int:
     words = run_processes.command([node], arguments, 0)
     interrupt.hold_back()
     os.execve(words[0], words, run_processes.node_environ(run))
-
-
-def _split(argv: list[str], word: str) -> tuple[list[str], list[str]]:
-    at = argv.index(word) if word in argv else len(argv)
-    return argv[:at], argv[at:]
 
 
 def _list(argv: list[str]) -> int:
@@ -265,8 +255,10 @@ def _test(argv: list[str]) -> int:
     _enter(['test', *argv], extras=('test',))
     spread = any(a.startswith(('-n', '--numprocesses', '--pdb')) or 'no:xdist' in a for a in argv)
     # On two cores three are a seventh faster than two: many tests wait for other processes.
-    _exec(['-m', 'pytest', *([] if spread else ['-n', '3', '--dist', 'loadfile']), *argv])
-    return 0
+    words = [] if spread else ['-n', '3', '--dist', 'loadfile']
+    os.chdir(CHECKOUT)
+    sys.stdout.flush()
+    return os.execv(sys.executable, [sys.executable, '-m', 'pytest', *words, *argv])
 
 
 def _lint(argv: list[str]) -> int:
@@ -320,10 +312,3 @@ def _enter(argv: list[str], extras: Sequence[str] = ()) -> None:
         words = [str(environment.python), str(CHECKOUT / 'launch.py'), *argv]
         interrupt.hold_back()
         os.execve(words[0], words, clean_environ())
-
-
-def _exec(words: list[str]) -> None:
-    """Becomes another program of this environment, in the checkout."""
-    os.chdir(CHECKOUT)
-    sys.stdout.flush()
-    os.execv(sys.executable, [sys.executable, *words])

@@ -73,12 +73,14 @@ def shared_options() -> argparse.ArgumentParser:
     )
     parser.add_argument(
         '--map',
+        dest='place',
         type=Path,
         metavar='FILE',
         help='the place (default: config/seven_rooms.yaml, for patrol config/patrol_world.yaml)',
     )
     parser.add_argument(
         '--params',
+        dest='parameters',
         type=Path,
         metavar='FILE',
         help='a ROS parameter file; what it says goes before config/parameters.yaml and the place',

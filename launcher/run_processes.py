@@ -50,14 +50,6 @@ def ros_arguments(files: Sequence[Path], run: Run) -> list[str]:
     return arguments
 
 
-def _merged_arguments(files: Sequence[Path], run: Run) -> list[str]:
-    """Return the arguments of a node that prints into the launcher's log.
-
-    A log file of its own, as ROS writes it, would grow without bound.
-    """
-    return [*ros_arguments(files, run), '--disable-external-lib-logs']
-
-
 def node_environ(run: Run, logs: Path | None = None) -> dict[str, str]:
     """Return the environment of a node's process."""
     environ = dict(os.environ)
@@ -96,8 +88,9 @@ def programs_of(
     """Return the processes of a run, each with the nodes that share it."""
 
     def program(members: Sequence[node_table.Node]) -> Program:
-        own = [files[node.name] for node in members]
-        words = command(members, _merged_arguments(own, run), os.getpid())
+        arguments = ros_arguments([files[node.name] for node in members], run)
+        # It prints into the launcher's log; one of its own, as ROS writes it, grows without bound.
+        words = command(members, [*arguments, '--disable-external-lib-logs'], os.getpid())
         memory = run.memory * 2**20
         return Program(members[0].name, words, environ, memory=memory)
 
