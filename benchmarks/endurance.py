@@ -29,7 +29,7 @@ from geometry_msgs.msg import PoseStamped
 from sensor_msgs.msg import BatteryState
 from whole_stack import ROOT, Stack
 
-from surveillance_behaviour.mission.mission_log import Summary, read_all, summarize
+from surveillance_behaviour.mission.mission_log import Event, read_all, summarize
 from surveillance_controllers.battery.model import BatteryParameters
 from surveillance_fsm.ros import ServiceCaller
 from surveillance_interfaces.msg import FactChanges
@@ -304,8 +304,8 @@ def run(
     log_level: str = 'fatal',
     people: int = 0,
     ranges: float | None = None,
-) -> tuple[Watch, Trouble, Summary]:
-    """Patrol for simulated seconds with trouble every `pause` seconds; return what was seen.
+) -> tuple[Watch, Trouble, list[Event]]:
+    """Patrol for simulated seconds with trouble every `pause` seconds.
 
     The seconds count from when the robot first drives. A KeyboardInterrupt ends them early.
 
@@ -318,6 +318,9 @@ def run(
         log_level: Of all nodes.
         people: How many walk about, who keep to their way (`pushy`).
         ranges: The battery lasts for so many ways to the farthest place and home; None: as it is.
+
+    Returns:
+        What was seen, what was made, and the mission's record until the seconds were over.
     """
     rng = random.Random(seed)
     parameters: dict[str, dict[str, Any]] = {
@@ -341,8 +344,7 @@ def run(
             watch.close()
             stack.close()
         # The drive that the end of the run cuts off has neither arrived nor failed.
-        events = (event for event in read_all(record) if event.time <= ended)
-        return watch, trouble, summarize(events)
+        return watch, trouble, [each for each in read_all(record) if each.time <= ended]
 
 
 def _patrol(
@@ -383,7 +385,7 @@ def main() -> int:
     logging.disable()
     begun = time.monotonic()
     signal.signal(signal.SIGTERM, signal.default_int_handler)
-    watch, trouble, summary = run(
+    watch, trouble, record = run(
         options.map,
         seconds,
         options.seed,
@@ -405,10 +407,13 @@ def main() -> int:
     print(f' (longest {watch.longest_wrong:.1f} s)')
     for since, lasted, said, true in watch.wrong[:20]:
         print(f'  at {since:.1f} s for {lasted:.1f} s: {said} instead of {true}')
-    visits, failures = sum(summary.visits.values()), sum(summary.failures.values())
-    print(f'drives that arrive    {visits} of {visits + failures}; {summary.recharges} recharges')
-    for what, times in summary.failures.items():
-        print(f'  failed {times} times: {what}')
+    summary = summarize(record)
+    failures = [event for event in record if event.name == 'failure']
+    visits = summary.visits.total()
+    drives = visits + sum(event.text('what') != 'recharging' for event in failures)
+    print(f'drives that arrive    {visits} of {drives}; {summary.recharges} recharges')
+    for event in failures:
+        print(f'  at {event.time:.1f} s: {event.text("what")}: {event.text("reason")}')
     print(f'{"place":<8} {"entered":>8} {"longest wait":>13}')
     for place, wait in watch.waits.items():
         print(f'{place:<8} {watch.visits[place]:>8} {wait:>11.0f} s')

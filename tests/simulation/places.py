@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import copy
+import math
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from surveillance_simulation.camera.model import Array
 from surveillance_simulation.world.world import World
 
 CONFIG = Path(__file__).parents[2] / 'config'
@@ -44,3 +48,29 @@ def changed(**sections: Any) -> dict[str, Any]:
 def two_rooms() -> World:
     """Return the two rooms as a world."""
     return World.from_parameters(TWO_ROOMS)
+
+
+def camera_pose(
+    x: float, y: float, z: float, yaw: float, pitch: float = 0.0, roll: float = 0.0
+) -> Array:
+    """Return the transform (4, 4) from the optical frame to the world.
+
+    Args:
+        x: Position, metres.
+        y: Position, metres.
+        z: Height, metres.
+        yaw: Direction of view in the plane, rad, anticlockwise from x.
+        pitch: Angle of view above the horizon, rad.
+        roll: Rotation about the line of sight, rad, clockwise as the camera sees it.
+    """
+    forward = np.array(
+        [math.cos(yaw) * math.cos(pitch), math.sin(yaw) * math.cos(pitch), math.sin(pitch)]
+    )
+    right = np.array([math.sin(yaw), -math.cos(yaw), 0.0])
+    down = np.cross(forward, right)
+    pose = np.eye(4)
+    pose[:3, 0] = math.cos(roll) * right + math.sin(roll) * down
+    pose[:3, 1] = math.cos(roll) * down - math.sin(roll) * right
+    pose[:3, 2] = forward
+    pose[:3, 3] = (x, y, z)
+    return pose

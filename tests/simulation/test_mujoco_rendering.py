@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from surveillance_simulation.camera import mujoco_rendering
-from surveillance_simulation.camera.model import Camera, Conditions, camera_pose, expose
+from surveillance_simulation.camera.model import Camera, Conditions, expose
 from surveillance_simulation.camera.mujoco_rendering import MujocoRenderer
 from surveillance_simulation.camera.rendering import Renderer
 from surveillance_simulation.world.world import read_world
 
-from .places import CONFIG, two_rooms
+from .places import CONFIG, camera_pose, two_rooms
 
 CLEAN = Conditions(noise=0.0, blur=0.0)
 

@@ -11,12 +11,12 @@ import pytest
 from surveillance_runtime.place import PlaceError
 from surveillance_runtime.place.floor_plan import Marker
 from surveillance_simulation.camera.lighting import LIGHTINGS, lit
-from surveillance_simulation.camera.model import Camera, Conditions, camera_pose, expose
-from surveillance_simulation.camera.rendering import Renderer, render
+from surveillance_simulation.camera.model import Camera, Conditions, expose
+from surveillance_simulation.camera.rendering import Renderer
 from surveillance_simulation.world import textures
 from surveillance_simulation.world.world import World, read_world
 
-from .places import CONFIG, two_rooms
+from .places import CONFIG, camera_pose, two_rooms
 
 CLEAN = Conditions(noise=0.0, blur=0.0)
 CAMERA = Camera.from_field_of_view(640, 480, math.radians(60))
@@ -29,7 +29,8 @@ def ids_in(picture: np.ndarray) -> set[int]:
 
 
 def look(world: World, *pose: float, conditions: Conditions = CLEAN) -> np.ndarray:
-    return render(world, camera_pose(*pose), CAMERA, conditions, np.random.default_rng(0))
+    ideal = Renderer(world, CAMERA).ideal(camera_pose(*pose))
+    return expose(ideal, conditions, np.random.default_rng(0))
 
 
 def facing_west(distance: float = 1.5) -> tuple[World, tuple[float, ...]]:

@@ -61,32 +61,6 @@ class Camera:
         )
 
 
-def camera_pose(
-    x: float, y: float, z: float, yaw: float, pitch: float = 0.0, roll: float = 0.0
-) -> Array:
-    """Return the transform (4, 4) from the optical frame to the world.
-
-    Args:
-        x: Position, metres.
-        y: Position, metres.
-        z: Height, metres.
-        yaw: Direction of view in the plane, rad, anticlockwise from x.
-        pitch: Angle of view above the horizon, rad.
-        roll: Rotation about the line of sight, rad, clockwise as the camera sees it.
-    """
-    forward = np.array(
-        [math.cos(yaw) * math.cos(pitch), math.sin(yaw) * math.cos(pitch), math.sin(pitch)]
-    )
-    right = np.array([math.sin(yaw), -math.cos(yaw), 0.0])
-    down = np.cross(forward, right)
-    pose = np.eye(4)
-    pose[:3, 0] = math.cos(roll) * right + math.sin(roll) * down
-    pose[:3, 1] = math.cos(roll) * down - math.sin(roll) * right
-    pose[:3, 2] = forward
-    pose[:3, 3] = (x, y, z)
-    return pose
-
-
 @dataclass(frozen=True)
 class Conditions:
     """What stands between the scene and its picture.

@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from surveillance_simulation.camera.model import Array, Camera, Conditions, Picture, expose
+from surveillance_simulation.camera.model import Array, Camera, Picture
 from surveillance_simulation.camera.scene import Face, faces_of
 from surveillance_simulation.world.textures import Texture
 from surveillance_simulation.world.world import World
@@ -161,17 +161,6 @@ class Renderer:
             size = (max(1, columns >> halvings_x), max(1, rows >> halvings_y))
             self._shrunk[key] = cv2.resize(texture, size, interpolation=cv2.INTER_AREA)
         return self._shrunk[key]
-
-
-def render(
-    world: World,
-    camera_pose: Array,
-    camera: Camera,
-    conditions: Conditions,
-    rng: np.random.Generator,
-) -> Picture:
-    """Return one picture (rows, columns, 3) of a world in RGB. For many, keep a `Renderer`."""
-    return expose(Renderer(world, camera).ideal(camera_pose), conditions, rng)
 
 
 def _halvings(texels: float, pixels: float) -> int:

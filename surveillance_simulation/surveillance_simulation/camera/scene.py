@@ -46,11 +46,6 @@ class Face:
         """Its middle (3,), metres, world frame."""
         return self.corner + (self.across + self.down) / 2
 
-    @property
-    def normal(self) -> Array:
-        """Direction (3,) from which the face is seen, not of unit length."""
-        return np.cross(self.down, self.across)
-
 
 def faces_of(world: World) -> list[Face]:
     """Return every face of a world.

@@ -68,7 +68,6 @@ class Base:
         turn_speed: Turning speed, rad/s, anticlockwise.
         collisions: How often the robot ran into something by its own motion.
         travelled: Length of the way driven, metres.
-        turned: Sum of the turns made, rad.
     """
 
     def __init__(
@@ -86,7 +85,6 @@ class Base:
         self.turn_speed = 0.0
         self.collisions = 0
         self.travelled = 0.0
-        self.turned = 0.0
         self._world = world
         self._rng = rng
         self._wanted = (0.0, 0.0)
@@ -135,7 +133,6 @@ class Base:
             distance *= reached
         self._sure -= abs(distance)
         self.travelled += abs(distance)
-        self.turned += abs(turn)
         self._count(distance, turn)
 
     def _speed_after(self, dt: float, wanted: float) -> float:
