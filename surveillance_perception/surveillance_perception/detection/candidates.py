@@ -35,7 +35,9 @@ Indices = npt.NDArray[np.int64]
 _MAX_HULL_CORNERS = 8
 _MIN_AREA = 12.0
 _LEAST_WIDTH = 2.0
-_QUAD_SCATTER, _MOST_SCATTER = 1.35, 8.0
+# how far a marker's outline that touches nothing is from a parallelogram's scatter, and how
+# scattered one may be that touches something
+_QUAD_DEVIATION, _MOST_SCATTER = 0.05, 8.0
 _MAX_GROWTH = 1.6
 _WIDE_WINDOW = 21
 _SAME_SIZE = 0.06
@@ -127,7 +129,7 @@ def quads_around(
             image itself. A blob with the same upright box as one before is left out.
         min_length: Longer side in pixels of the smallest blob's upright box.
         limit: Once so many blobs were looked at, in the first mask or in all others, only those
-            that are nearly quadrilaterals are; after the others, no further mask.
+            with a parallelogram's moments are; after the others, no further mask.
 
     Returns:
         (n, 4, 2) corners in pixels, clockwise as seen.
@@ -143,13 +145,14 @@ def quads_around(
         if blobs is None:
             continue
         outlines, boxes, scatter = blobs
-        kept = np.flatnonzero(scatter < _MOST_SCATTER)
-        kept = kept[np.argsort(scatter[kept])]
+        unlike = np.abs(scatter - 1.0)
+        kept = np.argsort(unlike)
+        kept = kept[scatter[kept] < _MOST_SCATTER]
         quads = []
         for index, box in zip(
             kept.tolist(), (boxes[kept] * scale // _SAME_BOX).tolist(), strict=True
         ):
-            if len(seen) > limit and scatter[index] > _QUAD_SCATTER:
+            if len(seen) > limit and unlike[index] > _QUAD_DEVIATION:
                 break
             if (blob := tuple(box)) in seen:
                 continue
@@ -165,15 +168,15 @@ def quads_around(
 
 
 class _Blobs(NamedTuple):
-    """Outer outlines of a mask's blobs.
+    """Outlines of a mask's blobs and of the holes in them.
 
     Attributes:
         outlines: (n, 1, 2) points of each.
         boxes: (k, 4) left, top, right, bottom of each.
-        scatter: (k,) 1 for a parallelogram, 1.33 for a triangle, the more, the further a blob's
-            parts lie from its middle. It is the first affine moment invariant (Flusser and Suk,
-            "Pattern recognition by affine moment invariants", Pattern Recognition 26(1), 1993),
-            relative to a parallelogram's.
+        scatter: (k,) 1 for a parallelogram, 0.91 for an ellipse, 1.33 for a triangle, the more,
+            the further a blob's parts lie from its middle; far above these for a hole. It is the
+            first affine moment invariant (Flusser and Suk, "Pattern recognition by affine moment
+            invariants", Pattern Recognition 26(1), 1993), relative to a parallelogram's.
     """
 
     outlines: list[Outline]
@@ -184,14 +187,12 @@ class _Blobs(NamedTuple):
 def _blobs_in(mask: Grey, length: float, width: float) -> _Blobs | None:
     """Return a mask's blobs of at least a length and a width in pixels, measured all at once.
 
-    One with more corners than its box has pixels around it is no quadrilateral.
+    One with far more corners than its box has pixels around it is no quadrilateral.
     """
-    outlines, hierarchy = cv2.findContours(mask, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_SIMPLE)
-    if not outlines:
-        return None
+    # in one pass over the rows; it traces blobs and holes in opposite directions
+    outlines, _ = cv2.findContoursLinkRuns(mask)
     counts = np.fromiter(map(len, outlines), np.int64, len(outlines))
-    # outlines of holes have a parent
-    kept = np.flatnonzero((counts >= 4) & (hierarchy[0, :, 3] < 0))
+    kept = np.flatnonzero(counts >= 4)
     if not len(kept):
         return None
     outlines, counts = [outlines[index] for index in kept.tolist()], counts[kept]
@@ -201,7 +202,7 @@ def _blobs_in(mask: Grey, length: float, width: float) -> _Blobs | None:
     top, bottom = np.minimum.reduceat(y, starts), np.maximum.reduceat(y, starts)
     wide, high = right - left + 1, bottom - top + 1
     large = (np.maximum(wide, high) >= length) & (np.minimum(wide, high) >= width)
-    large &= counts <= 2 * (wide + high)
+    large &= counts <= 3 * (wide + high)
     if not large.any():
         return None
     within = large.repeat(counts)
@@ -218,14 +219,17 @@ def _blobs_in(mask: Grey, length: float, width: float) -> _Blobs | None:
 
 
 def _scatter(x: Indices, y: Indices, counts: Indices) -> Array:
-    """Return the scatter (k,) of polygons with so many corners (k,) each, (n,) in all."""
+    """Return the scatter (k,) of polygons with so many corners (k,) each, (n,) in all.
+
+    An outline of a hole has a negative area, which is taken for a small one.
+    """
     starts = counts.cumsum() - counts
     x, y = x.astype(np.float32), y.astype(np.float32)
     u, v = np.roll(x, -1), np.roll(y, -1)
     u[starts + counts - 1], v[starts + counts - 1] = x[starts], y[starts]
     # moments of polygons by Green's theorem
-    cross = u * y - x * v
-    area = np.maximum(np.add.reduceat(cross, starts) / 2.0, 1e-9)
+    cross = x * v - u * y
+    area = np.maximum(np.add.reduceat(cross, starts) / 2.0, 1.0)
     terms = (x + u, y + v, x * x + (x + u) * u, y * y + (y + v) * v)
     mean_x, mean_y, xx, yy = (np.add.reduceat(cross * term, starts) / area for term in terms)
     xy = np.add.reduceat(cross * (2.0 * (x * y + u * v) + x * v + u * y), starts) / area

@@ -111,15 +111,18 @@ class MarkerReader:
         entries, correlation, patches, footprint = self._score(
             self._rough, pyramid, homographies, blur, None
         )
-        inner = self._rough.inner_correlations(patches, entries[:, :_HYPOTHESES], footprint)
         # blurred cells show little of their differences, but then the match is not far off
         shown = cells.correlation > _SHOWN
-        likely = correlation[:, 0] > np.where(shown, _LEAST_IF_SHOWN, _LEAST_IF_BLURRED)
-        likely &= inner.max(axis=1) > _LEAST_INNER
+        least = np.where(shown, _LEAST_IF_SHOWN, _LEAST_IF_BLURRED)
+        likely = np.flatnonzero(correlation[:, 0] > least)
+        inner = self._rough.inner_correlations(
+            patches[likely], entries[likely, :_HYPOTHESES], footprint.chosen(likely)
+        )
+        likely = likely[inner.max(axis=1, initial=-1.0) > _LEAST_INNER]
+        if not len(likely):
+            return None
         homographies, entries = homographies[likely], entries[likely]
         correlation, blur = correlation[likely], blur[likely]
-        if not len(homographies):
-            return None
         unexplained = 1.0 - np.square(np.maximum(correlation[:, :_HYPOTHESES], 0.0))
         close = unexplained < _HYPOTHESIS_RATIO * unexplained[:, :1] + 1e-6
         owner, column = np.nonzero(close)

@@ -37,6 +37,7 @@ from surveillance_perception.detection.image_sampling import (
     Array,
     Grey,
     ImagePyramid,
+    cell_widths,
     corners_of,
     homographies_of,
 )
@@ -54,6 +55,9 @@ _CONTRADICTED = 0.4
 _FEW_SPARE_BITS = 12.0
 _STRICT_BITS = 4.0
 _FULL_WORK = 2e6
+# print whose cells are a pixel wide has such a border, unless light falls unevenly on it, and then
+# its cells show the code
+_NARROW_CELL, _LEAST_BORDER = 1.0, 0.76
 # wrong ids that may be expected of one candidate
 _LARGEST_ERROR = 1e-5
 
@@ -175,15 +179,18 @@ class MarkerDetector:
         self.left_out = 0
         prepared = prepare(image)
         pyramid = ImagePyramid(prepared.grey)
-        quads = self._candidates(prepared, pyramid)
+        quads, border = self._candidates(prepared, pyramid)
         if len(expected):
             quads = np.concatenate([np.asarray(expected, dtype=float), quads])
+            border = np.concatenate([np.ones(len(expected)), border])
         if not len(quads):
             return []
         homographies = homographies_of(quads)
         cells = self._reader.read_cells(pyramid, homographies)
         found = self._shown_by_cells(pyramid, homographies, cells, prepared.grey)
-        unread = np.flatnonzero(~_covered(quads, found))
+        narrow = cell_widths(homographies, self._reader.codes.side) < _NARROW_CELL
+        plain = narrow | (border > _LEAST_BORDER)
+        unread = np.flatnonzero(plain & ~_covered(quads, found))
         for start in range(0, len(unread), _BATCH):
             part = unread[start : start + _BATCH]
             readings = self._reader.read(pyramid, homographies[part], cells.chosen(part))
@@ -204,27 +211,25 @@ class MarkerDetector:
         confidence = cells.correlation * (1.0 - 1.0 / cells.lead)
         return self._detections(homographies, cells.entries, confidence, grey)
 
-    def _candidates(self, prepared: PreparedImage, pyramid: ImagePyramid) -> Quads:
+    def _candidates(self, prepared: PreparedImage, pyramid: ImagePyramid) -> tuple[Quads, Array]:
+        """Return quadrilaterals (m, 4, 2), the likeliest first, and their borders' correlations."""
         settings = self.settings
         contrast = max(settings.contrast, 3.0 * prepared.noise)
         masks = dark_masks(prepared.smooth, settings.windows, contrast, settings.bridges)
         limit = settings.max_outlines * max(1.0, _FULL_WORK / prepared.grey.size)
         quads = quads_around(masks, min_length=settings.min_length, limit=limit)
-        if not len(quads):
-            return quads
         correlation = self._border.correlation(pyramid, homographies_of(quads), contrast)
         passed = correlation > 0.0
         quads, correlation = quads[passed], correlation[passed]
-        if not len(quads):
-            return quads
         fitted = self._edges.fitted(pyramid, quads)
         better = self._border.correlation(pyramid, homographies_of(fitted), contrast)
         closer = better > correlation
         quads[closer], correlation[closer] = fitted[closer], better[closer]
-        quads = quads[np.argsort(-correlation)]
-        quads = quads[distinct(quads, _SAME_QUAD)]
-        self.left_out = max(0, len(quads) - settings.max_candidates)
-        return np.asarray(quads[: settings.max_candidates])
+        best = np.argsort(-correlation)
+        best = best[distinct(quads[best], _SAME_QUAD)]
+        self.left_out = max(0, len(best) - settings.max_candidates)
+        best = best[: settings.max_candidates]
+        return quads[best], correlation[best]
 
     def _accepted(self, readings: Readings, grey: Grey) -> list[Detection]:
         settings, codes = self.settings, self._reader.codes

@@ -44,13 +44,13 @@ class ImagePyramid:
         depth = points[:, 2]
         depth = np.where(np.abs(depth) < 1e-6, np.float32(1e-6), depth)
         x, y = points[:, 0] / depth, points[:, 1] / depth
-        first = int(levels[0]) if len(levels) else 0
-        if (levels == first).all():
-            return self._read(x, y, first)
+        used = np.unique(levels).tolist()
+        if len(used) == 1:
+            return self._read(x, y, used[0])
         patches = np.empty(x.shape, np.float32)
-        for level in np.unique(levels):
+        for level in used:
             chosen = levels == level
-            patches[chosen] = self._read(x[chosen], y[chosen], int(level))
+            patches[chosen] = self._read(x[chosen], y[chosen], level)
         return patches
 
     def _read(self, x: Patches, y: Patches, level: int) -> Patches:

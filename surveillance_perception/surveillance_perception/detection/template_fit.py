@@ -45,6 +45,10 @@ class Footprint(NamedTuple):
     down: Indices
     across: Indices
 
+    def chosen(self, which: Indices) -> Footprint:
+        """Return the blur of some of the candidates."""
+        return Footprint(self.down[which], self.across[which])
+
 
 class TemplateFit:
     """Compares quadrilaterals of an image with the codes of a dictionary.
@@ -151,7 +155,7 @@ class TemplateFit:
         count, listed = entries.shape
         repeated = Footprint(footprint.down.repeat(listed), footprint.across.repeat(listed))
         drawn = self._render(entries.ravel(), repeated)[:, self._inside]
-        drawn = drawn.reshape(count, listed, -1)
+        drawn = drawn.reshape(count, listed, drawn.shape[1])
         seen = patches[:, self._inside]
         drawn = drawn - drawn.mean(axis=2, keepdims=True)
         seen = seen - seen.mean(axis=1, keepdims=True)
@@ -200,7 +204,7 @@ class TemplateFit:
     def _render(self, entries: Indices, footprint: Footprint) -> Patches:
         down, across = self._profile[footprint.down], self._profile[footprint.across]
         drawn = down @ self.codes.cells[entries] @ across.transpose(0, 2, 1)
-        return np.asarray(drawn.reshape(len(entries), -1))
+        return np.asarray(drawn.reshape(len(entries), self.count**2))
 
     def _steepest(self, entries: Indices, footprint: Footprint) -> Patches:
         """Change (m, 8, n) of the templates by each parameter of a homography."""
