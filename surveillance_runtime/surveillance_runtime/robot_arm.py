@@ -71,6 +71,19 @@ class Arm:
         """Greatest positions (n,), rad."""
         return np.array([joint.upper for joint in self.joints])
 
+    @property
+    def longest_motion(self) -> float:
+        """Seconds from rest to rest over the whole range of the slowest joint.
+
+        A motion limited in jerk, acceleration and speed that reaches all three takes this long.
+        """
+        return max(
+            (joint.upper - joint.lower) / joint.speed
+            + joint.speed / joint.acceleration
+            + joint.acceleration / joint.jerk
+            for joint in self.joints
+        )
+
     def frames(self, positions: Sequence[float] | Array) -> list[Array]:
         """Return the transforms (4, 4) from each joint's frame, after its turn, to `base_link`.
 

@@ -8,10 +8,12 @@ from typing import Any
 
 import pytest
 from nav_msgs.msg import Odometry
+from rcl_interfaces.msg import Log
 from std_msgs.msg import Int32
 from std_srvs.srv import Empty
 
 from surveillance_behaviour.initial_state_node import InitialState
+from surveillance_behaviour.map_from_markers import scan_peers
 from surveillance_fsm.ros import GoalServer
 from surveillance_interfaces.action import ScanSurroundings
 from surveillance_interfaces.msg import MarkerDetectionArray, OntologyMap
@@ -121,6 +123,32 @@ def test_a_map_that_is_not_complete_is_looked_at_again_on_patrol(graph: Any) -> 
     assert 'R4' not in robot.rooms()
     in_view.set()
     graph.until(lambda: 'R4' in robot.rooms())
+
+
+def test_an_arm_that_takes_a_scan_and_says_nothing_holds_nothing_up(
+    graph: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(scan_peers, '_SILENCE', 0.1)
+    robot = Robot(graph, {1: [11, 12, 13, 14, 15, 16]})
+    logged = graph.listen(Log, '/rosout')
+    arm = graph.add(PatrolNode, name='arm')
+    over = threading.Event()
+
+    def look(_goal: Any, _run: Any) -> Any:
+        over.wait(60.0)
+        return ScanSurroundings.Result()
+
+    GoalServer(arm, ScanSurroundings, 'scan_surroundings', look, lambda _goal: True)
+    graph.add(MarkerServer)
+    graph.add(InitialState, parameters={'robot_room': 'E', 'patience': 0.1, 'dwell': 0.1})
+    try:
+        started = robot.start()
+        graph.until(lambda: any(each.msg.startswith('scan given up: no view') for each in logged))
+        robot.show(17)
+        graph.until(started.done)
+    finally:
+        over.set()
+    assert 'R4' in robot.rooms()
 
 
 def test_a_scan_whose_node_was_killed_goes_on_where_it_was(graph: Any, tmp_path: Path) -> None:

@@ -17,11 +17,15 @@ from surveillance_interfaces.action import ScanSurroundings
 from surveillance_interfaces.msg import MarkerDetectionArray
 from surveillance_interfaces.srv import MarkerRoutine, RoomInformation
 from surveillance_runtime.node import PatrolNode
+from surveillance_runtime.robot_arm import ARM
 from surveillance_runtime.settled_frames import SettledFrames
 
 _ARM_SECONDS = 30.0
 _ANSWER_SECONDS = 5.0
 _START_SECONDS = 10.0
+_SILENCE = _ARM_SECONDS + ARM.longest_motion
+"""Seconds without a word from a scan, beside the rest at a view: the arm took its goal and may have
+moved as far as it can."""
 
 
 class CameraScanner:
@@ -62,17 +66,32 @@ class CameraScanner:
         self._moved(MarkerRoutine.Request.HOME)
 
     def scan(self, overlap: float, reach: float, dwell: float, done: Callable[[], bool]) -> None:
-        """Look all around the horizon; `done` is asked after each view and ends the scan."""
+        """Look all around the horizon; `done` is asked after each view and ends the scan.
+
+        An arm from which no view is heard for too long is given up.
+        """
         goal = ScanSurroundings.Goal(overlap=overlap, lowest=-reach, highest=reach, dwell=dwell)
-        view_changed, ended = Interrupt(), Interrupt()
+        heard, view_changed, ended = Interrupt(), Interrupt(), Interrupt()
         forget = self._node.stopping.subscribe(ended.set)
 
         def told(feedback: Any) -> None:
             if not feedback.resting and feedback.view > 1:
                 view_changed.set()
+            heard.set()
 
-        # `done` may ask other nodes, which a feedback callback must not wait for
-        watcher = self._node.spawn(lambda: _watch(view_changed, ended, done), 'scan watch')
+        def watch() -> None:
+            # `done` may ask other nodes, which a feedback callback must not wait for
+            while not ended.is_set():
+                if self._is_silent(heard, _SILENCE + dwell) and not ended.is_set():
+                    self._complain(f'scan given up: no view for {_SILENCE + dwell:.0f} s')
+                    ended.set()
+                heard.clear()
+                if view_changed.is_set():
+                    view_changed.clear()
+                    if done():
+                        ended.set()
+
+        watcher = self._node.spawn(watch, 'scan watch')
         try:
             self._scan.run(goal, accept_timeout=_ARM_SECONDS, interrupt=ended, on_feedback=told)
         except CallError as error:
@@ -81,8 +100,15 @@ class CameraScanner:
         finally:
             forget()
             ended.set()
-            view_changed.set()
+            heard.set()
             watcher.join()
+
+    def _is_silent(self, heard: Interrupt, seconds: float) -> bool:
+        """Wait for a word; tell whether none came for so long on the node's clock and in truth."""
+        begin = self._wait.elapsed()
+        if heard.wait(seconds):
+            return False
+        return self._wait.sleep(seconds - (self._wait.elapsed() - begin), heard)
 
     def _moved(self, number: int) -> bool:
         request = MarkerRoutine.Request(pos=number)
@@ -100,13 +126,6 @@ class CameraScanner:
             self._node.get_logger().warn(reason)
             # without an arm there is nothing to wait for but the pictures that come anyway
             self._wait.sleep(1.0, self._node.stopping)
-
-
-def _watch(view_changed: Interrupt, ended: Interrupt, done: Callable[[], bool]) -> None:
-    while view_changed.wait() and not ended.is_set():
-        view_changed.clear()
-        if done():
-            ended.set()
 
 
 class MarkerInquiry:
