@@ -32,30 +32,36 @@ Quads = npt.NDArray[np.float64]
 Outline = npt.NDArray[np.int32]
 Indices = npt.NDArray[np.int64]
 
+# of the quadrilateral around a blob: corners of the reduced hull that are merged to four, its least
+# area and width in pixels, and how much larger than the hull it may be
 _MAX_HULL_CORNERS = 8
-_MIN_AREA = 12.0
-_LEAST_WIDTH = 2.0
+_MIN_AREA, _LEAST_WIDTH = 12.0, 2.0
+_MAX_GROWTH = 1.6
 # how far a marker's outline that touches nothing is from a parallelogram's scatter, and how
 # scattered one may be that touches something
 _QUAD_DEVIATION, _MOST_SCATTER = 0.05, 8.0
-_MAX_GROWTH = 1.6
-_WIDE_WINDOW = 21
-_SAME_SIZE = 0.06
-_SAME_BOX = 3
-_PER_SIDE = 6
-_INNER = 5
-_LEAST_CORRELATION = 0.68
-_LEAST_SIDE, _WORST_SIDE = 0.15, 0.5
-# beyond a missing margin may lie what is far brighter than print, or a thin one half darker
-_LEAST_INNER_DEVIATION, _MOST_INNER_DEVIATION = 0.1, 2.0
-_CELL_PIXELS = 6.0
 # an outline runs through the middles of the outermost dark pixels, and blur makes dark smaller
 _INSET = 0.65
+# sine between sides below which a corner is not moved further: it would leave the image
 _LEAST_SINE = 0.3
-_PLACES, _STEPS = 10, 13
-_REACH = 1.2
-_STRAIGHTNESS = 0.15
-_STEEPEST = 0.5
+# neighbourhood in pixels from which the halved image does
+_WIDE_WINDOW = 21
+# blobs with one box to so many pixels, and quadrilaterals with one size to this share, are the same
+_SAME_BOX, _SAME_SIZE = 3, 0.06
+# places that `BorderCheck` looks at along each side, and along each side of the code
+_PER_SIDE, _INNER = 6, 5
+# image pixels a cell has at most where borders are looked at
+_CELL_PIXELS = 6.0
+# what passes: correlation of border and margin, contrast of the two worst sides as shares of all,
+# and deviation within the code: beyond a missing margin may lie what is far brighter than print,
+# or a thin one half darker
+_LEAST_CORRELATION = 0.68
+_LEAST_SIDE, _WORST_SIDE = 0.15, 0.5
+_LEAST_INNER_DEVIATION, _MOST_INNER_DEVIATION = 0.1, 2.0
+# of `EdgeFit`: places along a side, steps across it, and how far it looks, in cells
+_PLACES, _STEPS, _REACH = 10, 13, 1.2
+# cells from a side's line at which a place counts half, and the steepest slope of that line
+_STRAIGHTNESS, _STEEPEST = 0.15, 0.5
 
 
 def dark_masks(

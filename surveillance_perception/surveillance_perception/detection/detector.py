@@ -1,16 +1,16 @@
 """Finding ArUco markers in images, also where they are small, oblique, blurred, dark or noisy.
 
-The way from an image to markers:
+The way from an image to markers, with the module of each step:
 
-1. `prepare` stretches a dark image and smooths a noisy one.
-2. `dark_masks` and `quads_around` propose quadrilaterals, `BorderCheck` keeps those with a white
-   margin, a black border and something inside; `EdgeFit` moves their sides onto the border.
-3. `CellDifferences` reads those whose cells are wide enough to show their code, under any light;
+1. `preprocessing` stretches a dark image and smooths a noisy one.
+2. `candidates` proposes quadrilaterals around dark blobs, keeps those with a white margin, a black
+   border and something inside, and moves their sides onto the border.
+3. `cell_differences` reads those whose cells are wide enough to show their code, under any light;
    what such a reading may be wrong is computed.
-4. `TemplateFit` compares what is left with every code of the dictionary through the camera's blur,
-   aligns the likely ones with the image, and tries stronger blur where the fit is poor. Such a
-   reading is accepted by its correlation and by its lead over the second best code: a lower lead
-   is enough for an id on the known list than for any other.
+4. `decoding` has `template_fit` compare what is left with every code of the dictionary through the
+   camera's blur, align the likely ones with the image, and try stronger blur where the fit is poor.
+5. `MarkerDetector` accepts such a reading by its correlation and by its lead over the second best
+   code: a lower lead is enough for an id on the known list than for any other.
 """
 
 from __future__ import annotations
@@ -46,14 +46,19 @@ from surveillance_perception.detection.template_fit import Indices
 from surveillance_runtime import parameter_checks
 from surveillance_runtime.parameters import parameter
 
+# pixels between the middles of outlines that are one: what the search's masks differ by
 _SAME_QUAD = 2.0
+# pixels a cell from which corners are found in the image itself; smaller ones are aligned better
 _LARGE_CELL = 8.0
+# candidates that are matched at once, so that their patches stay in the processor's cache
 _BATCH = 128
+# share of a marker's half diagonal within which another outline's middle is taken for its part
 _COVER = 0.7
 # share of the cells that may rather have the other colour: cells a pixel wide show little
 _CONTRADICTED = 0.4
-_FEW_SPARE_BITS = 12.0
-_STRICT_BITS = 4.0
+# bits of a code beyond its id below which a higher lead is asked for, and how many raise it by one
+_FEW_SPARE_BITS, _STRICT_BITS = 12.0, 4.0
+# pixels of the image for which `max_outlines` is meant
 _FULL_WORK = 2e6
 # print whose cells are a pixel wide has such a border, unless light falls unevenly on it, and then
 # its cells show the code
