@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import fcntl
 import os
+import platform
 import shutil
 import signal
 import subprocess
@@ -78,8 +79,8 @@ class Environment:
         """
         if self.ready():
             return
-        machine = system.Machine.here()
-        if reason := machine.why_no_wheels():
+        machine = (platform.system(), platform.machine(), platform.libc_ver()[0])
+        if reason := system.why_no_wheels(*machine, sys.version_info[:2]):
             raise system.LaunchError(system.no_wheels_advice(reason, self.checkout))
         if missing := system.missing_packages():
             system.install_packages(missing)
@@ -152,7 +153,9 @@ class Environment:
 
             if step := steps.get(VENV_STEP):
                 with step:
-                    start([_base_python(), '-m', 'venv', '--clear', str(self.venv)]).watch(step)
+                    # Also where this process runs in an environment itself.
+                    python = getattr(sys, '_base_executable', sys.executable)
+                    start([python, '-m', 'venv', '--clear', str(self.venv)]).watch(step)
             self._remove_half_installed()
             if INTERFACES_STEP in steps:
                 shutil.rmtree(wheels, ignore_errors=True)
@@ -300,10 +303,3 @@ def clean_environ() -> dict[str, str]:
         kept = [path for path in libraries if path and not path.startswith('/opt/ros/')]
         environ['LD_LIBRARY_PATH'] = os.pathsep.join(kept)
     return environ
-
-
-def _base_python() -> str:
-    """Return the interpreter that a new environment is made from, also when this one is in a
-    venv.
-    """
-    return str(getattr(sys, '_base_executable', sys.executable))

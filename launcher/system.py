@@ -8,13 +8,11 @@ from __future__ import annotations
 
 import importlib.util
 import os
-import platform
 import shutil
 import subprocess
 import sys
 import sysconfig
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 from launcher.progress import Output, Step
@@ -37,36 +35,23 @@ class NotNowError(LaunchError):
     """What was asked for can be done later without a change: the machine or a run is in the way."""
 
 
-@dataclass(frozen=True)
-class Machine:
-    """What decides how this machine gets its ROS."""
+def why_no_wheels(name: str, processor: str, libc: str, python: tuple[int, int]) -> str:
+    """Return why the ROS wheels do not fit a machine, empty when they do.
 
-    system: str
-    processor: str
-    libc: str
-    python: tuple[int, int]
-
-    @classmethod
-    def here(cls) -> Machine:
-        return cls(
-            platform.system(),
-            platform.machine(),
-            platform.libc_ver()[0],
-            (sys.version_info.major, sys.version_info.minor),
+    Args:
+        name, processor, libc: As `platform` has them.
+        python: Version of the interpreter.
+    """
+    if name != 'Linux' or processor not in ('x86_64', 'AMD64'):
+        return f'there are no ROS 2 wheels for {name} on {processor}'
+    if libc != 'glibc':
+        return 'the ROS 2 wheels need glibc, which this Linux does not use'
+    if python not in WHEEL_PYTHONS:
+        return (
+            f'there are no ROS 2 wheels for Python {python[0]}.{python[1]}: '
+            'run launch.py with Python 3.11, 3.12 or 3.13'
         )
-
-    def why_no_wheels(self) -> str:
-        """Return why the ROS wheels do not fit this machine, empty when they do."""
-        if self.system != 'Linux' or self.processor not in ('x86_64', 'AMD64'):
-            return f'there are no ROS 2 wheels for {self.system} on {self.processor}'
-        if self.libc != 'glibc':
-            return 'the ROS 2 wheels need glibc, which this Linux does not use'
-        if self.python not in WHEEL_PYTHONS:
-            return (
-                f'there are no ROS 2 wheels for Python {self.python[0]}.{self.python[1]}: '
-                'run launch.py with Python 3.11, 3.12 or 3.13'
-            )
-        return ''
+    return ''
 
 
 def sourced_ros(environ: Mapping[str, str] | None = None) -> bool:

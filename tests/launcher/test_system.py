@@ -9,10 +9,16 @@ import pytest
 
 from launcher import system
 from launcher.environment import clean_environ
-from launcher.system import LaunchError, Machine, no_wheels_advice, note_of_unused_ros, sourced_ros
+from launcher.system import (
+    LaunchError,
+    no_wheels_advice,
+    note_of_unused_ros,
+    sourced_ros,
+    why_no_wheels,
+)
 from tests.launcher.conftest import ROOT
 
-HERE = Machine('Linux', 'x86_64', 'glibc', (3, 12))
+HERE = ('Linux', 'x86_64', 'glibc', (3, 12))
 CHECKOUT = Path('/somewhere/surveillance')
 
 
@@ -26,20 +32,20 @@ def test_who_may_not_install_is_told_what_this_machine_has(monkeypatch, sudo, ty
 
 
 def test_wheels_fit_the_machines_they_were_built_for():
-    assert HERE.why_no_wheels() == ''
+    assert why_no_wheels(*HERE) == ''
 
 
 @pytest.mark.parametrize(
     ('machine', 'reason'),
     [
-        (Machine('Linux', 'aarch64', 'glibc', (3, 12)), 'Linux on aarch64'),
-        (Machine('Darwin', 'arm64', '', (3, 12)), 'Darwin on arm64'),
-        (Machine('Linux', 'x86_64', '', (3, 12)), 'glibc'),
-        (Machine('Linux', 'x86_64', 'glibc', (3, 14)), 'Python 3.14'),
+        (('Linux', 'aarch64', 'glibc', (3, 12)), 'Linux on aarch64'),
+        (('Darwin', 'arm64', '', (3, 12)), 'Darwin on arm64'),
+        (('Linux', 'x86_64', '', (3, 12)), 'glibc'),
+        (('Linux', 'x86_64', 'glibc', (3, 14)), 'Python 3.14'),
     ],
 )
 def test_where_none_fit_it_is_said_why(machine, reason):
-    assert reason in machine.why_no_wheels()
+    assert reason in why_no_wheels(*machine)
 
 
 def test_without_wheels_and_ros_the_advice_is_to_install_it(tmp_path):
