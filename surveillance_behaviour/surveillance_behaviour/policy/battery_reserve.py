@@ -15,6 +15,7 @@ from dataclasses import dataclass, field
 from statistics import fmean
 
 from surveillance_behaviour.policy.graph import PatrolGraph
+from surveillance_behaviour.policy.leg_times import spread_of
 from surveillance_runtime.parameters import parameter
 
 FALLS_REMEMBERED = 50
@@ -22,10 +23,6 @@ LEARNED_FALL = 2.0
 """Percent by which the level falls while one rate is learned."""
 PERCENTILE_99 = 2.326
 """Standard deviations from the mean to the 99th percentile of a normal distribution."""
-PRIOR_SPREAD = 0.15
-"""Spread of the rates before any was learned, as a part of their mean."""
-PRIOR_WEIGHT = 5.0
-"""How many falls the prior of the spread weighs as much as."""
 
 
 @dataclass(frozen=True)
@@ -141,8 +138,7 @@ class DrawEstimate:
         if not rates:
             return Draw()
         rate = fmean(rates)
-        squares = PRIOR_WEIGHT * PRIOR_SPREAD**2 + sum((each / rate - 1.0) ** 2 for each in rates)
-        return Draw(rate, math.sqrt(squares / (PRIOR_WEIGHT + len(rates))))
+        return Draw(rate, spread_of([each / rate for each in rates]))
 
     def to_json(self) -> list[float]:
         """Return the rates, to be kept in a file."""

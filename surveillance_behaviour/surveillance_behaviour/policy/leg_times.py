@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -21,13 +21,22 @@ DRIVES_REMEMBERED = 20
 """How many of the last drives of a leg count."""
 ERRORS_REMEMBERED = 200
 PRIOR_SPREAD = 0.15
-"""Spread before anything was driven, as a part of the time."""
+"""Spread before anything was learned."""
 PRIOR_WEIGHT = 5.0
-"""How many drives the prior of the spread weighs as much as."""
+"""How many ratios the prior of the spread weighs as much as."""
 CHANGE = 0.03
 """Expected times of the map follow what was learned once they differ by more than this part."""
 
 Leg = tuple[str, str]
+
+
+def spread_of(ratios: Collection[float]) -> float:
+    """Return the standard deviation from 1 of ratios of what was seen to what was expected.
+
+    `PRIOR_SPREAD` stands for it while they are few; none counts as further off than 2.
+    """
+    squares = sum(min(abs(ratio - 1.0), 2.0) ** 2 for ratio in ratios)
+    return math.sqrt((PRIOR_WEIGHT * PRIOR_SPREAD**2 + squares) / (PRIOR_WEIGHT + len(ratios)))
 
 
 @dataclass
@@ -60,9 +69,7 @@ class LegTimes:
             straight: Metres between the two places in a straight line.
             metres: Length of the planned path; None: not known.
         """
-        if not 0.0 < seconds < math.inf:
-            return
-        if start == goal:
+        if start == goal or not 0.0 < seconds < math.inf:
             return
         expected = self.expected(start, goal, straight)
         if expected > 0.0:
@@ -91,9 +98,7 @@ class LegTimes:
     @property
     def spread(self) -> float:
         """Standard deviation of driven over predicted time."""
-        squares = sum(min(abs(error - 1.0), 2.0) ** 2 for error in self.errors)
-        prior = PRIOR_WEIGHT * PRIOR_SPREAD**2
-        return math.sqrt((prior + squares) / (PRIOR_WEIGHT + len(self.errors)))
+        return spread_of(self.errors)
 
     def _predicted(self, leg: Leg, straight: float) -> float:
         overhead, pace = self._line()
