@@ -42,7 +42,8 @@ class Completion:
         self._wanted = self._may_lack(self._program)
         self._schema = schema
         self._native = tuple(self._program.unsupported)
-        self._compared = False
+        # Whether classes were compared, and whether that holds whatever is said of individuals.
+        self._compared = self._stands = False
         self.unsupported: tuple[str, ...] | None = None
 
     def run(self, axioms: Iterable[Axiom]) -> None:
@@ -54,6 +55,7 @@ class Completion:
             return
         assertions = [axiom for axiom in axioms if is_assertion(axiom)]
         if len(assertions) > _MOST_ASSERTIONS:
+            self._forget_classes()
             self.unsupported = (*self._native, 'the assertions: too many for reasoning by cases')
             return
         if self._has_rules:
@@ -64,16 +66,16 @@ class Completion:
             self._forget_classes()
             return
         engine.take_from_cases(list(reasoner.facts(self._is_known)))
-        if engine.consistent and (reasoner.names_individuals or not self._compared):
+        if engine.consistent and (reasoner.names_individuals or not self._stands):
             known = self._classification
             found = reasoner.hierarchy(known.classes(), known.below_by_itself)
             known.complete(list(found))
-            self._compared = True
+            self._compared, self._stands = True, not reasoner.names_individuals
         self._report(reasoner)
 
     def _forget_classes(self) -> None:
         if self._compared:
-            self._compared = False
+            self._compared = self._stands = False
             self._classification.complete(())
 
     def entails(self, axioms: Iterable[Axiom], fact: Axiom) -> bool:

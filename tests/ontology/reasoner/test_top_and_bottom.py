@@ -77,3 +77,14 @@ def test_what_an_axiom_lists_twice_counts_once() -> None:
     assert base(ax.DisjointUnion(A, (B, C, B)), is_a(B, i)).types(i) == {A, B}
     assert base(ax.DisjointClasses((A, B, A)), is_a(A, i)).types(i) == {A}
     base(ax.DisjointClasses((A, A)), is_a(A, i), consistent=False)
+
+
+def test_a_class_that_an_assertion_empties_is_possible_again_without_it() -> None:
+    nobody_is_b = ax.ClassAssertion(ex.ObjectAllValuesFrom(TOP, ex.ObjectComplementOf(B)), i)
+    kb = base(ax.SubClassOf(A, ex.ObjectUnionOf((B, C))), is_a(C, j), nobody_is_b)
+    assert B in kb.subclasses(NOTHING)
+    assert kb.superclasses(A) == {C}
+    kb.remove(nobody_is_b)
+    assert kb.reason()
+    assert B not in kb.subclasses(NOTHING)
+    assert kb.superclasses(A) == set()
