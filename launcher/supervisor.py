@@ -306,9 +306,8 @@ class Supervisor:
         """Take what a dead process still printed, then let its pipes go."""
         assert process.stdout is not None
         # A process that left its group may hold the pipe open: its end is not waited for.
-        if process.stdout in self._selector.get_map():
-            while child.read():
-                pass
+        while process.stdout in self._selector.get_map() and child.read():
+            pass
         if process.stdout in self._selector.get_map():
             self._selector.unregister(process.stdout)
         for stream in (process.stdout, process.stdin):
