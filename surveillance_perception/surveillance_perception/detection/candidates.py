@@ -197,18 +197,16 @@ def _blobs_in(mask: Grey, length: float, width: float) -> _Blobs | None:
     """
     # in one pass over the rows; it traces blobs and holes in opposite directions
     outlines, _ = cv2.findContoursLinkRuns(mask)
-    counts = np.fromiter(map(len, outlines), np.int64, len(outlines))
-    kept = np.flatnonzero(counts >= 4)
-    if not len(kept):
+    if not outlines:
         return None
-    outlines, counts = [outlines[index] for index in kept.tolist()], counts[kept]
+    counts = np.fromiter(map(len, outlines), np.int64, len(outlines))
     x, y = np.concatenate(outlines)[:, 0].T.copy()
     starts = counts.cumsum() - counts
     left, right = np.minimum.reduceat(x, starts), np.maximum.reduceat(x, starts)
     top, bottom = np.minimum.reduceat(y, starts), np.maximum.reduceat(y, starts)
     wide, high = right - left + 1, bottom - top + 1
     large = (np.maximum(wide, high) >= length) & (np.minimum(wide, high) >= width)
-    large &= counts <= 3 * (wide + high)
+    large &= (counts >= 4) & (counts <= 3 * (wide + high))
     if not large.any():
         return None
     within = large.repeat(counts)

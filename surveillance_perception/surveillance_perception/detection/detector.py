@@ -37,7 +37,6 @@ from surveillance_perception.detection.image_sampling import (
     Array,
     Grey,
     ImagePyramid,
-    cell_widths,
     corners_of,
     homographies_of,
 )
@@ -48,9 +47,9 @@ from surveillance_runtime.parameters import parameter
 
 # pixels between the middles of outlines that are one: what the search's masks differ by
 _SAME_QUAD = 2.0
-# pixels a cell from which corners are found in the image itself; smaller ones are aligned better
+# pixels a cell from which corners are found in the image itself: it was halved for the reading
 _LARGE_CELL = 8.0
-# candidates that are matched at once, so that their patches stay in the processor's cache
+# candidates that are matched at once: bounds the memory
 _BATCH = 128
 # share of a marker's half diagonal within which another outline's middle is taken for its part
 _COVER = 0.7
@@ -60,9 +59,6 @@ _CONTRADICTED = 0.4
 _FEW_SPARE_BITS, _STRICT_BITS = 12.0, 4.0
 # pixels of the image for which `max_outlines` is meant
 _FULL_WORK = 2e6
-# print whose cells are a pixel wide has such a border, unless light falls unevenly on it, and then
-# its cells show the code
-_NARROW_CELL, _LEAST_BORDER = 1.0, 0.76
 # wrong ids that may be expected of one candidate
 _LARGEST_ERROR = 1e-5
 
@@ -184,18 +180,15 @@ class MarkerDetector:
         self.left_out = 0
         prepared = prepare(image)
         pyramid = ImagePyramid(prepared.grey)
-        quads, border = self._candidates(prepared, pyramid)
+        quads = self._candidates(prepared, pyramid)
         if len(expected):
             quads = np.concatenate([np.asarray(expected, dtype=float), quads])
-            border = np.concatenate([np.ones(len(expected)), border])
         if not len(quads):
             return []
         homographies = homographies_of(quads)
         cells = self._reader.read_cells(pyramid, homographies)
         found = self._shown_by_cells(pyramid, homographies, cells, prepared.grey)
-        narrow = cell_widths(homographies, self._reader.codes.side) < _NARROW_CELL
-        plain = narrow | (border > _LEAST_BORDER)
-        unread = np.flatnonzero(plain & ~_covered(quads, found))
+        unread = np.flatnonzero(~_covered(quads, found))
         for start in range(0, len(unread), _BATCH):
             part = unread[start : start + _BATCH]
             readings = self._reader.read(pyramid, homographies[part], cells.chosen(part))
@@ -216,8 +209,8 @@ class MarkerDetector:
         confidence = cells.correlation * (1.0 - 1.0 / cells.lead)
         return self._detections(homographies, cells.entries, confidence, grey)
 
-    def _candidates(self, prepared: PreparedImage, pyramid: ImagePyramid) -> tuple[Quads, Array]:
-        """Return quadrilaterals (m, 4, 2), the likeliest first, and their borders' correlations."""
+    def _candidates(self, prepared: PreparedImage, pyramid: ImagePyramid) -> Quads:
+        """Return quadrilaterals (m, 4, 2) that look like a marker's border, the likeliest first."""
         settings = self.settings
         contrast = max(settings.contrast, 3.0 * prepared.noise)
         masks = dark_masks(prepared.smooth, settings.windows, contrast, settings.bridges)
@@ -233,8 +226,7 @@ class MarkerDetector:
         best = np.argsort(-correlation)
         best = best[distinct(quads[best], _SAME_QUAD)]
         self.left_out = max(0, len(best) - settings.max_candidates)
-        best = best[: settings.max_candidates]
-        return quads[best], correlation[best]
+        return np.asarray(quads[best[: settings.max_candidates]])
 
     def _accepted(self, readings: Readings, grey: Grey) -> list[Detection]:
         settings, codes = self.settings, self._reader.codes
