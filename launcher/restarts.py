@@ -21,8 +21,9 @@ LONGEST_AFTER_WORK = 2.0
 """Longest pause, in seconds, before the restart of a process that had been ready."""
 STEADY_AFTER = 20.0
 """A process that ran this long, in seconds, starts again from the first pause."""
-TROUBLE_DEATHS, TROUBLE_PERIOD = 5, 300.0
-"""So many deaths in so many seconds are said, and not again before a period without any."""
+TROUBLE_DEATHS, TROUBLE_PERIOD = 5, 600.0
+"""So many deaths in so many seconds are said, and not again before a period without any. As many
+starts that hang (`process_watch.SILENT_START`) fall into a period."""
 
 
 class Restarts:

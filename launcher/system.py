@@ -117,7 +117,8 @@ def install_packages(packages: Sequence[str]) -> None:
     """Installs Debian packages with apt, where that needs no password.
 
     Raises:
-        LaunchError: there is no apt, no right to use it, or it failed.
+        LaunchError: There is no apt, or no right to use it.
+        NotNowError: It failed, as without network, or where another one runs.
     """
     names = ' '.join(packages)
     if shutil.which('apt-get') is None:
@@ -149,7 +150,7 @@ def install_packages(packages: Sequence[str]) -> None:
         # A repository that does not answer is no reason to stop: the packages may come from others.
         if process.returncode != 0 and command[0] == 'install':
             tail = '\n'.join(output[-4:])
-            raise LaunchError(
+            raise NotNowError(
                 f'apt-get could not install {names}:\n{tail}\nInstall them, then start again:\n'
                 f'  {_as_root(packages)}'
             )

@@ -26,7 +26,7 @@ _INT, _FLOAT = 'tag:yaml.org,2002:int', 'tag:yaml.org,2002:float'
 _NUMBERS = {
     _INT: r'[-+]?(0x[0-9a-fA-F]+|0[0-7]*|[1-9]\d*)\Z',
     _FLOAT: r'[-+]?(\d+\.\d*|\.\d+)([eE][-+]?\d+)?\Z|[-+]?\d+[eE][-+]?\d+\Z'
-    r'|[-+]?\.(inf|Inf|INF)\Z|\.(nan|NaN|NAN)\Z',
+    r'|[-+]?0\d*[89]\d*\Z|[-+]?\.(inf|Inf|INF)\Z|\.(nan|NaN|NAN)\Z',
 }
 KeyPath = tuple[str, ...]
 UNREADABLE = (yaml.YAMLError, ValueError, LookupError, TypeError, AttributeError)
@@ -36,7 +36,7 @@ UNREADABLE = (yaml.YAMLError, ValueError, LookupError, TypeError, AttributeError
 def _as_ros(kind: Any) -> Any:
     """Return a loader that takes for a number what ROS takes for one (`rcl_yaml_param_parser`).
 
-    `1e3` is a number, `010` is 8 as in C; `1:30` and `1_000`, numbers of YAML 1.1, are texts.
+    `1e3` and `08` are numbers, `010` is 8 as in C; `1:30` and `1_000`, numbers of YAML 1.1, are texts.
     """
     loader: Any = type(kind.__name__, (kind,), {})
     loader.yaml_implicit_resolvers = {

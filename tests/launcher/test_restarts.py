@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from launcher.process_watch import SILENT_START
 from launcher.restarts import (
     LONGEST_AFTER_WORK,
     PAUSES,
@@ -44,6 +45,14 @@ def test_one_failed_start_of_a_program_that_was_hit_often_costs_no_long_pause():
     assert restarts.died(11.0, START, worked=False) == PAUSES[0]
 
 
+def test_somebody_is_called_when_each_start_hangs():
+    restarts, now = Restarts(), 0.0
+    for _ in range(TROUBLE_DEATHS):
+        now += SILENT_START + 5.0  # on a busy machine
+        now += restarts.died(now, SILENT_START, worked=False)
+    assert restarts.trouble(now)
+
+
 def told(*deaths: float) -> list[str]:
     restarts, found = Restarts(), []
     for now in deaths:
@@ -56,7 +65,7 @@ def test_somebody_is_called_once_while_it_goes_on():
     step = TROUBLE_PERIOD / (TROUBLE_DEATHS + 1)
     found = told(*(number * step for number in range(50)))
     assert [number for number, text in enumerate(found) if text] == [TROUBLE_DEATHS - 1]
-    assert found[TROUBLE_DEATHS - 1] == 'died 5 times in 200 s'
+    assert found[TROUBLE_DEATHS - 1] == 'died 5 times in 400 s'
 
 
 def test_somebody_is_called_again_after_a_quiet_period():

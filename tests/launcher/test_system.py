@@ -11,6 +11,7 @@ from launcher import system
 from launcher.environment import clean_environ
 from launcher.system import (
     LaunchError,
+    NotNowError,
     no_wheels_advice,
     note_of_unused_ros,
     sourced_ros,
@@ -28,6 +29,13 @@ def test_who_may_not_install_is_told_what_this_machine_has(monkeypatch, sudo, ty
     monkeypatch.setattr(shutil, 'which', lambda name: name if name in there else None)
     monkeypatch.setattr(system, '_privilege', lambda: None)
     with pytest.raises(LaunchError, match=f'  {typed} install -y g\\+\\+'):
+        system.install_packages(['g++'])
+
+
+def test_packages_that_could_not_be_installed_may_be_later(monkeypatch):
+    monkeypatch.setattr(shutil, 'which', lambda name: name)
+    monkeypatch.setattr(system, '_privilege', lambda: ['false'])  # as without network
+    with pytest.raises(NotNowError, match=r'could not install g\+\+'):
         system.install_packages(['g++'])
 
 

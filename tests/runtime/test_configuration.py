@@ -210,7 +210,8 @@ def test_places_that_a_robot_cannot_use_are_refused_with_file_and_line(tmp_path)
         ('1:30', '1:30'),  # a number of YAML 1.1
         ('1:30.5', '1:30.5'),
         ('1_000', '1_000'),
-        ('08', '08'),
+        ('08', 8.0),  # no octal number: strtod reads it
+        ('0190', 190.0),
     ],
 )
 def test_a_number_is_what_ros_takes_for_one(tmp_path, written, value):
