@@ -43,8 +43,9 @@ TICK = 0.1
 """Seconds that a round of the loop takes at most."""
 LOOK_PERIOD = 0.5
 """Seconds between two looks at the heartbeats and the memory of the processes."""
-EXIT_UNUSABLE = 2
-"""The exit code with which a node says that its configuration does not let it start."""
+EXIT_UNUSABLE = (2, os.EX_TEMPFAIL)
+"""The exit codes with which a node says that its configuration does not let it start, or not now.
+"""
 _LONGEST_LINE = 64 * 1024
 _STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
@@ -324,9 +325,9 @@ class Supervisor:
         if child.finished:
             self._log.say(f'{name} has ended by itself')
             return
-        if code == EXIT_UNUSABLE and child.starts == 1:
+        if code in EXIT_UNUSABLE and child.starts == 1:
             self._log.error(f'{name} cannot start as it is configured: stopping')
-            self.stop(EXIT_UNUSABLE)
+            self.stop(code)
             return
         now = time.monotonic()
         worked = child.heartbeats is not None and child.heartbeats.begun

@@ -10,6 +10,7 @@ Arguments: `mode`, `behaviour`, `map`, `params`, `record`, `namespace`, `log_lev
 from __future__ import annotations
 
 import atexit
+import os
 import shutil
 import tempfile
 from pathlib import Path
@@ -38,7 +39,7 @@ from surveillance_runtime.run_parameters import (
     write_parameters,
 )
 
-EXIT_CANNOT_START = 2
+EXITS_CANNOT_START = (2, os.EX_TEMPFAIL)
 MARKERS = 'mission_markers'
 
 ARGUMENTS = [
@@ -115,7 +116,7 @@ def start_nodes(context: LaunchContext) -> list[Node]:
 
 def stop_if_unusable(event: ProcessExited, _context: LaunchContext) -> list[Shutdown] | None:
     """End the launch when a node says that its configuration does not let it start."""
-    if event.returncode != EXIT_CANNOT_START:
+    if event.returncode not in EXITS_CANNOT_START:
         return None
     return [Shutdown(reason=f'{event.process_name} cannot start as it is configured')]
 

@@ -38,7 +38,7 @@ from surveillance_behaviour.peers.ros_ports import (
 from surveillance_fsm.ros import IntrospectionServer
 from surveillance_runtime.files import FileError
 from surveillance_runtime.node import JOIN_SECONDS, PatrolNode
-from surveillance_runtime.parameters import ParameterError
+from surveillance_runtime.parameters import NotNowParameterError
 from surveillance_runtime.process import run_node
 from surveillance_runtime.qos import SENSOR_QOS
 from surveillance_runtime.waiting import AwaitedWork
@@ -162,7 +162,7 @@ def _open_record(path: str) -> MissionRecord | None:
     try:
         return MissionRecord(path)
     except FileError as error:
-        raise ParameterError(f'parameter record: {error}') from None
+        raise NotNowParameterError(f'parameter record: {error}') from None
 
 
 def main(args: Sequence[str] | None = None) -> int:

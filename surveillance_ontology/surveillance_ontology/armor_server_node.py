@@ -28,7 +28,7 @@ from surveillance_ontology.armor_client import CHANGES_TOPIC
 from surveillance_ontology.conversions import changes_to_ros, fill_response, request_from_ros
 from surveillance_runtime.files import FileError
 from surveillance_runtime.node import PatrolNode
-from surveillance_runtime.parameters import ParameterError
+from surveillance_runtime.parameters import NotNowParameterError
 from surveillance_runtime.process import run_node
 from surveillance_runtime.qos import STATE_QOS
 from surveillance_runtime.waiting import AwaitedWork
@@ -234,8 +234,8 @@ def _service(node: PatrolNode, keep: bool) -> ArmorService:
         keep: Whether the store is on by default.
 
     Raises:
-        ParameterError: A parameter is of the wrong type or out of range, or the store cannot be
-            used.
+        ParameterError: A parameter is of the wrong type or out of range.
+        NotNowParameterError: The store cannot be used.
     """
     settings = node.declare_fields(Settings())
     stored = node.parameter(
@@ -258,7 +258,7 @@ def _service(node: PatrolNode, keep: bool) -> ArmorService:
             log.info(f'store {folder}, which holds {kept}; "-p store:=none" keeps nothing')
         return service
     except FileError as error:
-        raise ParameterError(f'{node.get_name()}: parameter store: {error}') from None
+        raise NotNowParameterError(f'{node.get_name()}: parameter store: {error}') from None
 
 
 def _own_folder(node: PatrolNode) -> Path:

@@ -38,7 +38,7 @@ from surveillance_runtime.node import (
     give_arguments,
     report_exception,
 )
-from surveillance_runtime.parameters import ParameterError
+from surveillance_runtime.parameters import NotNowParameterError, ParameterError
 
 STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM)
 EXIT_CANNOT_START = 2
@@ -56,7 +56,8 @@ def run_node(factory: Callable[[], PatrolNode], args: Sequence[str] | None = Non
 
     Returns:
         The exit code: 0 for a wanted stop, 1 when the node failed, `EXIT_CANNOT_START` when its
-        configuration does not let it start, so that starting it again would not help.
+        configuration does not let it start, so that starting it again would not help,
+        `os.EX_TEMPFAIL` when it may help later.
     """
     return run_nodes([factory], args)
 
@@ -116,7 +117,7 @@ def _run_nodes(factories: Sequence[Callable[[], PatrolNode]], args: Sequence[str
     except ParameterError as error:
         who = getattr(factory, '__name__', '') + ' ' if len(factories) > 1 else ''
         print(f'{who}cannot start: {_one_line(error)}', file=sys.stderr)
-        code = EXIT_CANNOT_START
+        code = os.EX_TEMPFAIL if isinstance(error, NotNowParameterError) else EXIT_CANNOT_START
     finally:
         ending.ignore_signals()
         give_arguments(None)

@@ -36,7 +36,7 @@ UNREADABLE = (yaml.YAMLError, ValueError, LookupError, TypeError, AttributeError
 def _as_ros(kind: Any) -> Any:
     """Return a loader that takes for a number what ROS takes for one (`rcl_yaml_param_parser`).
 
-    `1e3` and `08` are numbers, `010` is 8 as in C; `1:30` and `1_000`, numbers of YAML 1.1, are texts.
+    `1e3` and `08` are numbers, `010` is 8 as in C; `1:30` and `1_000`, numbers of YAML 1.1, texts.
     """
     loader: Any = type(kind.__name__, (kind,), {})
     loader.yaml_implicit_resolvers = {

@@ -166,10 +166,11 @@ def test_pauses_grow_while_a_child_keeps_dying(start):
     assert launch.end(signal.SIGTERM)[0] == 0
 
 
-def test_a_child_that_cannot_be_configured_ends_the_launch(start):
-    bad = 'print("cannot start: level is -1"); raise SystemExit(2)'
+@pytest.mark.parametrize('code', [2, os.EX_TEMPFAIL])
+def test_a_child_that_cannot_be_configured_ends_the_launch(start, code):
+    bad = f'print("cannot start: level is -1"); raise SystemExit({code})'
     launch = start(DRIVER, f'one={WAIT}', f'two={bad}')
-    assert launch.end()[0] == 2
+    assert launch.end()[0] == code
     output = '\n'.join(launch.lines)
     assert 'cannot start: level is -1' in output
     assert 'two cannot start as it is configured' in output

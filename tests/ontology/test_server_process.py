@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import subprocess
 import sys
@@ -63,6 +64,6 @@ def test_a_server_that_cannot_start_says_why_in_one_line(tmp_path: Path) -> None
         timeout=60,
         check=False,
     )
-    assert ended.returncode != 0
+    assert ended.returncode == os.EX_TEMPFAIL
     (line,) = ended.stderr.strip().splitlines()
     assert 'armor_server: parameter store:' in line
