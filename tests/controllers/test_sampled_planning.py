@@ -56,12 +56,12 @@ def test_it_drives_around_somebody_and_arrives(
     assert came > 3.3
 
 
-def test_the_path_is_followed_when_nobody_is_near_it() -> None:
+@pytest.mark.parametrize('movers', [[Mover(3.0, -3.0, 0.5, 0.0, 0.25)], []], ids=['far', 'none'])
+def test_the_path_is_followed_when_nobody_is_near_it(movers: list[Mover]) -> None:
     planner, last, pose = SampledPlanner(ROBOT), Velocity(), (0.0, 0.0, 0.0)
-    away = Mover(3.0, -3.0, 0.5, 0.0, 0.25)
     for _ in range(40):
         way = np.array([relative(pose, (x, 0.0, 0.0))[:2] for x in np.arange(pose[0], 4, 0.1)])
-        last = planner.step(way, NOTHING, [away], last, PERIOD)
+        last = planner.step(way, NOTHING, movers, last, PERIOD)
         pose = composed(pose, (last.speed * PERIOD, 0.0, last.turn * PERIOD))
     assert pose[0] > 1.5
     assert abs(pose[1]) < 0.15

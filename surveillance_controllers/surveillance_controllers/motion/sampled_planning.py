@@ -258,8 +258,10 @@ class SampledPlanner:
 
 def _standing(seen: Points, movers: Sequence[Mover]) -> Points:
     """Return the points that belong to nothing that moves, shape (n, 2)."""
-    gaps = [np.hypot(seen[:, 0] - each.x, seen[:, 1] - each.y) - each.radius for each in movers]
-    return np.asarray(seen[np.min(gaps, axis=0, initial=np.inf) > MOVER_RIM])
+    for each in movers:
+        gaps = np.hypot(seen[:, 0] - each.x, seen[:, 1] - each.y) - each.radius
+        seen = seen[gaps > MOVER_RIM]
+    return seen
 
 
 def _rolled_out(controls: Floats, step: float) -> Floats:
