@@ -75,10 +75,14 @@ def _to_boxes(solid: boxes.Array, x: float, y: float, direction: boxes.Array) ->
     axes = np.array([[cos, sin], [-sin, cos]]).transpose(2, 0, 1)
     begin = np.einsum('nij,nj->ni', axes, (x, y) - solid[:, :2])[..., None]
     slope = axes @ direction
-    inverse = 1.0 / np.where(np.abs(slope) < _PARALLEL, _PARALLEL, slope)
-    middle, reach = -begin * inverse, solid[:, 4:6, None] * np.abs(inverse)
+    slope[np.abs(slope) < _PARALLEL] = _PARALLEL
+    # In place: with many boxes, new memory costs more than the arithmetic.
+    inverse = np.divide(1.0, slope, out=slope)
+    middle = -begin * inverse
+    reach = np.abs(inverse, out=inverse)
+    reach *= solid[:, 4:6, None]
     enter = (middle - reach).max(axis=1)
-    leave = (middle + reach).min(axis=1)
+    leave = np.add(middle, reach, out=middle).min(axis=1)
     hit = (leave >= enter) & (leave >= 0.0)
     distance = np.where(hit, np.maximum(enter, 0.0), np.inf)
     return np.asarray(distance.min(axis=0, initial=np.inf))
