@@ -156,6 +156,14 @@ class Robot:
         """Return the record."""
         return read(self.record)
 
+    def battery_is_heard(self) -> bool:
+        """Whether the behaviour knows what the battery said last, or one of them is away."""
+        battery, behavior = map(self.nodes.get, ('battery_controller', 'robot_behavior'))
+        if battery is None or behavior is None:
+            return True
+        heard = behavior.mission.battery
+        return (heard.level, heard.low) == battery._said
+
     def set_parameter(self, node: Any, name: str, value: Any) -> str:
         """Set a parameter at run time; why that was refused, empty: it was not."""
         (result,) = node.set_parameters([Parameter(name, value=value)])
@@ -183,5 +191,5 @@ def mission(graph: Any, patch: pytest.MonkeyPatch, behaviour: str, record: Path)
     """Provide a robot whose time stops when the block ends."""
     with simulated_time(graph, patch) as time:
         robot = Robot(graph, time, behaviour, record)
-        time.follow(lambda: list(robot.nodes.values()))
+        time.follow(lambda: list(robot.nodes.values()), robot.battery_is_heard)
         yield robot

@@ -2,9 +2,9 @@
 
 A mission under ``use_sim_time`` usually runs against a clock that ticks on its own: what happens
 first then depends on how busy the machine is. Here the clock moves only while one of the threads
-that carry the mission on (the state machine, a goal, a charge) sleeps on it, and then to the
-moment at which the next of all sleepers is due. Hours take seconds, and a run with the same seeds
-takes the same course.
+that carry the mission on (the state machine, a goal, a charge) sleeps on it and nobody else whom
+time woke is still at work, and then to the moment at which the next of all sleepers is due. Hours
+take seconds, and a run with the same seeds takes the same course.
 """
 
 from __future__ import annotations
@@ -45,6 +45,8 @@ class SimulatedTime:
         self._topic = graph.node.create_publisher(Clock, '/clock', 10)
         self._condition = threading.Condition()
         self._sleepers: dict[int, tuple[float, str]] = {}
+        self._at_work: set[threading.Thread] = set()
+        self._all_heard: Callable[[], bool] = lambda: True
         self._ended = False
         self.unattended = False
         self.error: BaseException | None = None
@@ -52,9 +54,12 @@ class SimulatedTime:
         self.alarms: list[tuple[float, Any]] = []
         self._thread = threading.Thread(target=self._run, name='simulated time')
 
-    def follow(self, nodes: Callable[[], list[Any]]) -> None:
-        """Name the nodes that must have seen each moment before the next one comes."""
-        self._nodes = nodes
+    def follow(self, nodes: Callable[[], list[Any]], all_heard: Callable[[], bool]) -> None:
+        """Name the nodes that must have seen each moment before the next one comes.
+
+        ``all_heard``: whether no message is under way that the next moment must not overtake.
+        """
+        self._nodes, self._all_heard = nodes, all_heard
 
     def start(self) -> None:
         """Let time run."""
@@ -80,20 +85,27 @@ class SimulatedTime:
 
     def fell_asleep(self, deadline: float) -> None:
         """Have the calling thread sleep until ``deadline``."""
+        thread = threading.current_thread()
         with self._condition:
-            self._sleepers[threading.get_ident()] = (deadline, threading.current_thread().name)
+            self._sleepers[threading.get_ident()] = (deadline, thread.name)
+            self._at_work.discard(thread)
             self._condition.notify_all()
 
-    def woke_up(self) -> None:
-        """Have the calling thread go on."""
+    def woke_up(self, *, in_time: bool) -> None:
+        """Have the calling thread go on; ``in_time``: nobody has interrupted its sleep."""
+        thread = threading.current_thread()
         with self._condition:
             self._sleepers.pop(threading.get_ident(), None)
+            if in_time and not thread.name.endswith(CARRIES_ON):
+                # It does what time has brought, and sleeps again: a battery that changes at random.
+                self._at_work.add(thread)
             self._condition.notify_all()
 
     def _run(self) -> None:
         while True:
             with self._condition:
-                self._condition.wait_for(lambda: self._ended or self._all_wait())
+                while not (self._ended or self._all_wait()):
+                    self._condition.wait(0.01)  # no word of a thread's end, or of a message
                 if self._ended:
                     return
                 due = min(deadline for deadline, _ in self._sleepers.values())
@@ -113,6 +125,10 @@ class SimulatedTime:
                 self._condition.wait_for(lambda: self._ended or not self._overdue(), timeout=60.0)
 
     def _all_wait(self) -> bool:
+        if any(thread.is_alive() for thread in self._at_work):
+            return False
+        if not self._all_heard():
+            return False
         if self.unattended:
             return bool(self._sleepers)
         return any(name.endswith(CARRIES_ON) for _, name in self._sleepers.values())
@@ -148,10 +164,12 @@ def simulated_time(graph: Any, monkeypatch: pytest.MonkeyPatch) -> Iterator[Simu
             # It only waits for time to begin.
             return sleep(self, seconds, interrupt)
         driver.fell_asleep(self.now() + seconds)
+        in_time = False
         try:
-            return sleep(self, seconds, interrupt)
+            in_time = sleep(self, seconds, interrupt)
+            return in_time
         finally:
-            driver.woke_up()
+            driver.woke_up(in_time=in_time)
 
     monkeypatch.setattr(ClockWait, 'sleep', watched)
     try:
