@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 from launcher import interrupt, package_commands, system
 from launcher.environment import CHECKOUT, Environment, clean_environ
 from launcher.instance_lock import claim
-from launcher.options import make_parser, shared_options
+from launcher.options import DEFAULT_MEMORY, make_parser, shared_options
 from surveillance_runtime import node_table
 from surveillance_runtime.command_line import EXIT_BAD_INPUT, CommandParser
 from surveillance_runtime.files import in_one_line
@@ -224,7 +224,7 @@ def _service(argv: list[str]) -> int:
     options = parser.parse_args(argv)
     words = [word for word in argv if word != '--print']
     # All nodes at their limit would be more than most machines have.
-    text = service.unit_text(CHECKOUT, words, 4 * options.memory or 8192)
+    text = service.unit_text(CHECKOUT, words, 4 * (options.memory or DEFAULT_MEMORY))
     if options.print:
         print(text, end='')
         return 0

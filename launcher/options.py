@@ -13,6 +13,7 @@ from surveillance_runtime import node_table
 from surveillance_runtime.command_line import CommandParser
 
 DEFAULT_KEEP = 20.0
+DEFAULT_MEMORY = 2048
 _DESCRIPTION = """\
 Patrols, with every node as a process of its own, until Ctrl-C; or does what COMMAND says. What the
 project needs is set up first, where it is not yet."""
@@ -67,9 +68,9 @@ def shared_options() -> argparse.ArgumentParser:
     parser.add_argument(
         '--behaviour',
         choices=node_table.BEHAVIOURS,
-        default='surveillance',
+        default=node_table.DEFAULT_BEHAVIOUR,
         metavar='|'.join(node_table.BEHAVIOURS),
-        help='surveillance knows its map, patrol learns it from markers (default: surveillance)',
+        help='surveillance knows its map, patrol learns it from markers (default: %(default)s)',
     )
     parser.add_argument(
         '--map',
@@ -169,7 +170,7 @@ def _add_process_options(group: argparse._ArgumentGroup) -> None:
             'a number of megabytes from 100, or 0',
             lambda value: value == 0 or 100 <= value < 1e7,
         ),
-        default=2048,
+        default=DEFAULT_MEMORY,
         metavar='MB',
         help='a node that holds more is started again; 0: any (default: %(default)s)',
     )

@@ -13,6 +13,7 @@ from typing import Any
 from urllib.parse import urlsplit
 
 from launcher import run_folder
+from launcher.options import DEFAULT_KEEP, DEFAULT_MEMORY
 from launcher.system import LaunchError
 from surveillance_runtime import node_table
 from surveillance_runtime.configuration import Configuration, file_layer
@@ -23,8 +24,6 @@ from surveillance_runtime.place import read_place_file
 
 NOT_RECORDED = 'off'
 RECORDER, MARKERS, PAGE = 'mission_recorder', 'mission_markers', 'mission_page'
-MEMORY = 2048
-"""Megabytes that a node may hold, unless the command line says otherwise."""
 _NAMESPACE = re.compile(r'/?[A-Za-z]\w*(/[A-Za-z]\w*)*\Z', re.ASCII)
 
 
@@ -55,7 +54,7 @@ class Run:
     """
 
     mode: str | None = None
-    behaviour: str = 'surveillance'
+    behaviour: str = node_table.DEFAULT_BEHAVIOUR
     place: Path | None = None
     parameters: Path | None = None
     assignments: Sequence[str] = ()
@@ -67,11 +66,11 @@ class Run:
     domain: int | None = None
     seconds: float | None = None
     record: str | None = NOT_RECORDED
-    keep: float = 20.0
+    keep: float = DEFAULT_KEEP
     web: bool = False
     web_control: bool = False
     web_address: str | None = None
-    memory: int = MEMORY
+    memory: int = DEFAULT_MEMORY
     alarm: str = ''
     network: bool = False
     fresh: bool = False

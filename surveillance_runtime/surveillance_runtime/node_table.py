@@ -10,6 +10,7 @@ from surveillance_runtime.suggestions import nearest
 MODES = ('SIMULATED', 'RANDOM', 'MANUAL')
 DEFAULT_MODE = 'SIMULATED'
 BEHAVIOURS = ('surveillance', 'patrol')
+DEFAULT_BEHAVIOUR = BEHAVIOURS[0]
 LOG_LEVELS = ('debug', 'info', 'warn', 'error', 'fatal')
 CONSOLE = 'console'
 
@@ -121,7 +122,7 @@ def find(name: str) -> Node:
 
 def select(
     mode: str,
-    behaviour: str = 'surveillance',
+    behaviour: str = DEFAULT_BEHAVIOUR,
     only: Iterable[str] = (),
     without: Iterable[str] = (),
 ) -> tuple[Node, ...]:
