@@ -37,8 +37,8 @@ _NUMBERS = ('whole', 'decimal', 'rational', 'real')
 _MOMENTS = ('utc', 'local')
 _ORDERED = (*_NUMBERS, 'float', 'double', *_MOMENTS)
 _OCTETS = ('hexBinary', 'base64Binary')
-_WITH_LENGTH = ('string', 'anyURI', *_OCTETS)
-_PLAIN = (*_WITH_LENGTH, 'langString', 'boolean', 'other')
+_WITH_LENGTH = ('string', 'langString', 'anyURI', *_OCTETS)
+_PLAIN = (*_WITH_LENGTH, 'boolean', 'other')
 _BOOLEANS = frozenset([('boolean', True), ('boolean', False)])
 
 
@@ -125,7 +125,8 @@ def _tested(data_range: DataRange) -> _Part:
 def _of_length(space: str, lengths: _Intervals) -> frozenset[Value] | None:
     """Return the values of the given lengths; None where there are more than 257."""
     is_octets = space in _OCTETS
-    longest = 1 if is_octets else 0
+    # There is an empty text in every language.
+    longest = -1 if space == 'langString' else int(is_octets)
     short = [length for length in range(longest + 1) if _is_in(length, lengths)]
     if sum(_count('whole', *each) for each in lengths) > len(short):
         return None
@@ -321,14 +322,14 @@ class ValueSet:
 
 def _count(layer: str, low: _End, high: _End) -> float:
     """Return how many values of a layer lie between two ends."""
+    if layer in ('float', 'double'):
+        return _count_floats(layer, max(low, _below(-math.inf)), min(high, _above(math.inf)))
     if low.beyond or high.beyond:
         return math.inf
     if layer == 'whole':
         first = math.ceil(low.key) + (low.side > 0 and math.ceil(low.key) == low.key)
         last = math.floor(high.key) - (high.side < 0 and math.floor(high.key) == high.key)
         return int(max(0, last - first + 1))
-    if layer in ('float', 'double'):
-        return _count_floats(layer, low, high)
     if layer in _MOMENTS:
         same_instant = low.key[0] == high.key[0]
         return sum(1 for _ in _between_moments(layer, low, high)) if same_instant else math.inf
@@ -344,7 +345,7 @@ def _between(layer: str, low: _End, high: _End) -> Iterator[Value]:
         first = math.ceil(low.key) + (low.side > 0 and math.ceil(low.key) == low.key)
         yield from range(first, first + number)
     elif layer in ('float', 'double'):
-        key = float(low.key)
+        key = -math.inf if low.beyond else float(low.key)
         if low.side > 0:
             key = _next_float(layer, key)
         for _ in range(number):
@@ -480,8 +481,8 @@ def _facet(datatype: str, facet: str, bound: ex.Literal) -> ValueSet | None:
     values = _datatype(datatype)
     if facet_test(facet, bound) is None or values is None:
         return None
-    if ends is None and values.intervals:
-        return None  # Numbers and moments have no patterns and lengths.
+    if 'boolean' in values.parts or (ends is None and values.intervals):
+        return None  # Truth values have no facets, numbers and moments no patterns and lengths.
     if name in ('length', 'minLength', 'maxLength'):
         size = value_of(bound)
         low = _below(size) if name != 'maxLength' else _LENGTHS[0][0]

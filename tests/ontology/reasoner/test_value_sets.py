@@ -16,7 +16,7 @@ from surveillance_ontology.owl.expressions import (
     DataUnionOf,
     Literal,
 )
-from surveillance_ontology.owl.vocabulary import OWL, XSD
+from surveillance_ontology.owl.vocabulary import OWL, RDF, XSD
 from surveillance_ontology.reasoner.datatypes import range_test, value_of
 from surveillance_ontology.reasoner.value_sets import ValueSet, value_set
 
@@ -26,7 +26,8 @@ LITERALS = [
     Literal('1/3', OWL + 'rational'),
     *(Literal(text) for text in ('a', 'b c', '1x')),
     Literal('true', XSD + 'boolean'),
-    *(Literal(text, XSD + 'float') for text in ('1.0', 'NaN', '-0')),
+    *(Literal(text, XSD + 'float') for text in ('1.0', 'NaN', '-0', '-INF')),
+    *(Literal(text, RDF + 'langString', 'en') for text in ('', 'ab')),
     *(Literal(text) for text in ('', 'ab')),
     *(Literal(text, XSD + 'hexBinary') for text in ('', '00', '0001')),
     *(
@@ -39,6 +40,7 @@ TYPES = (
     *('integer', 'decimal', 'byte', 'string', 'boolean', 'float', 'NCName', 'token'),
     *('dateTime', 'dateTimeStamp', 'hexBinary'),
 )
+WITH_LENGTH = (RDF + 'PlainLiteral', XSD + 'string', XSD + 'hexBinary', XSD + 'anyURI')
 FACETS = ('minInclusive', 'maxExclusive', 'maxInclusive', 'minExclusive')
 
 
@@ -52,8 +54,12 @@ def drawn(rng: random.Random, depth: int) -> DataRange:
         bound = Literal(str(rng.randrange(-2, 4)), XSD + 'integer')
         shape = rng.random()
         if shape < 0.2:
+            kinds = (
+                RDF + 'PlainLiteral',
+                *(XSD + name for name in ('string', 'hexBinary', 'anyURI')),
+            )
             return DatatypeRestriction(
-                XSD + rng.choice(('string', 'hexBinary', 'anyURI')),
+                rng.choice(kinds),
                 ((XSD + rng.choice(('length', 'minLength', 'maxLength')), bound),),
             )
         if shape < 0.4:
@@ -71,6 +77,11 @@ def drawn(rng: random.Random, depth: int) -> DataRange:
 def of_length(datatype: str, facet: str, length: int) -> DataRange:
     bound = Literal(str(length), XSD + 'integer')
     return DatatypeRestriction(XSD + datatype, ((XSD + facet, bound),))
+
+
+def above(bound: str, datatype: str) -> DataRange:
+    facet = (XSD + 'minExclusive', Literal(bound, XSD + datatype))
+    return DatatypeRestriction(XSD + datatype, (facet,))
 
 
 def between(first: str, last: str) -> DataRange:
@@ -104,6 +115,11 @@ def test_sets_agree_with_single_values() -> None:
         assert not (first.within(second) and mine - theirs)
 
 
+def test_truth_values_with_a_facet_are_named() -> None:
+    facet = (XSD + 'pattern', Literal('true'))
+    assert value_set(DatatypeRestriction(XSD + 'boolean', (facet,))) is None
+
+
 @pytest.mark.parametrize(
     ('data_range', 'size'),
     [
@@ -117,6 +133,8 @@ def test_sets_agree_with_single_values() -> None:
         (of_length('string', 'maxLength', 0), 1),
         (of_length('string', 'length', 1), math.inf),
         (of_length('hexBinary', 'maxLength', 1), 257),
+        (DataIntersectionOf((XSD + 'double', DataComplementOf(above('-INF', 'double')))), 2),
+        (above('INF', 'double'), 0),
         (
             DataIntersectionOf(
                 (of_length('string', 'minLength', 3), of_length('string', 'length', 2))
