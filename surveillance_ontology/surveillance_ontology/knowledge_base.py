@@ -138,7 +138,10 @@ class Feed:
         return shown
 
     def _derived(self, engine: Engine, come: Iterable[Axiom], gone: Iterable[Axiom]) -> None:
-        added, removed = [(axiom, True) for axiom in come], [(axiom, True) for axiom in gone]
+        come, gone = dict.fromkeys(come), dict.fromkeys(gone)
+        # Where a predicate was made anew, its facts went and came.
+        added = [(axiom, True) for axiom in come if axiom not in gone]
+        removed = [(axiom, True) for axiom in gone if axiom not in come]
         if added or removed or self._consistent != engine.consistent:
             self._consistent = engine.consistent
             self._tell(added, removed)

@@ -29,9 +29,12 @@ from surveillance_ontology.owl.axioms import (
     TransitiveObjectProperty,
 )
 from surveillance_ontology.owl.expressions import (
+    DataHasValue,
     Literal,
+    ObjectIntersectionOf,
     ObjectMaxCardinality,
     ObjectPropertyAtom,
+    ObjectUnionOf,
     SameIndividualAtom,
     Variable,
 )
@@ -287,6 +290,20 @@ def test_facts_that_support_each_other_go_together() -> None:
     assert kb.types(n('x')) == set()
     assert kb.object_values(n('near'), n('z')) == set()
     assert names(kb.object_values(n('near'), n('x'))) == {'x', 'y'}
+
+
+def test_a_fact_of_cases_that_stays_is_not_told_again() -> None:
+    one = DataHasValue(n('p'), Literal('1'))
+    sure = ClassAssertion(ObjectUnionOf((one, ObjectIntersectionOf((n('C'), one)))), n('x'))
+    kb = KnowledgeBase(n(''), [sure])
+    kb.reason()
+    assert kb.data_values(n('p'), n('x')) == {Literal('1')}
+    feed: list[Changes] = []
+    kb.subscribe(feed.append)
+    kb.add(ClassAssertion(ObjectUnionOf((n('C'), n('D'))), n('y')))
+    feed.clear()
+    kb.reason()
+    assert feed == []
 
 
 def test_the_clock_changes_only_the_places_that_cross_the_threshold() -> None:
