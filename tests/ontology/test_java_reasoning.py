@@ -12,7 +12,12 @@ from surveillance_ontology.armor.session import ChangeFeed
 from surveillance_ontology.armor.store import Store
 from surveillance_ontology.knowledge_base import KnowledgeBase
 from surveillance_ontology.owl.axioms import ClassAssertion, Rule, SubClassOf
-from surveillance_ontology.owl.expressions import ClassAtom, ObjectUnionOf, Variable
+from surveillance_ontology.owl.expressions import (
+    ClassAtom,
+    ObjectComplementOf,
+    ObjectUnionOf,
+    Variable,
+)
 from surveillance_ontology.reasoner import java_reasoning
 
 from .seven_rooms import FIXTURES, IRI, ONTOLOGY, asker, names
@@ -117,6 +122,13 @@ def test_hermit_derives_what_the_native_reasoner_does_not() -> None:
     explanation = kb.explain(ClassAssertion(e, i))
     assert explanation is not None
     assert 'hermit infers it' in explanation.sentence()
+    no_d = ClassAssertion(ObjectComplementOf(d), i)
+    kb.add(no_d)
+    assert not kb.reason()
+    contradiction = kb.explain_inconsistency()
+    assert contradiction is not None
+    assert 'hermit infers it' in contradiction.sentence()
+    kb.remove(no_d)
     kb.remove(either)
     kb.add(ClassAssertion(e, i))
     assert kb.reason()

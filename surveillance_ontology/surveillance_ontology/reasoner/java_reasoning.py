@@ -81,12 +81,12 @@ class JavaKnowledgeBase(KnowledgeBase):
         infer_from = partial(infer, self._kind, self.iri)
         return _JavaCompletion(self._classification, engine, tuple(self._told.schema), infer_from)
 
-    def explain(self, fact: Axiom) -> Explanation | None:
-        """Return why a fact holds; of what only the Java reasoner derives no more is known than
+    def _explained(self, goal: Axiom | None) -> Explanation:
+        """Return an explanation; of what only the Java reasoner derives no more is known than
         that.
         """
-        explanation = super().explain(fact)
-        if explanation is not None and not explanation.sources():
+        explanation = super()._explained(goal)
+        if not explanation.sources():
             return replace(explanation, because=f'{self._kind} infers it')
         return explanation
 
@@ -117,7 +117,7 @@ class _JavaCompletion(Completion):
         """Add what follows from everything that is asserted now."""
         self._forget_classes()
         super().run(axioms)
-        self.unsupported, self.failure = (), ''
+        self.failure = ''
         if not self._engine.consistent:
             return
         try:
@@ -125,6 +125,7 @@ class _JavaCompletion(Completion):
         except JavaReasonerError as error:
             self.failure = str(error)
             return
+        self.unsupported = ()
         if found is None:
             self._engine.take_from_cases(None)
         else:
