@@ -49,6 +49,7 @@ class RunState:
 
     Raises:
         NotNowError: Another launcher works in the folder.
+        OSError: It cannot be written; the folder is gone if nothing was in it.
     """
 
     def __init__(self, folder: Path, options: Mapping[str, Any]) -> None:
@@ -60,7 +61,15 @@ class RunState:
         except OSError:
             os.close(self._descriptor)
             raise NotNowError(f'{folder}: this run is still going on') from None
-        self._write(ended=False)
+        try:
+            self._write(ended=False)
+        except OSError as error:  # a full disk, on which a service begins again and again
+            if not os.fstat(self._descriptor).st_size:
+                (folder / STATE).unlink()
+                with contextlib.suppress(OSError):  # something else is in it
+                    folder.rmdir()
+            os.close(self._descriptor)
+            raise OSError(error.errno, error.strerror, str(folder / STATE)) from None
 
     def end(self, *, ended: bool = True) -> None:
         """Let go of the folder; where the run has not ended, the next launcher goes on with it."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import os
 import signal
 import sys
 
@@ -43,6 +45,20 @@ def test_runs_where_nothing_can_be_written(tmp_path):
     (tmp_path / 'runs').write_text('a file')
     with pytest.raises(LaunchError, match='cannot be made'):
         make_folder(tmp_path / 'runs')
+
+
+def test_a_full_disk_takes_no_run_away_and_leaves_no_empty_one(tmp_path, monkeypatch):
+    def full(*_):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    old = begun(tmp_path, 'old')
+    monkeypatch.setattr(os, 'pwrite', full)
+    for folder in (make_folder(tmp_path), old):
+        with pytest.raises(OSError, match=f'{folder / STATE}') as caught:
+            RunState(folder, {})
+        assert caught.value.errno == errno.ENOSPC
+    assert list(tmp_path.iterdir()) == [old]
+    assert look_into(old) is not None
 
 
 def test_a_run_that_came_to_its_end_says_so(tmp_path):
