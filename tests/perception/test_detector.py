@@ -300,9 +300,12 @@ def test_margin_may_be_cut_by_the_edge_of_the_image():
     assert [each.marker_id for each in DETECTOR.detect(image)] == [14]
 
 
-def test_dark_thing_that_touches_the_border_hides_no_marker():
+@pytest.mark.parametrize('crowd', [0, 30], ids=['alone', 'in a crowd'])
+def test_dark_thing_that_touches_the_border_hides_no_marker(crowd):
     marker = cv2.aruco.generateImageMarker(DICTIONARY, 14, 42)
-    image = np.full((160, 160), 215, np.uint8)
+    image = np.full((160 + 40 * crowd, 160 + 40 * crowd), 215, np.uint8)
+    for row, column in np.ndindex(crowd, crowd):
+        image[170 + 40 * row :, 20 + 40 * column :][:14, :14] = 20
     image[60:102, 60:102] = marker
     cv2.line(image, (101, 61), (108, 57), 10, 3)
     assert [each.marker_id for each in DETECTOR.detect(image)] == [14]

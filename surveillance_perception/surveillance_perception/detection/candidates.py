@@ -37,9 +37,9 @@ Indices = npt.NDArray[np.int64]
 _MAX_HULL_CORNERS = 8
 _MIN_AREA, _LEAST_WIDTH = 12.0, 2.0
 _MAX_GROWTH = 1.6
-# how far a marker's outline that touches nothing is from a parallelogram's scatter, and how
-# scattered one may be that touches something
-_QUAD_DEVIATION, _MOST_SCATTER = 0.05, 8.0
+# how far from a parallelogram's scatter outlines are looked at in a crowd, and how scattered one
+# may be elsewhere: those of small markers touch something or miss a corner
+_QUAD_DEVIATION, _MOST_SCATTER = 0.35, 8.0
 # an outline runs through the middles of the outermost dark pixels, and blur makes dark smaller
 _INSET = 0.65
 # sine between sides below which a corner is not moved further: it would leave the image
