@@ -30,7 +30,7 @@ from surveillance_behaviour.map_from_markers.scan_peers import CameraScanner, Ma
 from surveillance_fsm.ros import CallError, ServiceCaller
 from surveillance_interfaces.msg import OntologyMap
 from surveillance_interfaces.srv import ReferenceName
-from surveillance_runtime.files import replace_text
+from surveillance_runtime.files import read_file, replace_text
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.place.parameters import described_place
 from surveillance_runtime.process import run_node
@@ -38,6 +38,8 @@ from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
 from surveillance_runtime.waiting import AwaitedEvent
 
 _BUILD_SECONDS = 20.0
+_LARGEST = 10_000_000
+"""Bytes of what was found before that are read at most."""
 
 
 class InitialState(PatrolNode):
@@ -134,11 +136,11 @@ class InitialState(PatrolNode):
         if self._file is None or not self._file.exists():
             return
         try:
-            kept = json.loads(self._file.read_text(encoding='utf-8'))
+            kept = json.loads(read_file(self._file, _LARGEST))
             self._survey.restore(kept)
             poses = [int(number) for number in kept['poses']]
             self._progress = Progress(poses, float(kept['seconds']))
-        except (OSError, KeyError, TypeError, ValueError) as error:
+        except (ValueError, KeyError, TypeError, RecursionError) as error:
             self.get_logger().warn(f'{self._file}: what was found before is not used: {error}')
 
     def _start(self) -> bool:

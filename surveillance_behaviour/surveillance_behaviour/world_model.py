@@ -25,10 +25,12 @@ from surveillance_behaviour.policy.world import PolicyMemory, World
 from surveillance_fsm import Interrupt
 from surveillance_fsm.exceptions import CallError
 from surveillance_ontology.patrol_ontology import Snapshot
-from surveillance_runtime.files import FileError, replace_text
+from surveillance_runtime.files import FileError, read_file, replace_text
 
 SIMULTANEOUS = 1.0
 """Seconds by which what several threads take for the present may differ."""
+_LARGEST = 100_000_000
+"""Bytes of what was learned that are read at most."""
 
 
 @dataclass
@@ -83,13 +85,13 @@ class Experience:
         if self.path is None or not self.path.exists():
             return ''
         try:
-            kept: dict[str, Any] = json.loads(self.path.read_text(encoding='utf-8'))
+            kept: dict[str, Any] = json.loads(read_file(self.path, _LARGEST))
             self.visits = {str(place): float(at) for place, at in kept['visits'].items()}
             self.leg_times.restore(kept['leg_times'])
             self.draw.restore(kept['draw'])
             self.sent_to_charge = str(kept['sent_to_charge'])
             self.requested = str(kept.get('requested', ''))
-        except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+        except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
             self.visits, self.leg_times, self.draw = {}, LegTimes(), DrawEstimate()
             return f'{self.path}: what was learned before is not used: {error}'
         return ''

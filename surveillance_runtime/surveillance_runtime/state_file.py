@@ -91,7 +91,7 @@ class StateFile:
             return {}
         try:
             state = json.loads(read_file(self._path, LARGEST))
-        except ValueError:
+        except (ValueError, RecursionError):
             state = None
         if not isinstance(state, dict):
             self._complain(f'parameter state_file: {self._path} holds no state; it begins anew')

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import threading
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -130,3 +132,13 @@ def test_the_shortest_tour_is_looked_for_when_the_map_changes_not_with_each_leg(
     told.look(10.0, NOBODY)
     told.look(11.0, NOBODY)
     assert warnings == ['too short']
+
+
+@pytest.mark.parametrize('damage', [lambda path: path.write_text('[' * 9_000), os.mkfifo])
+def test_what_was_learned_and_cannot_be_read_is_said(
+    tmp_path: Path, damage: Callable[[Path], object]
+) -> None:
+    record = tmp_path / 'mission.jsonl'
+    damage(tmp_path / 'mission.jsonl.experience.json')
+    experience = Experience.of_record(str(record))
+    assert 'what was learned before is not used' in experience.problem

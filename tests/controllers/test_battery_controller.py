@@ -193,7 +193,9 @@ def test_a_level_outlives_a_process_that_was_killed(graph: Any, tmp_path: Any, m
     graph.until(lambda: values(levels)[-1:] == [68])
 
 
-@pytest.mark.parametrize('content', ['', '[]', '{"level": NaN}', '{"level": "full"}', 'x' * 20_000])
+@pytest.mark.parametrize(
+    'content', ['', '[]', '{"level": NaN}', '{"level": "full"}', 'x' * 20_000, '[' * 9_000]
+)
 def test_a_state_that_cannot_be_read_begins_anew(graph: Any, tmp_path: Any, content: str) -> None:
     path = tmp_path / 'battery.json'
     path.write_text(content)
