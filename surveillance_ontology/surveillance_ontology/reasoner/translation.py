@@ -195,6 +195,7 @@ class Translation:
         self._variables = _Y
         self._described: set[ClassExpression] = set()
         self._recognised: set[ClassExpression] = set()
+        self._counted: set[Predicate] = set()
         self._required: set[ClassExpression] = set()
         self._complements: dict[str, Predicate] = {}
         self._origin: Axiom | None = None
@@ -420,9 +421,9 @@ class Translation:
         self, label: Predicate, expression: ex.ObjectMinCardinality | ex.DataMinCardinality
     ) -> None:
         """Have a label recognised by counting."""
-        if expression in self._recognised:
+        if label in self._counted:
             return
-        self._recognised.add(expression)
+        self._counted.add(label)
         if isinstance(expression, ex.ObjectMinCardinality):
             prop, inverse = self._direction(expression.prop)
             filler = self._filler(expression.filler)

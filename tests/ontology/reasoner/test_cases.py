@@ -336,6 +336,20 @@ def test_a_number_on_the_left_is_not_lost_where_the_right_side_counts_too() -> N
     assert not reasoned(SubClassOf(none, some), ax.DataPropertyRange(T, nothing)).consistent
 
 
+@pytest.mark.parametrize(
+    'few', [ex.ObjectMaxCardinality(1, P), ex.DataMaxCardinality(1, Q, XSD + 'integer')]
+)
+def test_more_than_a_union_admits_leaves_the_other_choice(few: ex.ClassExpression) -> None:
+    kb = reasoned(
+        SubClassOf(A, ex.ObjectUnionOf((B, few))),
+        ClassAssertion(A, i),
+        *(ax.ObjectPropertyAssertion(P, i, other) for other in (j, k)),
+        *(ax.DataPropertyAssertion(Q, i, whole(number)) for number in (1, 2)),
+        differ(j, k),
+    )
+    assert kb.types(i) == {A, B}
+
+
 def test_what_is_recognised_by_a_count_alone_may_be_a_single_individual() -> None:
     """Nobody has more than the three of two individuals: everybody is one and the same."""
     few = ex.ObjectMaxCardinality(3, P, ex.ObjectOneOf((i, k)))
