@@ -56,6 +56,17 @@ def test_the_arm_is_paid_for_while_it_moves() -> None:
     assert battery.energy == pytest.approx(0.48)
 
 
+def test_a_trajectory_without_an_end_does_not_drain_the_battery() -> None:
+    battery, use = in_use()
+    use.advance(0.0)
+    use.move_arm(2.0**31, now=0.0)
+    use.advance(600.0)
+    drawn = 0.5 - battery.energy
+    use.move_arm(20.0, now=600.0)
+    use.advance(1200.0)
+    assert 0.5 - battery.energy == pytest.approx(2.0 * drawn)
+
+
 def test_it_charges_at_the_station_only_and_says_why_not_elsewhere() -> None:
     battery, use = in_use()
     assert use.why_not_charging() == ('where the robot is is not known (nothing came on amcl_pose)')

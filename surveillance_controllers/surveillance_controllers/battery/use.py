@@ -14,7 +14,8 @@ from surveillance_controllers.geometry import Pose, angle_between
 
 LONGEST_AWAY = 86_400.0
 """A longer time between two steps is none, but a jump of the clock, seconds."""
-
+LONGEST_MOTION = 20.0
+"""No motion of the arm is counted for longer, seconds, whatever its trajectory says."""
 
 TOP_SPEED, TOP_TURN = 2.0, 3.0
 """No robot is faster, m/s and rad/s: what is more is a correction of the estimate."""
@@ -67,7 +68,7 @@ class BatteryInUse:
     def move_arm(self, seconds: float, now: float) -> None:
         """Take that the arm moves from `now` on, instead of what it did before; seconds."""
         self._count_arm(now)
-        self._arm_moves = now, now + seconds
+        self._arm_moves = now, now + min(seconds, LONGEST_MOTION)
 
     def _count_arm(self, now: float) -> None:
         since, until = self._arm_moves
