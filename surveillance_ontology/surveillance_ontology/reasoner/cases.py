@@ -42,6 +42,7 @@ class CaseReasoner:
 
     Attributes:
         gaps: One sentence for each axiom that is not fully used, or for what was not decided.
+        class_gaps: What `hierarchy` did not decide.
         stopped: Whether a search was given up.
         names_individuals: Whether the axioms about classes name individuals.
     """
@@ -50,6 +51,7 @@ class CaseReasoner:
         axioms = list(axioms)
         self._rules = CaseRules(axioms)
         self.gaps = dict(self._rules.gaps)
+        self.class_gaps: dict[str, None] = {}
         self.stopped = False
         self._individuals = [
             a.iri for a in axioms if isinstance(a, ax.Declaration) and a.kind == 'individual'
@@ -280,6 +282,7 @@ class CaseReasoner:
         named = self.names_individuals
         left = self._most_steps - self._search.model.steps
         search = self._search if named else CaseSearch(self._rules, left)
+        self.class_gaps = search.gaps
         models = _ClassModels(self._rules, search)
         wanted = [(cls,) for cls in classes if not known(cls, NOTHING)]
         for cls, *_ in self._impossible(wanted, models, search):

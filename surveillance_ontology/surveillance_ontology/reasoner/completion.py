@@ -44,6 +44,9 @@ class Completion:
         self._native = tuple(self._program.unsupported)
         # Whether classes were compared, and whether that holds whatever is said of individuals.
         self._compared = self._stands = False
+        # What the comparison that stands did not decide.
+        self._class_gaps: dict[str, None] = {}
+        self._classes_stopped = False
         self.unsupported: tuple[str, ...] | None = None
 
     def run(self, axioms: Iterable[Axiom]) -> None:
@@ -68,14 +71,20 @@ class Completion:
         engine.take_from_cases(list(reasoner.facts(self._is_known)))
         if engine.consistent and (reasoner.names_individuals or not self._stands):
             known = self._classification
+            # Where the individuals took all steps, classes are not compared at all.
+            self._stands = not reasoner.names_individuals and not reasoner.stopped
             found = reasoner.hierarchy(known.classes(), known.below_by_itself)
             known.complete(list(found))
-            self._compared, self._stands = True, not reasoner.names_individuals
-        self._report(reasoner)
+            self._compared = True
+            self._class_gaps, self._classes_stopped = reasoner.class_gaps, reasoner.stopped
+        self._report(
+            {**reasoner.gaps, **self._class_gaps}, reasoner.stopped or self._classes_stopped
+        )
 
     def _forget_classes(self) -> None:
         if self._compared:
-            self._compared = self._stands = False
+            self._compared = self._stands = self._classes_stopped = False
+            self._class_gaps = {}
             self._classification.complete(())
 
     def entails(self, axioms: Iterable[Axiom], fact: Axiom) -> bool:
@@ -119,14 +128,14 @@ class Completion:
             return True
         return self._engine.holds(fact)
 
-    def _report(self, reasoner: CaseReasoner) -> None:
+    def _report(self, gaps: Iterable[str], stopped: bool) -> None:
         """Name what is still left out, in the words of the classification where it has some."""
-        found = list(self._native) if reasoner.stopped else []
-        for gap in reasoner.gaps:
+        found = list(self._native) if stopped else []
+        for gap in gaps:
             subject = gap.rpartition(': ')[0] + ':'
             said = [sentence for sentence in self._native if sentence.startswith(subject)]
             found += said or [gap]
-        if reasoner.stopped:
+        if stopped:
             found.append('the ontology: reasoning by cases took too many steps')
         found += self._program.unsupported[len(self._native) :]
         self.unsupported = tuple(dict.fromkeys(found))

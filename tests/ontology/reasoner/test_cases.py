@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import pytest
 
 from surveillance_ontology.knowledge_base import KnowledgeBase
@@ -242,11 +244,33 @@ def test_any_axiom_can_be_asked_for() -> None:
         kb.entails(ax.HasKey(A, (P,), ()))
 
 
+def test_what_classes_leave_open_is_named_after_later_assertions() -> None:
+    short = ex.DatatypeRestriction(XSD + 'string', ((XSD + 'pattern', Literal('[a-b]{1,2}')),))
+    kb = reasoned(SubClassOf(A, ex.DataSomeValuesFrom(P, short)), SubClassOf(A, B_OR_C))
+    named = ('whether values suit a pattern or a type of strings',)
+    assert kb.unsupported == named
+    kb.add(ClassAssertion(D, i))
+    assert kb.reason()
+    assert kb.unsupported == named
+
+
 def test_what_stops_is_named() -> None:
     numbers = [SubClassOf(A, ex.ObjectMinCardinality(30, P, ex.ObjectUnionOf((A, B))))]
     reasoner = CaseReasoner([*numbers, ClassAssertion(A, i)], most_steps=100)
     assert reasoner.consistent()
     assert reasoner.stopped
+
+
+def test_classes_are_compared_once_individuals_leave_steps(monkeypatch: pytest.MonkeyPatch) -> None:
+    few_steps = partial(CaseReasoner, most_steps=200)
+    monkeypatch.setattr('surveillance_ontology.reasoner.completion.CaseReasoner', few_steps)
+    many = ClassAssertion(ex.ObjectMinCardinality(30, P, ex.ObjectUnionOf((A, B))), i)
+    kb = reasoned(SubClassOf(A, B_OR_C), SubClassOf(B, D), SubClassOf(C, D), many)
+    assert kb.unsupported[-1] == 'the ontology: reasoning by cases took too many steps'
+    kb.remove(many)
+    assert kb.reason()
+    assert kb.superclasses(A) == {D}
+    assert kb.unsupported == ()
 
 
 def test_a_rule_is_named_where_cases_matter() -> None:
