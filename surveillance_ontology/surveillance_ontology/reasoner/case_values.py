@@ -17,6 +17,7 @@ from surveillance_ontology.reasoner.case_model import (
 )
 from surveillance_ontology.reasoner.case_rules import ValueCount
 from surveillance_ontology.reasoner.datatypes import Value
+from surveillance_ontology.reasoner.value_sets import point
 
 
 class CaseValues:
@@ -78,6 +79,10 @@ class CaseValues:
         model.put(self._made, (x, concept), True)
         if needed.values.size < needed.n:
             raise ClashError(choices)
+        if needed.values.size == needed.n:
+            for value in needed.values.members():
+                model.value(x, needed.prop, point(value), choices)
+            return
         made = [model.value(x, needed.prop, needed.values, choices) for _ in range(needed.n)]
         if len(made) > 1:
             model.differ(made, choices)

@@ -195,6 +195,15 @@ def test_as_many_values_as_a_range_has_are_all_of_them() -> None:
     assert not kb.data_values(P, j)
 
 
+def test_all_values_of_a_datatype_are_not_asked_for_one_by_one() -> None:
+    every_byte = ClassAssertion(ex.DataMinCardinality(256, P, XSD + 'byte'), i)
+    cases = CaseReasoner([every_byte], most_steps=2_000)
+    found = set(cases.facts(lambda _: False))
+    bytes_of_i = {ax.DataPropertyAssertion(P, i, whole(number)) for number in range(-128, 128)}
+    assert found == bytes_of_i
+    assert not cases.stopped
+
+
 def test_an_ill_formed_literal_is_a_value_in_no_datatype_for_clauses_and_cases() -> None:
     wrong = Literal('4a', XSD + 'int')
     kb = reasoned(ax.DataPropertyAssertion(S, i, wrong))
