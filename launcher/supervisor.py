@@ -22,6 +22,8 @@ from launcher.process_watch import IDLE_AFTER, Activity, Heartbeats, look_at
 from launcher.restarts import PAUSES, Restarts
 from launcher.service import notify
 from surveillance_runtime.launch_protocol import (
+    EXIT_CANNOT_START,
+    EXIT_NOT_NOW,
     FINISHED,
     HEARTBEAT,
     MEMORY,
@@ -43,9 +45,6 @@ TICK = 0.1
 """Seconds that a round of the loop takes at most."""
 LOOK_PERIOD = 0.5
 """Seconds between two looks at the heartbeats and the memory of the processes."""
-EXIT_UNUSABLE = (2, os.EX_TEMPFAIL)
-"""The exit codes with which a node says that its configuration does not let it start, or not now.
-"""
 _LONGEST_LINE = 64 * 1024
 _STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
@@ -325,7 +324,7 @@ class Supervisor:
         if child.finished:
             self._log.say(f'{name} has ended by itself')
             return
-        if code in EXIT_UNUSABLE and child.starts == 1:
+        if code in (EXIT_CANNOT_START, EXIT_NOT_NOW) and child.starts == 1:
             self._log.error(f'{name} cannot start as it is configured: stopping')
             self.stop(code)
             return

@@ -10,7 +10,6 @@ Arguments: `mode`, `behaviour`, `map`, `params`, `record`, `namespace`, `log_lev
 from __future__ import annotations
 
 import atexit
-import os
 import shutil
 import tempfile
 from pathlib import Path
@@ -23,6 +22,7 @@ from launch_ros.actions import Node
 
 from launch import LaunchContext, LaunchDescription
 from surveillance_runtime.configuration import Configuration
+from surveillance_runtime.launch_protocol import EXIT_CANNOT_START, EXIT_NOT_NOW
 from surveillance_runtime.node_table import (
     BEHAVIOURS,
     DEFAULT_MODE,
@@ -39,7 +39,6 @@ from surveillance_runtime.run_parameters import (
     write_parameters,
 )
 
-EXITS_CANNOT_START = (2, os.EX_TEMPFAIL)
 MARKERS = 'mission_markers'
 
 ARGUMENTS = [
@@ -116,7 +115,7 @@ def start_nodes(context: LaunchContext) -> list[Node]:
 
 def stop_if_unusable(event: ProcessExited, _context: LaunchContext) -> list[Shutdown] | None:
     """End the launch when a node says that its configuration does not let it start."""
-    if event.returncode not in EXITS_CANNOT_START:
+    if event.returncode not in (EXIT_CANNOT_START, EXIT_NOT_NOW):
         return None
     return [Shutdown(reason=f'{event.process_name} cannot start as it is configured')]
 

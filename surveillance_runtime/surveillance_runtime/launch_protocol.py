@@ -1,9 +1,11 @@
-"""What the launcher and the processes that it starts say to each other: variables and single bytes.
+"""What the launcher and the processes that it starts say to each other, exit codes included.
 
-A process gets descriptors of pipes and its limits in environment variables.
+A process gets descriptors of pipes and its limits in environment variables, and writes bytes.
 """
 
 from __future__ import annotations
+
+import os
 
 UP = 'LAUNCH_UP'
 """A descriptor that a process closes to say that the bulk of its start is done."""
@@ -20,3 +22,8 @@ SLEPT = b'S'
 """It did not run for so long that its peers may have forgotten it."""
 FINISHED = b'F'
 """It ends on purpose."""
+
+EXIT_CANNOT_START = 2
+"""The exit code of a process whose configuration does not let it start."""
+EXIT_NOT_NOW = os.EX_TEMPFAIL
+"""That of one which what its configuration names does not let start now, but perhaps later."""

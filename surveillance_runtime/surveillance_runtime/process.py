@@ -32,6 +32,7 @@ from surveillance_runtime.configuration import RosArguments, argument_layer, spl
 from surveillance_runtime.diagnostics import DiagnosticsThread, Heartbeat
 from surveillance_runtime.discovery import prefer_quick_discovery
 from surveillance_runtime.executor import PatrolExecutor
+from surveillance_runtime.launch_protocol import EXIT_CANNOT_START, EXIT_NOT_NOW
 from surveillance_runtime.node import (
     JOIN_SECONDS,
     PatrolNode,
@@ -41,8 +42,6 @@ from surveillance_runtime.node import (
 from surveillance_runtime.parameters import NotNowParameterError, ParameterError
 
 STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM)
-EXIT_CANNOT_START = 2
-"""The exit code of a node whose configuration does not let it start."""
 END_SECONDS = 30.0
 """Time for the threads and ROS to end once the nodes have stopped."""
 
@@ -57,7 +56,7 @@ def run_node(factory: Callable[[], PatrolNode], args: Sequence[str] | None = Non
     Returns:
         The exit code: 0 for a wanted stop, 1 when the node failed, `EXIT_CANNOT_START` when its
         configuration does not let it start, so that starting it again would not help,
-        `os.EX_TEMPFAIL` when it may help later.
+        `EXIT_NOT_NOW` when it may help later.
     """
     return run_nodes([factory], args)
 
@@ -117,7 +116,7 @@ def _run_nodes(factories: Sequence[Callable[[], PatrolNode]], args: Sequence[str
     except ParameterError as error:
         who = getattr(factory, '__name__', '') + ' ' if len(factories) > 1 else ''
         print(f'{who}cannot start: {_one_line(error)}', file=sys.stderr)
-        code = os.EX_TEMPFAIL if isinstance(error, NotNowParameterError) else EXIT_CANNOT_START
+        code = EXIT_NOT_NOW if isinstance(error, NotNowParameterError) else EXIT_CANNOT_START
     finally:
         ending.ignore_signals()
         give_arguments(None)
