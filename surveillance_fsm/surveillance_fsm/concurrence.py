@@ -1,14 +1,14 @@
 """The concurrence: all states at the same time, one outcome made of theirs.
 
-`ConcurrentFrame` runs each state on a logical thread of its own, which the concurrence's thread
-watches; `Concurrence` is the container.
+To the loop (`frame`) a concurrence is a container of one state, which stands for all of them.
+`ConcurrentFrame` executes that: each state on a logical thread of its own, which the concurrence's
+thread watches. `Concurrence` is the container.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Iterable, Mapping
 from functools import partial
-from operator import methodcaller
 from typing import Any, Unpack
 
 from surveillance_fsm import log
@@ -23,18 +23,15 @@ from surveillance_fsm.exceptions import (
     shown,
 )
 from surveillance_fsm.execution import (
-    NO_USERDATA,
-    RESUMPTION,
     SUSPENDED,
     ExecutionThread,
     Exit,
-    Frame,
-    History,
     LeftBehindError,
     Node,
     SpecialStep,
 )
-from surveillance_fsm.state import State
+from surveillance_fsm.frame import Frame, History, Move, answer_of
+from surveillance_fsm.state import State, this_thread
 from surveillance_fsm.timeouts import LimitOptions, supervise
 from surveillance_fsm.userdata import raw
 
@@ -42,7 +39,7 @@ Outcomes = dict[str, str | None]
 ChildTerminationCallback = Callable[[Outcomes], bool | Iterable[str] | None]
 OutcomeCallback = Callable[[Outcomes], str | None]
 
-TOGETHER = Exit('')
+ENDED = Exit('')
 """Where every outcome of a concurrence's state leads: it has ended."""
 
 
@@ -50,16 +47,64 @@ class _ChildThread(ExecutionThread):
     """The logical thread of one state of a concurrence.
 
     Attributes:
-        preempted: The state was asked to stop by a preempt, and has not ended without regard to it.
+        stopped: The state was asked to stop for good.
+        preempted: That was because of a preempt of the concurrence.
         making_way: The state was asked to make way for an interrupt.
+        served: The state has ended, and acknowledged that it was to stop.
     """
 
+    stopped = False
     preempted = False
     making_way = False
+    served = False
+
+    @property
+    def wanted(self) -> bool:
+        """Whether somebody wants the state to end."""
+        return self.stopped or self.making_way or super().wanted
+
+
+class _AllStates(State):
+    """What the loop executes of a concurrence: all its states that have not ended, together."""
+
+    fsm_suspends = True
+
+    def __init__(self, concurrence: Concurrence) -> None:
+        super().__init__(concurrence.get_registered_outcomes())
+        self._concurrence = concurrence
+
+    @property
+    def _frame(self) -> ConcurrentFrame | None:
+        frame = self._concurrence.fsm_frame
+        return frame if isinstance(frame, ConcurrentFrame) else None
+
+    def execute(self, ud: Any) -> Any:
+        """Run them to their ends; the concurrence's outcome, or `SUSPENDED`."""
+        frame: ConcurrentFrame = this_thread.stack[-1]
+        return frame.run_states()
+
+    def request_preempt(self) -> None:
+        """Ask those that run to stop; under the run's condition."""
+        super().request_preempt()
+        if self._frame is not None:
+            self._frame.preempt_states()
+
+    def fsm_suspend(self) -> None:
+        """Ask those that run to make way; under the run's condition."""
+        if self._frame is not None:
+            self._frame.cut_states()
+
+    def fsm_recall_suspend(self) -> None:
+        """Nothing was asked of states that had not begun."""
+
+    def fsm_forget(self) -> None:
+        """Drop how far they have come."""
+        for state in self._concurrence.fsm_states.values():
+            state.fsm_forget()
 
 
 class ConcurrentFrame(Frame):
-    """One execution of a concurrence.
+    """One execution of a concurrence: of one node that stands for all its states, and interrupts.
 
     Attributes:
         outcomes: What each state ended with; None for those that have not ended.
@@ -77,64 +122,50 @@ class ConcurrentFrame(Frame):
         parent_ud: Any,
     ) -> None:
         super().__init__(container, thread, path, current, parent_ud)
-        self.outcomes: Outcomes = {}
+        self.outcomes: Outcomes = dict.fromkeys(container.fsm_states)
         self._wakeup = Interrupt()
         # Those of all states that were started, by label; most have ended.
         self._threads: dict[str, _ChildThread] = {}
+        # What an execution that was left behind, or broke off, was asked is not for this one.
+        container.fsm_first().state.recall_preempt()
 
-    # From the beginning to the end.
+    def go_on_from(self, history: History) -> None:
+        """Begin where the container was put aside."""
+        super().go_on_from(history)
+        with self.run.condition:
+            self.outcomes.update(history.outcomes)
 
-    def execute(self, history: History | None) -> Any:
-        """Run all states to their ends, and interrupts in between; the outcome or `SUSPENDED`."""
-        container, run = self.container, self.run
-        if history is None:
-            container.fsm_copy_input_keys(self.parent_ud)
-        outcomes: Outcomes = dict.fromkeys(container.fsm_states)
-        outcomes.update(history.outcomes if history is not None else {})
-        with run.condition:
-            self.outcomes = outcomes
-        if run.chatty:
-            log.loginfo(f"'{self.path}' starts {sorted(container.fsm_states)} together")
-        if history is None:
-            container.call_start_cbs()
-        if run.control.trace is not None:
-            self.note((SpecialStep(self.path, '', '', 'start'), '', run.now(), NO_USERDATA))
-        return self._finish(self._run_states())
+    def history_before(self, target: Node | Exit) -> History:
+        """Return where to go on when the container is put aside before `target`."""
+        history = super().history_before(target)
+        history.outcomes = {label: end for label, end in self.outcomes.items() if end is not None}
+        return history
 
-    def run_on(self, outcome: Any) -> Any:
-        """Take `outcome` for that of the interrupt's state that hangs, and run to the end."""
-        node = self.current
-        assert isinstance(node, Node)
-        ending = self._end_branch(node, outcome)
-        return self._finish(self._run_states() if ending is None else ending)
+    def active_labels(self) -> list[str]:
+        """Return the labels of the states that run."""
+        return [label for label, outcome in self.outcomes.items() if outcome is None]
 
-    def _finish(self, outcome: Any) -> Any:
-        if outcome is not SUSPENDED:
-            self.container.call_termination_cbs(list(self.container.fsm_states), outcome)
-            self.container.fsm_copy_output_keys(self.parent_ud)
-        return outcome
+    def waits_for_threads(self) -> bool:
+        """Tell whether it watches threads of its own at present, which have bounds of their own."""
+        return self.current is self.container.fsm_first()
 
-    def _run_states(self) -> Any:
-        container = self.container
-        while True:
-            with self.run.condition:
-                node = self._next_branch()
-            if node is not None:
-                outcome = self._run_branch(node)
-                if outcome is not None:
-                    return outcome
-                continue
-            error = self._await_states(self._start_states())
-            if error is not None:
-                raise error
-            with self.run.condition:
-                if self.suspending and not container.preempt_requested():
-                    container.fsm_history = self.where()
-                    return SUSPENDED
-                if all(end is not None for end in self.outcomes.values()):
-                    return self._decide()
+    def woken(self) -> None:
+        """Wake the thread that waits for the states: it was left behind."""
+        self._wakeup.set()
 
-    def _decide(self) -> str:
+    def run_states(self) -> Any:
+        """Run all states that have not ended; the outcome, or `SUSPENDED` if one made way."""
+        error = self._await_states(self._start_states())
+        # Whatever comes of it is not told as a transition of one state.
+        self.attention = True
+        if error is not None:
+            raise error
+        with self.run.condition:
+            if any(end is None for end in self.outcomes.values()):
+                return SUSPENDED
+            return self._outcome()
+
+    def _outcome(self) -> str:
         """Return the outcome, all states having ended; a preempt that one of them served has its
         own.
         """
@@ -150,23 +181,23 @@ class ConcurrentFrame(Frame):
         elif outcome == container.default_outcome:
             # Nothing says that the outcome stands for a preempt: what runs next is asked.
             return outcome
-        container.service_preempt()
+        container.fsm_first().state.service_preempt()
         return outcome
 
     def _served_preempt(self, *, preempted: bool) -> bool:
         """Take back the requests that were not acknowledged; whether a state acknowledged one."""
-        ignored, served = [], False
-        for label, state in self.container.fsm_states.items():
-            thread = self._threads.get(label)
+        ignored = []
+        for label, thread in self._threads.items():
+            state = self.container.fsm_states[label]
             # A state that was left behind keeps the request, so that it ends some time.
-            if state.preempt_requested() and not (thread is not None and thread.without_leaf):
+            if state.preempt_requested() and not thread.without_leaf:
                 state.recall_preempt()
                 ignored.append(label)
-            elif thread is not None and thread.preempted:
-                served = True
+            elif thread.preempted and not thread.served:
+                ignored.append(label)
         if preempted and ignored:
             log.logwarn(f"'{self.path}': {ignored} did not acknowledge the preempt")
-        return served
+        return any(thread.preempted and thread.served for thread in self._threads.values())
 
     # The states.
 
@@ -185,10 +216,10 @@ class ConcurrentFrame(Frame):
             thread.start(partial(_execute, table[label]))
         with run.condition:
             # What was asked before there was anybody to ask.
-            if self.container.preempt_requested():
-                self._preempt_states()
-            elif self.suspending or self.container.fsm_urgent(self.current.priority):
-                self._cut()
+            if self.container.fsm_first().state.preempt_requested():
+                self.preempt_states()
+            elif self.cut is not None:
+                self.cut_states()
         return started
 
     def _await_states(self, running: dict[str, _ChildThread]) -> BaseException | None:
@@ -235,29 +266,25 @@ class ConcurrentFrame(Frame):
     def _note_end(self, label: str, thread: _ChildThread) -> str | None:
         """Note what a state ended with; None when it only made way."""
         node, outcome = self.container.fsm_table[label], thread.outcome
-        state = node.state
         if thread.forced is not None:
             # A preempt that it was asked for, too, is not served by that.
             outcome = thread.forced[1]
-            thread.preempted = False
-            state.fsm_forget()
+            node.state.fsm_forget()
             if not thread.without_leaf:
-                state.recall_preempt()
-        elif outcome is SUSPENDED:
-            node.release()
-            return None
-        elif thread.making_way and isinstance(state, Container):
-            # One that makes way is suspended; any other outcome is its own.
-            state.fsm_aside = False
-        elif thread.making_way:
-            made_way = not state.preempt_requested() or outcome == 'preempted'
-            if not thread.without_leaf:
-                state.recall_preempt()
-            if made_way:
+                node.state.recall_preempt()
+        else:
+            answer = answer_of(
+                node.state,
+                outcome,
+                preempted=thread.stopped,
+                cut=thread.making_way,
+                gone=thread.without_leaf,
+            )
+            thread.served = answer.served
+            if answer.made_way:
+                node.release()
                 return None
-            # Nor by ending by itself.
-            thread.preempted = False
-        state.fsm_progress = None
+        node.state.fsm_progress = None
         self.outcomes[label] = outcome
         node.release()
         return str(outcome)
@@ -270,124 +297,39 @@ class ConcurrentFrame(Frame):
             log.loginfo(f"'{self.path}': '{label}' ended with '{outcome}'")
         self.container.call_transition_cbs()
 
-    def _stop(
-        self,
-        threads: Iterable[_ChildThread],
-        ask: Callable[[State], object] = methodcaller('request_preempt'),
-    ) -> None:
-        for thread in threads:
-            if not thread.done and thread.leaf is not None:
-                thread.wanted = True
-                thread.asked()
-                ask(thread.leaf.state)
+    def tell(self, move: Move) -> None:
+        """Tell of the beginning and the end; the states between are told one by one."""
+        if move.left is None:
+            super().tell(move)
+        elif move.target.is_exit:
+            labels = list(self.container.fsm_states)
+            self.container.call_termination_cbs(labels, move.target.label)
+        else:
+            self.container.call_transition_cbs()
 
-    # Interrupts.
+    # What others want of the states; under the run's condition.
 
-    def _next_branch(self) -> Node | None:
-        if self.container.preempt_requested():
-            return None
-        branch = self.container.fsm_take_raised()
-        return None if branch is None else self.container.fsm_table[branch.label]
-
-    def _run_branch(self, node: Node) -> Any:
-        """Run an interrupt's state; None to go on with the states."""
-        container, run = self.container, self.run
-        branch = container.fsm_branches[node.label]
-        with run.condition:
-            self.cut = None
-            self.current = node
-            if container.preempt_requested():
-                branch.state.request_preempt()
-            elif self.suspending or container.fsm_urgent(node.priority):
-                self._cut()
-        return self._end_branch(node, _execute(node))
-
-    def _end_branch(self, node: Node, outcome: Any) -> Any:
-        """Settle what an interrupt's state ended with; None to go on with the states."""
-        container = self.container
-        branch = container.fsm_branches[node.label]
-        with self.run.condition:
-            if self.stale:
-                raise LeftBehindError
-            self.thread.heeded()
-            self.current = TOGETHER
-            node.release()
-            gone, self.gone = self.gone is node, None
-            pending = branch.state.preempt_requested() and not gone
-            served = not pending or outcome == 'preempted'
-            forced, self.forced = self.forced, None
-            if forced is not None:
-                outcome = forced[1]
-            if not gone:
-                branch.state.recall_preempt()
-            if forced is None and (outcome is SUSPENDED or (self.cut is node and served)):
-                container.fsm_raise(branch)
-                if self.suspending:
-                    container.fsm_history = self.where()
-                    return SUSPENDED
-                return None
-            branch.state.fsm_forget()
-            if forced is None and container.preempt_requested() and not pending:
-                container.service_preempt()
-        target = node.target(outcome)
-        if target is RESUMPTION:
-            return None
-        for state in container.fsm_states.values():
-            state.fsm_forget()
-        return target.label
-
-    # What others want; under the run's condition.
-
-    def preempt(self) -> None:
-        """Ask all states that run to stop."""
-        current = self.current
-        if isinstance(current, Node):
-            self.thread.asked()
-            current.state.request_preempt()
-        self._preempt_states()
-        self.run.condition.notify_all()
-
-    def _preempt_states(self) -> None:
+    def preempt_states(self) -> None:
         """Ask those that run to stop, each once: again could come after it served the first."""
         asked = [thread for thread in self._threads.values() if not thread.preempted]
         self._stop(asked)
         for thread in asked:
             thread.preempted = not thread.done
 
-    def interrupted(self) -> None:
-        """Make way for the container's raised interrupts."""
-        if self.container.fsm_urgent(self.current.priority):
-            self._cut()
-
-    def suspend(self) -> None:
-        """Have the container put aside with its history."""
-        self.suspending = True
-        self._cut()
-
-    def _cut(self) -> None:
-        current = self.current
-        if isinstance(current, Node):
-            self.cut = current
-            self.thread.asked()
-            current.state.fsm_suspend()
-            return
+    def cut_states(self) -> None:
+        """Ask those that run to make way."""
         for thread in self._threads.values():
-            thread.making_way = thread.making_way or not thread.done
-        self._stop(self._threads.values(), methodcaller('fsm_suspend'))
+            if not thread.done and thread.leaf is not None:
+                thread.making_way = True
+                thread.asked()
+                thread.leaf.state.fsm_suspend()
 
-    def woken(self) -> None:
-        """Wake the thread that waits for the states: it was left behind."""
-        self._wakeup.set()
-
-    def where(self) -> History | None:
-        """Return where the container would go on if its process ended now."""
-        return History(
-            outcomes={label: end for label, end in self.outcomes.items() if end is not None}
-        )
-
-    def active_labels(self) -> list[str]:
-        """Return the labels of the states that run."""
-        return [label for label, outcome in self.outcomes.items() if outcome is None]
+    def _stop(self, threads: Iterable[_ChildThread]) -> None:
+        for thread in threads:
+            if not thread.done and thread.leaf is not None:
+                thread.stopped = True
+                thread.asked()
+                thread.leaf.state.request_preempt()
 
 
 class Concurrence(Container):
@@ -567,19 +509,21 @@ class Concurrence(Container):
     # Running.
 
     def fsm_make_table(self) -> dict[str, Node]:
-        """Make the nodes of all states."""
+        """Make the nodes of all states, and the one without a label that runs them together."""
         table = {}
         for label, state in self.fsm_states.items():
             node = table[label] = self.fsm_node(label, state)
             for outcome in state.get_registered_outcomes():
-                node.targets[outcome] = TOGETHER
+                node.targets[outcome] = ENDED
             if node.limits is not None and node.limits.late_outcome:
-                node.targets.setdefault(node.limits.late_outcome, TOGETHER)
+                node.targets.setdefault(node.limits.late_outcome, ENDED)
+        node = table[''] = self.fsm_node('', _AllStates(self))
+        node.targets = {outcome: Exit(outcome) for outcome in self.get_registered_outcomes()}
         return table
 
-    def fsm_first(self) -> Node | Exit:
-        """Return where all states run."""
-        return TOGETHER
+    def fsm_first(self) -> Node:
+        """Return the node that runs all states."""
+        return self.fsm_table['']
 
     # The container's interface.
 

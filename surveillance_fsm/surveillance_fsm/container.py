@@ -2,7 +2,7 @@
 
 `Container` holds what its kinds have in common: construction, callbacks, userdata in and out, the
 beginning of an execution, interrupts. How the states inside are run is the matter of the frame that
-each kind makes for an execution (`sequential`, `concurrence`).
+is made for each execution (`frame`).
 """
 
 from __future__ import annotations
@@ -30,13 +30,12 @@ from surveillance_fsm.execution import (
     Branch,
     ExecutionThread,
     Exit,
-    Frame,
-    History,
     LeftBehindError,
     Limits,
     Node,
     Run,
 )
+from surveillance_fsm.frame import Frame, History
 from surveillance_fsm.log import logerr, logwarn
 from surveillance_fsm.state import State, structure_version, this_thread
 from surveillance_fsm.timeouts import (
@@ -94,7 +93,8 @@ class Container(State):
 
     together = False
     """Whether all states run at the same time."""
-    fsm_frame_type: ClassVar[type[Frame]]
+    fsm_suspends = True
+    fsm_frame_type: ClassVar[type[Frame]] = Frame
 
     fsm_frame: Frame | None = None
     fsm_history: History | None = None
@@ -751,7 +751,8 @@ class Container(State):
 
     def check_consistency(self) -> None:
         """Raise `InvalidTransitionError` naming all that keeps the container from running."""
-        names = {*self.fsm_states, *self.get_registered_outcomes(), RESUME}
+        states = () if self.together else self.fsm_states
+        names = {*states, *self.get_registered_outcomes(), RESUME}
         faults = self.fsm_faults() + [
             f"outcome '{outcome}' of interrupt '{branch.label}' leads to '{target}', which is "
             f"neither a state, nor an outcome, nor '{RESUME}'"

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING
 from surveillance_fsm.exceptions import InvalidStateError, InvalidTransitionError, describe
 from surveillance_fsm.execution import (
     ExecutionThread,
-    Frame,
     Node,
     RawTransition,
     Run,
@@ -22,6 +21,7 @@ from surveillance_fsm.log import logerr
 
 if TYPE_CHECKING:
     from surveillance_fsm.container import Container
+    from surveillance_fsm.frame import Frame
 
 shutdown_check: Callable[[], bool] | None = None
 """What was set with `set_shutdown_check`."""
@@ -172,11 +172,8 @@ class Control:
                     f"with '{place.forced[1]}', as it was forced to"
                 )
             place.forced = (node, outcome)
-            if isinstance(place, Frame):
-                place.thread.asked()
-            else:
-                place.wanted = True
-                place.asked()
+            thread = place if isinstance(place, ExecutionThread) else place.thread
+            thread.asked()
             node.state.request_preempt()
 
     def active_paths(self) -> list[str]:
@@ -191,8 +188,10 @@ class Control:
             if thread.leaf is not None:
                 active[thread.path] = thread, thread.leaf
             for frame in tuple(thread.stack):
-                if isinstance(frame.current, Node):
-                    active[f'{frame.path}/{frame.current.label}'] = frame, frame.current
+                node = frame.current
+                # All states of a concurrence together have no label.
+                if isinstance(node, Node) and node.label:
+                    active[f'{frame.path}/{node.label}'] = frame, node
         return active
 
     def left_behind(self) -> list[str]:

@@ -1,4 +1,4 @@
-"""An execution of a machine: its threads, the frames of the containers they are in, the nodes.
+"""An execution of a machine: its threads, the nodes that stand for states, where outcomes lead.
 
 A root's execution is a `Run`. It consists of logical threads, `ExecutionThread`: one for the root,
 and one for each child of a concurrence. A logical thread keeps a stack of frames, one for each
@@ -16,8 +16,8 @@ import os
 import threading
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, ClassVar
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 from surveillance_fsm import log
 from surveillance_fsm.clock import WALL_CLOCK, Clock, Interrupt, elapsed_of
@@ -34,6 +34,7 @@ from surveillance_fsm.userdata import Remapper
 if TYPE_CHECKING:
     from surveillance_fsm.container import Container
     from surveillance_fsm.control import Control
+    from surveillance_fsm.frame import Frame
 
 LOWEST = float('-inf')
 """The priority of ordinary work, below that of every interrupt."""
@@ -253,158 +254,6 @@ NO_USERDATA: dict[str, Any] = {}
 """Stands for a copy of userdata that holds nothing; never written to."""
 
 
-# Frames.
-
-
-@dataclass
-class History:
-    """Where a container that was put aside goes on.
-
-    Attributes:
-        current: Label of the state, or of the outcome when `leaving`.
-        leaving: `current` is an outcome of the container.
-        saved: Of the interrupts under way, where each goes on: (label, leaving).
-        index: How many items an iterator had begun, the current one included.
-        repeat: The current item had not ended.
-        outcomes: Of a concurrence's children that had ended.
-    """
-
-    current: str = ''
-    leaving: bool = False
-    saved: list[tuple[str, bool]] = field(default_factory=list)
-    index: int = 0
-    repeat: bool = True
-    outcomes: dict[str, str] = field(default_factory=dict)
-    # An iterator suspended in this process goes on with its own generator.
-    items: Any = None
-
-
-class Frame:
-    """One execution of a container; `SequentialFrame` and `ConcurrentFrame` are the two kinds.
-
-    The thread that executes writes `current` first and looks at `attention` after; a thread that
-    wants something raises `attention` first and looks at `current` after. So one of the two always
-    sees the other, and the loop needs no lock. Everything else is touched under the run's condition
-    only.
-
-    Attributes:
-        container: Whose execution it is.
-        thread: The logical thread it belongs to.
-        run: The execution that this belongs to.
-        path: The container's path.
-        current: The node that executes, or the exit that was taken.
-        parent_ud: The parent's userdata.
-        attention: Something beside the next state wants to be looked at.
-        stale: The machine went on without the thread that runs this frame.
-        preempted: The node whose state was last asked to stop because of a preempt.
-        cut: The node whose state was asked to stop because of an interrupt.
-        suspending: The parent wants the container put aside.
-        gone: The node whose state was left behind.
-        forced: A node, and the outcome to take in place of the one that its state returns.
-        ended: The execution is over. The container keeps the frame until its parent has taken note,
-            so that a checkpoint taken in between does not take it for one that has not begun.
-        carried_over: The attributes that `successor` takes over.
-    """
-
-    # Class attributes: most executions of a container need none of them.
-    attention = False
-    stale = False
-    preempted: Node | None = None
-    cut: Node | None = None
-    suspending = False
-    gone: Node | None = None
-    forced: tuple[Node, str] | None = None
-    ended = False
-    carried_over: ClassVar[tuple[str, ...]] = ('preempted', 'cut', 'suspending', 'forced')
-
-    def __init__(
-        self,
-        container: Container,
-        thread: ExecutionThread,
-        path: str,
-        current: Node | Exit,
-        parent_ud: Any,
-    ) -> None:
-        self.container = container
-        self.thread = thread
-        self.run = thread.run
-        self.path = path
-        self.current = current
-        self.parent_ud = parent_ud
-
-    # What each kind defines.
-
-    def execute(self, history: History | None) -> Any:
-        """Run the container to its outcome, or to `SUSPENDED`."""
-        raise NotImplementedError
-
-    def run_on(self, outcome: Any) -> Any:
-        """Take `outcome` for that of the current state, and run to the end; see `proceed`."""
-        raise NotImplementedError
-
-    def preempt(self) -> None:
-        """Ask what runs to stop; under the run's condition."""
-        raise NotImplementedError
-
-    def interrupted(self) -> None:
-        """Make way for the container's raised interrupts; under the run's condition."""
-        raise NotImplementedError
-
-    def suspend(self) -> None:
-        """Have the container put aside with its history; under the run's condition."""
-        raise NotImplementedError
-
-    def where(self) -> History | None:
-        """Return where the container would go on if its process ended now; under the condition."""
-        raise NotImplementedError
-
-    def active_labels(self) -> list[str]:
-        """Return the labels of the states that run."""
-        raise NotImplementedError
-
-    def woken(self) -> None:
-        """Wake the thread that runs the frame, if it waits: it was left behind."""
-
-    # What they share.
-
-    def proceed(self, outcome: Any) -> Any:
-        """Go on as if the current state had just returned `outcome`, and run to the end."""
-        stack = self.thread.stack
-        try:
-            return self.run_on(outcome)
-        except BaseException:
-            if self.container.fsm_frame is self:
-                self.container.fsm_frame = None
-            raise
-        finally:
-            self.ended = True
-            if stack and stack[-1] is self:
-                stack.pop()
-
-    def successor(self) -> Frame:
-        """Return a copy for the thread that takes this execution over."""
-        frame = type(self)(self.container, self.thread, self.path, self.current, self.parent_ud)
-        for name in self.carried_over:
-            setattr(frame, name, getattr(self, name))
-        return frame
-
-    @property
-    def wanted(self) -> bool:
-        """Whether somebody wants the current state to end."""
-        return bool(
-            self.container.preempt_requested()
-            or self.cut is not None
-            or self.suspending
-            or self.forced is not None
-        )
-
-    def note(self, raw: RawTransition) -> None:
-        """Tell the run's trace of a transition."""
-        trace = self.run.control.trace
-        if trace is not None:
-            trace(raw)
-
-
 # Threads.
 
 
@@ -475,7 +324,6 @@ class ExecutionThread:
         watches: Limits at work, outermost first.
         asked_at: When the state that executes was asked to stop, steady time; None: it was not.
         work: What its present thread does.
-        wanted: Somebody wants `leaf` to end.
         forced: `leaf`, and the outcome to take in place of the one that it returns.
     """
 
@@ -492,7 +340,6 @@ class ExecutionThread:
         self.error: BaseException | None = None
         self.asked_at: float | None = None
         self.work: Work | None = None
-        self.wanted = False
         self.forced: tuple[Node, str] | None = None
         run.threads.append(self)
 
@@ -565,6 +412,11 @@ class ExecutionThread:
             self.asked_at = time.monotonic()
             if self.run.sleeps_on_clock:
                 self.wakeup.set()
+
+    @property
+    def wanted(self) -> bool:
+        """Whether somebody wants `leaf` to end."""
+        return self.forced is not None
 
     def renew_request(self, node: Node) -> None:
         """Take the request of an earlier execution back from a state, but not a present one."""

@@ -27,7 +27,8 @@ from typing import IO, Any, NamedTuple
 from surveillance_fsm.clock import elapsed_of
 from surveillance_fsm.container import Container
 from surveillance_fsm.exceptions import MachineFileError, describe, shown
-from surveillance_fsm.execution import History, RawTransition
+from surveillance_fsm.execution import RawTransition
+from surveillance_fsm.frame import History
 from surveillance_fsm.log import logerr, logwarn
 from surveillance_fsm.state import State
 from surveillance_fsm.structure import Edge, Structure
@@ -593,9 +594,9 @@ def _read_place(state: Container, path: str, at: Any) -> History:
     for place in history.saved:
         pair = isinstance(place, list | tuple) and [type(part) for part in place]
         _expect(pair == [str, bool], path, 'a place', place)
-    labels = state.fsm_children()
+    labels = {'', *state.fsm_branches} if state.together else set(state.fsm_children())
     for label, leaving in ((history.current, history.leaving), *history.saved):
-        if not (state.together or leaving or label in labels):
+        if not (leaving or label in labels):
             raise MachineFileError(
                 f"'{path}' has no state '{label}' to resume in: its states are {sorted(labels)}"
             )

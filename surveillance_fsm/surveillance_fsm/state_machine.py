@@ -1,6 +1,6 @@
 """The containers that run one state at a time: state machine, sequence, iterator.
 
-They differ in how states lead to each other; how they run is the matter of `sequential`.
+They differ in how states lead to each other; how they run is the matter of `frame`.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ from surveillance_fsm.execution import (
     Exit,
     Node,
 )
+from surveillance_fsm.frame import Frame
 from surveillance_fsm.log import logwarn
-from surveillance_fsm.sequential import SequentialFrame
 from surveillance_fsm.state import State, structure_version
 from surveillance_fsm.timeouts import LimitOptions
 from surveillance_fsm.userdata import UserData, raw
@@ -44,8 +44,6 @@ class StateMachine(Container):
     Attributes:
         userdata: What the states inside share.
     """
-
-    fsm_frame_type = SequentialFrame
 
     def __init__(
         self,
@@ -284,7 +282,7 @@ class _Exhausted:
         return self._outcome
 
 
-class IteratorFrame(SequentialFrame):
+class IteratorFrame(Frame):
     """One execution of an iterator."""
 
     container: Iterator

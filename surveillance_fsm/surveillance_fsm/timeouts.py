@@ -10,14 +10,13 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable, Iterable, Sequence
-from typing import Any, TypedDict
+from typing import TYPE_CHECKING, Any, TypedDict
 
 from surveillance_fsm.clock import Interrupt
 from surveillance_fsm.exceptions import InvalidTransitionError
 from surveillance_fsm.execution import (
     SUSPENDED,
     ExecutionThread,
-    Frame,
     Limits,
     Node,
     Run,
@@ -26,6 +25,9 @@ from surveillance_fsm.execution import (
 )
 from surveillance_fsm.log import logerr, logwarn
 from surveillance_fsm.state import State, this_thread
+
+if TYPE_CHECKING:
+    from surveillance_fsm.frame import Frame
 
 TIMEOUT = 'timeout'
 """The outcome of a state that ran out of time, where its transitions bind it."""
@@ -250,7 +252,7 @@ def _bounds_itself(thread: ExecutionThread) -> bool:
     """Tell whether a thread is in a concurrence, which watches its states' threads."""
     # A copy: the thread itself changes its stack at any moment.
     stack = tuple(thread.stack)
-    return bool(stack) and stack[-1].container.together and stack[-1].current.is_exit
+    return bool(stack) and stack[-1].waits_for_threads()
 
 
 def _enforce(thread: ExecutionThread) -> None:

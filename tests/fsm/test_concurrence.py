@@ -8,8 +8,10 @@ import threading
 import pytest
 
 import surveillance_fsm as fsm
+from surveillance_fsm import history
+from surveillance_fsm.testing import FakeClock
 
-from .states import Answer, Background, Deaf, Waiter, began, chain
+from .states import Answer, Background, Deaf, Waiter, began, chain, through_json
 
 
 def together(*states, **arguments):
@@ -345,3 +347,87 @@ def test_an_outcome_callback_that_returns_what_cannot_be_hashed_is_named():
 def test_an_empty_concurrence_is_an_invalid_state():
     with pytest.raises(fsm.InvalidStateError, match='no states'):
         fsm.Concurrence(['done'], 'done').execute()
+
+
+def waiting_with_an_interrupt(**arguments):
+    """Two that wait, and one that cuts in and waits, too; all on a clock turned by hand."""
+    first, second, stop = Waiter(), Waiter(), Waiter()
+    concurrence = together(first, second, **arguments)
+    concurrence.set_clock(clock := FakeClock())
+    concurrence.add_interrupt('STOP', stop, priority=1)
+    return concurrence, (first, second), stop, clock
+
+
+def test_a_checkpoint_taken_in_an_interrupt_goes_on_in_it():
+    concurrence, states, stop, clock = waiting_with_an_interrupt(**ALL_DONE)
+    saved = []
+    concurrence.register_transition_cb(lambda ud, active: saved.append(through_json(concurrence)))
+    run = Background(concurrence)
+    for state in states:
+        began(state)
+    concurrence.raise_interrupt('STOP')
+    began(stop)
+    in_interrupt = saved[-1]
+    concurrence.request_preempt()
+    assert run.result() == 'preempted'
+    concurrence, states, stop, clock = waiting_with_an_interrupt(**ALL_DONE)
+    history.restore(concurrence, in_interrupt)
+    run = Background(concurrence)
+    began(stop)
+    assert [state.runs for state in states] == [0, 0]
+    clock.until_sleeping(1)
+    clock.advance(10.0)
+    clock.until_sleeping(2)
+    clock.advance(10.0)
+    assert run.result() == 'done'
+    assert stop.runs == 1
+
+
+def test_a_checkpoint_that_is_in_one_of_the_states_is_damaged():
+    concurrence, _, _, _ = waiting_with_an_interrupt()
+    checkpoint = through_json(concurrence)
+    checkpoint['machine']['at'] = {'current': 'S0'}
+    with pytest.raises(fsm.MachineFileError, match="no state 'S0' to resume in"):
+        history.restore(concurrence, checkpoint)
+
+
+def test_a_paused_machine_starts_no_state_of_a_concurrence():
+    concurrence, states, _, clock = waiting_with_an_interrupt(**ALL_DONE)
+    concurrence.control.pause()
+    stands = threading.Event()
+    concurrence.control.add_trace(lambda _: stands.set())
+    run = Background(concurrence)
+    assert stands.wait(60.0)
+    with concurrence.control.condition:
+        assert [state.runs for state in states] == [0, 0]
+    concurrence.control.step()
+    clock.until_sleeping(2)
+    clock.advance(10.0)
+    assert run.result() == 'done'
+
+
+def test_an_interrupt_cannot_lead_to_one_of_the_states_that_run_together():
+    concurrence, _, _, _ = waiting_with_an_interrupt()
+    concurrence.add_interrupt('ASTRAY', Answer('done'), transitions={'done': 'S0'})
+    with pytest.raises(fsm.InvalidTransitionError, match="leads to 'S0'"):
+        concurrence.execute()
+
+
+def test_a_state_that_the_first_end_stopped_is_not_resumed_after_an_interrupt():
+    gate, waiter, stop = Waiter(1.0), Waiter(1000.0), Answer('done')
+    concurrence = together(gate, waiter, child_termination_cb=lambda ends: True)
+    concurrence.set_clock(clock := FakeClock())
+    concurrence.add_interrupt('STOP', stop)
+    ended = threading.Event()
+    waiter.service_preempt = lambda: (ended.wait(60.0), fsm.State.service_preempt(waiter))
+    run = Background(concurrence)
+    began(waiter)
+    clock.until_sleeping(2)
+    clock.advance(1.0)
+    # The first has ended, and the second was asked to stop; before it says so, the interrupt comes.
+    while not waiter.preempt_requested():
+        ended.wait(0.0)
+    concurrence.raise_interrupt('STOP')
+    ended.set()
+    assert run.result(60.0) == 'preempted'
+    assert waiter.runs == 1

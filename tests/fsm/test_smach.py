@@ -323,6 +323,31 @@ def test_the_shutdown_check_ends_a_machine_between_two_states():
     assert len(turns) == 3
 
 
+@pytest.mark.parametrize('kind', ['machine', 'iterator', 'concurrence'])
+def test_the_shutdown_check_ends_what_is_inside_and_the_root(kind):
+    turns = []
+    state = smach.CBState(lambda ud: turns.append(1) or 'again', outcomes=['again'])
+    inner, outer = smach.StateMachine(['never']), smach.StateMachine(['never', 'exhausted'])
+    if kind == 'machine':
+        inner.add_state('A', state, {'again': 'A'})
+    elif kind == 'iterator':
+        inner = smach.Iterator([], [], [], it=range(1000))
+        inner.set_state('A', state, loop_outcomes=['again'])
+    else:
+        loop = smach.StateMachine(['never'])
+        loop.add_state('A', state, {'again': 'A'})
+        inner = smach.Concurrence(['never'], 'never')
+        inner.add_state('LOOP', loop)
+    outer.add_state('INNER', inner)
+    smach.set_shutdown_check(lambda: len(turns) >= 3)
+    try:
+        assert outer.execute() is None
+    finally:
+        smach.set_shutdown_check(None)
+    assert len(turns) == 3
+    assert outer.get_active_states() == []
+
+
 def test_get_and_set_initial_state():
     sm = smach.StateMachine(['ok'])
     seen = []

@@ -1,32 +1,36 @@
-"""The execution of a container in which one state runs at a time: the loop over its states.
+"""The execution of a container: the loop over its states.
 
-Most transitions need only the loop, `SequentialFrame._run_from`. It looks at one flag after each
-state. When something beside the next state wants to be looked at (`attention`), `_attend` passes
-preempts on, lets interrupts cut in and resumes from them, forces outcomes, and stands still while
-the machine is paused.
+Most transitions need only the loop, `Frame._run_from`. It looks at one flag after each state. When
+something beside the next state wants to be looked at (`attention`), `_attend` passes preempts on,
+lets interrupts cut in and resumes from them, forces outcomes, and stands still while the machine is
+paused.
 """
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 from surveillance_fsm import control, log
-from surveillance_fsm.container import Container
 from surveillance_fsm.exceptions import InvalidStateError, SmachError
 from surveillance_fsm.execution import (
     LOWEST,
     NO_USERDATA,
     RESUMPTION,
     SUSPENDED,
+    ExecutionThread,
     Exit,
-    Frame,
-    History,
     LeftBehindError,
     Node,
+    RawTransition,
     SpecialStep,
 )
+from surveillance_fsm.state import State
 from surveillance_fsm.timeouts import end_watch, settle, watch_of
 from surveillance_fsm.userdata import raw
+
+if TYPE_CHECKING:
+    from surveillance_fsm.container import Container
 
 SHUTDOWN = Exit('shutdown')
 """Where a run goes that the shutdown check ended."""
@@ -34,7 +38,31 @@ ASIDE = Exit('aside')
 """Where a run goes that was put aside."""
 
 
-class _Move(NamedTuple):
+@dataclass
+class History:
+    """Where a container that was put aside goes on.
+
+    Attributes:
+        current: Label of the state, or of the outcome when `leaving`; empty for all states of a
+            concurrence.
+        leaving: `current` is an outcome of the container.
+        saved: Of the interrupts under way, where each goes on: (label, leaving).
+        index: How many items an iterator had begun, the current one included.
+        repeat: The current item had not ended.
+        outcomes: Of a concurrence's children that had ended.
+    """
+
+    current: str = ''
+    leaving: bool = False
+    saved: list[tuple[str, bool]] = field(default_factory=list)
+    index: int = 0
+    repeat: bool = True
+    outcomes: dict[str, str] = field(default_factory=dict)
+    # An iterator suspended in this process goes on with its own generator.
+    items: Any = None
+
+
+class Move(NamedTuple):
     """A transition to be told: the state left (None at the start), its outcome, where to, kind."""
 
     left: Node | None
@@ -43,8 +71,54 @@ class _Move(NamedTuple):
     kind: str
 
 
-class SequentialFrame(Frame):
-    """One execution of a container that runs one state at a time.
+class Answer(NamedTuple):
+    """What the end of a state says of what it was asked.
+
+    Attributes:
+        made_way: It stopped for an interrupt, and is executed again.
+        served: It stopped for the preempt.
+    """
+
+    made_way: bool
+    served: bool
+
+
+def answer_of(state: State, outcome: Any, *, preempted: bool, cut: bool, gone: bool) -> Answer:
+    """Tell what a state's end answers, and take back what it did not acknowledge.
+
+    One flag stands for both requests. So a state that was asked for both, and acknowledged once,
+    served the preempt if nothing is pending, and else made way.
+
+    Args:
+        state: The state, which has ended.
+        outcome: What it ended with.
+        preempted: It was asked to stop for good.
+        cut: It was asked to make way for an interrupt.
+        gone: It was left behind: it keeps the request, so that it ends some time.
+    """
+    if cut and state.fsm_suspends:
+        # One that makes way is suspended; any other outcome is its own.
+        state.fsm_recall_suspend()
+        cut = False
+    pending = state.preempt_requested() and not gone
+    if pending and (preempted or cut):
+        state.recall_preempt()
+    if outcome is SUSPENDED:
+        made_way = True
+    elif pending:
+        made_way = cut and outcome == 'preempted'
+    else:
+        made_way = cut and not preempted
+    return Answer(made_way, served=preempted and not pending)
+
+
+class Frame:
+    """One execution of a container.
+
+    The thread that executes writes `current` first and looks at `attention` after; a thread that
+    wants something raises `attention` first and looks at `current` after. So one of the two always
+    sees the other, and the loop needs no lock. Everything else is touched under the run's condition
+    only.
 
     Args:
         container: Whose execution it is.
@@ -54,19 +128,64 @@ class SequentialFrame(Frame):
         parent_ud: The parent's userdata.
 
     Attributes:
+        run: The execution that this belongs to.
+        current: The node that executes, or the exit that was taken.
+        attention: Something beside the next state wants to be looked at.
+        stale: The machine went on without the thread that runs this frame.
+        preempted: The node whose state was last asked to stop because of a preempt.
+        cut: The node whose state was asked to stop because of an interrupt.
+        suspending: The parent wants the container put aside.
+        gone: The node whose state was left behind.
+        forced: A node, and the outcome to take in place of the one that its state returns.
+        ended: The execution is over. The container keeps the frame until its parent has taken note,
+            so that a checkpoint taken in between does not take it for one that has not begun.
         saved: Where to go on after each of the interrupts under way.
         stopped: Where the shutdown check ended the run.
         items: An iterator's items that are left.
         index: How many items an iterator has begun.
         repeat: An iterator's current item has not ended: it is not followed by the next one.
+        carried_over: The attributes that `successor` takes over.
     """
 
+    # Class attributes: most executions of a container need none of them.
+    attention = False
+    stale = False
+    preempted: Node | None = None
+    cut: Node | None = None
+    suspending = False
+    gone: Node | None = None
+    forced: tuple[Node, str] | None = None
+    ended = False
     saved: tuple[Node | Exit, ...] = ()
     stopped: Node | Exit = SHUTDOWN
     items: Any = None
     index = 0
     repeat = False
-    carried_over = (*Frame.carried_over, 'saved', 'items', 'index', 'repeat')
+    carried_over: ClassVar[tuple[str, ...]] = (
+        'preempted',
+        'cut',
+        'suspending',
+        'forced',
+        'saved',
+        'items',
+        'index',
+        'repeat',
+    )
+
+    def __init__(
+        self,
+        container: Container,
+        thread: ExecutionThread,
+        path: str,
+        current: Node | Exit,
+        parent_ud: Any,
+    ) -> None:
+        self.container = container
+        self.thread = thread
+        self.run = thread.run
+        self.path = path
+        self.current = current
+        self.parent_ud = parent_ud
 
     # From the beginning to the end.
 
@@ -76,13 +195,12 @@ class SequentialFrame(Frame):
         if history is None:
             container.fsm_copy_input_keys(self.parent_ud)
         else:
-            self._go_on_from(history)
+            self.go_on_from(history)
         if run.chatty:
             verb = 'starts in' if history is None else 'goes on in'
-            log.loginfo(
-                f"'{self.path}' {verb} '{self.current.label}' with userdata "
-                f'{sorted(container.userdata.keys())}'
-            )
+            place = ', '.join(map(repr, self.active_labels())) or repr(self.current.label)
+            keys = sorted(container.userdata.keys())
+            log.loginfo(f"'{self.path}' {verb} {place} with userdata {keys}")
         if history is None and container.fsm_start_cbs:
             container.call_start_cbs()
         target = self.current
@@ -97,11 +215,25 @@ class SequentialFrame(Frame):
         ):
             target = self._attend(None, None, target)
         elif run.control.trace is not None:
-            self._tell(_Move(None, None, target, 'start'))
+            self.tell(Move(None, None, target, 'start'))
         return self._run_from(target)
 
+    def proceed(self, outcome: Any) -> Any:
+        """Go on as if the current state had just returned `outcome`, and run to the end."""
+        stack = self.thread.stack
+        try:
+            return self.run_on(outcome)
+        except BaseException:
+            if self.container.fsm_frame is self:
+                self.container.fsm_frame = None
+            raise
+        finally:
+            self.ended = True
+            if stack and stack[-1] is self:
+                stack.pop()
+
     def run_on(self, outcome: Any) -> Any:
-        """Take `outcome` for that of the current state, and run to the end."""
+        """Take `outcome` for that of the current state, and run to the end; see `proceed`."""
         node = self.current
         assert isinstance(node, Node)
         watch = watch_of(self)
@@ -112,7 +244,14 @@ class SequentialFrame(Frame):
         node.release()
         return self._run_from(self._attend(node, outcome, target))
 
-    def _go_on_from(self, history: History) -> None:
+    def successor(self) -> Frame:
+        """Return a copy for the thread that takes this execution over."""
+        frame = type(self)(self.container, self.thread, self.path, self.current, self.parent_ud)
+        for name in self.carried_over:
+            setattr(frame, name, getattr(self, name))
+        return frame
+
+    def go_on_from(self, history: History) -> None:
         """Begin where the container was put aside.
 
         Raises:
@@ -174,7 +313,10 @@ class SequentialFrame(Frame):
         if target is ASIDE:
             return SUSPENDED
         container.fsm_copy_output_keys(self.parent_ud)
-        return None if target is SHUTDOWN else target.label
+        if target is SHUTDOWN:
+            is_root = self.thread.leaf is None and self.thread.stack[0] is self
+            return None if is_root else SUSPENDED
+        return target.label
 
     # Between two states.
 
@@ -189,8 +331,7 @@ class SequentialFrame(Frame):
         Returns:
             Where to go.
         """
-        run, ended, stood, still = self.run, left, False, False
-        kind, moved = '', True
+        run, stood, still = self.run, False, False
         while True:
             with run.condition:
                 paused = run.control.paused and not run.control.steps
@@ -200,68 +341,64 @@ class SequentialFrame(Frame):
                     raise LeftBehindError
                 self.thread.heeded()
                 self.attention = False
-                target, moves = self._decide(_Move(left, outcome, target, kind), ended, moved)
+                target, moves = self._decide(left, outcome, target, stood=stood)
                 self.current = target
                 still = self._stands_still(target)
                 self.attention = self._wants_attention(target)
             if stood and not still and not moves:
                 # The pause is no part of the duration of what begins now.
-                moves = [_Move(None, None, target, 'entered')]
+                moves = [Move(None, None, target, 'entered')]
             # Told before a pause, and not under the condition: callbacks may take their time.
             for move in moves:
-                self._tell(move)
+                self.tell(move)
             if not still:
                 return target
-            stood, moved, ended = True, False, None
-            left, outcome = target, ''  # type: ignore[assignment]
+            stood, outcome = True, ''
+            left = target  # type: ignore[assignment]
 
     def _decide(
-        self, move: _Move, ended: Node | None, moved: bool
-    ) -> tuple[Node | Exit, list[_Move]]:
+        self, left: Node | None, outcome: Any, target: Node | Exit, *, stood: bool
+    ) -> tuple[Node | Exit, list[Move]]:
         """Return where to go, and the transitions to be told; under the run's condition.
 
         Args:
-            move: What the table says.
-            ended: The state that has just ended; None at the start and after a pause.
-            moved: The move has not been told.
+            left: The state that ended, or before which the machine stood; None at the start.
+            outcome: What it returned.
+            target: Where that leads by the table.
+            stood: The machine stood here in a pause: nothing has ended since.
         """
-        container = self.container
-        left, outcome, target, kind = move
-        moves: list[_Move] = []
+        container, moves = self.container, []
+        ended = None if stood else left
+        move = None if stood else Move(left, outcome, target, '')
         while True:
             self._settle_cut(ended)
-            if self.forced is not None and self.forced[0] is ended:
-                node, outcome = self.forced
-                target, moved, kind = node.target(outcome), True, 'forced'
-                self._drop_requests(node)
-            elif ended is not None:
-                target, moved = self._sort_requests(ended, outcome, target)
-            if ended is not None and ended.priority > LOWEST and target is not ended:
-                target, kind = self._leave_branch(target, kind)
+            if ended is not None:
+                move = self._leave(ended, outcome, target)
+                target = ended if move is None else move.target
             if self.forced is None or self.forced[0] is not target:
                 break
             # Forced before it began.
-            if moved:
-                moves.append(_Move(left, outcome, target, kind))
+            if move is not None:
+                moves.append(move)
             left = ended = self.forced[0]
-        if container.preempt_requested() and isinstance(target, Node):
+        if move is not None:
+            outcome = move.outcome
+        preempted = container.preempt_requested()
+        if preempted and isinstance(target, Node):
             self._preempt_next(target)
         elif self.suspending and isinstance(target, Node):
-            container.fsm_history = self._history(target)
-            if moved and left is not None:
-                moves.append(_Move(left, outcome, target, kind))
-            return ASIDE, moves
-        elif container.fsm_raised and not container.preempt_requested():
+            container.fsm_history = self.history_before(target)
+            return ASIDE, moves if move is None or left is None else [*moves, move]
+        elif container.fsm_raised and not preempted:
             urgent = container.fsm_take_raised(target.priority)
             if urgent is not None:
                 self.saved = (*self.saved, target)
-                target, kind, moved = container.fsm_table[urgent.label], 'interrupt', True
+                target = container.fsm_table[urgent.label]
+                move = Move(left, outcome, target, 'interrupt')
         if control.is_shutdown():
             self.stopped = target
             return SHUTDOWN, moves
-        if moved:
-            moves.append(_Move(left, outcome, target, kind))
-        return target, moves
+        return target, moves if move is None else [*moves, move]
 
     def _settle_cut(self, ended: Node | None) -> None:
         """Take the request to make way back from a state that had not begun when it came."""
@@ -272,57 +409,58 @@ class SequentialFrame(Frame):
                 self.preempted = None  # It is asked again.
             self.cut = None
 
-    def _sort_requests(
-        self, left: Node, outcome: Any, target: Node | Exit
-    ) -> tuple[Node | Exit, bool]:
-        """Settle what was asked of the state that ended: a preempt, or to make way.
+    def _leave(self, node: Node, outcome: Any, target: Node | Exit) -> Move | None:
+        """Settle what was asked of the state that ended, and leave it.
 
         Returns:
-            Where to go, and whether that is a transition; a state that made way is not left.
+            The transition; None for a state that made way, which is not left.
         """
-        container, state, cut, made_way = self.container, left.state, self.cut, False
-        preempted = container.preempt_requested()
-        forced_next = self.forced is not None and self.forced[0] is target
-        asked = self.preempted is left
-        gone = self.gone is left
-        # A state that was left behind keeps the request, and has not ignored it any longer.
-        pending = state.preempt_requested() and not gone
+        if self.forced is not None and self.forced[0] is node:
+            outcome, kind = self.forced[1], 'forced'
+            target = node.target(outcome)
+            node.state.recall_preempt()
+            node.state.fsm_forget()
+            self.forced = self.preempted = self.cut = None
+        else:
+            answer = self._answer_of(node, outcome)
+            preempted = self.container.preempt_requested()
+            if answer.served and preempted:
+                self.container.service_preempt()
+            # Whoever forces the next state's outcome has seen this one end.
+            forced_next = self.forced is not None and self.forced[0] is target
+            if answer.made_way and not forced_next:
+                self.repeat = True
+                return None
+            kind, node.state.fsm_progress = '', None
+            if preempted and target is node:
+                target = self._end_of_loop(outcome, target)
+        if node.priority > LOWEST:
+            return self._leave_branch(Move(node, outcome, target, kind))
+        return Move(node, outcome, target, kind)
+
+    def _answer_of(self, node: Node, outcome: Any) -> Answer:
+        """Tell what a state's end answers; nothing is asked of it any more."""
+        asked, cut, gone = self.preempted is node, self.cut is node, self.gone is node
         self.cut = self.gone = None
         if asked:
             self.preempted = None
-        if cut is left and isinstance(state, Container):
-            # One that makes way is suspended; any other outcome is its own.
-            state.fsm_aside = False
-            cut = None
-        if cut is left and outcome is not SUSPENDED and (pending or not asked):
-            # With both asked and one still pending, what it served was to make way.
-            # Whoever forces the next state's outcome has seen this one end.
-            made_way = (not pending or outcome == 'preempted') and not forced_next
-            if not gone:
-                state.recall_preempt()
-        elif asked and pending:
-            state.recall_preempt()
-        elif asked and preempted:
-            container.service_preempt()
-        if made_way:
-            target = left
-        stays = made_way or outcome is SUSPENDED
-        if stays:
-            self.repeat = True
-        else:
-            state.fsm_progress = None
-            if preempted and target is left:
-                target = self._end_of_loop(outcome, target)
-        return target, not stays
+        return answer_of(node.state, outcome, preempted=asked, cut=cut, gone=gone)
+
+    def _leave_branch(self, move: Move) -> Move:
+        """Go back to where the interrupt came, or forget that place."""
+        if move.target is RESUMPTION:
+            *saved, target = self.saved
+            self.saved = tuple(saved)
+            return move._replace(target=target, kind='resume')
+        for node in self.saved:
+            if isinstance(node, Node):
+                node.state.fsm_forget()
+        self.saved = ()
+        return move
 
     def _end_of_loop(self, outcome: Any, target: Node | Exit) -> Node | Exit:
         """Return where a preempt leads that came while a state led to itself; an iterator ends."""
         return target
-
-    def _drop_requests(self, left: Node) -> None:
-        left.state.recall_preempt()
-        left.state.fsm_forget()
-        self.forced = self.preempted = self.cut = None
 
     def _preempt_next(self, target: Node) -> None:
         """Ask the next state to stop, because the last one did not acknowledge the preempt."""
@@ -360,21 +498,9 @@ class SequentialFrame(Frame):
             or (isinstance(target, Node) and target.state.fsm_progress)
         )
 
-    def _leave_branch(self, target: Node | Exit, kind: str) -> tuple[Node | Exit, str]:
-        """Go back to where the interrupt came, or forget that place."""
-        if target is RESUMPTION:
-            *saved, target = self.saved
-            self.saved = tuple(saved)
-            return target, 'resume'
-        for node in self.saved:
-            if isinstance(node, Node):
-                node.state.fsm_forget()
-        self.saved = ()
-        return target, kind
-
     # Telling.
 
-    def _tell(self, move: _Move) -> None:
+    def tell(self, move: Move) -> None:
         """Tell trace, log and callbacks of a transition."""
         container, run = self.container, self.run
         left, outcome, target, kind = move
@@ -398,7 +524,23 @@ class SequentialFrame(Frame):
         verb = 'ends' if target.is_exit else 'goes on'
         log.loginfo(f"'{self.path}' {verb}: '{left.label}' : '{outcome}' --> '{target.label}'")
 
+    def note(self, raw: RawTransition) -> None:
+        """Tell the run's trace of a transition."""
+        trace = self.run.control.trace
+        if trace is not None:
+            trace(raw)
+
     # What others want; under the run's condition.
+
+    @property
+    def wanted(self) -> bool:
+        """Whether somebody wants the current state to end."""
+        return bool(
+            self.container.preempt_requested()
+            or self.cut is not None
+            or self.suspending
+            or self.forced is not None
+        )
 
     def preempt(self) -> None:
         """Ask the state that runs to stop."""
@@ -415,16 +557,16 @@ class SequentialFrame(Frame):
         """Make way for the container's raised interrupts."""
         self.attention = True
         if self.container.fsm_urgent(self.current.priority):
-            self._cut()
+            self.cut_short()
         if self.run.control.paused:
             self.run.condition.notify_all()
 
     def suspend(self) -> None:
         """Have the container put aside with its history."""
         self.suspending = self.attention = True
-        self._cut()
+        self.cut_short()
 
-    def _cut(self) -> None:
+    def cut_short(self) -> None:
         current = self.current
         if isinstance(current, Node) and self.cut is not current:
             self.cut = current
@@ -435,9 +577,9 @@ class SequentialFrame(Frame):
         """Return where the container would go on if its process ended now."""
         if self.current is ASIDE:
             return self.container.fsm_history
-        return self._history(self.stopped if self.current is SHUTDOWN else self.current)
+        return self.history_before(self.stopped if self.current is SHUTDOWN else self.current)
 
-    def _history(self, target: Node | Exit) -> History:
+    def history_before(self, target: Node | Exit) -> History:
         """Return where to go on when the container is put aside before `target`."""
         return History(
             target.label,
@@ -452,3 +594,10 @@ class SequentialFrame(Frame):
         """Return the label of the state that runs; empty when none does."""
         current = self.current
         return [] if current.is_exit else [current.label]
+
+    def waits_for_threads(self) -> bool:
+        """Tell whether it watches threads of its own at present, which have bounds of their own."""
+        return False
+
+    def woken(self) -> None:
+        """Wake the thread that runs the frame, if it waits: it was left behind."""
