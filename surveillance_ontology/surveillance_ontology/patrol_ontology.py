@@ -273,6 +273,17 @@ class PatrolOntology:
         (answer,) = self._carry_out([self._request('QUERY OBJECTPROP IND', 'isIn', self._robot)])
         return _names(answer)
 
+    def reachable(self) -> frozenset[str]:
+        """Return the places that the robot can reach over one open door, as last reasoned.
+
+        Raises:
+            ArmorServiceCallError: The server does not answer.
+            ArmorServiceInternalError: It refuses.
+        """
+        request = self._request('QUERY OBJECTPROP IND', 'canReach', self._robot)
+        (answer,) = self._carry_out([request])
+        return frozenset(_names(answer))
+
     def record_place(self, place: str, stamp: int) -> None:
         """Tell where the robot is, instead of wherever it was thought to be.
 

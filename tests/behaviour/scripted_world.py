@@ -191,6 +191,9 @@ class World:
             connections={place: self.neighbours(place) for place in self.rooms},
         )
 
+    def reachable(self, interrupt: Interrupt) -> frozenset[str]:
+        return frozenset(self.neighbours(self.is_in))
+
     def await_place(self, place: str, seconds: float, interrupt: Interrupt) -> str:
         return self.is_in
 

@@ -179,6 +179,17 @@ def test_a_robot_that_is_shut_in_cries_for_help_and_goes_on_when_freed(machine: 
     assert visited(world, since=500.0) == set(SEVEN_ROOMS)
 
 
+def test_a_door_that_opens_ends_the_pause(machine: str) -> None:
+    world = World()
+    went_on: list[float] = []
+    world.waiting_for_help = lambda reason: went_on.append(world.clock.time)  # type: ignore[method-assign]
+    world.clock.after(100.0, lambda: world.closed.update(f'D{n}' for n in range(1, 8)))
+    world.clock.after(250.0, world.closed.clear)
+    Run(machine, world).until(400.0)
+    assert max(at for at in went_on if at < 245.0) < 240.0, 'it is in a long pause'
+    assert 250.0 <= min(at for at in went_on if at >= 245.0) < 252.0
+
+
 def test_an_ontology_that_lost_the_robot_is_waited_for(machine: str) -> None:
     world = World()
     right = world.snapshot

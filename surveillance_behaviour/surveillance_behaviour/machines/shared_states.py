@@ -105,20 +105,24 @@ WORDS = {
 }
 
 
-LOOK_PERIOD = 0.2
+PEER_PERIOD = 0.2
 """Seconds between two looks whether a peer that was away has come back."""
+
+WAY_PERIOD = 1.0
+"""Seconds between two questions to the ontology whether a way has opened."""
 
 
 class WaitForHelp(MissionState):
     """Says what is wrong and waits; then everything is tried anew, with longer pauses each time.
 
-    The return of a peer that was away ends the pause.
+    The return of a peer that was away ends the pause; where none was away, a way that has opened
+    does, such as a door.
     """
 
     ends = ('try_again',)
 
     def work(self, ud: Any, interrupt: fsm.Interrupt) -> str:
-        """Wait for one pause, or until the peer that was away is back."""
+        """Wait for one pause, or until the peer that was away is back, or a way has opened."""
         mission = self.mission
         failure = mission.failure
         reason = 'nothing works' if failure is None else f'{failure.what} failed: {failure.reason}'
@@ -127,15 +131,16 @@ class WaitForHelp(MissionState):
             f'{reason} (in {mission.place or "an unknown place"}, {mission.battery.level_text()}; '
             f'trying again in {seconds:g} s)'
         )
-        if not self._wait(seconds, failure.is_over if failure is not None else None):
+        is_over, period = mission.watch_ways(interrupt), WAY_PERIOD
+        if failure is not None and failure.is_over is not None:
+            is_over, period = failure.is_over, PEER_PERIOD
+        if not self._wait(seconds, is_over, period):
             return self.preempted()
         mission.ports.announcer.waiting_for_help('')
         return 'try_again'
 
-    def _wait(self, seconds: float, is_over: Callable[[], bool] | None) -> bool:
-        """Wait; return False when a preempt ended it."""
-        if is_over is None:
-            return self.wait(seconds)
+    def _wait(self, seconds: float, is_over: Callable[[], bool], period: float) -> bool:
+        """Wait, and look once a period; return False when a preempt ended it."""
         was_over = True
         while seconds > 0.0:
             over = is_over()
@@ -143,9 +148,9 @@ class WaitForHelp(MissionState):
             if over and not was_over:
                 return True
             was_over = over
-            if not self.wait(min(LOOK_PERIOD, seconds)):
+            if not self.wait(min(period, seconds)):
                 return False
-            seconds -= LOOK_PERIOD
+            seconds -= period
         return True
 
 

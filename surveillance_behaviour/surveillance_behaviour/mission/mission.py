@@ -167,6 +167,24 @@ class Mission:
             self.place = here
             self.note('visit', place=here, distance=0.0)
 
+    def watch_ways(self, interrupt: Interrupt) -> Callable[[], bool]:
+        """Return a look whether a place can be reached that could not be at the first look.
+
+        An ontology that does not answer tells nothing.
+        """
+        known: frozenset[str] | None = None
+
+        def way_opened() -> bool:
+            nonlocal known
+            try:
+                reachable = self.ports.ontology.reachable(interrupt)
+            except CallError:
+                return False
+            known = reachable if known is None else known
+            return not reachable <= known
+
+        return way_opened
+
     def departs(self) -> None:
         """Note that the robot leaves its place; until it arrives it may be anywhere."""
         self.astray = True

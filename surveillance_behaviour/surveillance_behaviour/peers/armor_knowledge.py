@@ -142,6 +142,11 @@ class ArmorKnowledge:
                 interrupt=interrupt,
             )
 
+    def reachable(self, interrupt: fsm.Interrupt) -> frozenset[str]:
+        """Return the places that an open door leads to from where the robot is."""
+        with self._talking(interrupt):
+            return self._ontology.reachable()
+
     @contextmanager
     def _talking(self, interrupt: fsm.Interrupt) -> Iterator[None]:
         """Heed the interrupt, and turn what went wrong into the ports' errors.

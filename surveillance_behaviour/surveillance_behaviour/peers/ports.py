@@ -54,6 +54,9 @@ class Ontology(Protocol):
             threshold: Seconds without a visit after which a place is URGENT; None: as it was.
         """
 
+    def reachable(self, interrupt: Interrupt) -> frozenset[str]:
+        """Return the places that an open door leads to from where the robot is."""
+
     def await_place(self, place: str, seconds: float, interrupt: Interrupt) -> str:
         """Wait until the robot is in ``place``, for a while; where it is then, empty: unknown."""
 
