@@ -12,6 +12,10 @@ from pathlib import Path
 
 UNIT = 'surveillance.service'
 _SOCKET = 'NOTIFY_SOCKET'
+_PROCESS = 'SYSTEMD_EXEC_PID'
+"""The process that systemd started: what that starts inherits the socket, but is not the service.
+
+systemd.exec(5); before version 248 nothing tells."""
 _TEXT = """\
 # Written by: python3 launch.py service
 [Unit]
@@ -62,7 +66,8 @@ def unit_path() -> Path:
 
 def is_service() -> bool:
     """Tell whether systemd keeps this process running, and wants to be told of it."""
-    return os.environ.get(_SOCKET, '')[:1] in ('/', '@')
+    started = os.environ.get(_PROCESS, str(os.getpid()))
+    return os.environ.get(_SOCKET, '')[:1] in ('/', '@') and started == str(os.getpid())
 
 
 def notify(text: str) -> None:

@@ -28,6 +28,7 @@ from surveillance_fsm.clock import elapsed_of
 from surveillance_fsm.container import Container
 from surveillance_fsm.exceptions import MachineFileError, describe, shown
 from surveillance_fsm.execution import RawTransition
+from surveillance_fsm.files import file_to_write, read_file
 from surveillance_fsm.frame import History
 from surveillance_fsm.log import logerr, logwarn
 from surveillance_fsm.state import State
@@ -38,6 +39,9 @@ RECORD_FORMAT = 'surveillance-fsm-record'
 RECORD_VERSION = 1
 CHECKPOINT_FORMAT = 'surveillance-fsm-checkpoint'
 CHECKPOINT_VERSION = 2
+LARGEST_RECORD = 2_000_000_000
+LARGEST_CHECKPOINT = 200_000_000
+"""More bytes than this are not read."""
 QUEUE_LENGTH = 100_000
 """Transitions that may wait to be written; the oldest are lost beyond that, as numbers show."""
 
@@ -256,9 +260,9 @@ def read_record(path: str | Path) -> list[Transition]:
         MachineFileError: The file is not such a record; the message names file and line.
     """
     try:
-        lines = Path(path).read_text(encoding='utf-8').split('\n')
+        lines = read_file(path, LARGEST_RECORD).decode('utf-8').split('\n')
     except (OSError, UnicodeDecodeError) as error:
-        raise MachineFileError(f'{path}: {error}') from error
+        raise MachineFileError(f'{path}: {getattr(error, "strerror", error)}') from error
     try:
         header = json.loads(lines[0])
         known = header['format'] == RECORD_FORMAT and header['version'] == RECORD_VERSION
@@ -610,13 +614,14 @@ def _read_place(state: Container, path: str, at: Any) -> History:
 def save(machine: Container, path: str | Path, leave_out: Iterable[str] = ()) -> None:
     """Write a checkpoint; a reader finds the old one or the new one, never half of one.
 
-    When it returns, the checkpoint is on the disk, and outlives a failure of power.
+    When it returns, the checkpoint is on the disk, and outlives a failure of power. A link to the
+    file stays.
 
     Raises:
         MachineFileError: A value cannot be kept, see `capture`.
         OSError: The file cannot be written.
     """
-    target = Path(path)
+    target = file_to_write(path)
     text = json.dumps(capture(machine, leave_out), ensure_ascii=False, allow_nan=False)
     draft = target.with_name(f'.{target.name}.{os.getpid()}.{threading.get_ident()}')
     try:
@@ -648,12 +653,12 @@ def load(machine: Container, path: str | Path) -> None:
         MachineFileError: The file cannot be read, or does not fit the machine.
     """
     try:
-        text = Path(path).read_bytes().decode('utf-8', 'surrogatepass')
+        text = read_file(path, LARGEST_CHECKPOINT).decode('utf-8', 'surrogatepass')
         restore(machine, json.loads(text))
     except RecursionError:
         raise MachineFileError(f'{path}: damaged: nested too deep') from None
     except (OSError, ValueError, MachineFileError) as error:
-        raise MachineFileError(f'{path}: {describe(error)}') from error
+        raise MachineFileError(f'{path}: {getattr(error, "strerror", describe(error))}') from error
 
 
 class Checkpointer:

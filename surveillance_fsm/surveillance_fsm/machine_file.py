@@ -42,6 +42,7 @@ from typing import Any
 from surveillance_fsm.concurrence import Concurrence
 from surveillance_fsm.container import Container
 from surveillance_fsm.exceptions import MachineFileError, describe, shown
+from surveillance_fsm.files import read_file
 from surveillance_fsm.state import CBState, State
 from surveillance_fsm.state_machine import Iterator, Sequence, StateMachine
 from surveillance_fsm.timeouts import LimitOptions
@@ -49,6 +50,9 @@ from surveillance_fsm.timeouts import LimitOptions
 KINDS: dict[str, type[Container]] = {
     kind.__name__: kind for kind in (StateMachine, Sequence, Concurrence, Iterator)
 }
+
+LARGEST = 4_000_000
+"""More bytes than this are no machine."""
 
 _LIMITS = set(LimitOptions.__annotations__)
 _KEYS = {'input_keys', 'output_keys'}
@@ -81,9 +85,9 @@ def load_machine(path: str | Path, offered: Mapping[str, Any] | None = None) -> 
         MachineFileError: The file cannot be read, or describes no machine that can run.
     """
     try:
-        return machine_from(parse(Path(path).read_text(encoding='utf-8')), offered)
+        return machine_from(parse(read_file(path, LARGEST).decode('utf-8')), offered)
     except (OSError, UnicodeDecodeError, MachineFileError) as error:
-        raise MachineFileError(f'{path}: {describe(error)}') from error
+        raise MachineFileError(f'{path}: {getattr(error, "strerror", describe(error))}') from error
 
 
 def parse(text: str) -> Any:

@@ -4,21 +4,13 @@ from __future__ import annotations
 
 import errno
 import os
-import stat
 from pathlib import Path
+
+from surveillance_fsm import files
 
 RECORD, PLACE = 'mission.jsonl', 'place.yaml'
 RECORDING, TIMELINE = 'recording', 'timeline.jsonl'
 """In the folder of a run: the mission's record, the place, the recording and its time line."""
-
-
-_KINDS = {
-    stat.S_IFDIR: 'a folder',
-    stat.S_IFIFO: 'a pipe',
-    stat.S_IFCHR: 'a device',
-    stat.S_IFBLK: 'a device',
-    stat.S_IFSOCK: 'a socket',
-}
 
 
 class FileError(ValueError):
@@ -38,54 +30,26 @@ def read_file(path: Path, most: int) -> bytes:
         FileError: It cannot be read, is no regular file, or holds more than `most` bytes.
     """
     try:
-        # Not blocking: a pipe would be waited for.
-        descriptor = os.open(path, os.O_RDONLY | os.O_CLOEXEC | os.O_NONBLOCK)
-        try:
-            found = os.fstat(descriptor)
-            if problem := _no_file(found):
-                raise FileError(f'{path}: {problem}')
-            if found.st_size > most:
-                raise FileError(f'{path}: {found.st_size} bytes, at most {most} are read')
-            with open(descriptor, 'rb', closefd=False) as file:
-                return file.read(most)  # files of /proc say that they are empty
-        finally:
-            os.close(descriptor)
+        return files.read_file(path, most)
     except OSError as error:
         raise FileError(f'{path}: {error.strerror or error}') from None
-
-
-def _no_file(found: os.stat_result) -> str:
-    """Return what is wrong with something that is no regular file, empty for one that is."""
-    if stat.S_ISREG(found.st_mode):
-        return ''
-    return f'expected a file, got {_KINDS[stat.S_IFMT(found.st_mode)]}'
-
-
-def _check_place(path: Path) -> None:
-    """Make sure that nothing but a file is written or replaced; for root that may be a device.
-
-    Raises:
-        OSError: Something else is there.
-    """
-    if path.exists() and (problem := _no_file(path.stat())):
-        raise OSError(errno.EINVAL, problem, str(path))
 
 
 def replace_text(path: Path, text: str) -> None:
     """Write a file so that whoever reads it finds all of the old text or all of the new one.
 
     Args:
-        path: The file; its folder is there.
+        path: The file, or a link to it, which stays; its folder is there.
         text: What it is to hold.
 
     Raises:
         OSError: It cannot be written; the error has its name, and the old file is whole.
     """
-    _check_place(path)
-    draft = path.with_name(path.name + '.new')
+    target = files.file_to_write(path)
+    draft = target.with_name(target.name + '.new')
     try:
         draft.write_text(text, encoding='utf-8')
-        os.replace(draft, path)
+        os.replace(draft, target)
     except OSError as error:
         raise OSError(error.errno, error.strerror, str(path)) from None
 
@@ -101,7 +65,7 @@ class LineFile:
     """
 
     def __init__(self, path: Path) -> None:
-        _check_place(path)
+        files.file_to_write(path)
         self._path = path
         content = path.read_bytes() if path.exists() else b''
         whole = content.rfind(b'\n') + 1

@@ -13,6 +13,7 @@ import pytest
 
 import surveillance_fsm as fsm
 from surveillance_fsm import history as checkpoint
+from surveillance_fsm.machine_file import load_machine
 
 from .states import Answer, CheckpointedWorld, through_json
 
@@ -226,3 +227,33 @@ def test_a_damaged_checkpoint_is_an_error_of_one_line_that_changes_nothing(old, 
     assert '\n' not in str(caught.value)
     assert str(path) in str(caught.value)
     assert machine.userdata.keys() == []
+
+
+def test_a_link_to_the_checkpoint_stays(tmp_path):
+    path, link = tmp_path / 'checkpoint.json', tmp_path / 'link.json'
+    link.symlink_to(path)
+    machine = CheckpointedWorld().root
+    checkpoint.save(machine, link)
+    assert link.is_symlink()
+    checkpoint.load(machine, path)
+
+
+@pytest.mark.parametrize('kind', ['a pipe', 'a device'])
+def test_what_is_no_file_is_neither_read_nor_replaced(tmp_path, kind):
+    """The link keeps a real device out of reach of a failing test."""
+    path = tmp_path / 'path'
+    if kind == 'a pipe':
+        os.mkfifo(path)
+    else:
+        path.symlink_to('/dev/zero')
+    machine = CheckpointedWorld().root
+    for read in (
+        lambda: checkpoint.load(machine, path),
+        lambda: checkpoint.read_record(path),
+        lambda: load_machine(path),
+    ):
+        with pytest.raises(fsm.MachineFileError, match=f'^{path}: expected a file, got {kind}$'):
+            read()
+    with pytest.raises(OSError, match=f'expected a file, got {kind}'):
+        checkpoint.save(machine, path)
+    assert not path.is_file()

@@ -19,10 +19,14 @@ from surveillance_runtime import discovery
 
 ROOT = Path(__file__).resolve().parents[2]
 USER_ENVIRON = {
-    **{name: os.environ[name] for name in os.environ if name not in discovery.VARIABLES},
+    **{
+        name: os.environ[name]
+        for name in os.environ
+        if name not in (*discovery.VARIABLES, 'NOTIFY_SOCKET', 'SYSTEMD_EXEC_PID')
+    },
     'PYTHONPATH': str(ROOT),
 }
-"""What a user's shell gives a command: it says nothing of how nodes find each other."""
+"""What a user's shell gives a command: nothing of how nodes find each other, or of systemd."""
 
 
 class Started:

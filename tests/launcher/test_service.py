@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from launcher.cli import main
-from launcher.service import notify, unit_path, unit_text
+from launcher.service import is_service, notify, unit_path, unit_text
 from tests.launcher.conftest import ROOT, USER_ENVIRON
 
 MISSION = str(Path(__file__).with_name('mission_process.py'))
@@ -76,8 +76,20 @@ def test_systemd_is_told_where_it_listens(tmp_path, monkeypatch):
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as listener:
         listener.bind(address)
         monkeypatch.setenv('NOTIFY_SOCKET', address)
+        for started in (None, str(os.getpid())):
+            monkeypatch.delenv('SYSTEMD_EXEC_PID', raising=False)
+            if started is not None:
+                monkeypatch.setenv('SYSTEMD_EXEC_PID', started)
+            notify('READY=1')
+            assert listener.recv(100) == b'READY=1'
+        # In a terminal that is a service itself.
+        monkeypatch.setenv('SYSTEMD_EXEC_PID', str(os.getppid()))
+        assert not is_service()
         notify('READY=1')
-        assert listener.recv(100) == b'READY=1'
+        listener.setblocking(False)
+        with pytest.raises(BlockingIOError):
+            listener.recv(100)
+    monkeypatch.delenv('SYSTEMD_EXEC_PID')
     monkeypatch.setenv('NOTIFY_SOCKET', str(tmp_path / 'nobody'))
     notify('READY=1')
     monkeypatch.delenv('NOTIFY_SOCKET')

@@ -48,6 +48,17 @@ def test_a_file_that_cannot_be_replaced_is_named_and_stays_whole(tmp_path: Path)
     assert path.read_text() == 'old'
 
 
+def test_a_link_stays_and_what_it_leads_to_is_replaced(tmp_path: Path) -> None:
+    (tmp_path / 'disk').mkdir()
+    path, link = tmp_path / 'disk' / 'state.json', tmp_path / 'link.json'
+    link.symlink_to(path)
+    for text in ('made', 'replaced'):
+        replace_text(link, text)
+        assert link.is_symlink()
+        assert path.read_text() == text
+    assert sorted(os.listdir(tmp_path / 'disk')) == ['state.json']
+
+
 def test_lines_go_to_where_a_link_points_behind_the_last_whole_one(tmp_path: Path) -> None:
     path, link = tmp_path / 'lines', tmp_path / 'link'
     link.symlink_to(path)
