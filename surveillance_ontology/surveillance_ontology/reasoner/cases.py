@@ -208,7 +208,8 @@ class CaseReasoner:
     def _literals(self, x: int) -> Iterator[tuple[str, Literal, Choices]]:
         """Return the values of an individual that are known: (property, literal, choices).
 
-        Where there are as many as their set has, each of the set may follow, and is asked for.
+        Where a value differs from others that could be all but one of its set, each of the set may
+        follow, and is asked for.
         """
         model = self._search.model
         there = model.values[x]
@@ -219,8 +220,8 @@ class CaseReasoner:
                 if only is not None:
                     yield prop, literal_of(only), choices | more
                 elif values.size <= len(there):
-                    alike = [w for w in there if model.sets[w][0].within(values)]
-                    if sum(prop in model.props[w] for w in alike) >= values.size:
+                    apart = sum(model.different(v, w) is not None for w in there if w != v)
+                    if apart >= values.size - 1:
                         yield from ((prop, literal_of(one), _UNSURE) for one in values.members())
 
     def _relations(self, x: int) -> Iterator[tuple[str, int, Choices]]:

@@ -16,7 +16,9 @@ from surveillance_ontology.owl.axioms import Axiom
 from surveillance_ontology.owl.expressions import (
     ClassExpression,
     DataMinCardinality,
+    DataSomeValuesFrom,
     ObjectMinCardinality,
+    ObjectSomeValuesFrom,
 )
 from surveillance_ontology.owl.vocabulary import NOTHING, THING
 from surveillance_ontology.reasoner.clauses import (
@@ -104,14 +106,18 @@ class Classification:
         if not program.partial:
             return
         contexts = Contexts(program)
-        for label, sentence in program.partial:
+        counted = {condition.filler for condition in (*program.at_least, *program.at_most)}
+        counted |= {key.cls for key in program.keys}
+        for partial in program.partial:
+            label, sentence = partial.label, partial.sentence
+            if label in counted and sentence not in program.unsupported:
+                program.unsupported.append(sentence)
             for clause in program.clauses:
                 atoms = [atom for atom in clause.body if isinstance(atom, PredicateAtom)]
-                if not any(atom.predicate is label for atom in atoms):
+                x = next((atom.terms[0] for atom in atoms if atom.predicate is label), None)
+                if x is None or partial.decided_by in self._places(atoms, x):
                     continue
                 head = clause.head
-                if isinstance(head, PredicateAtom) and _is_part(head.predicate, label):
-                    continue
                 if isinstance(head, PredicateAtom) and head.predicate.kind == 'class':
                     context = contexts.context(self._implied(atoms, head.terms[0]) - {label})
                     if context.clash or head.predicate in context.tokens:
@@ -122,19 +128,8 @@ class Classification:
     def _implied(self, atoms: list[PredicateAtom], x: Term) -> set[Predicate]:
         """Return classes that an individual is in by some atoms, and by domains and ranges."""
         program = self.program
-        found: set[Predicate] = set()
-        places: set[tuple[Predicate, int]] = set()
-        for atom in atoms:
-            counted = atom.predicate.expression
-            if atom.predicate.kind != 'class':
-                places |= {(atom.predicate, at) for at, term in enumerate(atom.terms) if term == x}
-            elif atom.terms[0] == x:
-                found.add(atom.predicate)
-                if isinstance(counted, ObjectMinCardinality):
-                    iri, inverted = directed(counted.prop)
-                    places.add((program.object(iri), int(inverted)))
-                elif isinstance(counted, DataMinCardinality):
-                    places.add((program.data(counted.prop), 0))
+        places = self._places(atoms, x)
+        found = {a.predicate for a in atoms if a.predicate.kind == 'class' and a.terms[0] == x}
         for clause in program.clauses:
             head = clause.head
             if len(clause.body) == 1 and isinstance(head, PredicateAtom):
@@ -144,6 +139,22 @@ class Classification:
                     if (only.predicate, at) in places:
                         found.add(head.predicate)
         return found - {program.thing}
+
+    def _places(self, atoms: list[PredicateAtom], x: Term) -> set[tuple[Predicate, int]]:
+        """Return where an individual stands by some atoms: a property and the place in it."""
+        program = self.program
+        places: set[tuple[Predicate, int]] = set()
+        for atom in atoms:
+            related = atom.predicate.expression
+            if atom.predicate.kind != 'class':
+                places |= {(atom.predicate, at) for at, term in enumerate(atom.terms) if term == x}
+            elif atom.terms[0] == x:
+                if isinstance(related, (ObjectMinCardinality, ObjectSomeValuesFrom)):
+                    iri, inverted = directed(related.prop)
+                    places.add((program.object(iri), int(inverted)))
+                elif isinstance(related, (DataMinCardinality, DataSomeValuesFrom)):
+                    places.add((program.data(related.prop), 0))
+        return places
 
     # --- class hierarchy ---
 
@@ -380,15 +391,6 @@ def _named(context: Context) -> frozenset[str]:
     """Return the named classes of a context."""
     labels = (token for token in context.tokens if isinstance(token, Predicate))
     return frozenset(one.expression for one in labels if isinstance(one.expression, str))
-
-
-def _is_part(part: Predicate, label: Predicate) -> bool:
-    """Tell whether a class is what membership in a number or `only` consists of."""
-    one, other = part.expression, label.expression
-    return hasattr(one, 'prop') and all(
-        getattr(one, name, None) == getattr(other, name, None)
-        for name in ('prop', 'filler', 'range')
-    )
 
 
 _TOGETHER = 'together with what must exist, which are the same would need reasoning by cases'

@@ -263,6 +263,22 @@ class Existential:
     origin: Axiom | None = field(default=None, compare=False)
 
 
+@dataclass(frozen=True, slots=True)
+class Partial:
+    """A label whose members are not all recognised.
+
+    Attributes:
+        label: The label.
+        sentence: Reports it.
+        decided_by: A property and the place in it of an individual: whoever stands there is
+            recognised, or is no member.
+    """
+
+    label: Predicate
+    sentence: str
+    decided_by: tuple[Predicate, int] | None = None
+
+
 @dataclass
 class Program:
     """Everything the engine runs.
@@ -273,8 +289,7 @@ class Program:
             to.
         thing, nothing, different, same: The predicates with fixed meaning; `same` only ever names a
             premise.
-        partial: Labels whose members are not all recognised, each with the sentence that reports
-            it.
+        partial: Labels whose members are not all recognised.
         meetings: Existentials whose individuals or values a lower bound counts.
         uses_thing: Whether the extension of owl:Thing must be kept.
         interacting: Whether several classes of one individual together imply more than each of
@@ -295,7 +310,7 @@ class Program:
     disjoint_properties: list[tuple[Predicate, bool, Predicate, bool]] = field(default_factory=list)
     negatives: dict[Predicate, Predicate] = field(default_factory=dict)
     unsupported: list[str] = field(default_factory=list)
-    partial: list[tuple[Predicate, str]] = field(default_factory=list)
+    partial: list[Partial] = field(default_factory=list)
     meetings: list[tuple[Existential, AtLeast]] = field(default_factory=list)
     uses_thing: bool = False
     interacting: bool = False

@@ -38,6 +38,7 @@ from surveillance_ontology.reasoner.clauses import (
     Existential,
     HeadAtom,
     Key,
+    Partial,
     Predicate,
     PredicateAtom,
     Program,
@@ -401,20 +402,24 @@ class Translation:
             return [()]
         label = self._label(expression)
         bodies: list[Body] = [(PredicateAtom(label, (x,)),)]
+        decided_by: tuple[Predicate, int] | None = None
         if isinstance(expression, (ex.ObjectMinCardinality, ex.DataMinCardinality)):
             self._count(label, expression)
         elif isinstance(expression, ex.ObjectAllValuesFrom):
             if functional(expression.prop):
-                return bodies + self._related(expression.prop, expression.filler, x)
+                bodies += self._related(expression.prop, expression.filler, x)
+                prop, inverse = self._direction(expression.prop)
+                decided_by = prop, int(inverse)
         elif isinstance(expression, ex.DataAllValuesFrom):
             if functional(expression.prop):
-                return [*bodies, self._valued(expression.prop, expression.range, x)]
+                bodies.append(self._valued(expression.prop, expression.range, x))
+                decided_by = self.program.data(expression.prop), 0
         elif isinstance(expression, ex.ObjectComplementOf) and isinstance(expression.operand, str):
             self._complements[expression.operand] = label
         if isinstance(expression, _NEGATIVE):
             subject = self._context if self._origin is None else axiom_text(self._origin)
             text = f'{subject}: not all members of {expression_text(expression)} are recognised'
-            self.program.partial.append((label, text))
+            self.program.partial.append(Partial(label, text, decided_by))
         return bodies
 
     def _count(

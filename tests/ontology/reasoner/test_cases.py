@@ -427,3 +427,59 @@ def test_nobody_is_put_off_as_being_like_a_named_individual() -> None:
     assert not CaseReasoner([*axioms, ClassAssertion(four, i)]).consistent()
     three = ex.ObjectIntersectionOf((ex.ObjectMinCardinality(3, P), C))
     assert CaseReasoner([*axioms, ClassAssertion(three, i)]).consistent()
+
+
+def test_only_holds_of_whoever_cannot_have_a_value_of_a_functional_property() -> None:
+    recognised = SubClassOf(ex.ObjectAllValuesFrom(P, A), C)
+    none = ClassAssertion(ex.ObjectMaxCardinality(0, P), i)
+    assert reasoned(ax.FunctionalObjectProperty(P), recognised, none).holds(ClassAssertion(C, i))
+
+
+def test_only_holds_of_whoever_cannot_have_a_value_of_a_functional_data_property() -> None:
+    recognised = SubClassOf(ex.DataAllValuesFrom(T, XSD + 'integer'), C)
+    none = ClassAssertion(ex.DataMaxCardinality(0, T), i)
+    assert reasoned(ax.FunctionalDataProperty(T), recognised, none).holds(ClassAssertion(C, i))
+
+
+def test_a_number_on_the_left_is_not_lost_where_the_right_side_is_its_opposite() -> None:
+    # Whoever has one at most has two, so everybody has two.
+    most, least = ex.ObjectMaxCardinality(1, P), ex.ObjectMinCardinality(2, P)
+    kb = reasoned(
+        SubClassOf(most, least),
+        SubClassOf(ex.ObjectSomeValuesFrom(P, THING), C),
+        ClassAssertion(A, i),
+    )
+    assert kb.holds(ClassAssertion(C, i))
+
+
+@pytest.mark.parametrize(
+    'counted', [ex.ObjectMaxCardinality(1, Q), ex.ObjectAllValuesFrom(Q, C)], ids=['max', 'only']
+)
+def test_members_that_cases_find_are_counted(counted: ex.ClassExpression) -> None:
+    none = ex.ObjectMaxCardinality(0, Q)
+    kb = reasoned(
+        ClassAssertion(ex.ObjectMaxCardinality(1, P, counted), i),
+        *(ClassAssertion(none, one) for one in (j, k)),
+        *(ax.ObjectPropertyAssertion(P, i, one) for one in (j, k)),
+    )
+    assert kb.holds(ax.SameIndividual(frozenset((j, k))))
+
+
+def test_members_that_cases_find_have_keys() -> None:
+    kb = reasoned(
+        ax.HasKey(ex.ObjectAllValuesFrom(Q, C), (), (T,)),
+        *(ClassAssertion(ex.ObjectMaxCardinality(0, Q), one) for one in (j, k)),
+        *(ax.DataPropertyAssertion(T, one, whole(1)) for one in (j, k)),
+    )
+    assert kb.holds(ax.SameIndividual(frozenset((j, k))))
+
+
+def test_a_value_follows_where_another_property_has_the_others() -> None:
+    two = ex.DataOneOf((whole(1), whole(2)))
+    kb = reasoned(
+        ax.DisjointDataProperties((S, T)),
+        ClassAssertion(ex.DataSomeValuesFrom(T, two), i),
+        ax.DataPropertyAssertion(S, i, whole(1)),
+        ax.DataPropertyAssertion(T, j, whole(2)),
+    )
+    assert kb.holds(ax.DataPropertyAssertion(T, i, whole(2)))
