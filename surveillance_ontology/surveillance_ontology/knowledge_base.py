@@ -17,6 +17,7 @@ import time
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import combinations
 from typing import Any, TypeAlias
 
 from surveillance_ontology.memory import uncollected
@@ -584,8 +585,16 @@ class KnowledgeBase:
         if engine.understands(fact) and engine.holds(fact):
             return True
         if isinstance(fact, DifferentIndividuals) and self._completion is not None:
-            return self._completion.entails(self._told.axioms, fact)
+            apart = self._completion.entails(self._told.axioms, fact)
+            return apart or self._rules_part(fact)
         return False
+
+    def _rules_part(self, fact: DifferentIndividuals) -> bool:
+        """Tell whether rules, which take no part in reasoning by cases, make individuals differ."""
+        if not any(isinstance(axiom, Rule) for axiom in self._told.schema):
+            return False
+        pairs = map(frozenset, combinations(sorted(fact.individuals), 2))
+        return all(follows([*self._told.axioms, SameIndividual(pair)], None) for pair in pairs)
 
     def _is_below(self, sub: str, sup: str) -> bool:
         if sup == NOTHING:

@@ -142,6 +142,7 @@ class CaseRules:
         self.by_source: dict[int, list[EdgeRule]] = {}
         self.by_target: dict[int, list[EdgeRule]] = {}
         self.by_prop: dict[str, list[ValueRule]] = {}
+        self._ranges: dict[str, ValueSet] = {}
         self.of_values: set[int] = set()
         self.at_least: dict[int, Count] = {}
         self.at_most: dict[int, Count] = {}
@@ -235,6 +236,18 @@ class CaseRules:
         if found is None:
             above = closure(prop, lambda one: self._data_inclusions.get(one, ()))
             found = self.props_above[prop] = tuple(above)
+        return found
+
+    def range_of(self, prop: str) -> ValueSet:
+        """Return the values of a data property that its ranges leave to everybody."""
+        found = self._ranges.get(prop)
+        if found is None:
+            found = EVERY
+            for one in self.data_above(prop):
+                for rule in self.by_prop.get(one, ()):
+                    if rule.xs == _ALL and not rule.heads:
+                        found &= rule.rest
+            self._ranges[prop] = found
         return found
 
     @property

@@ -77,13 +77,14 @@ class CaseValues:
         elif (x, concept) in self._made:
             return
         model.put(self._made, (x, concept), True)
-        if needed.values.size < needed.n:
+        values = needed.values & self._rules.range_of(needed.prop)
+        if values.size < needed.n:
             raise ClashError(choices)
-        if needed.values.size == needed.n:
-            for value in needed.values.members():
+        if values.size == needed.n:
+            for value in values.members():
                 model.value(x, needed.prop, point(value), choices)
             return
-        made = [model.value(x, needed.prop, needed.values, choices) for _ in range(needed.n)]
+        made = [model.value(x, needed.prop, values, choices) for _ in range(needed.n)]
         if len(made) > 1:
             model.differ(made, choices)
 
@@ -161,12 +162,12 @@ class CaseValues:
 
     def _assign(self, x: int) -> None:
         """Tell whether values that differ can be chosen from small sets."""
-        model = self._model
-        others: dict[int, list[int]] = {}
-        for v, w in combinations(model.values[x], 2):
-            if model.different(v, w) is not None:
-                others.setdefault(v, []).append(w)
-                others.setdefault(w, []).append(v)
+        model, there = self._model, self._model.values[x]
+        others = {
+            v: [w for w in there if w != v and model.different(v, w) is not None]
+            for v in there
+            if model.sets[v][0].size < len(there)
+        }
         small = [v for v, found in others.items() if model.sets[v][0].size <= len(found)]
         for group in _joined(small, others):
             if not self._have_values(group, others):

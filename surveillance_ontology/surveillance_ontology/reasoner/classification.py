@@ -106,8 +106,9 @@ class Classification:
         if not program.partial:
             return
         contexts = Contexts(program)
-        counted = {condition.filler for condition in (*program.at_least, *program.at_most)}
-        counted |= {key.cls for key in program.keys}
+        counted: set[object] = {least.filler for least in program.at_least}
+        counted.update(most.filler for most in program.at_most)
+        counted.update(key.cls for key in program.keys)
         for partial in program.partial:
             label, sentence = partial.label, partial.sentence
             if label in counted and sentence not in program.unsupported:

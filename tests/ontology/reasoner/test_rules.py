@@ -181,3 +181,14 @@ def test_a_rule_that_makes_values_without_end_is_stopped_and_reported() -> None:
     assert kb.reason()
     assert 'without end' in kb.unsupported[0]
     assert num(2) in kb.data_values(S, i)
+
+
+def test_a_rule_makes_individuals_different() -> None:
+    # Were they one, it would be in both classes, which the rule forbids.
+    rule = Rule((ClassAtom(A, X), ClassAtom(B, X)), ())
+    kb = KnowledgeBase('x:', [rule, is_a(A, i), is_a(B, j), is_a(A, k)])
+    assert kb.reason()
+    assert kb.holds(differ(i, j))
+    assert kb.holds(differ(j, k))
+    assert not kb.holds(differ(i, k))
+    assert not kb.holds(differ(i, j, k))
