@@ -32,10 +32,11 @@ from surveillance_controllers.controller_parameters import (
 from surveillance_controllers.manual.commands import BATTERY, BATTERY_SET, ParsedCommand
 from surveillance_controllers.manual.requests import CommandConsole
 from surveillance_fsm.ros import ClockWait
-from surveillance_runtime.conversions import pose_from, seconds_of
+from surveillance_runtime.conversions import seconds_of
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.process import run_node
 from surveillance_runtime.qos import STATE_QOS
+from surveillance_runtime.serialized import pose_of_serialized
 from surveillance_runtime.state_file import StateFile
 from surveillance_runtime.waiting import AwaitedEvent
 
@@ -188,7 +189,9 @@ class RobotBattery:
             since += self._wait.elapsed() - self._wait.now()
         self._use = BatteryInUse(battery, settings.station, settings.dock_reach, since)
         self._states = node.create_publisher(BatteryState, 'battery_state', STATE_QOS)
-        node.create_subscription(PoseWithCovarianceStamped, 'amcl_pose', self._on_pose, STATE_QOS)
+        node.create_subscription(
+            PoseWithCovarianceStamped, 'amcl_pose', self._on_pose, STATE_QOS, raw=True
+        )
         node.create_subscription(JointTrajectory, 'arm/joint_trajectory', self._on_trajectory, 1)
         node.create_subscription(Float32, 'battery_drain', self._on_drain, 10)
         node.create_timer(settings.update_period, self._update)
@@ -197,9 +200,9 @@ class RobotBattery:
         """Say why the battery cannot charge now; None when it can."""
         return self._use.why_not_charging()
 
-    def _on_pose(self, message: PoseWithCovarianceStamped) -> None:
+    def _on_pose(self, serialized: bytes) -> None:
         with conversions.refusing(self._node, 'amcl_pose'):
-            self._use.see_pose(pose_from(message.pose.pose), self._wait.elapsed())
+            self._use.see_pose(pose_of_serialized(serialized), self._wait.elapsed())
 
     def _on_trajectory(self, message: JointTrajectory) -> None:
         end = message.points[-1].time_from_start if message.points else Duration()

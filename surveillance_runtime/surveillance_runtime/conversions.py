@@ -70,15 +70,22 @@ def pose_from(message: Pose) -> PlanarPose:
         ValueError: A coordinate is not finite, or too large to be one.
     """
     at, q = message.position, message.orientation
-    if not all(map(math.isfinite, (at.x, at.y, q.x, q.y, q.z, q.w))):
+    return planar_pose(at.x, at.y, (q.x, q.y, q.z, q.w))
+
+
+def planar_pose(x: float, y: float, turn: Sequence[float]) -> PlanarPose:
+    """Return the pose in the plane at a point, turned by a quaternion (x, y, z, w).
+
+    Raises:
+        ValueError: As `pose_from`.
+    """
+    if not all(map(math.isfinite, (x, y, *turn))):
         raise ValueError('a pose with a coordinate that is not finite: expected finite numbers')
-    if max(abs(at.x), abs(at.y)) > FARTHEST:
-        raise ValueError(
-            f'a pose at ({at.x:g}, {at.y:g}) m: expected at most {FARTHEST:g} m from the origin'
-        )
+    if max(abs(x), abs(y)) > FARTHEST:
+        raise ValueError(f'a pose at ({x:g}, {y:g}) m: expected at most {FARTHEST:g} m from the origin')
     # Yaw of a quaternion in Z-Y-X order; exact for any tilt that is not straight up.
-    yaw = math.atan2(2 * (q.w * q.z + q.x * q.y), 1 - 2 * (q.y * q.y + q.z * q.z))
-    return at.x, at.y, yaw
+    qx, qy, qz, qw = turn
+    return x, y, math.atan2(2 * (qw * qz + qx * qy), 1 - 2 * (qy * qy + qz * qz))
 
 
 def pose_message(pose: PlanarPose) -> Pose:

@@ -27,6 +27,7 @@ from surveillance_runtime.parameters import ParameterError
 from surveillance_runtime.place import PlaceError
 from surveillance_runtime.process import run_node
 from surveillance_runtime.qos import STATE_QOS
+from surveillance_runtime.serialized import stamp_of_serialized
 from surveillance_runtime.state_file import StateFile
 from surveillance_simulation import conversions
 from surveillance_simulation.clock_rate import DRIVING, PLANNING, ClockRate, ClockRateModel
@@ -105,7 +106,7 @@ class Simulator(PatrolNode):
         self._unmonitored = self.create_subscription(Twist, 'cmd_vel', self._obey, 1)
         self.create_subscription(Twist, 'cmd_vel_monitored', self._on_monitored, 1)
         self.create_subscription(
-            PoseWithCovarianceStamped, 'amcl_pose', self._on_estimate, STATE_QOS
+            PoseWithCovarianceStamped, 'amcl_pose', self._on_estimate, STATE_QOS, raw=True
         )
         self.create_subscription(Time, 'mission_waits_until', self._on_mission_waits, STATE_QOS)
         self.create_subscription(RobotPlace, 'robot_place', self._on_place, STATE_QOS)
@@ -197,10 +198,9 @@ class Simulator(PatrolNode):
             self._rate.command(self.robot.base.is_moving, self.robot.time)
         self._go_on()
 
-    def _on_estimate(self, message: PoseWithCovarianceStamped) -> None:
+    def _on_estimate(self, serialized: bytes) -> None:
         if self._drives_clock:
-            measured = seconds_of(message.header.stamp)
-            self._rate.estimate(measured)
+            self._rate.estimate(stamp_of_serialized(serialized))
             self._go_on()
 
     def _on_mission_waits(self, message: Time) -> None:

@@ -30,6 +30,7 @@ from surveillance_runtime.conversions import cloud_from_points, pose_estimate, p
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
 from surveillance_runtime.robot_base import ROBOT_DECELERATION
+from surveillance_runtime.serialized import pose_of_serialized
 
 POSE_PERIOD = 0.19
 """Least time between two messages on amcl_pose, seconds: with every second scan at 10 Hz."""
@@ -78,7 +79,7 @@ class RobotBase:
         self._mount = mount
         node.create_subscription(OccupancyGrid, 'map', self._on_map, STATE_QOS)
         node.create_subscription(DoorStates, 'door_states', self._on_doors, STATE_QOS)
-        node.create_subscription(Odometry, 'odom', self._on_odometry, SENSOR_QOS)
+        node.create_subscription(Odometry, 'odom', self._on_odometry, SENSOR_QOS, raw=True)
         node.create_subscription(LaserScan, 'scan', self._on_scan, SENSOR_QOS)
         node.create_subscription(PoseWithCovarianceStamped, 'initialpose', self._on_initial_pose, 1)
 
@@ -208,9 +209,9 @@ class RobotBase:
         with self._lock:
             self._navigator.set_closed(message.closed)
 
-    def _on_odometry(self, message: Odometry) -> None:
+    def _on_odometry(self, serialized: bytes) -> None:
         with conversions.refusing(self._node, 'odom'):
-            pose = pose_from(message.pose.pose)
+            pose = pose_of_serialized(serialized, texts=1)
             with self._lock:
                 self._base.hear('odom')
                 self._navigator.move(pose)

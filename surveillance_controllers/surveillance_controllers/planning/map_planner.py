@@ -26,9 +26,10 @@ from surveillance_controllers.planning.grid_planning import (
 )
 from surveillance_fsm import Interrupt
 from surveillance_fsm.ros import GoalAbortedError, GoalRun
-from surveillance_runtime.conversions import points_from_cloud, pose_from, values_from_cloud
+from surveillance_runtime.conversions import points_from_cloud, values_from_cloud
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.qos import STATE_QOS
+from surveillance_runtime.serialized import pose_of_serialized
 
 
 class NavigationPlanning:
@@ -56,7 +57,9 @@ class NavigationPlanning:
         self._pose: Pose | None = None
         node.create_subscription(OccupancyGrid, 'map', self._on_map, STATE_QOS)
         node.create_subscription(PointCloud2, 'obstacles', self._on_obstacles, STATE_QOS)
-        node.create_subscription(PoseWithCovarianceStamped, 'amcl_pose', self._on_pose, STATE_QOS)
+        node.create_subscription(
+            PoseWithCovarianceStamped, 'amcl_pose', self._on_pose, STATE_QOS, raw=True
+        )
 
     def start(self, target: str, run: GoalRun) -> Points:
         """Return where the robot is, shape (3,), once there is a route over doors from there to a
@@ -118,9 +121,9 @@ class NavigationPlanning:
             stays = values_from_cloud(message, 'stays')
             self._obstacles = points_from_cloud(message), None if stays is None else stays > 0
 
-    def _on_pose(self, message: PoseWithCovarianceStamped) -> None:
+    def _on_pose(self, serialized: bytes) -> None:
         with conversions.refusing(self._node, 'amcl_pose'):
-            self._pose = pose_from(message.pose.pose)
+            self._pose = pose_of_serialized(serialized)
 
 
 def route(
