@@ -114,6 +114,7 @@ class ClockRate:
     Attributes:
         is_waiting: Whether time stood still, when last asked, until a program answers.
         awaits_picture: Whether that is one that reads a picture, or sees that the arm rests.
+        pause: At full speed, real seconds from the last `due` until the next step may be due.
     """
 
     def __init__(self, model: ClockRateModel, steady: float) -> None:
@@ -121,6 +122,7 @@ class ClockRate:
         self._model = model
         self._last = steady
         self._owed = 0.0
+        self.pause: float | None = None
         self._commands = Answers(model.window, model.patience)
         self._estimates = Answers(model.estimate_window, model.patience)
         self._looks = Answers(model.look_window, model.patience)
@@ -253,7 +255,10 @@ class ClockRate:
         else:
             # What a busy machine falls behind is caught up with, but not without bound.
             self._owed = min(self._owed + elapsed * model.speed, max(LONGEST_DEBT, step))
-        if self._owed < step - 1e-9:
-            return 0.0
-        self._owed -= step
-        return step
+        passed = 0.0
+        if self._owed >= step - 1e-9:
+            self._owed -= step
+            passed = step
+        if model.speed == 0.0:
+            self.pause = max(step - self._owed, MIN_STEP) / model.ceiling
+        return passed

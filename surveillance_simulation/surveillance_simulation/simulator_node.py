@@ -142,6 +142,9 @@ class Simulator(PatrolNode):
             if self._rate.waits(self.robot.time, time.monotonic()):
                 # The answer wakes it: useless ticks would take the time that the answer needs.
                 self._timer.cancel()
+            elif self._rate.pause is not None:
+                self._timer.timer_period_ns = round(1e9 * self._rate.pause)
+                self._timer.reset()
         if measure:
             self._sensors.publish(self._stamp())
             self._camera.tick()

@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Iterable
-from statistics import fmean
 
 STANDSTILL = 0.3
 """The robot stands this long after the first message that did not come, seconds."""
@@ -45,7 +44,7 @@ class SensorAge:
         if before <= now <= before + LONGEST_PERIOD + self._standstill:
             intervals.append(now - before)
         self._heard[topic] = now, intervals
-        self._stands_at[topic] = now + min(fmean(intervals), LONGEST_PERIOD) + self._standstill
+        self._stands_at[topic] = now + min(sum(intervals) / len(intervals), LONGEST_PERIOD) + self._standstill
 
     def left(self, now: float) -> tuple[float, str]:
         """Return the seconds within which the robot must stand, and the topic they are due to.
