@@ -111,7 +111,7 @@ def scan_from(message: LaserScan, mount: Pose = (0.0, 0.0, 0.0)) -> Scan:
     """Return a turn of a lidar; rays that are out of its range or not a number met nothing.
 
     Args:
-        message: The scan.
+        message: The scan; of a lidar that turns clockwise, its rays come back the other way round.
         mount: Where the lidar sits on the robot, robot's frame.
 
     Raises:
@@ -138,7 +138,8 @@ def scan_from(message: LaserScan, mount: Pose = (0.0, 0.0, 0.0)) -> Scan:
     angles = first + step * np.arange(count)
     # The lidar gives what is nearer than it can measure as its least range, or below it.
     good = (ranges > 0) & (ranges < reach)
-    return Scan(angles, np.where(good, ranges, np.inf), reach, mount)
+    ranges = np.where(good, ranges, np.inf)
+    return Scan(*((angles, ranges) if step >= 0 else (angles[::-1], ranges[::-1])), reach, mount)
 
 
 def planar_from(transform: Transform) -> Pose:

@@ -82,7 +82,9 @@ def planar_pose(x: float, y: float, turn: Sequence[float]) -> PlanarPose:
     if not all(map(math.isfinite, (x, y, *turn))):
         raise ValueError('a pose with a coordinate that is not finite: expected finite numbers')
     if max(abs(x), abs(y)) > FARTHEST:
-        raise ValueError(f'a pose at ({x:g}, {y:g}) m: expected at most {FARTHEST:g} m from the origin')
+        raise ValueError(
+            f'a pose at ({x:g}, {y:g}) m: expected at most {FARTHEST:g} m from the origin'
+        )
     # Yaw of a quaternion in Z-Y-X order; exact for any tilt that is not straight up.
     qx, qy, qz, qw = turn
     return x, y, math.atan2(2 * (qw * qz + qx * qy), 1 - 2 * (qy * qy + qz * qz))
@@ -140,6 +142,9 @@ def map_from(
     return cells.reshape(info.height, info.width), float(info.resolution), (x, y)
 
 
+_FLOATS = {PointField.FLOAT32: 'f4', PointField.FLOAT64: 'f8'}
+
+
 def cloud_from_points(
     points: NDArray[np.float64], **values: NDArray[np.float64] | NDArray[np.bool_]
 ) -> PointCloud2:
@@ -152,6 +157,9 @@ def cloud_from_points(
     message = PointCloud2()
     message.header.frame_id = 'map'
     message.height, message.width = 1, len(points)
+    # What a float of 32 bits leaves of a coordinate is up to 1 m in UTM.
+    near = points.astype(np.float32)
+    values = {'x_rest': points[:, 0] - near[:, 0], 'y_rest': points[:, 1] - near[:, 1], **values}
     names = ('x', 'y', 'z', *values)
     message.fields = [
         PointField(name=name, offset=4 * index, datatype=PointField.FLOAT32, count=1)
@@ -161,7 +169,7 @@ def cloud_from_points(
     message.is_dense = True
     heights = np.zeros(len(points))
     message.data.frombytes(
-        np.column_stack([points, heights, *values.values()]).astype('<f4').tobytes()
+        np.column_stack([near, heights, *values.values()]).astype('<f4').tobytes()
     )
     return message
 
@@ -170,26 +178,30 @@ def points_from_cloud(message: PointCloud2) -> NDArray[np.float64]:
     """Return the x and y of a cloud's points, shape (n, 2), metres.
 
     Raises:
-        ValueError: The cloud has no x and y of 32 bits.
+        ValueError: The cloud has no x and y.
     """
     x, y = (values_from_cloud(message, name) for name in 'xy')
     if x is None or y is None:
-        raise ValueError('a cloud without x and y: expected fields of type FLOAT32')
-    return np.stack([x, y], axis=1)
+        raise ValueError('a cloud without x and y: expected fields of type FLOAT32 or FLOAT64')
+    points = np.stack([x, y], axis=1)
+    for column, name in enumerate(('x_rest', 'y_rest')):
+        rest = values_from_cloud(message, name)
+        points[:, column] += 0.0 if rest is None else rest
+    return points
 
 
 def values_from_cloud(message: PointCloud2, name: str) -> NDArray[np.float64] | None:
-    """Return one field of a cloud's points, shape (n,); None: it has no such field of 32 bits.
+    """Return one field of a cloud's points, shape (n,); None: it has no such field of floats.
 
     Raises:
         ValueError: The cloud is not as long as it says.
     """
     for field in message.fields:
-        if field.name == name and field.datatype == PointField.FLOAT32:
+        if field.name == name and field.datatype in _FLOATS:
             kind = np.dtype(
                 {
                     'names': [name],
-                    'formats': ['>f4' if message.is_bigendian else '<f4'],
+                    'formats': ['<>'[message.is_bigendian] + _FLOATS[field.datatype]],
                     'offsets': [field.offset],
                     'itemsize': message.point_step,
                 }

@@ -11,7 +11,7 @@ from geometry_msgs.msg import Quaternion, Transform, Vector3
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from nav_msgs.msg import OccupancyGrid
-from sensor_msgs.msg import BatteryState, LaserScan, PointCloud2
+from sensor_msgs.msg import BatteryState, LaserScan, PointCloud2, PointField
 from std_msgs.msg import Header
 
 from surveillance_controllers import conversions
@@ -66,6 +66,21 @@ def test_clouds_come_back(points: list[tuple[float, float]]) -> None:
     assert values_from_cloud(cloud, 'intensity') is None
 
 
+def test_a_cloud_is_exact_in_coordinates_of_utm() -> None:
+    points = np.array([[499_999.137, 9_999_999.061], [-3.2, 1e7 + 0.07]])
+    assert np.abs(points_from_cloud(cloud_from_points(points)) - points).max() < 1e-6
+
+
+def test_a_cloud_of_doubles_is_read() -> None:
+    cloud = PointCloud2(width=1, height=1, point_step=16)
+    cloud.fields = [
+        PointField(name=name, offset=8 * index, datatype=PointField.FLOAT64, count=1)
+        for index, name in enumerate('xy')
+    ]
+    cloud.data.frombytes(np.array([9_999_999.061, 0.1]).tobytes())
+    assert points_from_cloud(cloud).tolist() == [[9_999_999.061, 0.1]]
+
+
 def test_a_cloud_without_coordinates_is_refused() -> None:
     with pytest.raises(ValueError, match='a cloud without x and y'):
         points_from_cloud(PointCloud2(width=1, height=1, point_step=4))
@@ -107,6 +122,13 @@ def test_a_scan_keeps_what_was_met_and_makes_the_rest_infinite() -> None:
     assert scan.ranges[0] == 0.5
     assert np.isinf(scan.ranges[1:]).all()
     assert scan.points == pytest.approx(np.array([[0.5 * math.cos(-1), 0.5 * math.sin(-1)]]))
+
+
+def test_a_lidar_that_turns_clockwise_is_read_the_other_way_round() -> None:
+    message = LaserScan(angle_min=1.0, angle_increment=-0.5, range_max=8.0, ranges=[1.0, 2.0, 3.0])
+    scan = conversions.scan_from(message)
+    assert scan.angles == pytest.approx([0.0, 0.5, 1.0])
+    assert scan.ranges.tolist() == [3.0, 2.0, 1.0]
 
 
 def test_a_velocity_is_a_twist() -> None:

@@ -106,6 +106,16 @@ def test_nav2_is_led_along_the_path(graph: Any, servers: Servers, run: Any) -> N
     assert tuple(end) == (2.9, 3.9, 0)
 
 
+def test_a_path_around_the_world_is_led_through_a_bounded_number_of_poses(
+    graph: Any, servers: Servers, run: Any
+) -> None:
+    far = np.array([[0.0, 0.0, 0.0], [2e7, 0.0, 0.0]])
+    nav2(graph).follow(far, run, lambda _: None)
+    poses = servers.asked[-1][1].poses
+    assert len(poses) == nav2_motion.MOST_POSES
+    assert poses[-1].pose.position.x == 2e7
+
+
 def test_a_goal_that_was_cancelled_is_no_failure(graph: Any, servers: Servers, run: Any) -> None:
     servers.feedback = [at(1, 0)]
     servers.ends['navigate_through_poses'] = CallInterruptedError('interrupted')

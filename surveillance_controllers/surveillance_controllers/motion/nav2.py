@@ -17,7 +17,7 @@ from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped
 
 from surveillance_controllers import conversions
 from surveillance_controllers.controller_parameters import MotionSettings
-from surveillance_controllers.geometry import Points, equally_spaced, point_of
+from surveillance_controllers.geometry import Points, equally_spaced, length, point_of
 from surveillance_controllers.map_knowledge import MapKnowledge
 from surveillance_controllers.motion.arrival import MotionFailedError, place_reached
 from surveillance_controllers.motion.place_recording import PlaceRecorder
@@ -29,6 +29,8 @@ from surveillance_runtime.qos import STATE_QOS
 
 SPACING = 1.5
 """The largest distance of the poses that Nav2 is led through, metres."""
+MOST_POSES = 10_000
+"""A path that would need more poses is led through poses farther apart."""
 TRACK_PERIOD = 0.5
 """Least time between two looks at the place that the robot passes, seconds."""
 
@@ -113,7 +115,7 @@ class Nav2Motion:
 
     def _poses(self, path: Points) -> list[PoseStamped]:
         """Return the poses behind the start, each facing along the path."""
-        points = equally_spaced(path, SPACING)
+        points = equally_spaced(path, max(SPACING, length(path) / MOST_POSES))
         if len(points) == 1:
             points = np.vstack([path[-1], path[-1]])
         stamp = self._node.get_clock().now().to_msg()

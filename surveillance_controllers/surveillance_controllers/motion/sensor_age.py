@@ -44,7 +44,9 @@ class SensorAge:
         if before <= now <= before + LONGEST_PERIOD + self._standstill:
             intervals.append(now - before)
         self._heard[topic] = now, intervals
-        self._stands_at[topic] = now + min(sum(intervals) / len(intervals), LONGEST_PERIOD) + self._standstill
+        self._stands_at[topic] = (
+            now + min(sum(intervals) / len(intervals), LONGEST_PERIOD) + self._standstill
+        )
 
     def left(self, now: float) -> tuple[float, str]:
         """Return the seconds within which the robot must stand, and the topic they are due to.
