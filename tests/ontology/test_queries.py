@@ -43,6 +43,10 @@ def test_explanations(ask: Ask) -> None:
     assert 'asserted' in tree
     refused = ask('QUERY EXPLAIN', 'URGENT(R4)')
     assert (refused.success, refused.exit_code) == (False, 0)
+    mistyped = ask('QUERY EXPLAIN', 'URGENTT(Rr)').error_description
+    assert 'no class' in mistyped
+    assert 'URGENT>)' in mistyped
+    assert 'no individual' in mistyped
     sentence, *missing = ask('QUERY EXPLAIN ABSENCE', 'URGENT(R4)').queried_objects
     assert sentence.startswith('R4 is URGENT would follow from the rule')
     assert missing

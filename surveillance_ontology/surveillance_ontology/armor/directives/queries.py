@@ -40,6 +40,7 @@ from surveillance_ontology.owl.axioms import (
     ObjectPropertyAssertion,
     SameIndividual,
 )
+from surveillance_ontology.owl.entities import entities_of
 from surveillance_ontology.owl.expressions import (
     ClassExpression,
     DataHasValue,
@@ -173,10 +174,14 @@ def _object_properties(ref: Reference, ind: str) -> DirectiveResponse:
 )
 def _explain(_: Session, ref: Reference, fact: str) -> DirectiveResponse:
     with ref.held() as kb:
-        explanation = kb.explain(_full_fact(ref, fact))
+        asked = _full_fact(ref, fact)
+        explanation = kb.explain(asked)
+        unknown = _unknown(ref, *entities_of(asked)) if explanation is None else ''
     if explanation is None:
+        reason = f': {unknown}' if unknown else ''
         return DirectiveResponse(
-            success=False, error_description=f'{fact} is neither asserted nor derived in {ref.name}'
+            success=False,
+            error_description=f'{fact} is neither asserted nor derived in {ref.name}{reason}',
         )
     return DirectiveResponse(queried_objects=[explanation.sentence(), explanation.tree()])
 
