@@ -20,11 +20,11 @@ def nearest(name: str, known: Iterable[str]) -> str:
 
     Returns:
         The nearest name, in quotes, where one is like it, whatever the case of its letters, or
-        has it as one of its words; else the names, at most sixteen of them.
+        has it as one of its words, and the only name; else the names, at most sixteen of them.
     """
     names = list(dict.fromkeys(known))
     likest = max(names, key=lambda each: _likeness(name, each), default='')
-    if _likeness(name, likest) >= _ALIKE:
+    if len(names) == 1 or _likeness(name, likest) >= _ALIKE:
         return f"'{likest}'"
     more = f' and {len(names) - _MOST} more' if len(names) > _MOST else ''
     return f'one of {", ".join(names[:_MOST])}{more}'

@@ -68,7 +68,7 @@ def test_end_of_input_leaves_the_node_at_work(graph: Any, operator: Any) -> None
     graph.until(lambda: values(levels)[-1:] == [33])
     answer = caller.call(ConsoleCommand.Request(line='move 1 2'), 60.0)
     assert not answer.accepted
-    assert answer.answer.startswith("'move' is no command: expected 'battery'")
+    assert answer.answer.startswith("'move' is no command: expected one of battery, ")
 
 
 def test_exit_ends_the_node_without_a_failure(graph: Any, operator: Any) -> None:

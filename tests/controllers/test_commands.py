@@ -47,13 +47,13 @@ def test_good_lines(line: str, parsed: ParsedCommand | None) -> None:
 @pytest.mark.parametrize(
     ('line', 'text'),
     [
+        ('batery set 1', "'batery' is no command: expected 'battery'"),
         (
-            'batery set 1',
-            "'batery' is no command: "
-            "expected 'battery', 'plan', 'move', 'help', 'status' or 'exit'",
+            'fly 1',
+            "'fly' is no command: expected one of battery, plan, move, help, status, exit",
         ),
         ('battery', "the line ends after 'battery': expected 'set' or 'offset'"),
-        ('battery put 3', "'put' after 'battery' is no command: expected 'set' or 'offset'"),
+        ('battery put 3', "'put' after 'battery' is no command: expected one of set, offset"),
         ('battery set', 'battery set: VALUE is missing: expected a whole number from 0 to 100'),
         ('battery set 101', "battery set: VALUE is '101': expected a whole number from 0 to 100"),
         ('battery set 5.5', "battery set: VALUE is '5.5': expected a whole number from 0 to 100"),

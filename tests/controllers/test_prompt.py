@@ -123,7 +123,7 @@ def test_one_console_addresses_every_controller(graph: Any, operator: Any, capfd
     assert (
         'motion_controller does not answer: service motion_controller/command: no server' in shown
     )
-    assert "'jump' is no command: expected 'battery', " in shown
+    assert "'jump' is no command: expected one of battery, " in shown
 
 
 def test_a_request_is_announced_once_with_its_controller_before_each_line(

@@ -126,7 +126,7 @@ def test_all_nodes_in_one_process(launch, clock):
 def test_one_console_serves_the_three_controllers(launch, clock):
     mission = launch('--mode', 'MANUAL')
     mission.write('fly')
-    mission.until(r"console +\| 'fly' is no command: expected 'battery', 'plan', ")
+    mission.until(r"console +\| 'fly' is no command: expected one of battery, plan, ")
     mission.until(r'planner_controller +\| New request')
     mission.write('plan set [[6, 9, 0], oops]')
     mission.until(r"console +\| plan set: .*'oops'")

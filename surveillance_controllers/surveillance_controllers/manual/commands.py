@@ -18,6 +18,7 @@ from dataclasses import dataclass
 
 from surveillance_controllers import geometry
 from surveillance_controllers.geometry import Points
+from surveillance_runtime.suggestions import nearest
 
 Point3 = tuple[float, float, float]
 """x, y, z in metres, world frame."""
@@ -95,7 +96,7 @@ def number(name: str, low: float, high: float, unit: str) -> Argument:
             raise ValueError
         return value
 
-    return Argument(name, f'a number from {low:g} to {high:g} ({unit})', read)
+    return Argument(name, f'a number from {low:.10g} to {high:.10g} ({unit})', read)
 
 
 def points(name: str) -> Argument:
@@ -214,13 +215,13 @@ class Grammar:
                 if len(command.words) > depth and command.words[depth] == given
             )
             if not fitting:
-                expected = _alternatives(
-                    [c.words[depth] for c in candidates if len(c.words) > depth]
-                )
+                words_here = [c.words[depth] for c in candidates if len(c.words) > depth]
                 before = ' '.join(words[:depth])
                 where = f' after {before!r}' if before else ''
                 if not given:
+                    expected = _alternatives(words_here)
                     raise CommandError(f'the line ends{where}: expected {expected}')
+                expected = nearest(given, words_here)
                 raise CommandError(
                     f'{_shown(words[depth])}{where} is no command: expected {expected}'
                 )
