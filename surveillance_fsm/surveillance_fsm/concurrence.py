@@ -8,7 +8,6 @@ thread watches. `Concurrence` is the container.
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Iterable, Mapping
-from functools import partial
 from typing import Any, Unpack
 
 from surveillance_fsm import log
@@ -30,9 +29,9 @@ from surveillance_fsm.execution import (
     Node,
     SpecialStep,
 )
-from surveillance_fsm.frame import Frame, History, Move, answer_of
+from surveillance_fsm.frame import Answer, Frame, History, Move, answer_of
 from surveillance_fsm.state import State, this_thread
-from surveillance_fsm.timeouts import LimitOptions, supervise
+from surveillance_fsm.timeouts import LimitOptions, leave_behind, supervise
 from surveillance_fsm.userdata import raw
 
 Outcomes = dict[str, str | None]
@@ -43,25 +42,83 @@ ENDED = Exit('')
 """Where every outcome of a concurrence's state leads: it has ended."""
 
 
-class _ChildThread(ExecutionThread):
-    """The logical thread of one state of a concurrence.
+class ChildFrame(Frame):
+    """One execution of one state of a concurrence, on a logical thread of its own.
 
     Attributes:
-        stopped: The state was asked to stop for good.
-        preempted: That was because of a preempt of the concurrence.
-        making_way: The state was asked to make way for an interrupt.
-        served: The state has ended, and acknowledged that it was to stop.
+        node: The state's node.
+        unneeded: The concurrence itself asked it to stop, because another one had ended.
+        served: It has ended, and acknowledged a preempt.
     """
 
-    stopped = False
-    preempted = False
-    making_way = False
+    container: Concurrence
+    unneeded = False
     served = False
+    carried_over = (*Frame.carried_over, 'unneeded')
+
+    def __init__(self, within: ConcurrentFrame, node: Node, thread: ExecutionThread) -> None:
+        super().__init__(within.container, thread, within.path, node, None)
+        self.node = node
+        self._within = within
+
+    def successor(self) -> ChildFrame:
+        """Return a copy for the thread that takes this execution over."""
+        frame = self.handed_over(ChildFrame(self._within, self.node, self.thread))
+        self._within.replace_child(frame)
+        return frame
+
+    def execute(self, history: History | None = None) -> Any:
+        """Execute the state; its outcome."""
+        node, stack = self.node, self.thread.stack
+        try:
+            outcome = node.execute(node.view)
+            node.target(outcome)
+            return outcome
+        except SmachError:
+            raise
+        except Exception as error:
+            raise node.user_fault(error) from error
+        finally:
+            if stack and stack[-1] is self:
+                stack.pop()
+
+    def run_on(self, outcome: Any) -> Any:
+        """Take `outcome` for that of the state."""
+        return self.settled(outcome)
+
+    def answer(self) -> Answer:
+        """Tell what the state's end answers, and take back what it did not acknowledge."""
+        node = self.node
+        answer = answer_of(
+            node.state,
+            self.thread.outcome,
+            preempted=self.unneeded or self.preempted is node,
+            cut=self.cut is node,
+            gone=self.gone is node,
+        )
+        self.served = answer.served and self.preempted is node
+        return answer
+
+    # What others want; under the run's condition.
 
     @property
     def wanted(self) -> bool:
         """Whether somebody wants the state to end."""
-        return self.stopped or self.making_way or super().wanted
+        return self.unneeded or super().wanted
+
+    def stop(self) -> None:
+        """Ask the state to stop: another one has ended."""
+        if not self.thread.done:
+            self.unneeded = True
+            self.thread.asked()
+            self.node.state.request_preempt()
+
+    def hold(self) -> None:
+        """Leave the concurrence to its own frame."""
+
+    def abandoned(self, *, for_good: bool) -> None:
+        """Note that the machine went on without the thread; the concurrence may go on."""
+        self.stale = self.attention = True
 
 
 class _AllStates(State):
@@ -124,8 +181,8 @@ class ConcurrentFrame(Frame):
         super().__init__(container, thread, path, current, parent_ud)
         self.outcomes: Outcomes = dict.fromkeys(container.fsm_states)
         self._wakeup = Interrupt()
-        # Those of all states that were started, by label; most have ended.
-        self._threads: dict[str, _ChildThread] = {}
+        # Of all states that were started, by label; most have ended.
+        self._children: dict[str, ChildFrame] = {}
         # What an execution that was left behind, or broke off, was asked is not for this one.
         container.fsm_first().state.recall_preempt()
 
@@ -149,8 +206,12 @@ class ConcurrentFrame(Frame):
         """Tell whether it watches threads of its own at present, which have bounds of their own."""
         return self.current is self.container.fsm_first()
 
-    def woken(self) -> None:
-        """Wake the thread that waits for the states: it was left behind."""
+    def abandoned(self, *, for_good: bool) -> None:
+        """Note that the machine went on without the thread; it goes on without the states, too."""
+        super().abandoned(for_good=for_good)
+        for child in self._children.values():
+            if not child.thread.done:
+                leave_behind(child.thread)
         self._wakeup.set()
 
     def run_states(self) -> Any:
@@ -187,42 +248,50 @@ class ConcurrentFrame(Frame):
     def _served_preempt(self, *, preempted: bool) -> bool:
         """Take back the requests that were not acknowledged; whether a state acknowledged one."""
         ignored = []
-        for label, thread in self._threads.items():
-            state = self.container.fsm_states[label]
+        for label, child in self._children.items():
+            state = child.node.state
             # A state that was left behind keeps the request, so that it ends some time.
-            if state.preempt_requested() and not thread.without_leaf:
+            pending = state.preempt_requested() and child.gone is None
+            if pending:
                 state.recall_preempt()
-                ignored.append(label)
-            elif thread.preempted and not thread.served:
+            if pending or (child.preempted is not None and not child.served):
                 ignored.append(label)
         if preempted and ignored:
             log.logwarn(f"'{self.path}': {ignored} did not acknowledge the preempt")
-        return any(thread.preempted and thread.served for thread in self._threads.values())
+        return any(child.served for child in self._children.values())
 
     # The states.
 
-    def _start_states(self) -> dict[str, _ChildThread]:
-        """Start those that have not ended, each on a thread of its own; return those threads."""
-        run, table = self.run, self.container.fsm_table
+    def _start_states(self) -> dict[str, ChildFrame]:
+        """Start those that have not ended, each on a thread of its own.
+
+        Raises:
+            LeftBehindError: The machine went on without the concurrence.
+        """
+        run, container = self.run, self.container
         with run.condition:
             started = {
-                label: _ChildThread(run, table[label].path, self._wakeup, leaf=table[label])
-                for label, end in self.outcomes.items()
-                if end is None
+                label: ChildFrame(self, node, ExecutionThread(run, node.path, self._wakeup))
+                for label, node in container.fsm_table.items()
+                if label in self.outcomes and self.outcomes[label] is None
             }
-            self._threads |= started
-        self.container.call_transition_cbs()
-        for label, thread in started.items():
-            thread.start(partial(_execute, table[label]))
+            for child in started.values():
+                child.thread.stack.append(child)
+            self._children |= started
+        container.call_transition_cbs()
         with run.condition:
+            if self.stale:
+                raise LeftBehindError
+            for child in started.values():
+                child.thread.start(child.execute)
             # What was asked before there was anybody to ask.
-            if self.container.fsm_first().state.preempt_requested():
+            if container.fsm_first().state.preempt_requested():
                 self.preempt_states()
             elif self.cut is not None:
                 self.cut_states()
         return started
 
-    def _await_states(self, running: dict[str, _ChildThread]) -> BaseException | None:
+    def _await_states(self, running: dict[str, ChildFrame]) -> BaseException | None:
         """Watch threads until their states have ended or made way.
 
         Returns:
@@ -233,57 +302,51 @@ class ConcurrentFrame(Frame):
         """
         first_error: BaseException | None = None
         while running:
-            supervise(self.run, list(running.values()), self._wakeup)
+            supervise(self.run, [child.thread for child in running.values()], self._wakeup)
             if self.stale:
-                self._stop(running.values())
-                for thread in running.values():
-                    thread.disown()
                 raise LeftBehindError
-            for label in [label for label, thread in running.items() if thread.done]:
-                thread = running.pop(label)
-                if thread.error is not None:
-                    first_error = first_error or thread.error
-                    self._stop(running.values())
+            for label in [label for label, child in running.items() if child.thread.done]:
+                error = running.pop(label).thread.error
+                if error is not None:
+                    first_error = first_error or error
+                    self._stop(running)
                     continue
                 with self.run.condition:
-                    ended = self._note_end(label, thread)
+                    ended = self._note_end(label)
                 if ended is not None:
                     self._tell_end(label, ended)
                 if first_error is None:
                     first_error = self._stop_others(running)
         return first_error
 
-    def _stop_others(self, running: Mapping[str, _ChildThread]) -> SmachError | None:
+    def _stop_others(self, running: Iterable[str]) -> SmachError | None:
         """Stop the states that are to stop now that one has ended; the error of deciding that."""
         error = None
         try:
             stop: Iterable[str] = self.container.fsm_states_to_stop(self.outcomes)
         except SmachError as raised:
-            error, stop = raised, list(running)
-        self._stop([running[label] for label in stop if label in running])
+            error, stop = raised, running
+        self._stop([label for label in stop if label in running])
         return error
 
-    def _note_end(self, label: str, thread: _ChildThread) -> str | None:
+    def _stop(self, labels: Iterable[str]) -> None:
+        with self.run.condition:
+            for label in labels:
+                self._children[label].stop()
+
+    def _note_end(self, label: str) -> str | None:
         """Note what a state ended with; None when it only made way."""
-        node, outcome = self.container.fsm_table[label], thread.outcome
-        if thread.forced is not None:
+        child = self._children[label]
+        node, outcome = child.node, child.thread.outcome
+        if child.forced is not None:
             # A preempt that it was asked for, too, is not served by that.
-            outcome = thread.forced[1]
+            outcome = child.forced[1]
             node.state.fsm_forget()
-            if not thread.without_leaf:
+            if child.gone is None:
                 node.state.recall_preempt()
-        else:
-            answer = answer_of(
-                node.state,
-                outcome,
-                preempted=thread.stopped,
-                cut=thread.making_way,
-                gone=thread.without_leaf,
-            )
-            thread.served = answer.served
-            if answer.made_way:
-                node.release()
-                return None
+        elif child.answer().made_way:
+            node.release()
+            return None
         node.state.fsm_progress = None
         self.outcomes[label] = outcome
         node.release()
@@ -309,27 +372,21 @@ class ConcurrentFrame(Frame):
 
     # What others want of the states; under the run's condition.
 
+    def replace_child(self, child: ChildFrame) -> None:
+        """Take note of the frame that goes on with a state."""
+        self._children[child.node.label] = child
+
     def preempt_states(self) -> None:
         """Ask those that run to stop, each once: again could come after it served the first."""
-        asked = [thread for thread in self._threads.values() if not thread.preempted]
-        self._stop(asked)
-        for thread in asked:
-            thread.preempted = not thread.done
+        for child in self._children.values():
+            if not child.thread.done:
+                child.preempt()
 
     def cut_states(self) -> None:
         """Ask those that run to make way."""
-        for thread in self._threads.values():
-            if not thread.done and thread.leaf is not None:
-                thread.making_way = True
-                thread.asked()
-                thread.leaf.state.fsm_suspend()
-
-    def _stop(self, threads: Iterable[_ChildThread]) -> None:
-        for thread in threads:
-            if not thread.done and thread.leaf is not None:
-                thread.stopped = True
-                thread.asked()
-                thread.leaf.state.request_preempt()
+        for child in self._children.values():
+            if not child.thread.done:
+                child.cut_short()
 
 
 class Concurrence(Container):
@@ -538,15 +595,3 @@ class Concurrence(Container):
             for outcome, wanted in self.outcome_map.items()
             for label, child_outcome in wanted.items()
         ]
-
-
-def _execute(node: Node) -> Any:
-    """Execute a state on a thread of its own; its outcome."""
-    try:
-        outcome = node.execute(node.view)
-    except SmachError:
-        raise
-    except Exception as error:
-        raise node.user_fault(error) from error
-    node.target(outcome)
-    return outcome

@@ -477,7 +477,7 @@ class Container(State):
         clock = self.fsm_clock
         if state.fsm_clock is not clock:
             state.fsm_clock = clock
-        if state.fsm_left is not None and state.fsm_left.is_going_on():
+        if state.fsm_left is not None:
             block_reentry(node, state.fsm_left)
         limits = node.limits = self.fsm_limits.get(label)
         if limits is not None:

@@ -160,20 +160,19 @@ class Control:
                 raise InvalidStateError(
                     f"State '{path}' is not active; the active ones are {sorted(active)}"
                 )
-            place, node = active[path]
+            frame, node = active[path]
             if outcome not in node.state.get_registered_outcomes():
                 raise InvalidTransitionError(
                     f"State '{path}' cannot be forced to '{outcome}': its outcomes are "
                     f'{sorted(node.state.get_registered_outcomes())}'
                 )
-            if place.forced is not None and place.forced[0] is not node:
+            if frame.forced is not None and frame.forced[0] is not node:
                 raise InvalidStateError(
-                    f"State '{path}' cannot be forced yet: '{place.forced[0].label}' has not ended "
-                    f"with '{place.forced[1]}', as it was forced to"
+                    f"State '{path}' cannot be forced yet: '{frame.forced[0].label}' has not ended "
+                    f"with '{frame.forced[1]}', as it was forced to"
                 )
-            place.forced = (node, outcome)
-            thread = place if isinstance(place, ExecutionThread) else place.thread
-            thread.asked()
+            frame.forced = (node, outcome)
+            frame.thread.asked()
             node.state.request_preempt()
 
     def active_paths(self) -> list[str]:
@@ -181,12 +180,10 @@ class Control:
         with self.condition:
             return list(self._active())
 
-    def _active(self) -> dict[str, tuple[Frame | ExecutionThread, Node]]:
-        """Return the active states by path: where an outcome is forced, and their nodes."""
-        active: dict[str, tuple[Frame | ExecutionThread, Node]] = {}
+    def _active(self) -> dict[str, tuple[Frame, Node]]:
+        """Return the active states by path: the frames they run in, and their nodes."""
+        active: dict[str, tuple[Frame, Node]] = {}
         for thread in self._threads():
-            if thread.leaf is not None:
-                active[thread.path] = thread, thread.leaf
             for frame in tuple(thread.stack):
                 node = frame.current
                 # All states of a concurrence together have no label.

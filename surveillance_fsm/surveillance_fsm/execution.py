@@ -153,7 +153,9 @@ class Node:
     def path(self) -> str:
         """The state's path from the root."""
         if self._path is None:
-            self._path = f'{self.container.get_name()}/{self.label}'
+            # That of all states of a concurrence together has no label.
+            name = self.container.get_name()
+            self._path = f'{name}/{self.label}' if self.label else name
         return self._path
 
     def __str__(self) -> str:
@@ -294,7 +296,7 @@ class Watch:
 
     Attributes:
         node: The state's node.
-        depth: Index in the thread's stack of the frame it runs in; -1 below a concurrence.
+        depth: Index in the thread's stack of the frame it runs in.
         soft: When the state is asked to stop, on the machine's clock; None when it was, or never.
         hard: When the machine goes on without it; None for never.
         asked: The state was asked to stop.
@@ -313,41 +315,35 @@ class ExecutionThread:
     Attributes:
         run: The execution it belongs to.
         path: Path of the state it was started for.
-        leaf: The node of a concurrence's child that it executes; None for a root.
         stack: Frames of the containers it is in, outermost first. A thread of the interpreter is
             the present one as long as this is the list that it began with.
         done: It has ended.
-        without_leaf: It ended because its own state, outside any container, was left behind.
         outcome: What it ended with.
         error: What it was ended by.
         wakeup: Raised when it has ended, or its limits have changed.
         watches: Limits at work, outermost first.
         asked_at: When the state that executes was asked to stop, steady time; None: it was not.
         work: What its present thread does.
-        forced: `leaf`, and the outcome to take in place of the one that it returns.
     """
 
-    def __init__(self, run: Run, path: str, wakeup: Interrupt, leaf: Node | None = None) -> None:
+    def __init__(self, run: Run, path: str, wakeup: Interrupt) -> None:
         self.run = run
         self.path = path
-        self.leaf = leaf
         self.wakeup = wakeup
         self.stack: list[Frame] = []
         self.watches: list[Watch] = []
         self.done = False
-        self.without_leaf = False
         self.outcome: Any = None
         self.error: BaseException | None = None
         self.asked_at: float | None = None
         self.work: Work | None = None
-        self.forced: tuple[Node, str] | None = None
         run.threads.append(self)
 
     # The side of the thread that executes.
 
     def executes_next(self, container: State, stack: list[Frame]) -> bool:
         """Tell whether `container` is what the engine executes next, not some user code."""
-        current = stack[-1].current if stack else self.leaf
+        current = stack[-1].current if stack else None
         return isinstance(current, Node) and current.state is container
 
     def path_inside(self) -> str:
@@ -372,28 +368,20 @@ class ExecutionThread:
             return body()
         finally:
             here.thread, here.stack = outer
-            self._retire()
+            self.retire()
 
     def end(self, outcome: Any, error: BaseException | None) -> None:
         """Note what it ended with; under the condition. `wakeup` is to be raised after."""
         self.outcome, self.error, self.done = outcome, error, True
         # The two refer to each other, which is left to no garbage collector.
         self.work = None
-        self._retire()
+        self.retire()
 
-    def _retire(self) -> None:
+    def retire(self) -> None:
+        """Take it from those that are at work."""
         with self.run.lock:
             if self in self.run.threads:
                 self.run.threads.remove(self)
-
-    def disown(self) -> None:
-        """Leave the present thread behind without a successor."""
-        with self.run.condition:
-            for frame in self.stack:
-                frame.stale = frame.attention = True
-                frame.container.fsm_frame = None
-            self.stack = []
-            self._retire()
 
     def check(self) -> None:
         """Raise `LeftBehindError` in a thread that is not the present one any more."""
@@ -413,11 +401,6 @@ class ExecutionThread:
             if self.run.sleeps_on_clock:
                 self.wakeup.set()
 
-    @property
-    def wanted(self) -> bool:
-        """Whether somebody wants `leaf` to end."""
-        return self.forced is not None
-
     def renew_request(self, node: Node) -> None:
         """Take the request of an earlier execution back from a state, but not a present one."""
         with self.run.condition:
@@ -428,10 +411,9 @@ class ExecutionThread:
     def still_gone(self, node: Node) -> None:
         """Note that a state could not be entered: an earlier execution of it has not ended."""
         with self.run.condition:
-            if self.stack:
-                self.stack[-1].gone, self.stack[-1].attention = node, True
-            else:
-                self.without_leaf = True
+            self.check()
+            frame = self.stack[-1]
+            frame.gone, frame.attention = node, True
 
     def heeded(self) -> None:
         """Note that the state that was asked to stop has returned."""

@@ -9,7 +9,7 @@ paused.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, TypeVar
 
 from surveillance_fsm import control, log
 from surveillance_fsm.exceptions import InvalidStateError, SmachError
@@ -69,6 +69,9 @@ class Move(NamedTuple):
     outcome: Any
     target: Node | Exit
     kind: str
+
+
+AnyFrame = TypeVar('AnyFrame', bound='Frame')
 
 
 class Answer(NamedTuple):
@@ -236,20 +239,33 @@ class Frame:
         """Take `outcome` for that of the current state, and run to the end; see `proceed`."""
         node = self.current
         assert isinstance(node, Node)
-        watch = watch_of(self)
-        if watch is not None:
-            end_watch(self.thread, watch)
-            outcome = settle(node, self, watch, outcome)
+        outcome = self.settled(outcome)
         self.current = target = node.target(outcome)
         node.release()
         return self._run_from(self._attend(node, outcome, target))
 
+    def settled(self, outcome: Any) -> Any:
+        """Return the current state's outcome, its limits taken into account and ended."""
+        watch = watch_of(self)
+        if watch is None:
+            return outcome
+        end_watch(self.thread, watch)
+        return settle(watch.node, self, watch, outcome)
+
     def successor(self) -> Frame:
         """Return a copy for the thread that takes this execution over."""
         frame = type(self)(self.container, self.thread, self.path, self.current, self.parent_ud)
+        return self.handed_over(frame)
+
+    def handed_over(self, frame: AnyFrame) -> AnyFrame:
+        """Give another frame what is asked of this one, and how far it is; return that."""
         for name in self.carried_over:
             setattr(frame, name, getattr(self, name))
         return frame
+
+    def hold(self) -> None:
+        """Be the execution of the container."""
+        self.container.fsm_frame = self
 
     def go_on_from(self, history: History) -> None:
         """Begin where the container was put aside.
@@ -314,8 +330,7 @@ class Frame:
             return SUSPENDED
         container.fsm_copy_output_keys(self.parent_ud)
         if target is SHUTDOWN:
-            is_root = self.thread.leaf is None and self.thread.stack[0] is self
-            return None if is_root else SUSPENDED
+            return None if self.thread.stack[0] is self else SUSPENDED
         return target.label
 
     # Between two states.
@@ -599,5 +614,13 @@ class Frame:
         """Tell whether it watches threads of its own at present, which have bounds of their own."""
         return False
 
-    def woken(self) -> None:
-        """Wake the thread that runs the frame, if it waits: it was left behind."""
+    def abandoned(self, *, for_good: bool) -> None:
+        """Note that the machine went on without the thread that runs this frame.
+
+        Args:
+            for_good: No other thread takes the execution over.
+        """
+        self.stale = self.attention = True
+        self.container.fsm_frame = None
+        if for_good:
+            self.container.recall_preempt()

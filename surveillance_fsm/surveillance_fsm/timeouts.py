@@ -119,12 +119,11 @@ def limited(node: Node, limits: Limits) -> Callable[[Any], Any]:
             finally:
                 if watch is not None and thread is not None:
                     end_watch(thread, watch)
-            frame = thread.stack[-1] if thread is not None and thread.stack else None
-            place = thread if frame is None else frame
-            outcome = settle(node, place, watch, outcome)
+            frame = thread.stack[-1] if thread is not None else None
+            outcome = settle(node, frame, watch, outcome)
             if outcome not in limits.failures or attempt == limits.retry:
                 return outcome
-            if node.state.preempt_requested() or (place is not None and place.wanted):
+            if node.state.preempt_requested() or (frame is not None and frame.wanted):
                 return outcome
             logwarn(
                 f"State '{node.path}' ended with '{outcome}': attempt {attempt + 2} of "
@@ -135,21 +134,19 @@ def limited(node: Node, limits: Limits) -> Callable[[Any], Any]:
     return run
 
 
-def settle(
-    node: Node, place: Frame | ExecutionThread | None, watch: Watch | None, outcome: Any
-) -> Any:
+def settle(node: Node, frame: Frame | None, watch: Watch | None, outcome: Any) -> Any:
     """Turn what a state returned after running out of time into the outcome for that.
 
     Args:
         node: The state's node.
-        place: The frame that it ran in; below a concurrence the thread.
+        frame: The frame that it ran in.
         watch: Its limits at work.
         outcome: What it returned.
     """
     limits = node.limits
     if watch is None or not watch.asked or limits is None or outcome is SUSPENDED:
         return outcome
-    if place is not None and place.wanted:
+    if frame is not None and frame.wanted:
         return outcome  # Whoever wants it to end too sorts the request out.
     ignored = node.state.preempt_requested()
     if ignored:
@@ -190,7 +187,7 @@ def end_watch(thread: ExecutionThread, watch: Watch) -> None:
 def watch_of(frame: Frame) -> Watch | None:
     """Return the limits at work on the state that `frame` executes."""
     for watch in frame.thread.watches:
-        if watch.depth >= 0 and frame.thread.stack[watch.depth] is frame:
+        if frame.thread.stack[watch.depth] is frame:
             return watch
     return None
 
@@ -265,7 +262,7 @@ def _enforce(thread: ExecutionThread) -> None:
             limits = watch.node.limits
             if watch.hard is not None and now >= watch.hard and limits is not None:
                 reason = f'did not return within its deadline of {limits.deadline:g} s'
-                _abandon(thread, watch.depth, watch.node, limits.late_outcome, reason)
+                _abandon(thread, watch.depth, limits.late_outcome, reason)
                 return
             if watch.soft is not None and now >= watch.soft:
                 watch.soft, watch.asked = None, True
@@ -292,15 +289,12 @@ def _abandon_unpreemptible(thread: ExecutionThread) -> None:
     Under the run's condition.
     """
     reason = f'ignored a preempt for {thread.run.preempt_timeout:g} s'
-    places = [(depth, frame.current, frame.forced) for depth, frame in enumerate(thread.stack)]
-    if thread.leaf is not None:
-        places.insert(0, (-1, thread.leaf, thread.forced))
-    for depth, node, forced in reversed(places):
-        if not isinstance(node, Node):
+    for depth, frame in reversed(list(enumerate(thread.stack))):
+        if not isinstance(frame.current, Node):
             return  # It is ending by itself.
-        outcome = forced[1] if forced is not None else stopped_outcome(node)
+        outcome = frame.forced[1] if frame.forced is not None else stopped_outcome(frame.current)
         if outcome is not None:
-            _abandon(thread, depth, node, outcome, reason)
+            _abandon(thread, depth, outcome, reason)
             return
     outcomes = thread.stack[0].container.get_registered_outcomes() if thread.stack else ()
     ending = next((outcome for outcome in STOPPED if outcome in outcomes), None)
@@ -308,73 +302,69 @@ def _abandon_unpreemptible(thread: ExecutionThread) -> None:
         f"State '{thread.path_inside()}' {reason}, and no container around it can end with "
         "'preempted' or 'aborted'"
     )
-    _abandon(thread, -1, None, error if ending is None else ending, reason)
+    _abandon(thread, -1, error if ending is None else ending, reason)
 
 
 def _abandon(
-    thread: ExecutionThread,
-    depth: int,
-    node: Node | None,
-    outcome: str | BaseException,
-    reason: str,
+    thread: ExecutionThread, depth: int, outcome: str | BaseException, reason: str
 ) -> None:
-    """Abandon the present thread, and go on as if the state in frame `depth` had ended.
+    """Go on without the present thread, as if the state in frame `depth` had ended.
 
     Under the run's condition.
 
     Args:
         thread: The logical thread.
         depth: Index of the frame to go on in; -1 to end the logical thread.
-        node: The state to go on without, whose userdata is taken away.
-        outcome: What it is taken to have returned, or the error to end with.
+        outcome: What the state is taken to have returned, or the error to end with.
         reason: What it did wrong, for the log.
     """
-    assert thread.work is not None
-    culprit = thread.path_inside()
-    leaf = thread.stack[-1].current if thread.stack else thread.leaf
     ended = f"with '{outcome}'" if isinstance(outcome, str) else 'with an error'
-    logerr(f"State '{culprit}' {reason}: the machine goes on without it, {ended}")
-    thread.run.left_behind.append((culprit, thread.work))
-    old = thread.stack
-    frames = _successors(old, depth, node)
-    if isinstance(leaf, Node):
-        # The request stays with the state, so that the thread left behind ends some time.
-        leaf.state.request_preempt()
-        leaf.revoke()
-        block_reentry(leaf, thread.work)
-    if node is not None and node is not leaf:
-        node.revoke()
-    thread.stack = list(frames)
-    thread.watches = [watch for watch in thread.watches if watch.depth < depth]
-    thread.asked_at = None
-    thread.run.condition.notify_all()
-    for frame in old:
-        frame.woken()
+    logerr(f"State '{thread.path_inside()}' {reason}: the machine goes on without it, {ended}")
+    frames = leave_behind(thread, depth)
     if frames:
         thread.start(lambda: _go_on(thread, frames, outcome))
         return
-    thread.without_leaf = leaf is thread.leaf
     error = None if isinstance(outcome, str) else outcome
     thread.end(outcome if error is None else None, error)
     thread.wakeup.set()
 
 
-def _successors(old: list[Frame], depth: int, node: Node | None) -> list[Frame]:
-    """Take containers away from the frames of a thread left behind.
+def leave_behind(thread: ExecutionThread, depth: int = -1) -> list[Frame]:
+    """Leave the present thread behind, and take its containers and userdata away from it.
+
+    Under the run's condition.
+
+    Args:
+        thread: The logical thread.
+        depth: Index of the last frame that is gone on in, without its state; -1 for none.
 
     Returns:
-        Frames in place of those up to `depth`, whose containers go on without `node`.
+        The frames up to `depth` for the thread that takes the execution over.
     """
+    old, work = thread.stack, thread.work
     frames = [frame.successor() for frame in old[: depth + 1]]
-    for frame in old:
-        frame.stale = frame.attention = True
-        frame.container.fsm_frame = None
-    for frame in old[depth + 1 :]:
-        frame.container.recall_preempt()
+    inside = old[-1].current if old else None
+    for index, frame in enumerate(old):
+        frame.abandoned(for_good=index > depth)
     for frame in frames:
-        frame.container.fsm_frame = frame
-    if frames:
-        frames[-1].gone = node
+        frame.hold()
+    if work is not None:
+        thread.run.left_behind.append((thread.path_inside(), work))
+    if isinstance(inside, Node) and work is not None:
+        # The request stays with the state, so that the thread left behind ends some time.
+        inside.state.request_preempt()
+        inside.revoke()
+        block_reentry(inside, work)
+    if frames and isinstance(frames[-1].current, Node):
+        frames[-1].gone = frames[-1].current
+        if frames[-1].current is not inside:
+            frames[-1].current.revoke()
+    thread.stack = list(frames)
+    thread.watches = [watch for watch in thread.watches if watch.depth < depth]
+    thread.asked_at = None
+    if not frames:
+        thread.retire()
+    thread.run.condition.notify_all()
     return frames
 
 
@@ -404,6 +394,7 @@ def block_reentry(node: Node, left: Work) -> None:
             if thread is not None:
                 thread.still_gone(node)
             return stopped_outcome(node)
+        node.state.fsm_left = None
         node.enter = enter
         if unlimited:
             node.execute = enter

@@ -210,3 +210,38 @@ def test_a_preempt_is_bounded_although_a_time_limit_on_a_clock_that_stands_is_wa
     machine.request_preempt()
     assert run.result() == 'preempted'
     deaf.release.set()
+
+
+@pytest.mark.parametrize('nested', [False, True])
+def test_the_states_of_a_concurrence_that_was_left_behind_are_left_behind_too(nested):
+    """They are named, and entered again only when they have ended, with no request left on them."""
+    deaf, requests, ended = Deaf(), [], threading.Event()
+    deaf.ending = lambda ud: requests.append(deaf.preempt_requested())
+    child = deaf
+    if nested:
+        child = fsm.StateMachine(['done', 'preempted'], ['key'], ['key'])
+        child.add_state('DEAF', deaf)
+    concurrence = fsm.Concurrence(['done'], 'done', ['key'], ['key'])
+    concurrence.userdata.key = 1
+    concurrence.add_state('CHILD', child)
+    root = fsm.StateMachine(['done', 'late'])
+    root.userdata.key = 1
+    root.set_name('ROOT')
+    root.add_state('FIRST', concurrence, {'timeout': 'AGAIN'}, deadline=0.05)
+    root.add_state('AGAIN', fsm.CBState(lambda ud: ended.wait(60.0) and 'done', outcomes=['done']))
+    run = Background(root)
+    path = 'ROOT/FIRST/CHILD/DEAF' if nested else 'ROOT/FIRST/CHILD'
+    while root.get_active_states() != ['AGAIN']:
+        ended.wait(0.001)
+    assert path in root.control.left_behind()
+    began(deaf)
+    ended.set()
+    assert run.result() == 'done'
+    # The same state once more, while the thread that was left behind in it has not ended.
+    second = fsm.Concurrence(['done'], 'done')
+    second.userdata.key = 1
+    second.add_state('CHILD', child)
+    run = Background(second)
+    deaf.release.set()
+    assert run.result() == 'done'
+    assert requests == [True, False]
