@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import tracemalloc
 
 import cv2
 import numpy as np
@@ -10,6 +11,7 @@ import pytest
 
 from benchmarks.backdrops import BACKDROPS, backdrop_of
 from surveillance_perception.detection.camera_model import CameraModel
+from surveillance_perception.detection.candidates import distinct
 from surveillance_perception.detection.detector import DetectorSettings, MarkerDetector
 from surveillance_perception.detection.dictionaries import DICTIONARY_NAMES, dictionary_named
 from surveillance_perception.testing.marker_scene import (
@@ -333,3 +335,18 @@ def test_drawn_outline_on_bright_paper_is_no_marker_in_a_reflection():
         cv2.polylines(image, [corners], True, 20, 3, cv2.LINE_AA)
         compressed = cv2.imencode('.jpg', image, [cv2.IMWRITE_JPEG_QUALITY, 60])[1]
         assert not detector.detect(cv2.imdecode(compressed, cv2.IMREAD_GRAYSCALE))
+
+
+def test_outlines_of_one_marker_are_one_in_crowds_too():
+    generator = np.random.default_rng(3)
+    middles = np.stack(np.meshgrid(np.arange(60.0), np.arange(50.0)), axis=-1).reshape(-1, 1, 2)
+    square = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
+    quads = 12.0 * middles + 4.0 * square
+    near = quads + generator.uniform(-0.5, 0.5, (len(quads), 1, 2))
+    inside = 12.0 * middles + 1.5 * square
+    tracemalloc.start()
+    kept = distinct(np.concatenate([quads, near, inside]), 2.0)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert kept.tolist() == [*range(len(quads)), *range(2 * len(quads), 3 * len(quads))]
+    assert peak < 20e6

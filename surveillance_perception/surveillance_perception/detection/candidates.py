@@ -19,6 +19,7 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 import numpy.typing as npt
+from scipy.spatial import cKDTree
 
 from surveillance_perception.detection.image_sampling import (
     Array,
@@ -32,16 +33,13 @@ Quads = npt.NDArray[np.float64]
 Outline = npt.NDArray[np.int32]
 Indices = npt.NDArray[np.int64]
 
-# of the quadrilateral around a blob: corners of the reduced hull that are merged to four, its least
-# area and width in pixels, and how much larger than the hull it may be
-_MAX_HULL_CORNERS = 8
-_MIN_AREA, _LEAST_WIDTH = 12.0, 2.0
-_MAX_GROWTH = 1.6
+# pixels across the narrowest blob
+_LEAST_WIDTH = 2.0
 # how far from a parallelogram's scatter outlines are looked at in a crowd, and how scattered one
 # may be elsewhere: those of small markers touch something or miss a corner
 _QUAD_DEVIATION, _MOST_SCATTER = 0.35, 8.0
-# an outline runs through the middles of the outermost dark pixels, and blur makes dark smaller
-_INSET = 0.65
+# an outline runs through the middles of the outermost dark pixels
+_INSET = 0.5
 # sine between sides below which a corner is not moved further: it would leave the image
 _LEAST_SINE = 0.3
 # neighbourhood in pixels from which the halved image does
@@ -163,7 +161,7 @@ def quads_around(
             if (blob := tuple(box)) in seen:
                 continue
             seen.add(blob)
-            quad = _quad_around(outlines[index], _MIN_AREA / scale**2)
+            quad = _quad_around(outlines[index])
             if quad is not None:
                 quads.append(quad)
         if quads:
@@ -251,31 +249,24 @@ def distinct(quads: Quads, distance: float) -> npt.NDArray[np.int64]:
     """
     middles = quads.mean(axis=1)
     sizes = np.linalg.norm(quads - middles[:, None], axis=2).mean(axis=1)
-    near = np.abs(middles[:, None] - middles[None]).max(axis=2) < distance
-    near &= np.abs(sizes[:, None] - sizes[None]) < np.maximum(distance, _SAME_SIZE * sizes)
-    kept: list[int] = []
-    taken = np.zeros(len(quads), bool)
-    for index in range(len(quads)):
-        if not taken[index]:
-            kept.append(index)
-            taken |= near[index]
-    return np.array(kept, dtype=np.int64)
+    # only neighbours are compared: a crowd has thousands of quads
+    pairs = cKDTree(middles).query_pairs(distance, np.inf, output_type='ndarray')
+    first, second = pairs[np.argsort(pairs[:, 0])].T
+    alike = np.abs(sizes[first] - sizes[second]) < np.maximum(distance, _SAME_SIZE * sizes[second])
+    kept = [True] * len(quads)
+    for better, other in zip(first[alike].tolist(), second[alike].tolist(), strict=True):
+        if kept[better]:
+            kept[other] = False
+    return np.flatnonzero(kept)
 
 
-def _quad_around(contour: Outline, least_area: float) -> npt.NDArray[np.float32] | None:
+def _quad_around(outline: Outline) -> npt.NDArray[np.float32] | None:
     """Return the smallest quadrilateral (4, 2) around an outline; None where it is none."""
-    hull = cv2.convexHull(contour)
-    area = cv2.contourArea(hull)
-    if area < least_area:
+    hull = cv2.convexHull(outline)
+    if len(hull) < 4:
         return None
-    tolerance = max(0.7, 0.02 * cv2.arcLength(hull, True))
-    reduced = cv2.approxPolyDP(hull, tolerance, True)
-    if len(reduced) < 4:
-        reduced = hull
-    if not 4 <= len(reduced) <= _MAX_HULL_CORNERS:
-        return None
-    quad = cv2.approxPolyN(reduced.astype(np.float32), 4, None, -1.0, True).reshape(-1, 2)
-    return quad if len(quad) == 4 and cv2.contourArea(quad) <= _MAX_GROWTH * area else None
+    quad = cv2.approxPolyN(hull.astype(np.float32), 4, None, -1.0, False)[0]
+    return quad if len(quad) == 4 else None
 
 
 def _clockwise(quads: Quads) -> Quads:

@@ -72,10 +72,11 @@ class CellDifferences:
 
     def read(self, cells: Patches) -> CellReadings:
         """Read grey levels (m, side, side) of the black square's cells."""
-        unlit = np.log(cells + np.float32(_DARK_LEVEL))
-        room = _room(cells)
-        level = self._best(_normalised(cells), room)
-        ratio = self._best(_normalised(unlit), np.ones_like(room))
+        levels, logarithms = _differences(cells), _differences(_logarithms(cells))
+        step = _step(levels)
+        room = _room(cells, step)
+        level = self._best(_normalised(levels, step), room)
+        ratio = self._best(_normalised(logarithms, _step(logarithms)), np.ones_like(room))
         better = ratio.error < level.error
         return CellReadings(
             np.where(better, ratio.entries, level.entries),
@@ -94,7 +95,8 @@ class CellDifferences:
         Returns:
             (m,) such cells of the code, and of its border.
         """
-        seen = _normalised(np.log(cells + np.float32(_DARK_LEVEL)))
+        differences = _differences(_logarithms(cells))
+        seen = _normalised(differences, _step(differences))
         before, flipped = self._flipped(seen, np.ones_like(seen), entries)
         better = (flipped > before).reshape(cells.shape)
         inner = better[:, 1:-1, 1:-1].sum(axis=(1, 2))
@@ -138,25 +140,28 @@ def _differences(cells: Patches) -> Patches:
     return _pairs(cells[:, :, 1:] - cells[:, :, :-1], cells[:, 1:] - cells[:, :-1])
 
 
-def _normalised(cells: Patches) -> Patches:
-    """Return differences of cells, 1 for those from black to white."""
-    differences = _differences(cells)
-    return np.asarray(np.clip(differences / _step(differences), -1.0, 1.0))
+def _logarithms(cells: Patches) -> Patches:
+    return np.asarray(np.log(cells + np.float32(_DARK_LEVEL)))
+
+
+def _normalised(differences: Patches, step: Patches) -> Patches:
+    """Return differences, 1 for those from black to white."""
+    return np.asarray(np.clip(differences / step, -1.0, 1.0))
 
 
 def _step(differences: Patches) -> Patches:
     """Return the difference (m, 1) between black and white."""
-    large = np.quantile(np.abs(differences), _STEP_QUANTILE, axis=1, keepdims=True)
-    return np.asarray(np.maximum(large, 1e-3), dtype=np.float32)
+    index = round(_STEP_QUANTILE * (differences.shape[1] - 1))
+    large = np.partition(np.abs(differences), index, axis=1)[:, index : index + 1]
+    return np.asarray(np.maximum(large, np.float32(1e-3)))
 
 
-def _room(cells: Patches) -> Patches:
+def _room(cells: Patches, step: Patches) -> Patches:
     """Return which share of the difference between black and white each pair can show."""
     lower = _pairs(
         np.minimum(cells[:, :, 1:], cells[:, :, :-1]), np.minimum(cells[:, 1:], cells[:, :-1])
     )
-    step = np.maximum(_step(_differences(cells)), _LEAST_STEP)
-    return np.asarray(np.clip((_SATURATED - lower) / step, 0.0, 1.0))
+    return np.asarray(np.clip((_SATURATED - lower) / np.maximum(step, _LEAST_STEP), 0.0, 1.0))
 
 
 def _pairs(beside: Patches, below: Patches) -> Patches:

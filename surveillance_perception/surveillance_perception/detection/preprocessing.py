@@ -18,6 +18,7 @@ _LARGEST_GAIN = 16.0
 _QUIET = 2.8
 _SMOOTHINGS = (0.5, 0.7, 0.9, 1.2)
 _STRIPS = 10
+_ROWS = 8
 # the second difference of white noise in both directions has 6 times its deviation (Immerkaer,
 # "Fast noise variance estimation", CVIU 64(2), 1996); 0.6745 turns a median into a deviation
 _SECOND_DIFFERENCE = np.array([[1, -2, 1], [-2, 4, -2], [1, -2, 1]], np.float32)
@@ -59,13 +60,21 @@ def prepare(image: npt.NDArray[np.uint8]) -> PreparedImage:
 
 def _stretched(grey: Grey) -> Grey:
     """Return a faint image, dark or washed out, with nearly the full range of grey levels."""
-    darker = np.cumsum(cv2.calcHist([grey], [0], None, [256], [0, 256]), dtype=float)
-    dark, bright = np.searchsorted(darker, (_FEW_PIXELS, grey.size - _FEW_PIXELS)).tolist()
-    if bright - dark > _FAINT_RANGE:
-        return grey
+    # what some rows already span, the whole image spans as well
+    for rows in (grey[::_ROWS], grey):
+        dark, bright = _extremes(rows)
+        if bright - dark > _FAINT_RANGE:
+            return grey
     gain = min((_STRETCHED[1] - _STRETCHED[0]) / max(bright - dark, 1), _LARGEST_GAIN)
     levels = _STRETCHED[0] + gain * (np.arange(256) - dark)
     return np.asarray(cv2.LUT(grey, np.clip(np.rint(levels), 0, 255).astype(np.uint8)))
+
+
+def _extremes(grey: Grey) -> tuple[int, int]:
+    """Return the grey levels that only a few pixels are darker or brighter than."""
+    darker = np.cumsum(cv2.calcHist([grey], [0], None, [256], [0, 256]), dtype=float)
+    dark, bright = np.searchsorted(darker, (_FEW_PIXELS, grey.size - _FEW_PIXELS)).tolist()
+    return dark, bright
 
 
 def grey_of(image: npt.NDArray[np.uint8]) -> Grey:
