@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import tracemalloc
+
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -139,3 +141,22 @@ def test_facts_and_patterns() -> None:
 def test_what_is_no_fact_is_refused(text: str) -> None:
     with pytest.raises(ValueError, match='expected CLASS'):
         parse_fact(text)
+
+
+def test_a_long_value_costs_no_more_than_its_length() -> None:
+    size = 1_000_000
+    for text in ('"' + 'x' * size + '"', '"' + '\\\\' * (size // 2) + '"'):
+        tracemalloc.start()
+        parse_literal('STRING', text)
+        assert tracemalloc.get_traced_memory()[1] < 12 * size
+        tracemalloc.stop()
+
+
+def test_a_fact_of_a_million_arguments_is_refused_at_its_third() -> None:
+    with pytest.raises(ValueError, match='expected CLASS'):
+        parse_fact('P(' + 'a, ' * 1_000_000 + 'a)')
+
+
+def test_what_only_looks_like_a_language_is_text() -> None:
+    assert parse_literal('STRING', '"x"@1') == Literal('"x"@1')
+    assert parse_literal('STRING', '"x"@en-1').language == 'en-1'

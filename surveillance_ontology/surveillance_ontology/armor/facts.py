@@ -16,7 +16,7 @@ from surveillance_ontology.owl.vocabulary import local_name
 SAME_AS = 'owl:sameAs'
 ANY = '?'
 _FORM = re.compile(r'\s*(<[^<>]+>|[^\s(),"<>]+)\s*\((.*)\)\s*\Z', re.DOTALL)
-_PART = re.compile(r'\s*("(?:[^"\\]|\\.)*"[^\s,]*|<[^<>]+>|[^\s,"]+)\s*', re.DOTALL)
+_PART = re.compile(r'\s*("[^"\\]*+(?:\\.[^"\\]*+)*+"[^\s,]*|<[^<>]+>|[^\s,"]+)\s*', re.DOTALL)
 _PLAIN = re.compile(r'[^\s(),"<>?]+')
 
 
@@ -63,22 +63,15 @@ def parse_names(text: str) -> ShortFact:
     match = _FORM.match(text)
     if match is None:
         raise ValueError(expected)
-    arguments: list[str] = []
-    rest = match[2]
-    while True:
-        part = _PART.match(rest)
-        if part is None:
-            raise ValueError(expected)
-        arguments.append(part[1])
-        rest = rest[part.end() :]
-        if not rest:
-            break
-        if rest[0] != ',':
-            raise ValueError(expected)
-        rest = rest[1:]
-    if len(arguments) > 2:
+    first = _PART.match(text, match.start(2), match.end(2))
+    if first is None:
         raise ValueError(expected)
-    return ShortFact(match[1], tuple(arguments))
+    if first.end() == match.end(2):
+        return ShortFact(match[1], (first[1],))
+    second = _PART.match(text, first.end() + 1, match.end(2))
+    if text[first.end()] != ',' or second is None or second.end() != match.end(2):
+        raise ValueError(expected)
+    return ShortFact(match[1], (first[1], second[1]))
 
 
 def short_name(name: str) -> str:

@@ -126,8 +126,10 @@ class DirectiveError(Exception):
 
 _IN_BRACKETS = re.compile(r'<([^<>]*)>')
 RENDERED = re.compile(
-    r'"(?P<text>(?:[^"\\]|\\.)*)"'
-    r'(?:\^\^(?:<(?P<iri>[^<>\s]+)>|(?P<name>[^\s<>"]+))|@(?P<language>[A-Za-z0-9-]+))?\Z',
+    # Possessive: what it could go back to for each character fills the memory.
+    r'"(?P<text>[^"\\]*+(?:\\.[^"\\]*+)*+)"'
+    r'(?:\^\^(?:<(?P<iri>[^<>\s]+)>|(?P<name>[^\s<>"]+))'
+    r'|@(?P<language>[A-Za-z]+(?:-[A-Za-z0-9]+)*))?\Z',
     re.DOTALL,
 )
 """A literal as answers have it; see `rendering`."""
