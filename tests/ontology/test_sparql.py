@@ -299,3 +299,11 @@ def test_a_graph_that_is_kept_up_to_date_is_the_one_that_a_new_process_gets(
         assert kept == graph_of(client), step
     assert wholes.count(False) > 20, 'most changes were told as a difference'
     service.close()
+
+
+def test_names_that_are_no_iris_are_seen(service: ArmorService, tmp_path: Path) -> None:
+    ask = asker(service)
+    (tmp_path / 'odd.ttl').write_text('<x:i> a <x:a#b#c>, <x:50%> ; <x:p#q#r> "v"@en-muchtoolong .')
+    assert ask('LOAD FILE', 'odd.ttl', 'x:o', 'false', '', 'false').success
+    rows = ask('QUERY SPARQL', 'SELECT ?c { <x:i> a ?c } ORDER BY ?c').queried_objects
+    assert rows == ['{c=x:50%}, {c=x:a#b#c}']

@@ -183,7 +183,9 @@ class _Worker:
             del wanted  # Its axioms are many: gone before a collection sees them.
         self.version = None
         sizes = {'whole': whole, 'removed': len(removed), 'added': len(added)}
-        self._exchange(sizes, deadline, removed + added)
+        answer = self._exchange(sizes, deadline, removed + added)
+        if 'error' in answer:
+            raise DirectiveError(f'QUERY SPARQL: {answer["error"]}')
         self.version = version
 
     def ask(self, query: str, deadline: float, rows: int) -> Any:

@@ -31,7 +31,7 @@ NO_FURTHER_FILES = 3
 MOST_CHARACTERS = 64 * 1024 * 1024
 """In one answer; the server holds it in memory."""
 _NO_KEYWORDS = re.compile(
-    r"""("{3}|'{3})(?:[^\\]|\\.)*?\1|"(?:[^"\\]|\\.)*"|'(?:[^'\\]|\\.)*'"""
+    r"""("{3}|'{3})(?:[^\\]|\\.)*?\1|"[^"\\]*+(?:\\.[^"\\]*+)*+"|'[^'\\]*+(?:\\.[^'\\]*+)*+'"""
     r"""|<[^<>"{}|^`\\\s]*>|#[^\r\n]*|[?$]\w+|[\w.-]*:[\w.:-]*""",
     re.DOTALL,
 )
@@ -50,11 +50,14 @@ def serve(requests: BinaryIO, answers: BinaryIO) -> None:
                 store, forms = pyoxigraph.Store(), WrittenForms()
             removed = requests.read(request['removed'])
             added = requests.read(request['added'])
-            for quad in _quads(removed):
-                store.remove(quad)
-            store.bulk_load(added, format=pyoxigraph.RdfFormat.N_TRIPLES)
-            forms.change(_rewritten(added), _rewritten(removed))
             answer: dict[str, Any] = {}
+            try:
+                for quad in _quads(removed):
+                    store.remove(quad)
+                store.bulk_load(added, format=pyoxigraph.RdfFormat.N_TRIPLES, lenient=True)
+                forms.change(_rewritten(added), _rewritten(removed))
+            except SyntaxError as error:
+                answer = {'error': f'the ontology is no graph: {str(error)[:MOST_SHOWN]}'}
         else:
             # The kernel ends this process if the one that asked is not there to do it.
             signal.setitimer(signal.ITIMER_REAL, request['seconds'])
@@ -65,7 +68,8 @@ def serve(requests: BinaryIO, answers: BinaryIO) -> None:
 
 
 def _quads(triples: bytes) -> list[Any]:
-    return list(pyoxigraph.parse(triples, format=pyoxigraph.RdfFormat.N_TRIPLES))
+    # Names that are no IRIs are read from documents, too.
+    return list(pyoxigraph.parse(triples, format=pyoxigraph.RdfFormat.N_TRIPLES, lenient=True))
 
 
 def _rewritten(triples: bytes) -> list[Any]:

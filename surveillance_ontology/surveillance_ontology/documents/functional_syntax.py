@@ -6,14 +6,15 @@ import re
 from collections.abc import Iterator
 from typing import Any
 
-from surveillance_ontology.documents.structural import DEEPEST, MOST_DIGITS, Axioms, Call
-from surveillance_ontology.documents.xml_reading import OntologyFileError
-from surveillance_ontology.owl.expressions import Literal
+from surveillance_ontology.documents.structural import MOST_DIGITS, Axioms, Call, blank_label
+from surveillance_ontology.documents.xml_reading import DEEPEST, OntologyFileError, resolve
+from surveillance_ontology.owl.expressions import Literal, language_tag
 from surveillance_ontology.owl.vocabulary import RDF
 
-_START = re.compile(rb'(?:\s|#[^\n]*\n)*(?:Prefix|Ontology)\s*\(')
+_START = re.compile(rb'(?:\s++|#[^\n]*+\n)*+(?:Prefix|Ontology)\s*\(')
 _TOKEN = re.compile(
-    r'(?P<space>\s+|#[^\n]*)|<(?P<iri>[^<>"\s]*)>|"(?P<text>(?:[^"\\]|\\.)*)"|(?P<mark>\^\^|[()=])'
+    r'(?P<space>\s+|#[^\n]*)|<(?P<iri>[^<>"\s]*)>|"(?P<text>[^"\\]*+(?:\\.[^"\\]*+)*+)"'
+    r'|(?P<mark>\^\^|[()=])'
     r'|@(?P<language>[A-Za-z0-9-]+)|(?P<name>[^\s()<>"=^@]+)',
     re.DOTALL,
 )
@@ -24,18 +25,23 @@ def is_functional(data: bytes) -> bool:
     return _START.match(data) is not None
 
 
-def parse_functional(text: str) -> Axioms:
+def parse_functional(text: str, base: str) -> Axioms:
     """Parse a document.
+
+    Args:
+        text: The document.
+        base: For relative IRIs, where the ontology names none.
 
     Raises:
         OntologyFileError: With line and column.
     """
-    return _Parser(text).stated
+    return _Parser(text, base).stated
 
 
 class _Parser:
-    def __init__(self, text: str) -> None:
-        self._text = text
+    def __init__(self, text: str, base: str) -> None:
+        self._text, self._base = text, base
+        self._iris: dict[str, str] = {}
         self._tokens = self._read_tokens()
         self.stated = Axioms(self._line)
         self._ended = False
@@ -90,7 +96,8 @@ class _Parser:
             self._take(')')
             return
         if self._next[0] == 'iri':
-            self.stated.iri = self._take()[1]
+            _, iri, place = self._take()
+            self.stated.iri = self._base = self._iri(iri, place)
             if self._next[0] == 'iri':
                 self._take()
         while self._next[:2] != ('mark', ')'):
@@ -105,7 +112,7 @@ class _Parser:
     def _part(self, depth: int) -> Any:
         kind, value, place = self._take()
         if kind == 'iri':
-            return value
+            return self._iri(value, place)
         if kind == 'text':
             return self._literal(re.sub(r'\\(.)', r'\1', value, flags=re.DOTALL))
         if (kind, value) == ('mark', '('):
@@ -129,11 +136,15 @@ class _Parser:
 
     def _literal(self, text: str) -> Literal:
         if self._next[0] == 'language':
-            return Literal(text, RDF + 'langString', self._take()[1].lower())
+            _, tag, place = self._take()
+            try:
+                return Literal(text, RDF + 'langString', language_tag(tag))
+            except ValueError as error:
+                raise self._fail(str(error), place) from None
         if self._next[:2] == ('mark', '^^'):
             self._take()
             kind, value, place = self._take()
-            datatype = value if kind == 'iri' else self._named(value, place)
+            datatype = self._iri(value, place) if kind == 'iri' else self._named(value, place)
             return Literal(text, str(datatype))
         return Literal(text)
 
@@ -143,8 +154,21 @@ class _Parser:
                 raise self._fail(f'a number of {len(name)} digits', place)
             return int(name)
         if name.startswith('_:'):
-            return name
+            try:
+                return blank_label(name)
+            except OntologyFileError as error:
+                raise self._fail(error.message, place) from None
         iri = self.stated.named(name)
         if iri is None:
             raise self._fail(f'the prefix of {name!r} is not declared', place)
+        return self._iri(iri, place)
+
+    def _iri(self, reference: str, place: int) -> str:
+        iri = self._iris.get(reference)
+        if iri is None:
+            try:
+                iri = resolve(self._base, reference)
+                self._iris[reference] = iri
+            except OntologyFileError as error:
+                raise self._fail(error.message, place) from None
         return iri

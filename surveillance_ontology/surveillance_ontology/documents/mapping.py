@@ -9,10 +9,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import partial
-from typing import TypeAlias
+from typing import TypeAlias, TypeVar
 
 from surveillance_ontology.documents.rdf_xml import Graph, Node
-from surveillance_ontology.documents.xml_reading import IllFormedError
+from surveillance_ontology.documents.xml_reading import DEEPEST, IllFormedError
 from surveillance_ontology.owl import axioms as ax
 from surveillance_ontology.owl import expressions as ex
 from surveillance_ontology.owl.axioms import Axiom
@@ -29,6 +29,7 @@ from surveillance_ontology.owl.vocabulary import (
 )
 
 _TYPE = RDF + 'type'
+T = TypeVar('T')
 _ReadNode: TypeAlias = 'Callable[[Mapping, str, dict[str, list[Node]]], None]'
 DECLARATIONS = {
     OWL + 'Class': 'class',
@@ -267,8 +268,9 @@ class Mapping:
             raise self._ill_formed(
                 self._subject_read, f'expected a data range, got the literal {node.lexical!r}'
             )
-        if not node.startswith('_:'):
-            return node
+        return self._inside(node, self._data_range) if node.startswith('_:') else node
+
+    def _data_range(self, node: str) -> ex.DataRange:
         properties = self._nodes.get(node, {})
         if OWL + 'oneOf' in properties:
             items = self._list(properties[OWL + 'oneOf'][0])
@@ -318,12 +320,19 @@ class Mapping:
         known = self._expressions.get(node)
         if known is not None:
             return known
-        if node in self._open:
-            raise self._ill_formed(node, 'a class expression contains itself')
-        self._open.add(node)
-        expression = self._expressions[node] = self._expression(node)
-        self._open.discard(node)
+        expression = self._expressions[node] = self._inside(node, self._expression)
         return expression
+
+    def _inside(self, node: str, read: Callable[[str], T]) -> T:
+        """Read an anonymous node that may hold others of its kind."""
+        if node in self._open:
+            raise self._ill_formed(node, 'an expression contains itself')
+        if len(self._open) >= DEEPEST:
+            raise self._ill_formed(node, f'expressions nest deeper than {DEEPEST}')
+        self._open.add(node)
+        found = read(node)
+        self._open.discard(node)
+        return found
 
     def _expression(self, node: str) -> ex.ClassExpression:
         properties = self._nodes.get(node, {})

@@ -6,8 +6,14 @@ import re
 from dataclasses import dataclass, field
 from typing import Any
 
-from surveillance_ontology.documents.structural import DEEPEST, MOST_DIGITS, Axioms, Call
-from surveillance_ontology.documents.xml_reading import XML, XmlReader, is_absolute
+from surveillance_ontology.documents.structural import MOST_DIGITS, Axioms, Call, blank_label
+from surveillance_ontology.documents.xml_reading import (
+    DEEPEST,
+    XML,
+    OntologyFileError,
+    XmlReader,
+    is_absolute,
+)
 from surveillance_ontology.owl.expressions import Literal
 from surveillance_ontology.owl.vocabulary import OWL, RDF
 
@@ -58,7 +64,7 @@ class _Reader(XmlReader):
         if not name.startswith(OWL):
             raise self.fail(f'element {name!r} is not of OWL/XML')
         base = self.resolve(above.base, attributes.pop(XML + 'base', above.base))
-        language = attributes.pop(XML + 'lang', above.language).lower()
+        language = self.language(attributes, above.language)
         line = self.parser.CurrentLineNumber
         element = _Element(name.removeprefix(OWL), attributes, line, base, language)
         if self.depth == 1 and 'ontologyIRI' in attributes:
@@ -107,7 +113,11 @@ class _Reader(XmlReader):
         if name == 'AbbreviatedIRI':
             return self._named(text)
         if name == 'AnonymousIndividual':
-            return '_:' + self._attribute(element, 'nodeID').removeprefix('_:')
+            label = '_:' + self._attribute(element, 'nodeID').removeprefix('_:')
+            try:
+                return blank_label(label)
+            except OntologyFileError as error:
+                raise self.fail(error.message) from None
         if name == 'Variable':
             return Call(name, (self._iri(element),), element.line)
         return Call(name, self._parts(element), element.line)
@@ -152,7 +162,7 @@ class _Reader(XmlReader):
         iri = self.stated.named(name)
         if iri is None:
             raise self.fail(f'the prefix of {name!r} is not declared')
-        return iri
+        return self.resolve('', iri)
 
     def _attribute(self, element: _Element, name: str) -> str:
         if name not in element.attributes:

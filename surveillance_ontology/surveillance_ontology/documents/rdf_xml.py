@@ -9,7 +9,12 @@ import re
 from dataclasses import dataclass, field
 from typing import TypeAlias
 
-from surveillance_ontology.documents.xml_reading import XML, OntologyFileError, XmlReader
+from surveillance_ontology.documents.xml_reading import (
+    FORBIDDEN,
+    XML,
+    OntologyFileError,
+    XmlReader,
+)
 from surveillance_ontology.owl.expressions import Literal
 from surveillance_ontology.owl.vocabulary import RDF, XSD
 
@@ -49,7 +54,7 @@ class _Frame:
 
 
 _NAME = re.compile(r'[^\W\d][\w.\-]*')
-_TAG = re.compile(rb'<(?:[^"\'>]|"[^"]*"|\'[^\']*\')*>')
+_TAG = re.compile(rb'<(?:[^"\'>]++|"[^"]*"|\'[^\']*\')*+>')
 
 
 class _Reader(XmlReader):
@@ -62,6 +67,8 @@ class _Reader(XmlReader):
         self.seen_root = False
 
     def namespace(self, prefix: str | None, iri: str | None) -> None:
+        if found := FORBIDDEN.search(iri or ''):
+            raise self.fail(f'namespace {iri!r} contains {found.group()!r}')
         self.graph.prefixes.setdefault(prefix or '', iri or '')
 
     def new_blank(self) -> str:
@@ -105,8 +112,7 @@ class _Reader(XmlReader):
         if attributes:
             if XML + 'base' in attributes:
                 base = self.resolve(base, attributes.pop(XML + 'base'))
-            if XML + 'lang' in attributes:
-                language = attributes.pop(XML + 'lang').lower()
+            language = self.language(attributes, language)
         if parent.kind == 'root':
             if name == RDF + 'RDF' and not self.seen_root:
                 self.seen_root = True

@@ -19,11 +19,11 @@ from surveillance_ontology.documents.mapping import Mapping
 from surveillance_ontology.documents.owl_xml import is_owl_xml, parse_owl_xml
 from surveillance_ontology.documents.rdf_xml import Graph, Node, parse_rdf_xml
 from surveillance_ontology.documents.structural import Axioms
-from surveillance_ontology.documents.xml_reading import OntologyFileError
+from surveillance_ontology.documents.xml_reading import FORBIDDEN, OntologyFileError
 from surveillance_ontology.memory import uncollected
 from surveillance_ontology.owl.axioms import Axiom, Import
 from surveillance_ontology.owl.entities import entities_of, renamed
-from surveillance_ontology.owl.expressions import Literal
+from surveillance_ontology.owl.expressions import Literal, language_tag
 from surveillance_ontology.owl.vocabulary import RDF, local_name
 
 _BOMS = {
@@ -35,9 +35,9 @@ _BOMS = {
     b'\0<': 'utf-16-be',
 }
 _DECLARED = re.compile(rb'<\?xml[^>]*?\sencoding\s*=\s*["\']([\w.:-]+)')
-_COMMENTS = re.compile(rb'(?:\s+|#[^\n]*)*')
-_XML = re.compile(rb'<(?:[?!]|[A-Za-z_][\w.-]*(?::[A-Za-z_][\w.-]*)?(?:[\s/>]|\Z))')
-_SPACE = re.compile(r'\s')
+_COMMENTS = re.compile(rb'(?:\s++|#[^\n]*+)*+')
+# A prefix is declared by an attribute: without one, <urn:a> is a name in Turtle.
+_XML = re.compile(rb'<(?:[?!]|[A-Za-z_][\w.-]*(?:[\s/>]|\Z|:[A-Za-z_][\w.-]*(?:\s|\Z)))')
 _JSON = re.compile(rb'\{\s*["}]|\[\s*\{')
 _TRIPLE = re.compile(
     rb'(?:<[^\s<>]*>|_:[^\s<]+)\s*<[^\s<>]*>[^\n]*\.[ \t\r]*(?:#.*)?$', re.MULTILINE
@@ -189,10 +189,10 @@ def _parsed(data: bytes, iri: str) -> tuple[str, Mapping | Axioms]:
     if place == len(data):
         raise OntologyFileError('the document is empty', 1, 1)
     if is_functional(data):
-        return 'functional', parse_functional(_text(data))
+        return 'functional', parse_functional(_text(data), iri)
     if _TRIPLE.match(data, place):
         try:
-            return 'ntriples', Mapping(_rdf_text(data, iri, 'ntriples', lenient=True))
+            return 'ntriples', Mapping(_rdf_text(data, iri, 'ntriples'))
         except OntologyFileError as error:
             # Turtle can begin so as well.
             try:
@@ -228,7 +228,7 @@ def _rdf_text(data: bytes, iri: str, form: str, lenient: bool = False) -> Graph:
         data: The document.
         iri: Base for relative IRIs where the document gives none.
         form: 'turtle', 'ntriples' or 'jsonld'.
-        lenient: Take names that are no IRIs, such as those with two '#', as they are.
+        lenient: Take names that are no IRIs, such as those with two '#', and languages as they are.
 
     Raises:
         OntologyFileError: Not of that format, or with statements that are no plain triples.
@@ -254,18 +254,18 @@ def _rdf_text(data: bytes, iri: str, form: str, lenient: bool = False) -> Graph:
             if not isinstance(node, pyoxigraph.Literal):
                 value = _name(node)
             elif node.language:
-                value = Literal(node.value, RDF + 'langString', node.language.lower())
+                value = Literal(node.value, RDF + 'langString', language_tag(node.language))
             else:
                 value = Literal(node.value, node.datatype.value)
             graph.triples.append((_name(quad.subject), quad.predicate.value, value))
     except SyntaxError as error:
         message = _PARSER_PLACE.sub('', str(error.msg), count=1)
         place = error.lineno or 0, error.offset or 0
-        if message.startswith('Invalid IRI') and not lenient:
+        if not lenient:
             with contextlib.suppress(OntologyFileError):
                 graph = _rdf_text(data, iri, form, lenient=True)
-                names = (n for triple in graph.triples for n in triple if isinstance(n, str))
-                if not any(map(_SPACE.search, names)):
+                names = {n for triple in graph.triples for n in triple if isinstance(n, str)}
+                if not any(map(FORBIDDEN.search, names)):
                     return graph
         raise OntologyFileError(f'not {_NAMES[form]}: {message}', *place) from None
     if not graph.triples:

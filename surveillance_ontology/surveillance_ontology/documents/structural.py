@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import MISSING, dataclass, fields
 from typing import Any, TypeAlias, get_args
 
-from surveillance_ontology.documents.xml_reading import IllFormedError
+from surveillance_ontology.documents.xml_reading import IllFormedError, OntologyFileError
 from surveillance_ontology.owl import axioms as ax
 from surveillance_ontology.owl import expressions as ex
 from surveillance_ontology.owl.axioms import Axiom, Declaration, Import
@@ -19,12 +19,28 @@ from surveillance_ontology.owl.expressions import Literal
 from surveillance_ontology.owl.vocabulary import OWL, RDF, RDFS, SWRL, SWRLB, XSD
 
 Make: TypeAlias = Callable[[Any], Any]
-DEEPEST = 200
-"""How deep constructs may nest."""
 PREFIXES = {'owl': OWL, 'rdf': RDF, 'rdfs': RDFS, 'xsd': XSD, 'swrl': SWRL, 'swrlb': SWRLB}
 """What a document need not declare."""
 MOST_DIGITS = 18
 """Of a number in a cardinality."""
+
+
+_LETTERS = (
+    'A-Za-z_\xc0-\xd6\xd8-\xf6\xf8-\u02ff\u0370-\u037d\u037f-\u1fff\u200c\u200d\u2070-\u218f'
+    '\u2c00-\u2fef\u3001-\ud7ff\uf900-\ufdcf\ufdf0-\ufffd\U00010000-\U000effff'
+)
+_LABEL = re.compile(f'_:[{_LETTERS}0-9]([{_LETTERS}0-9\xb7.-]*[{_LETTERS}0-9\xb7-])?')
+
+
+def blank_label(text: str) -> str:
+    """Return the label of an individual without a name, ``_:a``, if RDF can hold it.
+
+    Raises:
+        OntologyFileError: It cannot.
+    """
+    if not _LABEL.fullmatch(text):
+        raise OntologyFileError(f'{text[:40]!r} is no label of an individual without a name')
+    return text
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import count
 from typing import Any
@@ -11,7 +12,7 @@ from surveillance_ontology.documents.rdf_xml import Node, Triple
 from surveillance_ontology.owl import axioms as ax
 from surveillance_ontology.owl import expressions as ex
 from surveillance_ontology.owl.axioms import Axiom
-from surveillance_ontology.owl.entities import entities_of
+from surveillance_ontology.owl.entities import entities_of, renamed
 from surveillance_ontology.owl.expressions import Literal
 from surveillance_ontology.owl.vocabulary import OWL, RDF, RDFS, SWRL, THING, XSD
 
@@ -214,6 +215,8 @@ class _Mapping:
         """Return the nodes of what an axiom lists; those of a set in one order."""
         listed = getattr(axiom, field)
         parts = sorted(listed) if isinstance(listed, frozenset) else listed
+        if isinstance(listed, frozenset) and len(listed) == 1:
+            parts *= 2  # Of itself: as a list of one it would say nothing.
         return [str(self.part(one)) for one in parts]
 
     def rule(self, rule: ax.Rule) -> None:
@@ -250,6 +253,20 @@ class _Mapping:
         return node
 
 
+_LABEL = re.compile(r'_:(?!w\d+\Z)[A-Za-z](?:[\w.-]*\w)?', re.ASCII)
+"""Labels that every format can hold, and that no node of an expression has."""
+
+
+def _labelled(axioms: tuple[Axiom, ...]) -> tuple[Axiom, ...]:
+    """Give individuals without a name labels that can be written, where they have others."""
+    found = {name for axiom in axioms for _, name in entities_of(axiom) if name[:2] == '_:'}
+    free = (label for number in count(1) if (label := f'_:i{number}') not in found)
+    for old in sorted(name for name in found if not _LABEL.fullmatch(name)):
+        new = next(free)
+        axioms = tuple(renamed(axiom, 'individual', old, new) for axiom in axioms)
+    return axioms
+
+
 _VALUED = ('object_property', 'data_property')
 
 
@@ -264,7 +281,7 @@ def triples_of(axioms: Iterable[Axiom], iri: str) -> Iterator[Triple]:
     mapping.add(iri, _TYPE, OWL + 'Ontology')
     declared: set[tuple[str, str]] = set()
     used: dict[tuple[str, str], None] = {}
-    axioms = tuple(dict.fromkeys(axioms))
+    axioms = _labelled(tuple(dict.fromkeys(axioms)))
     notes: dict[Axiom, list[ax.AxiomAnnotation]] = {}
     for axiom in axioms:
         if isinstance(axiom, ax.AxiomAnnotation):

@@ -6,7 +6,9 @@ import os
 import re
 import tempfile
 from collections.abc import Iterable, Mapping
+from itertools import count
 from pathlib import Path
+from xml.parsers import expat
 from xml.sax.saxutils import escape, quoteattr
 
 from surveillance_ontology.documents.rdf_xml import Node, Triple
@@ -23,8 +25,9 @@ from surveillance_ontology.owl.expressions import Literal
 from surveillance_ontology.owl.vocabulary import OWL, RDF, RDFS, SWRL, XSD
 
 FORMATS = ('rdfxml', 'ntriples')
+_XML = ('http://www.w3.org/XML/1998/namespace', 'http://www.w3.org/2000/xmlns/')
 _PREFIXES = {'rdf': RDF, 'rdfs': RDFS, 'owl': OWL, 'xsd': XSD, 'swrl': SWRL}
-_LOCAL = re.compile(r'[^\W\d][\w.\-]*$')
+_LOCAL = re.compile(r'[^\W\d][\w.\-]*')
 _NOT_XML = re.compile('[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]')
 
 
@@ -149,9 +152,12 @@ class _RdfXml:
         } - self._on_cycles()
         self._names: dict[str, str] = {}
         self._namespaces: dict[str, str] = {}
-        for prefix, namespace in {**_PREFIXES, **prefixes, '': iri.rstrip('#/') + '#'}.items():
-            if prefix != 'xml' and namespace:
+        named = {prefix: iri for prefix, iri in prefixes.items() if _is_prefix(prefix)}
+        named = {**_PREFIXES, **named, **_PREFIXES, '': iri.rstrip('#/') + '#'}
+        for prefix, namespace in named.items():
+            if namespace and not namespace.startswith(_XML):
                 self._namespaces.setdefault(namespace, prefix)
+        self._further = (p for number in count(1) if (p := f'ns{number}') not in named)
         self._lines: list[str] = []
 
     def _on_cycles(self) -> set[str]:
@@ -187,17 +193,14 @@ class _RdfXml:
         known = self._names.get(iri)
         if known is not None:
             return known
-        found = _LOCAL.search(iri)
         cut = max(iri.rfind('#'), iri.rfind('/'), iri.rfind(':')) + 1
-        local = iri[cut:]
-        if not _LOCAL.match(local):
-            local = found.group() if found else ''
+        local = next((iri[at:] for at in range(cut, len(iri)) if _is_name(iri[at:])), '')
         namespace = iri[: len(iri) - len(local)]
         if not local or not namespace:
             raise OntologyFileError(f'RDF/XML cannot name <{iri}>; save it as N-Triples (.nt)')
         prefix = self._namespaces.get(namespace)
         if prefix is None:
-            prefix = self._namespaces[namespace] = f'ns{len(self._namespaces)}'
+            prefix = self._namespaces[namespace] = next(self._further)
         name = self._names[iri] = f'{prefix}:{local}' if prefix else local
         return name
 
@@ -277,7 +280,27 @@ class _RdfXml:
 
 
 def _nameable(iri: str) -> bool:
-    return not iri.startswith('_:') and bool(_LOCAL.match(re.split('[#/:]', iri)[-1]))
+    return not iri.startswith('_:') and _is_name(re.split('[#/:]', iri)[-1])
+
+
+def _is_prefix(text: str) -> bool:
+    return _is_name(text) and not text.lower().startswith('xml')
+
+
+def _is_name(text: str) -> bool:
+    """Tell whether a text is a name for XML, without a colon.
+
+    Not all that are letters for Python are letters for XML's parsers, so one of these is asked.
+    """
+    if not _LOCAL.fullmatch(text):
+        return False
+    if text.isascii():
+        return True
+    try:
+        expat.ParserCreate().Parse(f'<{text}/>', True)
+    except expat.ExpatError:
+        return False
+    return True
 
 
 def _checked(text: str) -> str:

@@ -10,11 +10,15 @@ import re
 from urllib.parse import urljoin
 from xml.parsers import expat
 
+from surveillance_ontology.owl.expressions import language_tag
+
 _ABSOLUTE = re.compile(r'[A-Za-z][A-Za-z0-9+.\-]*:')
-_FORBIDDEN = re.compile(r'[\x00-\x20<>"{}|\\^`]')
+FORBIDDEN = re.compile(r'[\x00-\x20<>"{}|\\^`]')
 _REFERENCE = re.compile(rb'&([A-Za-z_][\w.-]*);')
 _MAX_ENTITY = 512
 _MAX_DEPTH = 20_000
+DEEPEST = 100
+"""How deep expressions may nest; what reads, derives and writes them is recursive."""
 XML = 'http://www.w3.org/XML/1998/namespace'
 
 
@@ -54,7 +58,7 @@ def resolve(base: str, reference: str) -> str:
     Raises:
         OntologyFileError: It has a forbidden character.
     """
-    found = _FORBIDDEN.search(reference)
+    found = FORBIDDEN.search(reference)
     if found:
         raise OntologyFileError(f'IRI {reference!r} contains {found.group()!r}')
     if is_absolute(reference):
@@ -129,6 +133,13 @@ class XmlReader:
         """Return an error with the place that is being read."""
         parser = self.parser
         return OntologyFileError(message, parser.CurrentLineNumber, parser.CurrentColumnNumber + 1)
+
+    def language(self, attributes: dict[str, str], outer: str) -> str:
+        """Take the language tag of an element; that of the one around it where it has none."""
+        try:
+            return language_tag(attributes.pop(XML + 'lang', outer))
+        except ValueError as error:
+            raise self.fail(f'xml:lang {error}') from None
 
     def resolve(self, base: str, reference: str) -> str:
         """Return an IRI reference against a base IRI."""

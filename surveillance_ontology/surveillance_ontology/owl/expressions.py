@@ -6,7 +6,9 @@ submission (https://www.w3.org/Submission/SWRL/). All are frozen, hashable recor
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import TypeAlias
 
 from surveillance_ontology.owl.vocabulary import THING, TOP_LITERAL, XSD
@@ -23,6 +25,22 @@ class Literal:
     lexical: str
     datatype: str = XSD + 'string'
     language: str = ''
+
+
+_TAG = re.compile('[a-z]+(-[a-z0-9]+)*')
+
+
+@lru_cache(maxsize=256)
+def language_tag(text: str) -> str:
+    """Return a language tag as literals have it: in lower case, en_US as en-us.
+
+    Raises:
+        ValueError: Not a tag (BCP 47), and not empty.
+    """
+    tag = text.lower().replace('_', '-')
+    if tag and not _TAG.fullmatch(tag):
+        raise ValueError(f'{text[:40]!r} is no language tag')
+    return tag
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,6 +4,8 @@ half-written.
 
 from __future__ import annotations
 
+import re
+import tracemalloc
 from pathlib import Path
 
 import pytest
@@ -13,7 +15,7 @@ from surveillance_ontology.documents.writing import (
     ontology_bytes,
     write_ontology,
 )
-from surveillance_ontology.documents.xml_reading import OntologyFileError
+from surveillance_ontology.documents.xml_reading import XML, OntologyFileError
 from surveillance_ontology.knowledge_base import KnowledgeBase
 from surveillance_ontology.owl.axioms import (
     Axiom,
@@ -27,7 +29,7 @@ from surveillance_ontology.owl.axioms import (
     SubClassOf,
 )
 from surveillance_ontology.owl.expressions import Literal
-from surveillance_ontology.owl.vocabulary import OWL, RDF, XSD
+from surveillance_ontology.owl.vocabulary import OWL, RDF, RDFS, XSD
 from tests.ontology.reasoner.patrol_map import (
     IRI,
     SCHEMA,
@@ -173,7 +175,7 @@ def test_errors_name_line_and_column(text: bytes, line: int, words: str) -> None
                 '</rdf:Description>'
             ),
             3,
-            'p is left out: it nests too deeply, or contains itself',
+            'p is left out: an expression contains itself',
         ),
     ],
 )
@@ -320,8 +322,9 @@ def test_any_text_survives(text: str, form: str) -> None:
 def test_rdf_xml_says_what_it_cannot_hold() -> None:
     with pytest.raises(OntologyFileError, match='save it as N-Triples'):
         ontology_bytes([value('now', 'x', Literal('\x01'))], IRI)
-    with pytest.raises(OntologyFileError, match='cannot name'):
-        ontology_bytes([link('42', 'x', 'y')], IRI)
+    for name in ('42', 'speed²'):
+        with pytest.raises(OntologyFileError, match='cannot name'):
+            ontology_bytes([link(name, 'x', 'y')], IRI)
     assert ontology_bytes([value('now', 'x', Literal('\x01'))], IRI, 'ntriples')
 
 
@@ -335,3 +338,110 @@ def test_a_failed_write_leaves_the_old_file(tmp_path: Path) -> None:
     assert [entry.name for entry in tmp_path.iterdir()] == ['map.owl']
     with pytest.raises(OntologyFileError, match='No such file'):
         write_ontology(VISITS, IRI, tmp_path / 'no' / 'map.owl')
+
+
+ON = f'a <{OWL}Restriction>; <{OWL}onProperty> <x:p>; <{OWL}allValuesFrom>'
+
+
+@pytest.mark.parametrize('form', ['rdfxml', 'ntriples'])
+@pytest.mark.parametrize(
+    'text',
+    [
+        '<x:i> <x:²µm> <x:j> .',
+        '_:1 a <x:C> . _:a.b a <x:C> . _:w1 a <x:C> . <x:i> <x:p> _:w2 .'
+        f' <x:A> <{RDFS}subClassOf> [ {ON} <x:B> ], [ {ON} <x:C> ] .',
+        f'<x:i> <{OWL}differentFrom> <x:i> ; <{OWL}sameAs> <x:i> .',
+        '<x:i> <x:d> "v"@en-US-x-1 .',
+    ],
+)
+def test_whatever_was_read_is_read_again(text: str, form: str) -> None:
+    read = read_ontology(text.encode(), IRI)
+    again = read_ontology(ontology_bytes(read.axioms, IRI, form, read.prefixes), IRI)
+    assert again.unsupported == []
+
+    def told(axiom: Axiom) -> str:
+        return re.sub(r"'_:[^']*'", '_:', repr(axiom))
+
+    assert {told(axiom) for axiom in read.axioms} <= {told(axiom) for axiom in again.axioms}
+
+
+@pytest.mark.parametrize(
+    'prefixes',
+    [
+        {'rdf': 'x:other#', 'r': RDF, 'owl': 'x:o#'},
+        {'2x': 'x:two#', 'a/b': 'x:b#', 'xmlnot': 'x:x#', 'q': XML},
+        {'ns7': 'x:seven#'},
+    ],
+)
+def test_any_prefixes_leave_a_document_that_is_read(prefixes: dict[str, str]) -> None:
+    axioms = [
+        ClassAssertion('x:other#C', 'x:i'),
+        DataPropertyAssertion('x:q#p', 'x:i', Literal('')),
+    ]
+    read = read_ontology(ontology_bytes(axioms, IRI, prefixes=prefixes), IRI)
+    assert set(axioms) <= set(read.axioms)
+
+
+@pytest.mark.parametrize('levels', [100, 101, 10_000])
+@pytest.mark.parametrize('inner', ['class', 'range'])
+def test_expressions_nest_to_a_bound(levels: int, inner: str) -> None:
+    if inner == 'class':
+        text = f'<x:B> <{RDFS}subClassOf> {f"[ {ON} " * levels} <x:A> {"]" * levels} .'
+    else:
+        begin = f'[ a <{RDFS}Datatype>; <{OWL}datatypeComplementOf> ' * levels
+        text = f'<x:d> a <{OWL}DatatypeProperty>; <{RDFS}range> {begin} <{XSD}int> {"]" * levels} .'
+    read = read_ontology(text.encode(), IRI)
+    if levels > 100:
+        (report,) = read.unsupported
+        assert report.endswith('is left out: expressions nest deeper than 100')
+    else:
+        assert read.unsupported == []
+        kb = KnowledgeBase(IRI, read.axioms)
+        assert kb.reason()
+        assert read_ontology(ontology_bytes(read.axioms, IRI), IRI).unsupported == []
+
+
+@pytest.mark.parametrize(
+    ('text', 'complaint'),
+    [
+        (b'<x:a{b}> a <x:C> .', "1:1: not Turtle: Invalid IRI code point '{'"),
+        (b'<x:i> <x:p> <x:a|b> .\n', "1:13: not N-Triples: Invalid IRI code point '|'"),
+        (b'Ontology(ClassAssertion(<x:a{b}> <x:i>))', "1:25: IRI 'x:a{b}' contains '{'"),
+        (b'Prefix(:=<x:>)Ontology(ClassAssertion(:C :a|b))', "IRI 'x:a|b' contains '|'"),
+        (b'Ontology(ClassAssertion(<x:C> _:a;b))', "'_:a;b' is no label"),
+        (b'Ontology(DataPropertyAssertion(<x:d> <x:i> "v"@1))', "'1' is no language tag"),
+        (
+            document('<rdf:Description rdf:about="#i"><d xml:lang="a b"/></rdf:Description>'),
+            "2:33: xml:lang 'a b' is no language tag",
+        ),
+        (document('<d xmlns="x:{a}#"/>'), "2:1: namespace 'x:{a}#' contains '{'"),
+    ],
+)
+def test_what_no_document_could_hold_is_refused(text: bytes, complaint: str) -> None:
+    with pytest.raises(OntologyFileError) as caught:
+        read_ontology(text, IRI)
+    assert complaint in str(caught.value)
+
+
+def test_languages_with_underscores_are_read() -> None:
+    text = document('<rdf:Description rdf:about="#i"><d xml:lang="en_US">v</d></rdf:Description>')
+    spoken = Literal('v', RDF + 'langString', 'en-us')
+    assert DataPropertyAssertion(n('d'), n('i'), spoken) in read_ontology(text, IRI).axioms
+
+
+def test_a_relative_iri_of_functional_syntax_is_completed() -> None:
+    text = b'Ontology(<http://example.org/o> ClassAssertion(<#C> <b>))'
+    assert read_ontology(text, IRI).axioms == [
+        ClassAssertion('http://example.org/o#C', 'http://example.org/b')
+    ]
+
+
+def test_a_long_text_costs_no_more_than_its_length() -> None:
+    size = 400_000
+    text = f'Ontology(DataPropertyAssertion(<x:d> <x:i> "{"x" * size}"))'.encode()
+    notes = b'#\n' * size + text
+    for data in (text, notes):
+        tracemalloc.start()
+        read_ontology(data, IRI)
+        assert tracemalloc.get_traced_memory()[1] < 12 * len(data)
+        tracemalloc.stop()
