@@ -256,6 +256,9 @@ def _test(argv: list[str]) -> int:
     spread = any(a.startswith(('-n', '--numprocesses', '--pdb')) or 'no:xdist' in a for a in argv)
     # On two cores three are a seventh faster than two: many tests wait for other processes.
     words = [] if spread else ['-n', '3', '--dist', 'loadfile']
+    if os.environ.pop('PYTHONDONTWRITEBYTECODE', None):
+        # As in many containers. Hundreds of processes would compile all that they import.
+        os.environ.setdefault('PYTHONPYCACHEPREFIX', str(CHECKOUT / 'build' / 'pycache'))
     os.chdir(CHECKOUT)
     sys.stdout.flush()
     return os.execv(sys.executable, [sys.executable, '-m', 'pytest', *words, *argv])
