@@ -58,24 +58,6 @@ def process_of(launched: Started, node: str, after: int = 0) -> int:
     return int(launched.until(rf'started {node} \(process (\d+)\)', after=after)[1])
 
 
-def test_ctrl_c_ends_a_mission_with_its_summary_and_leaves_nothing_behind(launch, clock, tmp_path):
-    mission = launch('--mode', 'RANDOM')
-    processes = [process_of(mission, node) for node in NODES]
-    mission.until(r'robot_behavior +\| decision 1:')
-    mission.until(r'robot_behavior +\| arrived in')
-    assert mission.end(signal.SIGINT)[0] == 0
-    assert gone(processes, 0)
-    output = '\n'.join(mission.lines)
-    assert 'SIGINT: stopping' in output
-    assert 'every process has ended' in output
-    assert 'visits' in output
-    assert 'decisions by rule' in output
-    assert 'Traceback' not in output
-    assert 'killed' not in output
-    (folder,) = (tmp_path / 'runs').iterdir()
-    assert {'mission.jsonl', 'launch.log', 'parameters'} <= {p.name for p in folder.iterdir()}
-
-
 @pytest.mark.parametrize('moment', ['surveillance in mode', 'started armor_server'])
 def test_ctrl_c_in_the_middle_of_the_start_ends_it(launch, moment):
     mission = launch('--mode', 'RANDOM')
@@ -88,8 +70,11 @@ def test_ctrl_c_in_the_middle_of_the_start_ends_it(launch, moment):
     assert gone([int(process) for process in started], 0)
 
 
-def test_the_mission_goes_on_when_each_node_is_killed_once(launch, clock):
+def test_a_mission_goes_on_after_kills_and_ctrl_c_ends_it_with_its_summary_and_nothing_left(
+    launch, clock, tmp_path
+):
     mission = launch('--mode', 'RANDOM')
+    mission.until(r'robot_behavior +\| decision 1:')
     mission.until(r'robot_behavior +\| arrived in')
     for node in NODES:
         seen = len(mission.lines)
@@ -102,6 +87,15 @@ def test_the_mission_goes_on_when_each_node_is_killed_once(launch, clock):
             mission.until(r'robot_behavior +\| arrived in', after=back)
             back = len(mission.lines)
     assert mission.end(signal.SIGINT)[0] == 0
+    output = '\n'.join(mission.lines)
+    assert gone([int(process) for process in re.findall(r'\(process (\d+)\)', output)], 0)
+    assert 'every process has ended' in output
+    assert 'Traceback' not in output
+    assert 'killed' not in output.partition('SIGINT: stopping')[2]
+    assert 'visits' in output
+    assert 'decisions by rule' in output
+    (folder,) = (tmp_path / 'runs').iterdir()
+    assert {'mission.jsonl', 'launch.log', 'parameters'} <= {p.name for p in folder.iterdir()}
 
 
 def test_a_mission_that_did_not_begin_in_its_time_is_a_failure(launch):

@@ -67,31 +67,20 @@ def terminal(mission_domain: int, tmp_path: Path) -> Iterator[Open]:
         each.close()
 
 
-def test_a_person_answers_the_requests_of_mode_manual(terminal: Open, tmp_path: Path) -> None:
-    words = ('--mode', 'MANUAL', '--namespace', 'manual', '--record', str(tmp_path))
+def test_arm_and_battery_are_set_from_the_terminal_of_mode_manual(
+    terminal: Open, tmp_path: Path
+) -> None:
+    words = ('--mode', 'MANUAL', '--behaviour', 'patrol', '--namespace', 'manual')
+    nodes = ('console', 'simulator', 'arm_controller', 'battery_controller')
+    words += ('--only', ','.join(nodes), '--record', str(tmp_path))
     manual = terminal(*words, columns=120, rows=60)
-    manual.until('New request: compute a path')
-    manual.type('plan set [[7,9,0]]\r')
-    manual.until('New request: follow')
-    manual.type('move 1 0\r')
-    manual.until('arrived in')
-    manual.type('battery set 10\r')
-    manual.until('battery low: 10 %')
-    manual.type('status\r')
-    manual.until('The battery is at 10 %')
-    manual.type('exit\r')
-    assert manual.ended() == 0
-
-
-def test_the_arm_is_moved_from_the_terminal_of_mode_manual(terminal: Open, tmp_path: Path) -> None:
-    words = ('--mode', 'MANUAL', '--behaviour', 'patrol', '--namespace', 'arm')
-    words += ('--only', 'console,simulator,arm_controller', '--record', str(tmp_path))
-    manual = terminal(*words, columns=120, rows=60)
-    manual.until(*(f'{name:<14} | ready' for name in ('arm_controller', 'simulator', 'console')))
+    manual.until(*(f'{name:<18} | ready' for name in nodes))
     manual.type('arm up\r')
     manual.until("arm: 'up': expected left, home, right, back")
     manual.type('arm left\r')
     manual.until('at pose left')
+    manual.type('battery set 10\r')
+    manual.until('The battery is at 10 %')
     manual.type('exit\r')
     assert manual.ended() == 0
 
