@@ -65,7 +65,7 @@ EQUAL_LEGS = of_pairs(
 
 def settled(graph: PatrolGraph, policy: str, threshold: float) -> float:
     patrol = Patrol(graph, Rules(), policy, threshold, graph.places[0])
-    for _ in patrol.until(25.0 * max(graph.tour.length, threshold)):
+    for _ in patrol.until(10.0 * max(graph.tour.length, threshold)):
         pass
     return patrol.run.settled
 

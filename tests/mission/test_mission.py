@@ -45,11 +45,11 @@ def robot(
 def test_a_mission_reaches_all_places_and_charges(robot: Robot, graph: Any) -> None:
     decisions = graph.listen(Decision, 'decision', STATE_QOS)
     robot.begin()
-    robot.until(800.0)
+    robot.until(500.0)
     summary = robot.summary()
     assert set(summary.visits) == PLACES
     assert min(summary.visits.values()) >= 2
-    assert sum(summary.visits.values()) >= 40
+    assert sum(summary.visits.values()) >= 25
     assert summary.recharges >= 1
     assert not summary.failures
     assert {'URGENT', 'CORRIDOR', 'recharge'} <= set(summary.rules)

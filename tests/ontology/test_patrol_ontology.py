@@ -104,8 +104,8 @@ def test_the_robot_is_in_one_place_whoever_tells_it(transport: Counting) -> None
     # Two clients, an ontology that is built again in between, and foreign assertions.
     first, second = (PatrolOntology(ArmorClient(name, 'map', transport)) for name in ('one', 'two'))
     armor = ArmorClient('foreign', 'map', transport)
+    first.build(PLACE, ONTOLOGY, IRI, now=100)
     for order in itertools.permutations(('build', 'first', 'second', 'foreign')):
-        first.build(PLACE, ONTOLOGY, IRI, now=100)
         first.forget()
         first.build(PLACE, ONTOLOGY, IRI, now=100)
         for step in order:

@@ -152,7 +152,11 @@ def test_compressed_image_that_says_it_is_huge_is_refused_before_it_is_decoded()
 
     head = struct.pack('>IIBBBBB', 30_000, 30_000, 8, 0, 0, 0, 0)
     packer = zlib.compressobj(9)
-    rows = b''.join(packer.compress(bytes(30_001)) for _ in range(30_000)) + packer.flush()
+    # After a full flush each block is packed like the one before.
+    first, block = (
+        packer.compress(bytes(30_001 * 100)) + packer.flush(zlib.Z_FULL_FLUSH) for _ in range(2)
+    )
+    rows = first + 299 * block + packer.flush()
     data = b'\x89PNG\r\n\x1a\n' + chunk(b'IHDR', head) + chunk(b'IDAT', rows) + chunk(b'IEND', b'')
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     with pytest.raises(ImageError, match='far more than 1000000 pixels'):

@@ -96,10 +96,13 @@ def values_of(data_range: DataRange) -> ValueSet:
     return found
 
 
-def test_sets_agree_with_single_values() -> None:
-    rng = random.Random(5)
+@pytest.mark.parametrize(
+    ('seed', 'count'), [(5, 500), pytest.param(6, 10_000, marks=pytest.mark.long)]
+)
+def test_sets_agree_with_single_values(seed: int, count: int) -> None:
+    rng = random.Random(seed)
     values = [value_of(literal) for literal in LITERALS]
-    for _ in range(3000):
+    for _ in range(count):
         one, other = drawn(rng, 3), drawn(rng, 3)
         first, second = values_of(one), values_of(other)
         test, other_test = range_test(one), range_test(other)
