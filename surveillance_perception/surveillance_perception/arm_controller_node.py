@@ -37,7 +37,7 @@ from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.parameters import converted, parameter
 from surveillance_runtime.process import run_node
 from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
-from surveillance_runtime.robot_arm import ARM, Arm, Array
+from surveillance_runtime.robot_arm import ARM, REST_PATIENCE, Arm, Array
 from surveillance_runtime.settled_frames import SettledFrames
 
 _POSES = {
@@ -67,7 +67,7 @@ class ArmSettings:
         4, 'Pictures that the marker detector must have looked at before a view is left.', 0
     )
     patience: float = parameter(
-        3.0, 'Seconds of real time after which a view is left without them.', 0.0
+        3.0, 'Seconds of real time after which a view is left without them.', 0.0, REST_PATIENCE
     )
     horizontal: float = converted(
         math.radians,

@@ -16,6 +16,10 @@ import numpy.typing as npt
 
 Array = npt.NDArray[np.float64]
 
+REST_PATIENCE = 30.0
+"""Seconds of real time for which a scan may wait for pictures at a view, beyond its rest there:
+whoever listens to a scan waits for longer before it counts as dead."""
+
 
 @dataclass(frozen=True)
 class Joint:

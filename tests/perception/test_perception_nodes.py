@@ -366,6 +366,11 @@ def test_scan_rests_at_each_view_and_can_be_cancelled(graph: Any) -> None:
     assert wrong.status == 'aborted'
 
 
+def test_an_arm_waits_no_longer_at_a_view_than_its_listeners(graph: Any) -> None:
+    with pytest.raises(ParameterError, match='patience'):
+        graph.add(ArmController, parameters={'patience': 36.0})
+
+
 def test_arm_that_does_not_report_is_named(graph: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     node = graph.add(ArmController)
     monkeypatch.setattr(node._driver, '_patience', 0.05)

@@ -17,15 +17,15 @@ from surveillance_interfaces.action import ScanSurroundings
 from surveillance_interfaces.msg import MarkerDetectionArray
 from surveillance_interfaces.srv import MarkerRoutine, RoomInformation
 from surveillance_runtime.node import PatrolNode
-from surveillance_runtime.robot_arm import ARM
+from surveillance_runtime.robot_arm import ARM, REST_PATIENCE
 from surveillance_runtime.settled_frames import SettledFrames
 
 _ARM_SECONDS = 30.0
 _ANSWER_SECONDS = 5.0
 _START_SECONDS = 10.0
-_SILENCE = _ARM_SECONDS + ARM.longest_motion
-"""Seconds without a word from a scan, beside the rest at a view: the arm took its goal and may have
-moved as far as it can."""
+_SILENCE = REST_PATIENCE + ARM.longest_motion
+"""Seconds without a word from a scan, beside the rest at a view: the arm has waited for pictures as
+long as it may, or moved as far as it can."""
 
 
 class CameraScanner:
