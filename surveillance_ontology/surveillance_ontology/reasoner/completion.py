@@ -14,6 +14,7 @@ from surveillance_ontology.reasoner.classification import Classification
 from surveillance_ontology.reasoner.clauses import BodyAtom, Constant, Program, SameAtom
 from surveillance_ontology.reasoner.engine import Engine, FactView
 from surveillance_ontology.reasoner.normal_form import is_positive
+from surveillance_ontology.reasoner.open_cases import values_may_split
 from surveillance_ontology.reasoner.property_chains import chains_turn_back
 
 _MOST_ASSERTIONS = 20_000
@@ -98,7 +99,8 @@ class Completion:
 
         They do not where nothing unnamed must exist, nor where each class that requires somebody
         says all by itself, no chain comes back from somebody unnamed, and nothing is counted or
-        excluded, or rules, which take no part in cases, do the rest.
+        excluded. Nor where there are rules, which take no part in cases, and no value that must
+        exist is one of several that matter.
         """
         if program.unsupported or program.interacting:
             return True
@@ -112,7 +114,7 @@ class Completion:
         if chains_turn_back(program):
             return True
         if self._has_rules:
-            return False
+            return values_may_split(program)
         values = any(existential.prop.kind == 'data' for existential in program.existentials)
         # The states of chains stand among the labels as tuples.
         classes = (label for label in program.labels if not isinstance(label, tuple))

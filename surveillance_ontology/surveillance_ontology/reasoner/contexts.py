@@ -411,10 +411,10 @@ class Contexts:
             elif token[0] == 'self':
                 yield PredicateAtom(token[1], (0, 0))
         for held in context.values:
-            value = held.values.only
-            if value is not None:
-                for prop in held.props:
-                    yield PredicateAtom(prop, (0, Constant(value, True)))
+            if held.values.size == held.count:
+                for value in held.values.members():
+                    for prop in held.props:
+                        yield PredicateAtom(prop, (0, Constant(value, True)))
         for edge in context.edges:
             for name in edge.target.names:
                 for predicate, backwards in edge.roles:

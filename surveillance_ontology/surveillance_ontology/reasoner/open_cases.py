@@ -23,10 +23,15 @@ from surveillance_ontology.reasoner.clauses import (
     Predicate,
     PredicateAtom,
     Program,
+    RangeAtom,
     StoppedError,
+    closure,
 )
 from surveillance_ontology.reasoner.joins import JoinContext, compile_call
-from surveillance_ontology.reasoner.value_sets import ValueSet
+from surveillance_ontology.reasoner.value_sets import EVERY, NONE, ValueSet, point
+
+_MOST_COMPARED = 20_000
+"""Where so many values are possible, those that are known leave one."""
 
 
 class OpenCases:
@@ -125,6 +130,50 @@ class OpenCases:
         except StoppedError:
             return found[0]
         return None
+
+
+def values_may_split(program: Program) -> bool:
+    """Tell whether it may matter which of its values a data property has that must have some.
+
+    It does not where a value is left that no clause asks for: then what follows of it follows of
+    any. Ranges are taken together here, whoever they hold for.
+    """
+    above: dict[Predicate, list[Predicate]] = {}
+    asked: dict[Predicate, ValueSet] = {}
+    excluded: dict[Predicate, ValueSet] = {}
+    compared: set[Predicate] = set()
+    for clause in program.clauses:
+        atoms = [atom for atom in clause.body if isinstance(atom, PredicateAtom)]
+        links = [atom for atom in atoms if atom.predicate.kind == 'data']
+        if clause.named_only or not links:
+            continue
+        if len(links) > 1:
+            compared.update(link.predicate for link in links)
+            continue
+        prop, (_, value) = links[0].predicate, links[0].terms
+        head = clause.head.predicate if isinstance(clause.head, PredicateAtom) else None
+        if head is not None and head.kind == 'data' and clause.head.terms[1] == value:
+            above.setdefault(prop, []).append(head)
+        values = point(value.value) if isinstance(value, Constant) else EVERY
+        for atom in clause.body:
+            if isinstance(atom, RangeAtom):
+                values &= atom.values
+        if values is not EVERY:
+            table = excluded if head is program.nothing else asked
+            table[prop] = table.get(prop, NONE) | values
+    for existential in program.existentials:
+        if isinstance(existential.filler, ValueSet):
+            props = closure(existential.prop, lambda one: above.get(one, ()))
+            left = existential.filler
+            for prop in props:
+                left &= ~excluded.get(prop, NONE)
+            if left.size <= _MOST_COMPARED and not compared.isdisjoint(props):
+                return True
+            for prop in props:
+                left &= ~asked.get(prop, NONE)
+            if left.size < existential.n and any(prop in asked for prop in props):
+                return True
+    return False
 
 
 def _related(prop: Predicate, inverse: bool, z: str) -> set[Any]:

@@ -483,3 +483,55 @@ def test_a_value_follows_where_another_property_has_the_others() -> None:
         ax.DataPropertyAssertion(T, j, whole(2)),
     )
     assert kb.holds(ax.DataPropertyAssertion(T, i, whole(2)))
+
+
+IDLE = ax.Rule((ex.ClassAtom(D, ex.Variable('x:x')),), (ex.ClassAtom('x:E', ex.Variable('x:x')),))
+"""A rule that has nothing to do with the rest."""
+
+
+def number(*facets: tuple[str, int]) -> ex.DataRange:
+    return ex.DatatypeRestriction(
+        XSD + 'integer', tuple((XSD + name, whole(bound)) for name, bound in facets)
+    )
+
+
+def test_beside_a_rule_too_every_value_that_must_exist_is_looked_at() -> None:
+    some = ex.DataSomeValuesFrom(T, number(('minInclusive', 0), ('maxInclusive', 9)))
+    kb = reasoned(
+        IDLE,
+        SubClassOf(A, some),
+        SubClassOf(ex.DataSomeValuesFrom(T, number(('maxExclusive', 5))), B),
+        SubClassOf(ex.DataSomeValuesFrom(T, number(('minInclusive', 5))), B),
+        ClassAssertion(A, i),
+    )
+    assert kb.holds(ClassAssertion(B, i))
+    assert kb.unsupported  # The rule takes no part.
+
+
+def test_beside_a_rule_too_disjoint_properties_share_no_value() -> None:
+    kb = reasoned(
+        IDLE,
+        ax.DisjointDataProperties((S, T)),
+        SubClassOf(A, ex.DataSomeValuesFrom(T, ex.DataOneOf((whole(1), whole(2))))),
+        *(ax.DataPropertyAssertion(S, i, whole(one)) for one in (1, 2)),
+        ClassAssertion(A, i),
+    )
+    assert not kb.consistent
+
+
+def test_rules_do_without_cases_where_a_value_is_left() -> None:
+    below = ex.DataSomeValuesFrom(T, number(('maxExclusive', 5)))
+    kb = reasoned(
+        IDLE,
+        SubClassOf(A, ex.DataSomeValuesFrom(T, XSD + 'integer')),
+        SubClassOf(below, B),
+        ClassAssertion(A, i),
+    )
+    assert kb.unsupported == ()
+
+
+def test_as_many_values_as_there_are_all_follow() -> None:
+    two = ex.DataOneOf((whole(1), whole(2)))
+    kb = reasoned(SubClassOf(A, ex.DataMinCardinality(2, T, two)), ClassAssertion(A, i))
+    assert kb.holds(ax.DataPropertyAssertion(T, i, whole(1)))
+    assert kb.holds(ax.DataPropertyAssertion(T, i, whole(2)))
