@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -79,6 +81,38 @@ def test_a_run_is_drawn_with_its_waits(
     plain = draw_place(read_world(place).plan, 'x', 'y')
     with Image.open(output) as picture:
         assert picture.size[0] > plain.size[0]
+
+
+def test_the_names_of_places_end_before_their_bars(
+    record: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    names = {'R1': 'Kitchen', 'R2': 'The_store_beside_the_stairs_of_the_first_floor'}
+    texts = {path: path.read_text() for path in (CONFIG / 'seven_rooms.yaml', record)}
+    for path, text in texts.items():
+        for name, new in names.items():
+            text = re.sub(rf'\b{name}\b', new, text)
+        (tmp_path / f'new_{path.name}').write_text(text)
+    ends, begins = [], []
+    write, fill = Canvas.text, Canvas.box
+
+    def text(
+        self: Canvas, at: tuple[float, float], words: str, size: float, *rest: str, **named: str
+    ) -> None:
+        if words[:3] in ('Kit', 'The') and named.get('anchor') == 'lm':
+            ends.append(at[0] + self.text_width(words, size))
+        write(self, at, words, size, *rest, **named)
+
+    def box(self: Canvas, left: float, top: float, *rest: Any) -> None:
+        begins.append(left)
+        fill(self, left, top, *rest)
+
+    monkeypatch.setattr(Canvas, 'text', text)
+    monkeypatch.setattr(Canvas, 'box', box)
+    new = [str(tmp_path / f'new_{path.name}') for path in texts]
+    assert map_command.main([new[0], '--record', new[1], '-o', str(tmp_path / 'run.png')]) == 0
+    bars = max(set(begins), key=begins.count)
+    assert len(ends) == 2
+    assert max(ends) < bars
 
 
 def test_ways_and_failures_come_from_the_record(record: Path) -> None:

@@ -26,6 +26,7 @@ _GRAPH, _SIGN, _SIGN_HOME = '#7fa3c7', '#2c5d8f', '#2f8a4c'
 _DRIVEN, _PLANNED, _CALM, _LATE = '#14717f', '#8a7fb8', '#fdf9f0', '#f2b287'
 _LONGEST_SIDE = 1180.0
 _PANEL = 250
+_WIDEST_NAME = 100.0
 
 
 @dataclass(frozen=True)
@@ -232,7 +233,7 @@ class _Picture:
             radius = max(9.0, self._canvas.scale * 0.24)
             x, y = self._canvas.at(self._plan.station[:2])
             at = (x + radius + 6, y + radius + self._size * 1.5)
-            self._canvas.text(at, f'× {count}', self._size, _SIGN_HOME, anchor='lm')
+            self._canvas.text(at, f'x {count}', self._size, _SIGN_HOME, anchor='lm')
 
     def _bolt(self, x: float, y: float) -> None:
         radius = max(8.0, min(14.0, self._canvas.scale * 0.24))
@@ -288,6 +289,13 @@ class _Picture:
         self._canvas.text((x, y), text, 13, _INK, anchor='lm')
         return self._canvas.text_width(text, 13)
 
+    def _cut(self, text: str, size: float, width: float) -> str:
+        """Return a text, or what of it is so wide at most."""
+        whole = text
+        while self._canvas.text_width(text, size) > width:
+            text = whole[: len(text.removesuffix('...')) - 1] + '...'
+        return text
+
     def _stroke(self, x: float, y: float, colour: str, *, dashed: bool) -> None:
         for start in (0, 8, 16) if dashed else (0, 6, 12, 18):
             self._canvas.box(x + start, y - 1.2, x + start + 6, y + 1.2, colour)
@@ -302,21 +310,24 @@ class _Picture:
         step = min(30.0, (bottom - top - 24) / max(1, len(ranked)))
         size = min(14.0, max(7.0, step * 0.62))
         longest = max(*run.waits.values(), run.threshold or 0.0)
-        room = _PANEL - 150
+        names = {name: self._cut(name, size, _WIDEST_NAME) for name in ranked}
+        widest = max(canvas.text_width(name, size) for name in names.values())
+        begin = left + max(44.0, widest + 8.0)
+        room = left + _PANEL - 106 - begin
         threshold = run.threshold or 0.0
-        urgent = left + 44 + (room * threshold / longest if longest else 0.0)
+        urgent = begin + (room * threshold / longest if longest else 0.0)
         for number, name in enumerate(ranked):
             y = top + 24 + (number + 0.5) * step
             share = run.waits[name] / longest if longest else 0.0
-            canvas.text((left, y), name, size, _INK, anchor='lm')
+            canvas.text((left, y), names[name], size, _INK, anchor='lm')
             canvas.box(
-                left + 44,
+                begin,
                 y - step * 0.3,
-                left + 44 + max(2.0, room * share),
+                begin + max(2.0, room * share),
                 y + step * 0.3,
                 blend(_CALM, _LATE, 0.25 + 0.75 * share),
             )
-            words, x = f'{run.waits[name]:.0f} s', left + 50 + room * share
+            words, x = f'{run.waits[name]:.0f} s', begin + 6 + room * share
             if x - 6 < urgent < x + canvas.text_width(words, size) + 6:
                 x = urgent + 5
             canvas.text((x, y), words, size, _SOFT, anchor='lm')
@@ -326,4 +337,4 @@ class _Picture:
             end = top + 24 + len(ranked) * step + 4
             canvas.box(urgent - 0.8, top + 18, urgent + 0.8, end, _ALARM)
             words = f'urgent after {threshold:.0f} s'
-            canvas.text((left + 44, end + 6), words, 12, _ALARM)
+            canvas.text((begin, end + 6), words, 12, _ALARM)

@@ -132,7 +132,7 @@ export class MapView {
     const [x, y] = region?.label ?? [at[0] + .8, at[1] - .25];
     const shown = short(name, 16);
     const readable = (this.width ?? 16) / 24;
-    const fits = region ? 3.2 * region.room / Math.max(4, shown.length) : readable;
+    const fits = region ? 2.9 * region.room / Math.max(4, shown.length) : readable;
     const size = Math.max(readable / 2, Math.min(readable, fits));
     const words = s('tspan', {class: 'age', ...(region ? {x, dy: size * .95} : {dx: size * .4}), 'font-size': size * .8}, '');
     const label = s('text', {class: region ? null : 'beside', x, y: -y, 'font-size': size}, ...(!region || region.room > .25 * size * shown.length ? [shown, words] : []));
