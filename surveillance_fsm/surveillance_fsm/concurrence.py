@@ -70,6 +70,8 @@ class ChildFrame(Frame):
     def execute(self, history: History | None = None) -> Any:
         """Execute the state; its outcome."""
         node, stack = self.node, self.thread.stack
+        if self.stale:
+            raise LeftBehindError
         try:
             outcome = node.execute(node.view)
             node.target(outcome)
@@ -105,6 +107,11 @@ class ChildFrame(Frame):
     def wanted(self) -> bool:
         """Whether somebody wants the state to end."""
         return self.unneeded or super().wanted
+
+    @property
+    def asked(self) -> bool:
+        """Whether the state was asked to end; without that there is nothing to answer."""
+        return self.unneeded or self.preempted is not None or self.cut is not None
 
     def stop(self) -> None:
         """Ask the state to stop: another one has ended."""
@@ -184,7 +191,9 @@ class ConcurrentFrame(Frame):
         # Of all states that were started, by label; most have ended.
         self._children: dict[str, ChildFrame] = {}
         # What an execution that was left behind, or broke off, was asked is not for this one.
-        container.fsm_first().state.recall_preempt()
+        together = container.fsm_first().state
+        if together.preempt_requested():
+            together.recall_preempt()
 
     def go_on_from(self, history: History) -> None:
         """Begin where the container was put aside."""
@@ -199,7 +208,9 @@ class ConcurrentFrame(Frame):
         return history
 
     def active_labels(self) -> list[str]:
-        """Return the labels of the states that run."""
+        """Return the labels of the states that run, or of the interrupt's."""
+        if not self.waits_for_threads():
+            return super().active_labels()
         return [label for label, outcome in self.outcomes.items() if outcome is None]
 
     def waits_for_threads(self) -> bool:
@@ -217,8 +228,11 @@ class ConcurrentFrame(Frame):
     def run_states(self) -> Any:
         """Run all states that have not ended; the outcome, or `SUSPENDED` if one made way."""
         error = self._await_states(self._start_states())
-        # Whatever comes of it is not told as a transition of one state.
-        self.attention = True
+        container, control = self.container, self.run.control
+        callbacks = container.fsm_transition_cbs or container.fsm_termination_cbs
+        if callbacks or control.trace is not None or self.run.chatty:
+            # Its end is not told as that of one state: see `tell`.
+            self.attention = True
         if error is not None:
             raise error
         with self.run.condition:
@@ -270,6 +284,7 @@ class ConcurrentFrame(Frame):
         """
         run, container = self.run, self.container
         with run.condition:
+            self._check()
             started = {
                 label: ChildFrame(self, node, ExecutionThread(run, node.path, self._wakeup))
                 for label, node in container.fsm_table.items()
@@ -279,11 +294,10 @@ class ConcurrentFrame(Frame):
                 child.thread.stack.append(child)
             self._children |= started
         container.call_transition_cbs()
+        for child in started.values():
+            child.thread.start(child.execute)
         with run.condition:
-            if self.stale:
-                raise LeftBehindError
-            for child in started.values():
-                child.thread.start(child.execute)
+            self._check()
             # What was asked before there was anybody to ask.
             if container.fsm_first().state.preempt_requested():
                 self.preempt_states()
@@ -303,8 +317,7 @@ class ConcurrentFrame(Frame):
         first_error: BaseException | None = None
         while running:
             supervise(self.run, [child.thread for child in running.values()], self._wakeup)
-            if self.stale:
-                raise LeftBehindError
+            self._check()
             for label in [label for label, child in running.items() if child.thread.done]:
                 error = running.pop(label).thread.error
                 if error is not None:
@@ -319,6 +332,11 @@ class ConcurrentFrame(Frame):
                     first_error = self._stop_others(running)
         return first_error
 
+    def _check(self) -> None:
+        """Raise `LeftBehindError` when the machine went on without the concurrence."""
+        if self.stale:
+            raise LeftBehindError
+
     def _stop_others(self, running: Iterable[str]) -> SmachError | None:
         """Stop the states that are to stop now that one has ended; the error of deciding that."""
         error = None
@@ -326,7 +344,8 @@ class ConcurrentFrame(Frame):
             stop: Iterable[str] = self.container.fsm_states_to_stop(self.outcomes)
         except SmachError as raised:
             error, stop = raised, running
-        self._stop([label for label in stop if label in running])
+        if stop:
+            self._stop([label for label in stop if label in running])
         return error
 
     def _stop(self, labels: Iterable[str]) -> None:
@@ -344,7 +363,7 @@ class ConcurrentFrame(Frame):
             node.state.fsm_forget()
             if child.gone is None:
                 node.state.recall_preempt()
-        elif child.answer().made_way:
+        elif (outcome is SUSPENDED or child.asked) and child.answer().made_way:
             node.release()
             return None
         node.state.fsm_progress = None

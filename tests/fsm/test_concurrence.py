@@ -368,6 +368,7 @@ def test_a_checkpoint_taken_in_an_interrupt_goes_on_in_it():
     concurrence.raise_interrupt('STOP')
     began(stop)
     in_interrupt = saved[-1]
+    assert concurrence.get_active_states() == ['STOP']
     concurrence.request_preempt()
     assert run.result() == 'preempted'
     concurrence, states, stop, clock = waiting_with_an_interrupt(**ALL_DONE)
