@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from launcher import interrupt, package_commands, system
-from launcher.environment import CHECKOUT, Environment, clean_environ
+from launcher.environment import CHECKOUT, Environment, clean_environ, keep_bytecode
 from launcher.instance_lock import claim
 from launcher.options import DEFAULT_MEMORY, make_parser, shared_options
 from surveillance_runtime import node_table
@@ -256,9 +256,6 @@ def _test(argv: list[str]) -> int:
     spread = any(a.startswith(('-n', '--numprocesses', '--pdb')) or 'no:xdist' in a for a in argv)
     # On two cores three are a seventh faster than two: many tests wait for other processes.
     words = [] if spread else ['-n', '3', '--dist', 'loadfile']
-    if os.environ.pop('PYTHONDONTWRITEBYTECODE', None):
-        # As in many containers. Hundreds of processes would compile all that they import.
-        os.environ.setdefault('PYTHONPYCACHEPREFIX', str(CHECKOUT / 'build' / 'pycache'))
     os.chdir(CHECKOUT)
     sys.stdout.flush()
     return os.execv(sys.executable, [sys.executable, '-m', 'pytest', *words, *argv])
@@ -305,6 +302,7 @@ def _environment(extras: Sequence[str]) -> Environment | None:
 
 def _enter(argv: list[str], extras: Sequence[str] = ()) -> None:
     """Set the project's environment up, and go on as a process of it."""
+    keep_bytecode(os.environ)
     environment = _environment(extras)
     if environment is None:
         return

@@ -289,6 +289,16 @@ class _Command:
         return f'the set-up stopped: {reason} (more in {self._log}); the next start goes on'
 
 
+def keep_bytecode(environ: MutableMapping[str, str], checkout: Path = CHECKOUT) -> None:
+    """Have Python keep compiled modules in `build` where it may not beside their sources.
+
+    Containers often forbid the latter. Without compiled modules each start of a node takes three
+    times the processor time, and each process of a test run compiles all that it imports.
+    """
+    if environ.pop('PYTHONDONTWRITEBYTECODE', ''):
+        environ.setdefault('PYTHONPYCACHEPREFIX', str(checkout / 'build' / 'pycache'))
+
+
 def clean_environ() -> dict[str, str]:
     """Return this process's environment without what belongs to another ROS or virtual
     environment.

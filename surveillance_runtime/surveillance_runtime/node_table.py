@@ -46,7 +46,6 @@ class Node:
         return self.name in ('battery_controller', 'planner_controller', 'motion_controller')
 
 
-# In start order: what the first decision waits for comes first, so that it is ready first.
 _PURPOSES = {
     'surveillance_ontology': {
         'armor_server': 'ontologies and their reasoner, behind the ARMOR interface',
@@ -87,6 +86,19 @@ NODES = tuple(
 )
 BY_NAME = {node.name: node for node in NODES}
 
+# What the first decision waits for comes first, so that it is ready first: the map, and the place
+# that the robot is in, which takes the base's laser.
+_FIRST = (
+    'armor_server',
+    'ontology_map_builder',
+    'simulator',
+    'motion_controller',
+    'robot_behavior',
+)
+_START_ORDER = (
+    *(BY_NAME[name] for name in _FIRST),
+    *(node for node in NODES if node.name not in _FIRST),
+)
 _ALWAYS = (
     'robot_behavior',
     'armor_server',
@@ -145,7 +157,7 @@ def select(
             wanted.update(_OF_PATROL)
         if mode == 'SIMULATED':
             wanted.update(_OF_BASE)
-    chosen = tuple(node for node in NODES if node.name in wanted - left_out)
+    chosen = tuple(node for node in _START_ORDER if node.name in wanted - left_out)
     if not chosen:
         raise ValueError('no node is left to start: check --only and --without')
     return chosen

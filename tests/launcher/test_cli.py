@@ -143,18 +143,6 @@ def test_a_domain_of_the_environment_that_is_none_costs_one_line(domain):
     assert f'ROS_DOMAIN_ID: got {domain!r}' in done.stderr
 
 
-def test_processes_of_a_test_run_share_compiled_modules_beside_the_sources_or_not(monkeypatch):
-    given = {}
-    monkeypatch.setattr('launcher.cli._enter', lambda *_, **__: None)
-    monkeypatch.setattr(os, 'chdir', lambda _folder: None)
-    monkeypatch.setattr(os, 'execv', lambda *_: given.update(os.environ))
-    monkeypatch.setenv('PYTHONDONTWRITEBYTECODE', '1')
-    monkeypatch.delenv('PYTHONPYCACHEPREFIX', raising=False)
-    main(['test'])
-    assert 'PYTHONDONTWRITEBYTECODE' not in given
-    assert given['PYTHONPYCACHEPREFIX'] == str(ROOT / 'build' / 'pycache')
-
-
 def test_the_runs_of_a_read_only_checkout_lie_in_the_users_folder(tmp_path, monkeypatch):
     assert runs_folder(tmp_path) == tmp_path / 'runs'
     monkeypatch.setattr(os, 'access', lambda _path, _mode: False)

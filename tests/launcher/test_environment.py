@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from launcher.environment import clean_environ
+from launcher.environment import clean_environ, keep_bytecode
 from launcher.fingerprint import INTERFACES, JOURNAL
 from tests.launcher.conftest import ROOT
 
@@ -179,3 +179,19 @@ def test_half_an_environment_without_pip_is_made_anew(tmp_path, checkout, start)
     anew = start('-u', '-c', PREPARE, str(checkout), environ=environ())
     anew.until(r'\[1/3\] virtual environment')
     anew.end(signal.SIGINT)  # the rest is as from nothing
+
+
+def test_compiled_modules_are_kept_where_python_may_not_write_them_beside_the_sources(tmp_path):
+    (tmp_path / 'module.py').write_text('VALUE = 1\n')
+    given = {**clean_environ(), 'PYTHONDONTWRITEBYTECODE': '1'}
+    given.pop('PYTHONPYCACHEPREFIX', None)
+    keep_bytecode(given, tmp_path)
+    subprocess.run([sys.executable, '-c', 'import module'], cwd=tmp_path, env=given, check=True)
+    assert not (tmp_path / '__pycache__').exists()
+    assert list((tmp_path / 'build').rglob('module.*.pyc'))
+
+
+def test_who_lets_python_write_its_compiled_modules_gets_them_beside_the_sources(tmp_path):
+    given = {'PATH': os.environ['PATH']}
+    keep_bytecode(given, tmp_path)
+    assert given == {'PATH': os.environ['PATH']}
