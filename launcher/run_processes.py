@@ -14,6 +14,7 @@ from launcher.supervisor import Program
 from launcher.system import LaunchError
 from surveillance_runtime import node_table
 from surveillance_runtime.discovery import LAST_DOMAIN, launched_nodes
+from surveillance_runtime.launch_protocol import ONE_THREAD
 from surveillance_runtime.run_parameters import BEHAVIOUR_NODE
 
 CHILD = Path(__file__).with_name('child.py')
@@ -56,6 +57,7 @@ def node_environ(run: Run, logs: Path | None = None) -> dict[str, str]:
     if run.domain is not None:
         environ['ROS_DOMAIN_ID'] = str(run.domain)
     environ |= launched_nodes(environ, network=run.network)
+    environ |= ONE_THREAD
     for name in ('NOTIFY_SOCKET', 'WATCHDOG_USEC', 'WATCHDOG_PID'):
         environ.pop(name, None)  # of the launcher alone
     if logs is not None:

@@ -26,13 +26,12 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.time import Time
 from rclpy.time_source import CLOCK_TOPIC
 from rosgraph_msgs.msg import Clock as ClockMessage
-from threadpoolctl import threadpool_limits
 
 from surveillance_runtime.configuration import RosArguments, argument_layer, split_arguments
 from surveillance_runtime.diagnostics import DiagnosticsThread, Heartbeat
 from surveillance_runtime.discovery import prefer_quick_discovery
 from surveillance_runtime.executor import PatrolExecutor
-from surveillance_runtime.launch_protocol import EXIT_CANNOT_START, EXIT_NOT_NOW
+from surveillance_runtime.launch_protocol import EXIT_CANNOT_START, EXIT_NOT_NOW, ONE_THREAD
 from surveillance_runtime.node import (
     JOIN_SECONDS,
     PatrolNode,
@@ -146,10 +145,13 @@ def use_one_thread_for_matrices() -> None:
     A node's matrices are small: further threads cost half as much processor time again, taken from
     the other nodes, and save none.
     """
-    for variable in ('OPENBLAS_NUM_THREADS', 'OMP_NUM_THREADS', 'MKL_NUM_THREADS'):
-        # for libraries that are loaded from now on
-        os.environ.setdefault(variable, '1')
+    if ONE_THREAD.items() <= os.environ.items():
+        return  # said before they were loaded
+    # for libraries that are loaded from now on
+    os.environ.update(ONE_THREAD)
     # for those that are there already
+    from threadpoolctl import threadpool_limits
+
     threadpool_limits(1)
 
 

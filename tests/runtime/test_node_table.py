@@ -46,6 +46,16 @@ def test_the_patrol_adds_what_learns_the_place_from_markers():
     assert set(names('RANDOM', 'patrol')) == SEED | more | {'simulator'}
 
 
+def test_what_the_first_decision_waits_for_is_started_first():
+    assert names('SIMULATED')[:5] == [
+        'armor_server',
+        'ontology_map_builder',
+        'simulator',
+        'motion_controller',
+        'robot_behavior',
+    ]
+
+
 def test_only_and_without():
     assert names('RANDOM', only=['video_source', 'armor_server']) == [
         'armor_server',
