@@ -16,9 +16,7 @@ RESTARTS = 'LAUNCH_RESTARTS'
 MEMORY = 'LAUNCH_MEMORY'
 """The bytes of data that the process may map."""
 
-ONE_THREAD = {
-    name: '1' for name in ('OPENBLAS_NUM_THREADS', 'OMP_NUM_THREADS', 'MKL_NUM_THREADS')
-}
+ONE_THREAD = dict.fromkeys(('OPENBLAS_NUM_THREADS', 'OMP_NUM_THREADS', 'MKL_NUM_THREADS'), '1')
 """Has the libraries behind NumPy and SciPy work on the calling thread alone, see `process`. They
 read it when they are loaded, before a process can say so itself."""
 

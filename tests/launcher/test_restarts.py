@@ -5,7 +5,9 @@ from __future__ import annotations
 from launcher.process_watch import SILENT_START
 from launcher.restarts import (
     LONGEST_AFTER_WORK,
+    MOST_HITS,
     PAUSES,
+    REMIND_AFTER,
     STEADY_AFTER,
     TROUBLE_DEATHS,
     TROUBLE_PERIOD,
@@ -34,8 +36,20 @@ def test_a_program_that_dies_in_a_slow_start_gets_them_too():
 
 
 def test_one_that_worked_is_back_soon_however_often_it_is_hit():
-    assert max(pauses(13, worked=True, lived=5.0)) == LONGEST_AFTER_WORK
-    assert set(pauses(13, worked=True, lived=STEADY_AFTER)) == {0.0}
+    assert max(pauses(MOST_HITS, worked=True, lived=5.0)) == LONGEST_AFTER_WORK
+    assert set(pauses(100, worked=True, lived=STEADY_AFTER)) == {0.0}
+
+
+def test_one_that_dies_soon_after_each_ready_start_gets_growing_pauses_in_the_end():
+    found = pauses(MOST_HITS + len(PAUSES) + 1, worked=True)
+    assert found[MOST_HITS:] == [2.0, 2.0, 2.0, 2.0, *PAUSES[4:], PAUSES[-1]]
+
+
+def test_one_that_ran_well_again_is_back_at_once():
+    restarts = Restarts()
+    for second in range(100):
+        restarts.died(float(second), START, worked=True)
+    assert restarts.died(200.0, STEADY_AFTER, worked=True) == 0.0
 
 
 def test_one_failed_start_of_a_program_that_was_hit_often_costs_no_long_pause():
@@ -66,6 +80,14 @@ def test_somebody_is_called_once_while_it_goes_on():
     found = told(*(number * step for number in range(50)))
     assert [number for number, text in enumerate(found) if text] == [TROUBLE_DEATHS - 1]
     assert found[TROUBLE_DEATHS - 1] == 'died 5 times in 400 s'
+
+
+def test_somebody_is_reminded_while_it_goes_on_for_days():
+    restarts, now, calls = Restarts(), 0.0, 0
+    while now < 10 * REMIND_AFTER:
+        now += START + restarts.died(now, START, worked=True)
+        calls += bool(restarts.trouble(now))
+    assert calls == 10
 
 
 def test_somebody_is_called_again_after_a_quiet_period():
