@@ -133,6 +133,16 @@ def test_the_oldest_files_are_deleted_first(tmp_path: Path) -> None:
     assert read(tmp_path / '2' / RECORDING)
 
 
+def test_a_file_that_another_recorder_just_deleted_keeps_no_other_from_being_deleted(
+    tmp_path: Path,
+) -> None:
+    write(tmp_path / '1' / RECORDING, ['word ' * 100] * 4, segment_bytes=10).close()
+    files = segments(tmp_path / '1' / RECORDING)
+    (tmp_path / '0' / RECORDING).mkdir(parents=True)
+    (tmp_path / '0' / RECORDING / f'{RECORDING}_0.mcap').symlink_to(tmp_path / 'gone')
+    assert prune(tmp_path, 0) == files
+
+
 def test_definitions_name_all_that_a_type_uses() -> None:
     text = definition('surveillance_interfaces/msg/FactChanges')
     for name in ('FactChange', 'Fact'):

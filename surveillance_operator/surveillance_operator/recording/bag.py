@@ -210,32 +210,36 @@ def repair(folder: Path) -> list[str]:
 def prune(runs: Path, keep_bytes: float) -> list[Path]:
     """Delete the oldest recordings, segment by segment, until the rest is small enough.
 
-    Files that are being written stay. What a run leaves beside its recording stays, too.
+    Files that are being written stay, and those that may not be deleted. What a run leaves beside
+    its recording stays, too. Another recorder may do the same at the same time.
 
     Returns:
         The deleted files.
     """
-    files = [path for folder in runs.glob(f'*/{RECORDING}') for path in segments(folder)]
-    files.sort(key=lambda path: path.stat().st_mtime)
-    total = sum(path.stat().st_size for path in files)
+    files = []
+    for path in (path for folder in runs.glob(f'*/{RECORDING}') for path in segments(folder)):
+        with contextlib.suppress(OSError):
+            status = path.stat()
+            files.append((status.st_mtime, status.st_size, path))
+    total = sum(size for _, size, _ in files)
     deleted = []
-    for path in files:
+    for _, size, path in sorted(files):
         if total <= keep_bytes:
             break
-        size = path.stat().st_size
-        with open(path, 'rb') as file:
-            try:
+        try:
+            with open(path, 'rb') as file:
                 fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except OSError:
-                continue
-            path.unlink()
+                path.unlink()
+        except OSError:
+            continue
         deleted.append(path)
         total -= size
     for folder in {path.parent for path in deleted}:
-        if segments(folder):
-            write_metadata(folder, _whole_segments(folder))
-        else:
-            shutil.rmtree(folder, ignore_errors=True)
+        with contextlib.suppress(OSError):
+            if segments(folder):
+                write_metadata(folder, _whole_segments(folder))
+            else:
+                shutil.rmtree(folder, ignore_errors=True)
     return deleted
 
 
