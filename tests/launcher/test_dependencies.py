@@ -78,7 +78,7 @@ def test_every_import_is_installed_by_the_set_up(folder):
 
 def test_the_set_up_itself_needs_the_standard_library_alone(tmp_path):
     # A Python without any package, in a copy without those that need one.
-    for part in ('launcher', 'surveillance_runtime'):
+    for part in ('launcher', 'surveillance_runtime', 'surveillance_fsm'):
         shutil.copytree(ROOT / part, tmp_path / part)
     modules = ('cli', 'options', 'environment', 'instance_lock', 'progress', 'system')
     program = ';'.join(f'import launcher.{module}' for module in modules)
