@@ -137,6 +137,13 @@ def test_the_plan_comes_within_a_twentieth_of_the_bound_that_knows_the_rules(
     assert settled_on(name, 'tour', factor) <= 1.05 * bound.low
 
 
+def test_little_more_than_the_round_is_accepted_for_shorter_first_waits() -> None:
+    graph = of_pairs({(0, 1): 17.9, (0, 2): 15.4, (0, 3): 19.5, (1, 4): 17.0, (2, 3): 32.4})
+    threshold = 2.0 * graph.tour.length
+    bound = rule_bound(graph, threshold).low
+    assert settled(graph, 'tour', threshold) <= 1.03 * bound
+
+
 @pytest.mark.parametrize('seed', [2, 3])
 def test_leg_times_that_are_learned_do_not_turn_the_round(seed: int) -> None:
     draw = random.Random(seed)

@@ -63,8 +63,9 @@ HORIZON = 12.0
 """How many periods a course is simulated at most."""
 GOOD_ENOUGH = 1.004
 """A longest wait of so many bounds is not improved any further."""
-ACCEPTED = 1.04
-"""A wait from visit to visit of so many bounds is accepted for shorter first waits."""
+ACCEPTED = 1.03
+"""A wait from visit to visit of so many bounds is accepted for shorter first waits. The round may
+be a little longer than it need be itself, and both together are to stay below 1.05."""
 SKIPS = (0.0, 0.3, 0.6)
 """Targets visited more lately than this may be skipped, in lengths of the round."""
 SIMPLE: tuple[Choice, ...] = (oldest, lookahead)
@@ -361,7 +362,7 @@ class Plan:
         longer than what is accepted. Then the first waits do, which come once.
         """
         bound = self._bound
-        lasting = max(0, round(100.0 * (outcome.settled - self._accepted) / bound))
+        lasting = max(0, math.ceil(100.0 * (outcome.settled - self._accepted) / bound - 1e-6))
         return lasting, round(100.0 * outcome.first / bound), outcome.settled
 
     def _entered(self, phase: int, targets: tuple[int, ...] = ()) -> Course:
