@@ -279,6 +279,15 @@ def one_state(library: Any = fsm) -> Any:
     return machine
 
 
+def three_together(library: Any = fsm) -> Any:
+    """Return a concurrence of three states that end at once."""
+    concurrence = library.Concurrence(['done'], 'done')
+    with concurrence:
+        for label in 'ABC':
+            library.Concurrence.add(label, library.CBState(lambda ud: 'done', outcomes=['done']))
+    return concurrence
+
+
 def time_of(work: Callable[[], object], repeats: int = 300, rounds: int = 20) -> float:
     """Return the seconds that some work takes, the wall's: the best of several rounds."""
     work()
@@ -683,6 +692,8 @@ def figures(quick: bool, smach: Any) -> None:
     for name, library in libraries:
         spent = time_of(one_state(library).execute)
         print(f'{f"{name}, execute() of one state":42}{1e6 * spent:9.1f} us')
+        spent = time_of(three_together(library).execute, rounds=5)
+        print(f'{f"{name}, a concurrence of 3 states":42}{1e6 * spent:9.1f} us')
     unwatched = one_state()
     unwatched.preempt_timeout = None
     print(f'{"this engine, on the calling thread":42}{1e6 * time_of(unwatched.execute):9.1f} us')
