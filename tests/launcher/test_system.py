@@ -90,18 +90,6 @@ def test_the_folders_of_the_checkout_are_no_built_workspace():
     assert done.stdout == 'False\n'
 
 
-def test_it_starts_before_anything_is_set_up():
-    done = subprocess.run(
-        [sys.executable, '-S', str(ROOT / 'launch.py'), '--help'],
-        env=clean_environ(),
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-        check=False,
-    )
-    assert (done.returncode, done.stdout[:15]) == (0, 'usage: launch.p'), done.stdout
-
-
 def test_a_sourced_jazzy_is_seen():
     assert sourced_ros({'ROS_DISTRO': 'jazzy', 'AMENT_PREFIX_PATH': '/opt/ros/jazzy'})
     assert not sourced_ros({'ROS_DISTRO': 'humble', 'AMENT_PREFIX_PATH': '/opt/ros/humble'})
