@@ -301,6 +301,12 @@ def test_a_graph_that_is_kept_up_to_date_is_the_one_that_a_new_process_gets(
     service.close()
 
 
+def test_a_long_text_in_a_query_is_read_once(built: ArmorClient) -> None:
+    long = 'x' * 2_000_000
+    # A word was looked at again from each of its characters, for hours.
+    assert built.query.sparql(f'SELECT ?x {{ ?x ?p "{long}" }}', 20_000) == []
+
+
 def test_names_that_are_no_iris_are_seen(service: ArmorService, tmp_path: Path) -> None:
     ask = asker(service)
     (tmp_path / 'odd.ttl').write_text('<x:i> a <x:a#b#c>, <x:50%> ; <x:p#q#r> "v"@en-muchtoolong .')

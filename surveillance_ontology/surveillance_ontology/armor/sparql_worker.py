@@ -32,7 +32,7 @@ MOST_CHARACTERS = 64 * 1024 * 1024
 """In one answer; the server holds it in memory."""
 _NO_KEYWORDS = re.compile(
     r"""("{3}|'{3})(?:[^\\]|\\.)*?\1|"[^"\\]*+(?:\\.[^"\\]*+)*+"|'[^'\\]*+(?:\\.[^'\\]*+)*+'"""
-    r"""|<[^<>"{}|^`\\\s]*>|#[^\r\n]*|[?$]\w+|[\w.-]*:[\w.:-]*""",
+    r"""|<[^<>"{}|^`\\\s]*>|#[^\r\n]*|[?$]\w+|(?<![\w.-])[\w.-]*+:[\w.:-]*""",
     re.DOTALL,
 )
 """Strings, IRIs, comments, variables and prefixed names (SPARQL 1.1, section 19.8)."""
@@ -126,8 +126,8 @@ _WHOLE = {_XSD + name for name in ('integer', 'long', 'int', 'short', 'byte')}
 _CANONICAL = re.compile('0|-?[1-9][0-9]{0,17}')
 _COMPUTED = re.compile(r'\bAS\s+[?$](\w+)', re.IGNORECASE)
 _PREFIX = re.compile(r'\bPREFIX\s+([\w.-]*):\s*<([^<>]*)>', re.IGNORECASE)
-_NAME = re.compile(r'<([^<>\s]*)>|([\w.-]*):([\w.-]*\w)')
-_BEFORE = r'(\S+)\s+[?$]{}\b'
+_NAME = re.compile(r'<([^<>\s]*+)>|(?<![\w.-])([\w.-]*+):([\w.-]*\w)')
+_BEFORE = r'(?<!\S)(\S++)\s+[?$]{}\b'
 _VARIABLE = re.compile(r'[?$](\w+)')
 
 _Places = dict[tuple[str, str], None]

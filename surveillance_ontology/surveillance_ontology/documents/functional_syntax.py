@@ -111,6 +111,8 @@ class _Parser:
 
     def _part(self, depth: int) -> Any:
         kind, value, place = self._take()
+        if depth > DEEPEST:
+            raise self._fail(f'constructs nest deeper than {DEEPEST}', place)
         if kind == 'iri':
             return self._iri(value, place)
         if kind == 'text':
@@ -125,8 +127,6 @@ class _Parser:
             raise self._fail(f'unexpected {value!r}', place)
         if ':' in value or self._next[:2] != ('mark', '('):
             return self._named(value, place)
-        if depth > DEEPEST:
-            raise self._fail(f'constructs nest deeper than {DEEPEST}', place)
         self._take('(')
         parts = []
         while self._next[:2] != ('mark', ')'):

@@ -233,7 +233,7 @@ class Mapping:
         inverse = self._one(node, OWL + 'inverseOf') if node.startswith('_:') else None
         if not isinstance(inverse, str):
             return node
-        inner = self._property(inverse)
+        inner = self._inside(node, lambda _: self._property(inverse))
         return inner.prop if isinstance(inner, ex.ObjectInverseOf) else ex.ObjectInverseOf(inner)
 
     def _is_data(self, prop: str, range_node: Node | None = None) -> bool:
@@ -429,9 +429,6 @@ class Mapping:
         except IllFormedError as error:
             text = f'{left_out}: {error.message}'
             self.unsupported.append(f'line {error.line}: {text}' if error.line else text)
-        except RecursionError:
-            self._open.clear()
-            self._report(subject, f'{left_out}: it nests too deeply, or contains itself')
 
     def _triple(self, subject: str, predicate: str, value: Node) -> None:
         handler = _PREDICATES.get(predicate)

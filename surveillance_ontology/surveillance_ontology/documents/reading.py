@@ -163,8 +163,6 @@ def _read(source: str | Path | bytes, iri: str, size_limit: int) -> tuple[str, M
     except OntologyFileError as error:
         error.path = name
         raise
-    except RecursionError:
-        raise OntologyFileError('class expressions nest too deeply', path=name) from None
 
 
 def _utf8(data: bytes) -> bytes:

@@ -408,6 +408,7 @@ def test_expressions_nest_to_a_bound(levels: int, inner: str) -> None:
         (b'<x:i> <x:p> <x:a|b> .\n', "1:13: not N-Triples: Invalid IRI code point '|'"),
         (b'Ontology(ClassAssertion(<x:a{b}> <x:i>))', "1:25: IRI 'x:a{b}' contains '{'"),
         (b'Prefix(:=<x:>)Ontology(ClassAssertion(:C :a|b))', "IRI 'x:a|b' contains '|'"),
+        (b'Ontology(' + b'(' * 10_000, '1:111: constructs nest deeper than 100'),
         (b'Ontology(ClassAssertion(<x:C> _:a;b))', "'_:a;b' is no label"),
         (b'Ontology(DataPropertyAssertion(<x:d> <x:i> "v"@1))', "'1' is no language tag"),
         (
