@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from functools import partial
 
 import pytest
@@ -13,7 +14,7 @@ from surveillance_ontology.owl.axioms import Axiom, ClassAssertion, SubClassOf
 from surveillance_ontology.owl.expressions import Literal
 from surveillance_ontology.owl.vocabulary import NOTHING, THING, TOP_LITERAL, XSD
 from surveillance_ontology.reasoner.cases import CaseReasoner, UnsupportedError, entails
-from tests.ontology.reasoner.wide_ontologies import INDIVIDUALS, WideOntology
+from tests.ontology.reasoner.wide_ontologies import INDIVIDUALS, PlainOntology, WideOntology
 
 A, B, C, D = (f'x:{name}' for name in 'ABCD')
 P, Q, R = (f'x:{name}' for name in 'pqr')
@@ -535,3 +536,32 @@ def test_as_many_values_as_there_are_all_follow() -> None:
     kb = reasoned(SubClassOf(A, ex.DataMinCardinality(2, T, two)), ClassAssertion(A, i))
     assert kb.holds(ax.DataPropertyAssertion(T, i, whole(1)))
     assert kb.holds(ax.DataPropertyAssertion(T, i, whole(2)))
+
+
+def assert_as_by_cases(seed: int) -> None:
+    drawn = PlainOntology(seed)
+    rng = drawn.random
+    axioms = drawn.ontology(rng.randrange(1, 6), rng.randrange(1, 6))
+    kb = reasoned(*axioms)
+    if kb.unsupported:
+        return
+    found = CaseReasoner(axioms)
+    assert found.consistent() == kb.consistent
+    if not kb.consistent:
+        return
+    assert list(found.facts(kb.holds)) == []
+    for one, other in itertools.permutations((*drawn.classes, NOTHING), 2):
+        below = SubClassOf(one, other)
+        assert one == NOTHING or kb.holds(below) or not entails(axioms, below)
+
+
+@pytest.mark.parametrize('seed', [4856, 5751, *range(15)])
+def test_nothing_is_missed_without_cases(seed: int) -> None:
+    assert_as_by_cases(seed)
+
+
+@pytest.mark.long
+@pytest.mark.timeout(0)
+def test_nothing_is_missed_without_cases_for_long() -> None:
+    for seed in range(10_000):
+        assert_as_by_cases(seed)

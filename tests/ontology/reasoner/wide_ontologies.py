@@ -507,6 +507,38 @@ class DenseOntology(WideOntology):
         return ex.ObjectPropertyAtom(draw.choice(self.objects), one, other)
 
 
+class PlainOntology(DenseOntology):
+    """Draws small ontologies without unions and complements; many need no reasoning by cases.
+
+    Args:
+        seed: Equal seeds draw equal axioms.
+    """
+
+    def __init__(self, seed: int) -> None:
+        super().__init__(seed)
+        draw = self.random
+        self._likely |= {'or': 0.0, 'not': 0.0, 'rule': 0.0}
+        self._likely['one of'] *= draw.choice([0, 1])
+        self._likely['characteristic'] += 0.3
+        for kind in ('only', 'max'):
+            if draw.random() < 0.5:
+                self._likely[kind] += 0.3
+        if draw.random() < 0.6:
+            data = ('data has', 'data some', 'data only', 'data count', 'data')
+            self._likely |= dict.fromkeys(data, 0.0)
+        if draw.random() < 0.5:
+            self._likely['key'] = 0.0
+
+    def expression(self, depth: int = 2) -> ClassExpression:
+        drawn = super().expression(min(depth, 2))
+        return ex.ObjectOneOf(drawn.individuals[:1]) if isinstance(drawn, ex.ObjectOneOf) else drawn
+
+    def assertion(self) -> Axiom:
+        if self.random.random() < 0.3:
+            return ax.ClassAssertion(self.expression(1), self.random.choice(self.individuals))
+        return super().assertion()
+
+
 def _variables(atom: ex.Atom) -> list[ex.Variable]:
     terms = [getattr(atom, name, None) for name in ('argument', 'first', 'second')]
     return [term for term in terms if isinstance(term, ex.Variable)]
