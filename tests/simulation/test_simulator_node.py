@@ -235,7 +235,7 @@ def test_markers_break_and_move(graph: Any) -> None:
 @pytest.mark.parametrize(
     ('kind', 'service', 'request_fields', 'message'),
     [
-        (SetDoor, 'set_door', {'door': 'X'}, "there is no door 'X': expected one of D"),
+        (SetDoor, 'set_door', {'door': 'X'}, "there is no door 'X': expected 'D'"),
         (PlaceObstacle, 'place_obstacle', {'name': 'b'}, "obstacle 'b': radius 0 m"),
         (RemoveObstacle, 'remove_obstacle', {'name': 'b'}, "there is no obstacle 'b'"),
         (DrainBattery, 'drain_battery', {'percent': 101.0}, 'percent 101: expected 0 to 100'),

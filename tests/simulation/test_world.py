@@ -97,13 +97,13 @@ def test_every_change_counts_up_the_version() -> None:
 @pytest.mark.parametrize(
     ('change', 'message'),
     [
-        (lambda w: w.set_door('X', True), "there is no door 'X': expected one of D"),
-        (lambda w: w.is_open('X'), "there is no door 'X': expected one of D"),
+        (lambda w: w.set_door('X', True), "there is no door 'X': expected 'D'"),
+        (lambda w: w.is_open('X'), "there is no door 'X': expected 'D'"),
         (lambda w: w.remove_obstacle('box'), "there is no obstacle 'box', nor any other"),
         (lambda w: w.place_obstacle('', 0.0, 0.0, 1.0), "obstacle '': expected a name"),
         (lambda w: w.place_obstacle('b', math.nan, 0.0, 1.0), "obstacle 'b' at (nan, 0)"),
         (lambda w: w.place_obstacle('b', 0.0, 0.0, 0.0), "obstacle 'b': radius 0 m"),
-        (lambda w: w.set_marker('m9', 'broken'), "there is no marker 'm9': expected one of m1"),
+        (lambda w: w.set_marker('m9', 'broken'), "there is no marker 'm9': expected 'm1'"),
         (lambda w: w.set_marker('m1', 'gone'), "marker state 'gone': expected one of whole"),
         (lambda w: w.hang_marker(Marker('m', -1, 0, 0, 0, 0, 0.2)), "marker 'm': "),
     ],
