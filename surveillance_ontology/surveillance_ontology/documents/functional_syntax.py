@@ -140,7 +140,8 @@ class _Parser:
             try:
                 return Literal(text, RDF + 'langString', language_tag(tag))
             except ValueError as error:
-                raise self._fail(str(error), place) from None
+                self.stated.unsupported.append(f'line {self._line(place)}: {error}')
+                return Literal(text)
         if self._next[:2] == ('mark', '^^'):
             self._take()
             kind, value, place = self._take()

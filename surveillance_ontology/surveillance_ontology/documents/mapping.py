@@ -98,7 +98,7 @@ class Mapping:
 
     def __init__(self, graph: Graph) -> None:
         self.axioms: dict[Axiom, None] = {}
-        self.unsupported: list[str] = []
+        self.unsupported = graph.unsupported.copy()
         self.prefixes = graph.prefixes
         self._header = ''
         self._places = graph.places

@@ -55,6 +55,7 @@ class _Reader(XmlReader):
     def __init__(self, data: bytes, base: str) -> None:
         super().__init__(data)
         self.stated = Axioms(lambda line: line)
+        self.stated.unsupported = self.unsupported
         self._stack = [_Element('', {}, 0, base, '')]
 
     def start(self, name: str, attributes: dict[str, str]) -> None:

@@ -30,12 +30,14 @@ _SYNTAX = {
 class Graph:
     """Triples of one document in document order.
 
-    `places` holds (line, column) of the first statement about each subject.
+    `places` holds (line, column) of the first statement about each subject, `unsupported` one
+    sentence for each part that was not understood.
     """
 
     triples: list[Triple] = field(default_factory=list)
     prefixes: dict[str, str] = field(default_factory=dict)
     places: dict[str, tuple[int, int]] = field(default_factory=dict)
+    unsupported: list[str] = field(default_factory=list)
 
 
 @dataclass(slots=True)
@@ -60,7 +62,7 @@ _TAG = re.compile(rb'<(?:[^"\'>]++|"[^"]*"|\'[^\']*\')*+>')
 class _Reader(XmlReader):
     def __init__(self, base: str, data: bytes) -> None:
         super().__init__(data)
-        self.graph = Graph()
+        self.graph = Graph(unsupported=self.unsupported)
         self.stack = [_Frame('root', base=base)]
         self.blank = 0
         self.ids: set[str] = set()

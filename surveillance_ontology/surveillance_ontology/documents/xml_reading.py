@@ -81,11 +81,15 @@ class XmlReader:
 
     Args:
         data: The document, UTF-8 whatever it declares.
+
+    Attributes:
+        unsupported: One sentence for each language that is none.
     """
 
     def __init__(self, data: bytes) -> None:
         self.data = data
         self.depth = 0
+        self.unsupported: list[str] = []
         self._entities = {b'amp', b'lt', b'gt', b'quot', b'apos'}
         parser = expat.ParserCreate('UTF-8', namespace_separator='')
         parser.buffer_text = True
@@ -135,11 +139,15 @@ class XmlReader:
         return OntologyFileError(message, parser.CurrentLineNumber, parser.CurrentColumnNumber + 1)
 
     def language(self, attributes: dict[str, str], outer: str) -> str:
-        """Take the language tag of an element; that of the one around it where it has none."""
+        """Take the language tag of an element; that of the one around it where it has none.
+
+        What is no tag is reported, and the texts are kept without one.
+        """
         try:
             return language_tag(attributes.pop(XML + 'lang', outer))
         except ValueError as error:
-            raise self.fail(f'xml:lang {error}') from None
+            self.unsupported.append(f'line {self.parser.CurrentLineNumber}: xml:lang {error}')
+            return ''
 
     def resolve(self, base: str, reference: str) -> str:
         """Return an IRI reference against a base IRI."""

@@ -410,11 +410,6 @@ def test_expressions_nest_to_a_bound(levels: int, inner: str) -> None:
         (b'Prefix(:=<x:>)Ontology(ClassAssertion(:C :a|b))', "IRI 'x:a|b' contains '|'"),
         (b'Ontology(' + b'(' * 10_000, '1:111: constructs nest deeper than 100'),
         (b'Ontology(ClassAssertion(<x:C> _:a;b))', "'_:a;b' is no label"),
-        (b'Ontology(DataPropertyAssertion(<x:d> <x:i> "v"@1))', "'1' is no language tag"),
-        (
-            document('<rdf:Description rdf:about="#i"><d xml:lang="a b"/></rdf:Description>'),
-            "2:33: xml:lang 'a b' is no language tag",
-        ),
         (document('<d xmlns="x:{a}#"/>'), "2:1: namespace 'x:{a}#' contains '{'"),
     ],
 )
@@ -428,6 +423,32 @@ def test_languages_with_underscores_are_read() -> None:
     text = document('<rdf:Description rdf:about="#i"><d xml:lang="en_US">v</d></rdf:Description>')
     spoken = Literal('v', RDF + 'langString', 'en-us')
     assert DataPropertyAssertion(n('d'), n('i'), spoken) in read_ontology(text, IRI).axioms
+
+
+@pytest.mark.parametrize(
+    ('text', 'report'),
+    [
+        (
+            document('<rdf:Description rdf:about="#i"><d xml:lang="a b">v</d></rdf:Description>'),
+            "line 2: xml:lang 'a b' is no language tag",
+        ),
+        (
+            b'<Ontology xmlns="http://www.w3.org/2002/07/owl#"><DataPropertyAssertion>'
+            b'<DataProperty IRI="%(ns)sd"/><NamedIndividual IRI="%(ns)si"/>'
+            b'<Literal xml:lang="1">v</Literal></DataPropertyAssertion></Ontology>'
+            % {b'ns': n('').encode()},
+            "line 1: xml:lang '1' is no language tag",
+        ),
+        (
+            f'Ontology(DataPropertyAssertion(<{n("d")}> <{n("i")}> "v"@1))'.encode(),
+            "line 1: '1' is no language tag",
+        ),
+    ],
+)
+def test_a_text_whose_language_is_none_is_read_and_reported(text: bytes, report: str) -> None:
+    read = read_ontology(text, IRI)
+    assert DataPropertyAssertion(n('d'), n('i'), Literal('v')) in read.axioms
+    assert read.unsupported == [report]
 
 
 def test_a_relative_iri_of_functional_syntax_is_completed() -> None:
