@@ -59,13 +59,19 @@ class ChildFrame(Frame):
     def __init__(self, within: ConcurrentFrame, node: Node, thread: ExecutionThread) -> None:
         super().__init__(within.container, thread, within.path, node, None)
         self.node = node
-        self._within = within
 
     def successor(self) -> ChildFrame:
         """Return a copy for the thread that takes this execution over."""
-        frame = self.handed_over(ChildFrame(self._within, self.node, self.thread))
-        self._within.replace_child(frame)
+        # Not kept: the two would refer to each other, which is left to no garbage collector.
+        within = self.container.fsm_frame
+        assert isinstance(within, ConcurrentFrame)
+        frame = self.handed_over(ChildFrame(within, self.node, self.thread))
+        within.replace_child(frame)
         return frame
+
+    def last_outcomes(self) -> Iterable[str]:
+        """Return what the logical thread may end with: the state's, not the concurrence's."""
+        return self.node.state.get_registered_outcomes()
 
     def execute(self, history: History | None = None) -> Any:
         """Execute the state; its outcome."""

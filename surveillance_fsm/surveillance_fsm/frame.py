@@ -8,6 +8,7 @@ paused.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, TypeVar
 
@@ -263,6 +264,10 @@ class Frame:
             setattr(frame, name, getattr(self, name))
         return frame
 
+    def last_outcomes(self) -> Iterable[str]:
+        """Return what the logical thread may end with whose outermost frame this is."""
+        return self.container.get_registered_outcomes()
+
     def hold(self) -> None:
         """Be the execution of the container."""
         self.container.fsm_frame = self
@@ -330,8 +335,19 @@ class Frame:
             return SUSPENDED
         container.fsm_copy_output_keys(self.parent_ud)
         if target is SHUTDOWN:
-            return None if self.thread.stack[0] is self else SUSPENDED
+            return self._shut_down()
         return target.label
+
+    def _shut_down(self) -> Any:
+        """End with None; below the root, leave that to the parent, which sees the check, too."""
+        container = self.container
+        if self.thread.stack[0] is not self:
+            # What runs beside it may save a checkpoint yet.
+            container.fsm_history = self.where()
+            return SUSPENDED
+        for child in container.fsm_children().values():
+            child.fsm_forget()
+        return None
 
     # Between two states.
 

@@ -296,7 +296,7 @@ def _abandon_unpreemptible(thread: ExecutionThread) -> None:
         if outcome is not None:
             _abandon(thread, depth, outcome, reason)
             return
-    outcomes = thread.stack[0].container.get_registered_outcomes() if thread.stack else ()
+    outcomes = thread.stack[0].last_outcomes() if thread.stack else ()
     ending = next((outcome for outcome in STOPPED if outcome in outcomes), None)
     error = InvalidTransitionError(
         f"State '{thread.path_inside()}' {reason}, and no container around it can end with "

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import gc
 import random
 import threading
+import weakref
 
 import pytest
 
@@ -83,6 +85,68 @@ def test_a_child_of_a_concurrence_that_ignores_a_preempt_is_left_behind(caplog):
     assert not root.preempt_requested()
     assert not concurrence.preempt_requested()
     deaf.release.set()
+
+
+def test_a_child_that_ignores_a_preempt_ends_with_no_outcome_of_the_concurrence():
+    deaf = Deaf(['done'])
+    root = fsm.Concurrence(['done', 'preempted'], 'done')
+    root.add_state('S0', deaf)
+    root.preempt_timeout = 0.05
+    run = Background(root)
+    began(deaf)
+    root.request_preempt()
+    with pytest.raises(fsm.InvalidTransitionError, match="'Concurrence/S0' ignored a preempt"):
+        run.result()
+    # It keeps the request, so that it ends some time.
+    assert deaf.preempt_requested()
+    deaf.release.set()
+
+
+def test_an_execution_that_is_over_holds_on_to_nothing():
+    root = together(Answer('done'), Answer('done'), **ALL_DONE)
+    root.preempt_timeout = None
+    ud = type('Watched', (fsm.UserData,), {})()
+    held = weakref.ref(ud)
+    gc.disable()
+    try:
+        assert root.execute(ud) == 'done'
+        del ud
+        assert held() is None
+    finally:
+        gc.enable()
+
+
+def test_a_checkpoint_in_a_shutdown_says_where_a_nested_machine_stopped():
+    down, turns, saved = threading.Event(), [], []
+
+    def first(ud):
+        turns.append(1)
+        down.set()
+        return 'done'
+
+    def later(ud):
+        down.wait(60.0)
+        while inner.fsm_frame is not None:
+            pass
+        return 'done'
+
+    inner = fsm.StateMachine(['done'])
+    inner.add_state('S0', fsm.CBState(first, outcomes=['done']), {'done': 'S1'})
+    inner.add_state('S1', Answer('done'))
+    root = fsm.Concurrence(['done'], 'done')
+    root.add_state('INNER', inner)
+    root.add_state('LATER', fsm.CBState(later, outcomes=['done']))
+    root.register_transition_cb(lambda *_: saved.append(through_json(root)))
+    fsm.set_shutdown_check(down.is_set)
+    try:
+        assert root.execute() is None
+    finally:
+        fsm.set_shutdown_check(None)
+    assert saved[-1]['machine']['at']['outcomes'] == {'LATER': 'done'}
+    assert saved[-1]['machine']['states']['INNER']['at']['current'] == 'S1'
+    # Another execution begins anew.
+    assert root.execute() == 'done'
+    assert len(turns) == 2
 
 
 def test_a_request_to_a_state_that_an_earlier_run_left_behind_is_kept():
