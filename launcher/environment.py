@@ -43,6 +43,9 @@ PATH_FILE = 'surveillance_checkout.pth'
 # What makes an interpreter of one ROS unfit to start one of another.
 _FOREIGN_ROS = ('PYTHONPATH', 'PYTHONHOME', 'AMENT_PREFIX_PATH', 'CMAKE_PREFIX_PATH', 'ROS_DISTRO')
 _BOOTSTRAP = '_ROS_WHEELS_BOOTSTRAP_COMPLETE'
+_KEPT_IN = 'PYTHONPYCACHEPREFIX'
+_BYTECODE_SPACE = 100_000_000
+"""Bytes that must be free where compiled modules are to be kept: several times what they take."""
 
 
 class Environment:
@@ -243,10 +246,13 @@ class _Command:
 
     def __init__(self, environment: Environment, words: list[str], lock: int) -> None:
         self._log = environment.venv / 'setup.log'
+        # pip would compile all of every package, which takes as long as to unpack it.
+        environ = {**clean_environ(), 'PIP_COMPILE': '0'}
+        if _KEPT_IN in environ:  # pip builds in temporary folders: what it left there would stay
+            environ['PYTHONDONTWRITEBYTECODE'] = '1'
         self._process = subprocess.Popen(
             words,
-            # pip would compile all of every package, which takes as long as to unpack it.
-            env={**clean_environ(), 'PIP_COMPILE': '0'},
+            env=environ,
             cwd=environment.checkout,
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
@@ -294,9 +300,24 @@ def keep_bytecode(environ: MutableMapping[str, str], checkout: Path = CHECKOUT) 
 
     Containers often forbid the latter. Without compiled modules each start of a node takes three
     times the processor time, and each process of a test run compiles all that it imports.
+
+    Where they cannot be kept all stays as it is: in a folder that it cannot write Python would
+    find not even its own library compiled, and on a full disk it leaves files that are cut off,
+    and fails to read them ever after.
     """
-    if environ.pop('PYTHONDONTWRITEBYTECODE', ''):
-        environ.setdefault('PYTHONPYCACHEPREFIX', str(checkout / 'build' / 'pycache'))
+    folder = checkout / 'build' / 'pycache'
+    if not environ.get('PYTHONDONTWRITEBYTECODE'):
+        return
+    if _KEPT_IN not in environ:
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            free = shutil.disk_usage(folder).free
+        except OSError:
+            return
+        if not os.access(folder, os.W_OK) or free < _BYTECODE_SPACE:
+            return
+        environ[_KEPT_IN] = str(folder)
+    del environ['PYTHONDONTWRITEBYTECODE']
 
 
 def clean_environ() -> dict[str, str]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import fcntl
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -12,8 +13,10 @@ from pathlib import Path
 
 import pytest
 
-from launcher.environment import clean_environ, keep_bytecode
+from launcher import cli
+from launcher.environment import Environment, _Command, clean_environ, keep_bytecode
 from launcher.fingerprint import INTERFACES, JOURNAL
+from launcher.progress import Step
 from tests.launcher.conftest import ROOT
 
 # A build backend that needs nothing and waits, when told to, for the test to go on.
@@ -195,3 +198,47 @@ def test_who_lets_python_write_its_compiled_modules_gets_them_beside_the_sources
     given = {'PATH': os.environ['PATH']}
     keep_bytecode(given, tmp_path)
     assert given == {'PATH': os.environ['PATH']}
+
+
+@pytest.mark.parametrize('in_the_way', ['a file', 'a full disk', 'another user'])
+def test_where_compiled_modules_cannot_be_kept_all_stays_as_it_is(
+    tmp_path, monkeypatch, in_the_way
+):
+    if in_the_way == 'a file':
+        (tmp_path / 'build').write_text('')
+    elif in_the_way == 'a full disk':
+        full = shutil.disk_usage(tmp_path)._replace(free=10**6)
+        monkeypatch.setattr(shutil, 'disk_usage', lambda _: full)
+    else:
+        monkeypatch.setattr(os, 'access', lambda *_: False)
+    given = {'PYTHONDONTWRITEBYTECODE': '1'}
+    keep_bytecode(given, tmp_path)
+    assert given == {'PYTHONDONTWRITEBYTECODE': '1'}
+
+
+def test_what_a_set_up_runs_leaves_no_compiled_modules_of_its_folders(tmp_path, monkeypatch):
+    (tmp_path / 'module.py').write_text('VALUE = 1\n')
+    monkeypatch.delenv('PYTHONDONTWRITEBYTECODE', raising=False)
+    monkeypatch.setenv('PYTHONPYCACHEPREFIX', str(tmp_path / 'kept'))
+    lock = os.open(tmp_path, os.O_RDONLY)
+    try:
+        words = [sys.executable, '-c', 'import module']
+        with _Command(Environment(tmp_path), words, lock) as command, Step(1, 1, 'import') as step:
+            command.watch(step)
+    finally:
+        os.close(lock)
+    assert not (tmp_path / 'kept').exists()
+
+
+def test_the_processes_of_a_test_run_share_compiled_modules(tmp_path, monkeypatch):
+    given = {'PATH': os.environ['PATH'], 'PYTHONDONTWRITEBYTECODE': '1'}
+    started = []
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(os, 'environ', given)
+    monkeypatch.setattr(os, 'execv', lambda _, words: started.append((words, dict(given))))
+    monkeypatch.setattr(cli, '_environment', lambda extras: None)
+    cli._test(['-x'])
+    ((words, environ),) = started
+    assert words[1:3] == ['-m', 'pytest']
+    assert environ['PYTHONPYCACHEPREFIX'] == str(ROOT / 'build' / 'pycache')
+    assert 'PYTHONDONTWRITEBYTECODE' not in environ
