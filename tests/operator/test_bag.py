@@ -18,6 +18,7 @@ from rosbags.typesys import Stores, get_typestore
 from std_msgs.msg import String
 
 from surveillance_interfaces.msg import FactChange, FactChanges
+from surveillance_operator.recording import bag
 from surveillance_operator.recording.bag import (
     BagWriter,
     TopicType,
@@ -141,6 +142,23 @@ def test_a_file_that_another_recorder_just_deleted_keeps_no_other_from_being_del
     (tmp_path / '0' / RECORDING).mkdir(parents=True)
     (tmp_path / '0' / RECORDING / f'{RECORDING}_0.mcap').symlink_to(tmp_path / 'gone')
     assert prune(tmp_path, 0) == files
+
+
+def test_what_another_recorder_deletes_meanwhile_is_not_deleted_again_elsewhere(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write(tmp_path / '1' / RECORDING, ['word ' * 100] * 4, segment_bytes=10).close()
+    files = segments(tmp_path / '1' / RECORDING)
+    for number, path in enumerate(files):
+        os.utime(path, (number, number))
+    size = sum(path.stat().st_size for path in files)
+
+    def opened(path: Path, mode: str) -> Any:
+        files[0].unlink(missing_ok=True)
+        return open(path, mode)
+
+    monkeypatch.setattr(bag, 'open', opened, raising=False)
+    assert prune(tmp_path, size - 1) == []
 
 
 def test_definitions_name_all_that_a_type_uses() -> None:

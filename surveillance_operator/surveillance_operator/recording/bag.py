@@ -231,6 +231,8 @@ def prune(runs: Path, keep_bytes: float) -> list[Path]:
                 fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
                 path.unlink()
         except OSError:
+            if not path.exists():  # by the other recorder
+                total -= size
             continue
         deleted.append(path)
         total -= size
