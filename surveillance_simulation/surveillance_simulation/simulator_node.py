@@ -49,7 +49,7 @@ _UNDER_WAY = (
 
 OBEYS_WITHIN = 0.02
 """At a set speed of time the base is moved on this often, real seconds: a command is obeyed then,
-not with the next measurement."""
+not with the next measurement. At full speed no sleep is longer: a command may end the idle step."""
 LOOK_PERIOD = 0.5
 """Real seconds between two looks whether a program that time waits for is to be given up."""
 
@@ -143,7 +143,7 @@ class Simulator(PatrolNode):
                 # The answer wakes it: useless ticks would take the time that the answer needs.
                 self._timer.cancel()
             elif self._rate.pause is not None:
-                self._timer.timer_period_ns = round(1e9 * self._rate.pause)
+                self._timer.timer_period_ns = round(1e9 * min(self._rate.pause, OBEYS_WITHIN))
                 self._timer.reset()
         if measure:
             self._sensors.publish(self._stamp())
