@@ -198,7 +198,9 @@ def follows(axioms: Iterable[Axiom], goal: Axiom | None) -> bool:
         found = entails(axioms, goal)
         if found is not None:
             return found
-    kb = KnowledgeBase('', axioms)
+    # What follows for everything follows for an individual that no axiom names.
+    asked = () if goal is None else entities_of(goal)
+    kb = KnowledgeBase('', [*axioms, *(Declaration(kind, name) for kind, name in asked)])
     consistent = kb.reason()
     return not consistent if goal is None else consistent and kb.holds(goal)
 

@@ -306,6 +306,16 @@ def test_justifications_are_minimal() -> None:
     assert len(kb.justification(SubClassOf(A, D))) in (2, 3)
 
 
+def test_what_holds_for_everything_needs_no_axiom_that_names_the_individual() -> None:
+    x = ex.Variable('x')
+    needed = {
+        SubClassOf(ex.ObjectComplementOf(A), A),
+        ax.Rule((ex.ClassAtom(A, x),), (ex.ClassAtom(B, x),)),
+    }
+    kb = reasoned(*needed, differ(i, j))
+    assert set(kb.justification(ClassAssertion(B, i))) == needed
+
+
 def test_a_union_or_enumeration_on_the_left_takes_no_choice() -> None:
     people = [f'x:n{n}' for n in range(300)]
     kinds = ex.ObjectOneOf((i, j, k))
