@@ -257,14 +257,37 @@ _LABEL = re.compile(r'_:(?!w\d+\Z)[A-Za-z](?:[\w.-]*\w)?', re.ASCII)
 """Labels that every format can hold, and that no node of an expression has."""
 
 
-def _labelled(axioms: tuple[Axiom, ...]) -> tuple[Axiom, ...]:
-    """Give individuals without a name labels that can be written, where they have others."""
-    found = {name for axiom in axioms for _, name in entities_of(axiom) if name[:2] == '_:'}
+def _labelled(axioms: tuple[Axiom, ...], found: set[str]) -> tuple[Axiom, ...]:
+    """Give individuals without a name labels that can be written, where they have others.
+
+    Args:
+        axioms: The axioms.
+        found: The labels in them.
+    """
     free = (label for number in count(1) if (label := f'_:i{number}') not in found)
     for old in sorted(name for name in found if not _LABEL.fullmatch(name)):
         new = next(free)
         axioms = tuple(renamed(axiom, 'individual', old, new) for axiom in axioms)
     return axioms
+
+
+def _mentioned(axioms: Iterable[Axiom]) -> tuple[dict[tuple[str, str], None], set[str]]:
+    """Return the classes, properties and datatypes that axioms use, in order, and the labels of
+    individuals without a name.
+    """
+    used: dict[tuple[str, str], None] = {}
+    labels: set[str] = set()
+    for axiom in axioms:
+        if isinstance(axiom, ax.Declaration):
+            continue
+        if isinstance(axiom, ax.AxiomAnnotation):
+            used.update((('annotation_property', prop), None) for prop, _ in axiom.annotations)
+        for entity in entities_of(axiom):
+            if entity[0] not in ('individual', 'annotated'):
+                used[entity] = None
+            elif entity[1][:2] == '_:':
+                labels.add(entity[1])
+    return used, labels
 
 
 _VALUED = ('object_property', 'data_property')
@@ -279,9 +302,10 @@ def triples_of(axioms: Iterable[Axiom], iri: str) -> Iterator[Triple]:
     """
     mapping = _Mapping(iri)
     mapping.add(iri, _TYPE, OWL + 'Ontology')
-    declared: set[tuple[str, str]] = set()
-    used: dict[tuple[str, str], None] = {}
-    axioms = _labelled(tuple(dict.fromkeys(axioms)))
+    axioms = tuple(dict.fromkeys(axioms))
+    declared = {(axiom.kind, axiom.iri) for axiom in axioms if isinstance(axiom, ax.Declaration)}
+    used, labels = _mentioned(axioms)
+    axioms = _labelled(axioms, labels)
     notes: dict[Axiom, list[ax.AxiomAnnotation]] = {}
     for axiom in axioms:
         if isinstance(axiom, ax.AxiomAnnotation):
@@ -289,16 +313,8 @@ def triples_of(axioms: Iterable[Axiom], iri: str) -> Iterator[Triple]:
     for axiom in axioms:
         if axiom in notes:
             mapping.annotated(axiom, notes[axiom])
-        elif isinstance(axiom, ax.AxiomAnnotation):
-            used.update((('annotation_property', prop), None) for prop, _ in axiom.annotations)
-        else:
+        elif not isinstance(axiom, ax.AxiomAnnotation):
             mapping.axiom(axiom)
-        if isinstance(axiom, ax.Declaration):
-            declared.add((axiom.kind, axiom.iri))
-        elif not isinstance(axiom, (ax.SameIndividual, ax.DifferentIndividuals)):
-            for kind, name in entities_of(axiom):
-                if kind not in ('individual', 'annotated'):
-                    used[kind, name] = None
     valued = {name for kind, name in used | dict.fromkeys(declared) if kind in _VALUED}
     for kind, name in used:
         if kind == 'annotation_property' and name in valued:
