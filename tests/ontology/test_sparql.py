@@ -22,6 +22,7 @@ from surveillance_ontology.armor.service import ArmorService
 from surveillance_ontology.armor.sparql_engine import SparqlEngine
 from surveillance_ontology.armor.sparql_graph import GraphChanges, GraphUpdate, Version
 from surveillance_ontology.owl.axioms import ObjectPropertyAssertion
+from surveillance_ontology.owl.vocabulary import OWL
 
 from .seven_rooms import IRI, asker, build_seven_rooms
 
@@ -313,3 +314,15 @@ def test_names_that_are_no_iris_are_seen(service: ArmorService, tmp_path: Path) 
     assert ask('LOAD FILE', 'odd.ttl', 'x:o', 'false', '', 'false').success
     rows = ask('QUERY SPARQL', 'SELECT ?c { <x:i> a ?c } ORDER BY ?c').queried_objects
     assert rows == ['{c=x:50%}, {c=x:a#b#c}']
+
+
+def test_an_individual_without_a_name_is_one_node(service: ArmorService, tmp_path: Path) -> None:
+    ask = asker(service)
+    (tmp_path / 'blank.ttl').write_text(
+        f'_:1 <x:p> <x:a>; <{OWL}differentFrom> <x:j> . _:i1 <x:p> <x:b> . _:w1 <x:p> <x:c> .'
+        f' <x:k> a [ a <{OWL}Restriction>; <{OWL}onProperty> <x:p>; <{OWL}someValuesFrom> <x:C> ] .'
+    )
+    assert ask('LOAD FILE', 'blank.ttl', 'x:o', 'false', '', 'false').success
+    for further, row in (('differentFrom> <x:j>', '{v=x:a}'), ('onProperty> ?q', '')):
+        rows = ask('QUERY SPARQL', f'SELECT ?v {{ ?i <x:p> ?v; <{OWL}{further} }}').queried_objects
+        assert rows == [row]

@@ -78,7 +78,8 @@ class GraphUpdate:
         named: dict[tuple[str, str], None] = {}
         for axiom in self.added:
             line = '' if annotated and axiom in annotated else fact_line(axiom)
-            if line:
+            # Labels are all written in one place, which may give others.
+            if line and '_:' not in line:
                 lines.append(line)
                 kind = type(axiom)
                 if kind is ClassAssertion:

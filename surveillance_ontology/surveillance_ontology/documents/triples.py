@@ -265,10 +265,14 @@ def _labelled(axioms: tuple[Axiom, ...], found: set[str]) -> tuple[Axiom, ...]:
         found: The labels in them.
     """
     free = (label for number in count(1) if (label := f'_:i{number}') not in found)
-    for old in sorted(name for name in found if not _LABEL.fullmatch(name)):
-        new = next(free)
-        axioms = tuple(renamed(axiom, 'individual', old, new) for axiom in axioms)
-    return axioms
+    new = {old: next(free) for old in sorted(found) if not _LABEL.fullmatch(old)}
+    return tuple(_relabelled(axiom, new) for axiom in axioms) if new else axioms
+
+
+def _relabelled(axiom: Axiom, new: dict[str, str]) -> Axiom:
+    for name in {name for _, name in entities_of(axiom) if name in new}:
+        axiom = renamed(axiom, 'individual', name, new[name])
+    return axiom
 
 
 def _mentioned(axioms: Iterable[Axiom]) -> tuple[dict[tuple[str, str], None], set[str]]:

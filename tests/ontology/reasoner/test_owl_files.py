@@ -467,3 +467,12 @@ def test_a_long_text_costs_no_more_than_its_length() -> None:
         read_ontology(data, IRI)
         assert tracemalloc.get_traced_memory()[1] < 12 * len(data)
         tracemalloc.stop()
+
+
+def test_labels_that_cannot_be_written_cost_no_more_than_their_number() -> None:
+    # Each went through all axioms, for minutes.
+    text = ''.join(f'_:{number} <x:d> {number} .\n' for number in range(20_000)).encode()
+    read = read_ontology(text, IRI)
+    again = read_ontology(ontology_bytes(read.axioms, IRI), IRI).axioms
+    subjects = {axiom.subject for axiom in again if isinstance(axiom, DataPropertyAssertion)}
+    assert len(subjects) == 20_000
