@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 
 import pytest
 
@@ -188,6 +189,22 @@ def test_a_door_that_opens_ends_the_pause(machine: str) -> None:
     Run(machine, world).until(400.0)
     assert max(at for at in went_on if at < 245.0) < 240.0, 'it is in a long pause'
     assert 250.0 <= min(at for at in went_on if at >= 245.0) < 252.0
+
+
+def test_an_ontology_that_hangs_makes_no_pause_longer(machine: str) -> None:
+    world = World()
+    cries: list[tuple[float, str]] = []
+
+    def hangs(interrupt: fsm.Interrupt) -> frozenset[str]:
+        world.clock.sleep(5.0, interrupt)
+        raise CallError('armor: no answer')
+
+    world.waiting_for_help = lambda reason: cries.append((world.clock.time, reason))  # type: ignore[method-assign]
+    world.reachable = hangs  # type: ignore[method-assign]
+    world.clock.after(100.0, lambda: world.closed.update(f'D{n}' for n in range(1, 8)))
+    Run(machine, world).until(1000.0)
+    pauses = [end - begin for (begin, reason), (end, _) in pairwise(cries) if reason]
+    assert 60.0 <= max(pauses) <= 66.0
 
 
 def test_an_ontology_that_lost_the_robot_is_waited_for(machine: str) -> None:

@@ -143,6 +143,7 @@ class WaitForHelp(MissionState):
         """Wait, and look once a period; return False when a preempt ended it."""
         was_over = True
         while seconds > 0.0:
+            began = self.mission.now()
             over = is_over()
             # One that is there all the time does not answer: that takes the whole pause.
             if over and not was_over:
@@ -150,7 +151,8 @@ class WaitForHelp(MissionState):
             was_over = over
             if not self.wait(min(period, seconds)):
                 return False
-            seconds -= period
+            # a look takes long where nobody answers, and a clock may be set back
+            seconds -= max(period, self.mission.now() - began)
         return True
 
 
