@@ -100,13 +100,13 @@ def answer_of(state: State, outcome: Any, *, preempted: bool, cut: bool, gone: b
         cut: It was asked to make way for an interrupt.
         gone: It was left behind: it keeps the request, so that it ends some time.
     """
+    pending = state.preempt_requested() and not gone
+    if pending and (preempted or (cut and outcome is not SUSPENDED)):
+        state.recall_preempt()
     if cut and state.fsm_suspends:
         # One that makes way is suspended; any other outcome is its own.
         state.fsm_recall_suspend()
         cut = False
-    pending = state.preempt_requested() and not gone
-    if pending and (preempted or cut):
-        state.recall_preempt()
     if outcome is SUSPENDED:
         made_way = True
     elif pending:

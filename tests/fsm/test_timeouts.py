@@ -245,3 +245,21 @@ def test_the_states_of_a_concurrence_that_was_left_behind_are_left_behind_too(ne
     deaf.release.set()
     assert run.result() == 'done'
     assert requests == [True, False]
+
+
+def test_a_timeouts_request_does_not_outlive_a_nested_machine_that_an_interrupt_wanted_aside():
+    deaf = Deaf(['done'])
+    inner = fsm.StateMachine(['done', 'preempted'])
+    inner.add_state('DEAF', deaf)
+    root = fsm.StateMachine(['done', 'preempted'])
+    root.add_state('INNER', inner, timeout=0.01)
+    root.add_interrupt('INTERRUPT', Answer('done'))
+    run = Background(root)
+    began(deaf)
+    while not deaf.preempt_requested():
+        pass
+    root.raise_interrupt('INTERRUPT')
+    deaf.release.set()
+    assert run.result() == 'done'
+    assert not inner.preempt_requested()
+    assert root.execute() == 'done'
