@@ -155,8 +155,8 @@ class State:
     fsm_waiting: tuple[str, float] | None = None
     fsm_left: Any = None
     fsm_source: Mapping[str, Any] | None = None
-    fsm_suspends = False
     # Whether it makes way for an interrupt with its history kept, as containers do.
+    fsm_suspends = False
     fsm_of_execution: ClassVar[frozenset[str]] = frozenset(
         {
             '_preempt_requested',
