@@ -326,3 +326,9 @@ def test_an_individual_without_a_name_is_one_node(service: ArmorService, tmp_pat
     for further, row in (('differentFrom> <x:j>', '{v=x:a}'), ('onProperty> ?q', '')):
         rows = ask('QUERY SPARQL', f'SELECT ?v {{ ?i <x:p> ?v; <{OWL}{further} }}').queried_objects
         assert rows == [row]
+
+
+def test_a_query_that_nests_too_deeply_is_called_that(built: ArmorClient) -> None:
+    with pytest.raises(ArmorServiceInternalError, match='nests too deeply'):
+        built.query.sparql(f'SELECT ?s {{ ?s ?p ?o FILTER({"!" * 100_000}true) }}', 20_000)
+    assert built.query.sparql('SELECT ?s { ?s ?p ?o } LIMIT 1', 20_000)

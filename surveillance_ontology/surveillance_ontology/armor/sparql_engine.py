@@ -11,6 +11,7 @@ import contextlib
 import json
 import os
 import select
+import signal
 import subprocess
 import sys
 import threading
@@ -86,7 +87,8 @@ class SparqlEngine:
 
         Raises:
             TimeoutError: Stopped at the time limit.
-            DirectiveError: Not a valid SELECT query, too many rows, too much memory.
+            DirectiveError: Not a valid SELECT query, too many rows, too much memory, too
+                deeply nested.
         """
         deadline = time.monotonic() + limit
         worker = self._take(version)
@@ -233,6 +235,8 @@ class _Worker:
         code = self._process.wait()
         if code > 0 and code != OUT_OF_MEMORY:
             return 'the query process could not start; pyoxigraph is needed'
+        if code == -signal.SIGSEGV:
+            return 'the query nests too deeply'  # Oxigraph's stack ended.
         return 'the query needs too much memory'
 
     def _await(self, deadline: float, *, writing: bool) -> None:
