@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import re
-import tempfile
+import secrets
 from collections.abc import Iterable, Mapping
 from itertools import count
 from pathlib import Path
@@ -54,20 +55,18 @@ def write_ontology(
     """
     data = ontology_bytes(axioms, iri, format, prefixes)
     target = Path(path)
-    temporary = ''
+    temporary = target.with_name(f'.{target.name}.{secrets.token_hex(4)}')
     try:
-        handle, temporary = tempfile.mkstemp(dir=target.parent, prefix=f'.{target.name}.')
+        # Not by tempfile: to give its file the usual rights, all threads' umask would change.
+        handle = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o666)
         with open(handle, 'wb') as file:
             file.write(data)
             file.flush()
             os.fsync(file.fileno())
-        umask = os.umask(0)
-        os.umask(umask)
-        os.chmod(temporary, 0o666 & ~umask)
         os.replace(temporary, target)
     except OSError as error:
-        if temporary:
-            Path(temporary).unlink(missing_ok=True)
+        with contextlib.suppress(OSError):
+            temporary.unlink()
         raise OntologyFileError(error.strerror or str(error), path=str(target)) from None
     directory = os.open(target.parent, os.O_RDONLY)
     try:

@@ -4,6 +4,7 @@ half-written.
 
 from __future__ import annotations
 
+import os
 import re
 import tracemalloc
 from pathlib import Path
@@ -476,3 +477,17 @@ def test_labels_that_cannot_be_written_cost_no_more_than_their_number() -> None:
     again = read_ontology(ontology_bytes(read.axioms, IRI), IRI).axioms
     subjects = {axiom.subject for axiom in again if isinstance(axiom, DataPropertyAssertion)}
     assert len(subjects) == 20_000
+
+
+def test_a_file_gets_the_usual_rights_and_leaves_those_of_others(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    old = os.umask(0o027)
+    try:
+        # It is the whole process's: another thread's files would get all rights meanwhile.
+        monkeypatch.setattr(os, 'umask', lambda _: pytest.fail('changes the rights of all threads'))
+        write_ontology([], IRI, tmp_path / 'map.nt', 'ntriples')
+    finally:
+        monkeypatch.undo()
+        os.umask(old)
+    assert (tmp_path / 'map.nt').stat().st_mode & 0o777 == 0o640
