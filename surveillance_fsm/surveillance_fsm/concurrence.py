@@ -227,7 +227,10 @@ class ConcurrentFrame(Frame):
         """Note that the machine went on without the thread; it goes on without the states, too."""
         super().abandoned(for_good=for_good)
         for child in self._children.values():
-            if not child.thread.done:
+            if child.thread.done:
+                # Its end will not be noted.
+                child.node.release()
+            else:
                 leave_behind(child.thread)
         self._wakeup.set()
 

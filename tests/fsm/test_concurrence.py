@@ -149,6 +149,21 @@ def test_a_checkpoint_in_a_shutdown_says_where_a_nested_machine_stopped():
     assert len(turns) == 2
 
 
+def test_a_checkpoint_after_a_concurrence_was_left_behind_has_no_place_in_it():
+    hold, calls = threading.Event(), []
+    machines = [chain(Answer('done'))[0] for _ in range(2)]
+    concurrence = together(*machines)
+    # The first state's end is told, and the second one's is not noted meanwhile.
+    concurrence.register_transition_cb(
+        lambda *_: calls.append(1) or (len(calls) == 2 and hold.wait(60.0))
+    )
+    root = fsm.StateMachine(['late', 'done', 'preempted'])
+    root.add_state('TOGETHER', concurrence, {'timeout': 'late'}, deadline=0.5)
+    assert root.execute() == 'late'
+    assert 'states' not in through_json(root)['machine']
+    hold.set()
+
+
 def test_a_request_to_a_state_that_an_earlier_run_left_behind_is_kept():
     deaf = Deaf()
     root = fsm.StateMachine(['done', 'preempted'])
