@@ -654,7 +654,10 @@ class Mapping:
             if predicate not in (_TYPE, SWRL + 'body', SWRL + 'head')
             for value in values
         )
-        self._add(ax.Rule(body, head, annotations))
+        kept = tuple(note for note in annotations if str(note[1])[:2] != '_:')
+        if kept != annotations:
+            self._report(node, 'an annotation on a rule is not kept')
+        self._add(ax.Rule(body, head, kept))
 
     def _argument(self, value: Node | None, atom: str) -> str | ex.Variable | Literal:
         if value is None:

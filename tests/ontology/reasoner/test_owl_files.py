@@ -30,7 +30,7 @@ from surveillance_ontology.owl.axioms import (
     SubClassOf,
 )
 from surveillance_ontology.owl.expressions import Literal
-from surveillance_ontology.owl.vocabulary import OWL, RDF, RDFS, XSD
+from surveillance_ontology.owl.vocabulary import OWL, RDF, RDFS, SWRL, XSD
 from tests.ontology.reasoner.patrol_map import (
     IRI,
     SCHEMA,
@@ -491,3 +491,12 @@ def test_a_file_gets_the_usual_rights_and_leaves_those_of_others(
         monkeypatch.undo()
         os.umask(old)
     assert (tmp_path / 'map.nt').stat().st_mode & 0o777 == 0o640
+
+
+def test_a_rule_is_saved_without_what_has_no_name() -> None:
+    text = (
+        f'_:r a <{SWRL}Imp>; <{RDFS}seeAlso> _:1; <{SWRL}body> (); <{SWRL}head> () . _:1 a <x:C> .'
+    )
+    read = read_ontology(text.encode(), IRI)
+    assert read.unsupported == ['an annotation on a rule is not kept']
+    assert read_ontology(ontology_bytes(read.axioms, IRI), IRI).unsupported == []
