@@ -6,11 +6,14 @@ import threading
 from functools import partial
 from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from surveillance_ontology.armor.access import DATA, Settings
 from surveillance_ontology.armor.service import ArmorService
+from surveillance_ontology.documents import writing
+from surveillance_ontology.owl.axioms import Axiom
 
 from .seven_rooms import IRI, ONTOLOGY, Ask, asker, names
 
@@ -169,6 +172,34 @@ def test_saving_and_loading_again(ask: Ask, tmp_path: Path) -> None:
         ask('REMOVE DATAPROP IND', 'visitedAt', 'R3', 'LONG', '1', reference=name)
         assert names(ask('QUERY IND CLASS', 'URGENT', reference=name)) == urgent
         assert ask('SAVE', '', reference=name).success, 'an empty path is the file it came from'
+
+
+def test_an_older_state_never_replaces_a_newer_one(
+    ask: Ask, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    compose, begun, go_on = writing.ontology_bytes, threading.Event(), threading.Event()
+
+    def slowly(axioms: list[Axiom], *rest: Any) -> bytes:
+        data = compose(axioms, *rest)
+        if not begun.is_set():
+            begun.set()
+            assert go_on.wait(30)
+        return data
+
+    monkeypatch.setattr(writing, 'ontology_bytes', slowly)
+    answers = []
+    older = threading.Thread(target=lambda: answers.append(ask('SAVE', 'map.owl')))
+    older.start()
+    assert begun.wait(30)
+    ask('ADD IND CLASS', 'X', 'DOOR')
+    assert ask('SAVE', 'map.owl').success
+    newer = (tmp_path / 'map.owl').read_bytes()
+    go_on.set()
+    older.join()
+    assert answers[0].success
+    assert (tmp_path / 'map.owl').read_bytes() == newer
+    assert [path.name for path in tmp_path.iterdir()] == ['map.owl'], 'no draft is left'
+    assert ask('SAVE', 'map.owl').success
 
 
 def test_names_that_rdf_xml_cannot_hold_are_saved_as_ntriples(ask: Ask) -> None:

@@ -5,9 +5,11 @@ The service hands it to the directives; it knows neither of them.
 
 from __future__ import annotations
 
+import os
 import threading
 from collections import deque
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import NamedTuple
 
 from surveillance_ontology.armor.access import SafePaths, Settings
@@ -31,6 +33,38 @@ Watcher = Callable[[str, Changes | None], None]
 """Told of a reference's name and what changed in it; None: it was loaded or dropped."""
 
 
+class SaveOrder:
+    """Keeps the newest state in a file that several clients save at once.
+
+    A state is taken under the lock of its reference and written without: a later one may be there
+    first.
+    """
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._begun = 0
+        self._written: dict[Path, int] = {}
+
+    def begin(self) -> Callable[[Path, Path], None]:
+        """Return what puts a draft of the state of this moment into the place of a file.
+
+        Where a later state is there already, the draft is deleted.
+        """
+        with self._lock:
+            self._begun += 1
+            number = self._begun
+
+        def replace(draft: Path, target: Path) -> None:
+            with self._lock:
+                if self._written.get(target, 0) > number:
+                    draft.unlink()
+                    return
+                os.replace(draft, target)
+                self._written[target] = number
+
+        return replace
+
+
 class Session:
     """The state of one directive service.
 
@@ -50,6 +84,7 @@ class Session:
         graphs: What changed in the graphs that they see.
         references: What is loaded.
         loading: Held while an ontology is loaded.
+        saves: Orders saves of the same file.
         store: Makes references durable; None: they end with the process.
     """
 
@@ -70,6 +105,7 @@ class Session:
         self.graphs = GraphChanges()
         self.references = Registry()
         self.loading = threading.Lock()
+        self.saves = SaveOrder()
         self._warn = warn
         self.clock = clock
         self.store = store

@@ -6,7 +6,7 @@ import contextlib
 import os
 import re
 import secrets
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from itertools import count
 from pathlib import Path
 from xml.parsers import expat
@@ -38,6 +38,7 @@ def write_ontology(
     path: str | Path,
     format: str = 'rdfxml',
     prefixes: Mapping[str, str] | None = None,
+    replace: Callable[[Path, Path], None] = os.replace,
 ) -> None:
     """Write a document through a temporary file beside it, so that the old one stays until the new
     is whole.
@@ -48,6 +49,7 @@ def write_ontology(
         path: The file; its directory must exist.
         format: One of `FORMATS`.
         prefixes: Further namespace prefixes for RDF/XML.
+        replace: Puts the temporary file into the place of the file.
 
     Raises:
         OntologyFileError: The directory is not writable, the format is unknown, or RDF/XML cannot
@@ -63,7 +65,7 @@ def write_ontology(
             file.write(data)
             file.flush()
             os.fsync(file.fileno())
-        os.replace(temporary, target)
+        replace(temporary, target)
     except OSError as error:
         with contextlib.suppress(OSError):
             temporary.unlink()

@@ -209,12 +209,13 @@ def _save(session: Session, request: DirectiveRequest, path: str) -> DirectiveRe
         if request.primary:
             axioms = list(dict.fromkeys([*axioms, *ref.kb.facts()]))
         origin = ref.origin
+        replace = session.saves.begin()
     # Late, as what LOAD WEB needs: a server that starts again is to be back at once.
     from surveillance_ontology.documents.writing import write_ontology
 
     form = 'ntriples' if target.suffix.lower() == '.nt' else origin.format
     try:
-        write_ontology(axioms, ref.kb.iri, target, form, origin.prefixes)
+        write_ontology(axioms, ref.kb.iri, target, form, origin.prefixes, replace)
     except OntologyFileError as error:
         raise DirectiveError(f'SAVE: {error}') from None
     return DirectiveResponse()
