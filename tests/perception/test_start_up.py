@@ -43,7 +43,7 @@ def robot(graph: Any) -> list[Int32]:
     """Return all nodes of the start, with no deadline; the list of ids as they are found."""
     ids = graph.listen(Int32, 'aruco_detector/id', IDS_QOS)
     # every wait ends by what happens: a busy machine only makes it longer
-    patient = SIMULATED | {'patience': 60.0, 'pictures': 2}
+    patient = SIMULATED | {'patience': 30.0, 'pictures': 2}
     graph.add(Simulator, parameters=place() | {'speed': 4.0, 'camera.rate': 5.0})
     graph.add(ArucoDetector, parameters=SIMULATED | {'known_ids': [*range(11, 18)]})
     graph.add(MarkerServer, parameters=SIMULATED)
