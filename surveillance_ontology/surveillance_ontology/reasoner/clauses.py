@@ -285,8 +285,9 @@ class Program:
 
     Attributes:
         classes, objects, datas: Predicates by IRI.
-        labels: Predicates of complex class expressions that individuals may be asserted to belong
-            to.
+        labels: Predicates of complex class expressions.
+        required: Those of them that individuals may be asserted to belong to: what that implies is
+            there.
         thing, nothing, different, same: The predicates with fixed meaning; `same` only ever names a
             premise.
         partial: Labels whose members are not all recognised.
@@ -300,6 +301,7 @@ class Program:
     objects: dict[str, Predicate] = field(default_factory=dict)
     datas: dict[str, Predicate] = field(default_factory=dict)
     labels: dict[ClassExpression, Predicate] = field(default_factory=dict)
+    required: set[ClassExpression] = field(default_factory=set)
     clauses: list[Clause] = field(default_factory=list)
     at_least: list[AtLeast] = field(default_factory=list)
     at_most: list[AtMost] = field(default_factory=list)

@@ -201,12 +201,13 @@ class Engine:
 
     def takes(self, axiom: Axiom) -> bool:
         """Tell whether the program keeps an assertion apart from others: it understands it, and a
-        complex class has a label that is no named class equal to it.
+        complex class has a label that is no named class equal to it, with what it implies.
         """
         if not self.understands(axiom):
             return False
         if isinstance(axiom, ClassAssertion) and not isinstance(axiom.cls, str):
-            return not is_public(self.program.labels[axiom.cls])
+            required = axiom.cls in self.program.required
+            return required and not is_public(self.program.labels[axiom.cls])
         return True
 
     def take_spelling(self, other: Engine) -> None:

@@ -67,6 +67,7 @@ class ProgramChange:
         running.objects = self._table(running.objects, wanted.objects)
         running.datas = self._table(running.datas, wanted.datas)
         running.labels = self._table(running.labels, wanted.labels)
+        running.required = wanted.required
         running.clauses, running.existentials = self.clauses, self.existentials
         running.at_most = self.limits
         running.meetings, running.unsupported = self.meetings, wanted.unsupported

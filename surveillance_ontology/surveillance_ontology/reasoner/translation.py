@@ -197,7 +197,6 @@ class Translation:
         self._described: set[ClassExpression] = set()
         self._recognised: set[ClassExpression] = set()
         self._counted: set[Predicate] = set()
-        self._required: set[ClassExpression] = set()
         self._complements: dict[str, Predicate] = {}
         self._origin: Axiom | None = None
         self._context = 'the ontology'
@@ -587,8 +586,8 @@ class Translation:
         implies.
         """
         label = self._label(expression)
-        if not isinstance(expression, str) and expression not in self._required:
-            self._required.add(expression)
+        if not isinstance(expression, str) and expression not in self.program.required:
+            self.program.required.add(expression)
             self._attempt(self.imply, (PredicateAtom(label, (_X,)),), expression, _X)
         return label
 

@@ -22,7 +22,7 @@ from surveillance_ontology.owl.axioms import (
     SubClassOf,
     SubObjectPropertyOf,
 )
-from surveillance_ontology.owl.expressions import ObjectSomeValuesFrom
+from surveillance_ontology.owl.expressions import ObjectHasValue, ObjectSomeValuesFrom
 from surveillance_ontology.reasoner.engine import Engine
 from tests.ontology.reasoner.random_ontologies import CLASSES, RandomOntology
 from tests.ontology.reasoner.test_incremental import by_value, derived
@@ -230,3 +230,13 @@ def test_what_an_axiom_says_twice_goes_with_it() -> None:
     kb.remove(twice)
     kb.reason()
     assert kb.object_values(P, IRI + 'y') == set()
+
+
+def test_what_a_class_implies_is_found_though_rules_only_recognised_it_before() -> None:
+    leads_to_x = ObjectHasValue(P, IRI + 'x')
+    kb = KnowledgeBase(IRI, [SubClassOf(ObjectSomeValuesFrom(P, leads_to_x), A)])
+    kb.reason()
+    kb.add(ClassAssertion(leads_to_x, IRI + 'x'))
+    kb.reason()
+    assert kb.object_values(P, IRI + 'x') == {IRI + 'x'}
+    assert kb.instances(A) == {IRI + 'x'}
