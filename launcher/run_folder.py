@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from launcher.system import LaunchError, NotNowError
+from surveillance_runtime.suggestions import like
 
 STATE = 'run.json'
 
@@ -142,7 +143,9 @@ def find(runs: Path, name: str) -> Found:
     else:
         folder, found = runs, latest(runs)
     if found is None:
-        expected = 'the name of a folder there' if name else 'a run that can be gone on with'
+        likely = like(name, (each.name for each in _folders(runs)))
+        there = f'{likely!r}' if likely else 'the name of a folder there'
+        expected = there if name else 'a run that can be gone on with'
         raise LaunchError(f'--resume: no run in {folder}: expected {expected}')
     if found.running:
         raise NotNowError(f'--resume: {found.folder}: this run is still going on')

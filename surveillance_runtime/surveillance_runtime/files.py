@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import os
 from pathlib import Path
 
 from surveillance_fsm import files
+from surveillance_runtime.suggestions import like
 
 RECORD, PLACE = 'mission.jsonl', 'place.yaml'
 RECORDING, TIMELINE = 'recording', 'timeline.jsonl'
@@ -18,9 +20,28 @@ class FileError(ValueError):
 
 
 def in_one_line(error: OSError) -> str:
-    """Return one line for a user: the file, where it is known, and what is wrong with it."""
+    """Return one line for a user: the file, where it is known, and what is wrong with it.
+
+    Of a file that is not there, the one that is most like it is named.
+    """
     what = f'{error.filename}: ' if error.filename else ''
-    return f'{what}{error.strerror or error}'
+    there = ''
+    if error.errno == errno.ENOENT and isinstance(error.filename, str | Path):
+        there = like_file(Path(error.filename))
+    return f'{what}{error.strerror or error}' + (f", expected '{there}'" if there else '')
+
+
+def like_file(path: Path) -> str:
+    """Return the path that is most like one that is not there; empty where none is like it."""
+    missing = next((each for each in reversed([path, *path.parents]) if not each.exists()), path)
+    with contextlib.suppress(OSError):
+        # A link that leads nowhere is listed, too.
+        there = set(os.listdir(missing.parent)) - {missing.name}
+        if name := like(missing.name, sorted(there)):
+            likely = missing.with_name(name)
+            whole = likely / path.relative_to(missing)
+            return str(whole if whole.exists() else likely)
+    return ''
 
 
 def read_file(path: Path, most: int) -> bytes:
@@ -32,7 +53,7 @@ def read_file(path: Path, most: int) -> bytes:
     try:
         return files.read_file(path, most)
     except OSError as error:
-        raise FileError(f'{path}: {error.strerror or error}') from None
+        raise FileError(in_one_line(error)) from None
 
 
 def replace_text(path: Path, text: str) -> None:

@@ -23,11 +23,16 @@ def nearest(name: str, known: Iterable[str]) -> str:
         has it as one of its words, and the only name; else the names, at most sixteen of them.
     """
     names = list(dict.fromkeys(known))
-    likest = max(names, key=lambda each: _likeness(name, each), default='')
-    if len(names) == 1 or _likeness(name, likest) >= _ALIKE:
-        return f"'{likest}'"
+    if len(names) == 1 or (likest := like(name, names)):
+        return f"'{names[0] if len(names) == 1 else likest}'"
     more = f' and {len(names) - _MOST} more' if len(names) > _MOST else ''
     return f'one of {", ".join(names[:_MOST])}{more}'
+
+
+def like(name: str, known: Iterable[str]) -> str:
+    """Return the known name that is most like an unknown one; empty where none is like it."""
+    likest = max(known, key=lambda each: _likeness(name, each), default='')
+    return likest if _likeness(name, likest) >= _ALIKE else ''
 
 
 def _likeness(given: str, name: str) -> float:

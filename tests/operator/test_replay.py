@@ -181,6 +181,10 @@ def test_a_run_is_found_by_what_it_holds_and_not_by_a_wrong_name(
     monkeypatch.chdir(run)  # the folder of a run itself
     with pytest.raises(FileError, match='nowhere'):
         find_run('nowhere', run.parent)
+    (other := run.with_name('20260102-000000')).mkdir()
+    (other / 'mission.jsonl').touch()
+    with pytest.raises(FileError, match=f'e.g. {run.name}, or last'):
+        find_run('20260101-00000', run.parent)
 
 
 def test_a_run_without_a_visit_has_no_report(run: Path) -> None:

@@ -38,6 +38,29 @@ def test_a_file_is_read_up_to_a_bound(tmp_path: Path) -> None:
         read_file(tmp_path / 'none', 4)
 
 
+@pytest.mark.parametrize(
+    ('given', 'expected'),
+    [
+        ('config/ofice.yaml', ", expected 'config/office.yaml'"),
+        ('confg/office.yaml', ", expected 'config/office.yaml'"),
+        ('confg/new.yaml', ", expected 'config'"),
+        ('config/Office.yml', ", expected 'config/office.yaml'"),
+        ('config/nothing-like-it', ''),
+        ('config/zebra', ''),
+    ],
+)
+def test_a_file_that_is_not_there_is_told_with_the_one_most_like_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, given: str, expected: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path('config').mkdir()
+    Path('config/office.yaml').touch()
+    Path('config/nothing-like-it').symlink_to('nowhere')
+    with pytest.raises(FileError) as refused:
+        read_file(Path(given), 100)
+    assert str(refused.value) == f'{given}: No such file or directory{expected}'
+
+
 def test_a_file_that_cannot_be_replaced_is_named_and_stays_whole(tmp_path: Path) -> None:
     path = tmp_path / 'state.json'
     replace_text(path, 'old')

@@ -7,7 +7,8 @@ from pathlib import Path
 
 from surveillance_operator.recording.reading import SUFFIX, files_of
 from surveillance_runtime.command_line import CommandParser
-from surveillance_runtime.files import RECORD, RECORDING, TIMELINE, FileError
+from surveillance_runtime.files import RECORD, RECORDING, TIMELINE, FileError, like_file
+from surveillance_runtime.suggestions import like
 
 LAST = 'last'
 
@@ -29,8 +30,10 @@ def find_run(name: str, runs: Path) -> Path:
     for folder in (given, runs / name, *holder):
         if is_run(folder):
             return folder
-    newest = f', e.g. {known[-1]}, or {LAST}' if known else ''
-    raise FileError(f'{name}: expected the folder of a run below {runs}{newest}')
+    likely = like(given.name, known) or like_file(given) or (known[-1] if known else '')
+    example = f', e.g. {likely}' if likely else ''
+    last = f', or {LAST}' if known else ''
+    raise FileError(f'{name}: expected the folder of a run below {runs}{example}{last}')
 
 
 @dataclass(frozen=True)

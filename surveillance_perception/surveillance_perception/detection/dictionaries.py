@@ -17,6 +17,8 @@ import numpy as np
 import numpy.typing as npt
 import yaml
 
+from surveillance_runtime.files import FileError, read_file
+
 _FILE_SUFFIXES = ('.yaml', '.yml', '.json')
 _LARGEST_FILE = 10_000_000
 _MOST_MARKERS = 100_000
@@ -53,13 +55,9 @@ def dictionary_named(name: str) -> cv2.aruco.Dictionary:
 def _dictionary_in(path: Path) -> cv2.aruco.Dictionary:
     what = f'marker dictionary {path}'
     try:
-        if path.exists() and not path.is_file():
-            raise ValueError(f'{what} is no regular file')
-        if path.stat().st_size > _LARGEST_FILE:
-            raise ValueError(f'{what} has more than {_LARGEST_FILE} bytes')
-        text = path.read_text(encoding='utf-8')
-    except OSError as error:
-        raise ValueError(f'{what}: {error.strerror or error}') from error
+        text = read_file(path, _LARGEST_FILE).decode('utf-8')
+    except FileError as error:
+        raise ValueError(f'marker dictionary {error}') from None
     except UnicodeDecodeError as error:
         raise ValueError(f'{what} is no text') from error
     expected = "expected OpenCV's form: nmarkers, markersize, maxCorrectionBits, marker_0, ..."

@@ -10,6 +10,8 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from surveillance_runtime.files import FileError, read_file
+
 # what OpenCV cannot decode is said once, by an ImageError
 _set_level = cv2.setLogLevel if hasattr(cv2, 'setLogLevel') else cv2.utils.logging.setLogLevel
 _set_level(0)
@@ -67,14 +69,9 @@ def read_image(path: Path, max_pixels: int = MAX_PIXELS) -> ImageArray:
         ImageError: The file cannot be read, is no image, or a larger one than `max_pixels`.
     """
     try:
-        if path.exists() and not path.is_file():
-            raise ImageError(f'{path} is no regular file')
-        size = path.stat().st_size
-        if size > MAX_BYTES:
-            raise ImageError(f'{path} has {size} bytes, at most {MAX_BYTES} are read')
-        data = path.read_bytes()
-    except OSError as error:
-        raise ImageError(f'{path}: {error.strerror or error}') from error
+        data = read_file(path, MAX_BYTES)
+    except FileError as error:
+        raise ImageError(str(error)) from None
     return decode_image(data, str(path), max_pixels)
 
 

@@ -15,6 +15,7 @@ from surveillance_perception.stream.image_files import (
     ImageError,
     read_image,
 )
+from surveillance_runtime.files import like_file
 
 
 class FrameSource(Protocol):
@@ -48,7 +49,9 @@ def open_source(source: str) -> FrameSource:
             raise ImageError(f'{path} holds no images ({", ".join(IMAGE_SUFFIXES)})')
         return _Files(files)
     if not path.exists():
-        raise ImageError(f'{source}: no such video file or folder of images')
+        likely = like_file(path)
+        expected = f", expected '{likely}'" if likely else ''
+        raise ImageError(f'{source}: no such video file or folder of images{expected}')
     if path.suffix.lower() in IMAGE_SUFFIXES:
         return _Files([path])
     return _Capture(str(path), f'video {path}')
