@@ -73,8 +73,6 @@ def run_of(events: Sequence[mission_log.Event], place: Place, source: str) -> Ru
         listed = max(event.time for event in events) - events[0].time
         line += f' · the ways of the last {listed / 3600.0:.1f} h'
     driven, planned, failures = _drives(events, place)
-    thresholds = [event.fields.get('urgency_threshold') for event in events]
-    numbers = [float(each) for each in thresholds if isinstance(each, int | float)]
     charged = Counter(event.text('place') for event in events if event.name == 'recharge')
     return Run(
         driven=driven,
@@ -83,7 +81,7 @@ def run_of(events: Sequence[mission_log.Event], place: Place, source: str) -> Ru
         waits=summary.unvisited,
         visits=summary.visits,
         recharges=charged,
-        threshold=numbers[-1] if numbers else None,
+        threshold=summary.threshold,
         summary=line,
     )
 

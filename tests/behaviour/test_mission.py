@@ -12,6 +12,7 @@ from surveillance_behaviour.decision import Rules
 from surveillance_behaviour.mission.mission_log import (
     MissionRecord,
     read,
+    read_all,
     summarize,
 )
 from surveillance_behaviour.world_model import Experience
@@ -183,10 +184,13 @@ def test_a_record_that_cannot_be_written_does_not_end_the_mission(
     assert [time for time in times if time > 200.0]
 
 
-def test_settings_changed_on_the_way_count_from_the_next_choice(machine: str) -> None:
+def test_settings_changed_on_the_way_count_from_the_next_choice(
+    machine: str, tmp_path: Path
+) -> None:
     world = World()
     mission_settings = settings()
-    run = Run(machine, world, mission_settings)
+    record = MissionRecord(tmp_path / 'record', segment_bytes=20_000)
+    run = Run(machine, world, mission_settings, record)
 
     def change() -> None:
         mission_settings.choice.urgency_threshold = 500.0
@@ -197,6 +201,14 @@ def test_settings_changed_on_the_way_count_from_the_next_choice(machine: str) ->
     assert world.threshold == 500.0
     assert world.decisions[-1].policy == 'oldest'
     assert {place for time, place in world.arrivals if time > 220.0} == {'C1', 'C2', 'E'}
+    told = [each for each in read_all(record.path) if 'urgency_threshold' in each.fields]
+    assert [(each.name, each.number('urgency_threshold')) for each in told] == [
+        ('start', 30.0),
+        ('decision', 500.0),
+    ]
+    run.until(5000.0)
+    assert read(record.path)[0].name == 'snapshot'
+    assert summarize(read(record.path)).threshold == 500.0
 
 
 def test_a_threshold_that_nobody_can_keep_to_is_warned_of_once(machine: str) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import sys
 from pathlib import Path
@@ -128,6 +129,11 @@ def test_ways_and_failures_come_from_the_record(record: Path) -> None:
     assert run.failures == [(10.0, 6.0), (10.0, 5.0)]
     assert run.waits['R2'] == 60.0
     assert run.visits['R1'] == 1
+    assert run.threshold is None
+    with record.open('a') as file:
+        fields = {'place': 'E', 'rule': 'URGENT', 'reason': '', 'urgency_threshold': 90}
+        file.write(json.dumps({'event': 'decision', 'time': 70.0, **fields}) + '\n')
+    assert map_command.run_of(mission_log.read(record), place, 'run').threshold == 90.0
 
 
 @pytest.mark.parametrize(

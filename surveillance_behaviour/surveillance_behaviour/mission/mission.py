@@ -97,6 +97,7 @@ class Mission:
         self._cut_off = cut_off
         self._started: float | None = None
         self._noted_places: frozenset[str] = frozenset()
+        self._noted_threshold = 0.0
         self._record_complaint = ''
 
     # The way of the mission.
@@ -114,12 +115,13 @@ class Mission:
             return
         self._started = self.now()
         self._noted_places = decisions.places
+        self._noted_threshold = self.settings.choice.urgency_threshold
         self.note(
             'start',
             machine=self.machine,
             place=self.place,
             places=sorted(decisions.places),
-            urgency_threshold=self.settings.choice.urgency_threshold,
+            urgency_threshold=self._noted_threshold,
         )
         before, self._cut_off = self._cut_off, None
         if before is None or is_other_simulation(before.time, self.now()):
@@ -154,7 +156,12 @@ class Mission:
             self._noted_places = decisions.places
             self.note('map', places=sorted(self._noted_places))
         self.ports.announcer.decision(decision)
-        self.note('decision', place=decision.place, rule=decision.rule, reason=decision.reason)
+        threshold, changed = self.settings.choice.urgency_threshold, {}
+        if threshold != self._noted_threshold:
+            self._noted_threshold = threshold
+            changed = {'urgency_threshold': threshold}
+        fields = {'place': decision.place, 'rule': decision.rule, 'reason': decision.reason}
+        self.note('decision', **fields, **changed)
         return decision
 
     def _notice_place(self, interrupt: Interrupt) -> None:

@@ -14,7 +14,9 @@ and the event's own fields::
     {"event": "visit", "time": 9.4, "place": "C1", "distance": 5.4, "path": [[5, 10], ...],
      "driven": [[5, 10], ...]}
 
-The ``path`` was planned; ``driven`` is where the robot was, where the motion controller tells it.
+A start, and a decision under another threshold than the last one, has ``urgency_threshold``,
+seconds. The ``path`` was planned; ``driven`` is where the robot was, where the motion controller
+tells it.
 
 A record of a month stays small to read: a file that has grown to :data:`SEGMENT_BYTES` is packed as
 ``FILE.0001.gz``, ``FILE.0002.gz``, ..., and the new one begins with a ``snapshot`` of all that was
@@ -248,6 +250,7 @@ class Summary:
         rules: Decisions by rule.
         failures: Failures by the state in which they happened.
         restarts: Times the machine started again in the middle of the mission.
+        threshold: The urgency threshold of the last decision, seconds; None: it is not known.
     """
 
     seconds: float = 0.0
@@ -259,6 +262,7 @@ class Summary:
     rules: Counter[str] = field(default_factory=Counter)
     failures: Counter[str] = field(default_factory=Counter)
     restarts: int = 0
+    threshold: float | None = None
 
     def __str__(self) -> str:
         if not self.visits:
@@ -391,6 +395,8 @@ def summarize(events: Iterable[Event]) -> Summary:
 
 
 def _count(summary: Summary, event: Event, last_seen: dict[str, float]) -> None:
+    if isinstance(threshold := event.fields.get('urgency_threshold'), int | float):
+        summary.threshold = float(threshold)
     match event.name:
         case 'start':
             summary.restarts += bool(summary.visits)
