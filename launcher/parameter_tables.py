@@ -40,7 +40,8 @@ the place (`--map`); `config/parameters.yaml`; the default below. Within one fil
 unknown name, a wrong type and a value out of range end the start with one line and status 2.
 `python3 launch.py params [NODE]` prints the values and where each comes from.
 
-Parameters marked *live* can be changed while the node runs (`ros2 param set`).
+Parameters marked *live* can be changed while the node runs: `param set NODE NAME VALUE` in
+`python3 launch.py console`, or `ros2 param set`.
 """
 
 

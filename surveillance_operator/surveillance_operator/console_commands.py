@@ -5,7 +5,7 @@ The controllers' own commands (`battery`, `plan`, `move`) are handed on as they 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from textwrap import wrap
 from typing import TYPE_CHECKING
@@ -24,6 +24,8 @@ from surveillance_controllers.manual.commands import (
     number,
 )
 from surveillance_fsm.exceptions import CallError
+from surveillance_runtime.configuration import declared, read_schema
+from surveillance_runtime.parameters import ParameterSpec, shown
 
 if TYPE_CHECKING:  # the launcher's prompt needs the words alone, without ROS
     from surveillance_operator.mission_actions import MissionActions
@@ -38,8 +40,8 @@ LIMIT = 10_000.0
 """Coordinates are within this many metres."""
 
 
-def _word(name: str, expected: str) -> Argument:
-    return Argument(name, expected, str)
+def _word(name: str, expected: str, known: Callable[..., Iterable[str]] = lambda: ()) -> Argument:
+    return Argument(name, expected, str, known=known)
 
 
 def _rest(name: str, expected: str) -> Argument:
@@ -48,6 +50,23 @@ def _rest(name: str, expected: str) -> Argument:
 
 _DOOR = _word('DOOR', 'a door like D1')
 _PLACE = _word('ROOM', 'the name of a place like R3')
+_NODE = _word('NODE', 'a node like robot_behavior', read_schema)
+
+
+def _parameters(node: str) -> Mapping[str, ParameterSpec]:
+    return schema.parameters if (schema := read_schema().get(node)) else {}
+
+
+def _live(node: str) -> list[str]:
+    return [name for name, spec in _parameters(node).items() if not spec.read_only]
+
+
+def _choices(node: str, name: str) -> Iterable[str]:
+    spec = _parameters(node).get(name)
+    return map(str, spec.choices) if spec else ()
+
+
+_POSES = ('left', 'home', 'right', 'back', 'stop')
 _X, _Y = number('X', -LIMIT, LIMIT, 'metres'), number('Y', -LIMIT, LIMIT, 'metres')
 
 Do = Callable[..., str]
@@ -67,6 +86,32 @@ def _known(actions: MissionActions, place: str) -> str:
         else:
             lines += ['  ' * depth + text for depth, text in actions.explain(fact)]
     return '\n'.join(lines) or f'nothing is known of {place}'
+
+
+def _list_parameters(actions: MissionActions, node: str) -> str:
+    """Return a node's parameters with the values that they have now; live ones are marked."""
+    declared(node, 'use_sim_time')
+    values, live = actions.parameters(node), _live(node)
+    width = max(map(len, values), default=0)
+    return '\n'.join(
+        f'{"*" if name in live else " "} {name:<{width}}  {shown(value)}'
+        for name, value in values.items()
+    )
+
+
+def _get_parameter(actions: MissionActions, node: str, name: str) -> str:
+    """Return a parameter's value now, what it means, and whether it can be changed now."""
+    spec = declared(node, name)
+    values = actions.parameters(node)
+    if name not in values:
+        raise ValueError(f'{node} does not have {name} in this mode')
+    change = f'param set {node} {name} VALUE'
+    if spec.read_only:
+        change = f'only when {node} starts, as launch.py -p {node}:{name}:=VALUE'
+    return (
+        f'{name} is {shown(values[name])}\n  {spec.description}\n'
+        f'  expected: {spec.expected()}\n  change it: {change}'
+    )
 
 
 def _command(words: str, text: str, do: Do, *arguments: Argument) -> tuple[Command, Do]:
@@ -105,13 +150,17 @@ _COMMANDS = (
         'arm',
         'Move the camera arm.',
         lambda a, pose: a.move_arm(pose),
-        _word('POSE', 'left, home, right, back or stop'),
+        _word(
+            'POSE',
+            'left, home, right, back or stop',
+            lambda: _POSES,
+        ),
     ),
     _command(
         'policy',
         'Set how places are chosen.',
         lambda a, policy: a.set_policy(policy),
-        _word('POLICY', 'a policy like tour'),
+        _word('POLICY', 'a policy like tour', lambda: _choices('robot_behavior', 'policy')),
     ),
     _command(
         'threshold',
@@ -125,6 +174,20 @@ _COMMANDS = (
     _command('step', 'Enter one state, then pause.', lambda a: a.machine('step')),
     _command('resume', 'Go on.', lambda a: a.machine('resume')),
     _command('why not', 'Say why the robot does not go there now.', _why_not, _PLACE),
+    _command('param list', "Show a node's parameters; * can be set now.", _list_parameters, _NODE),
+    _command(
+        'param get',
+        'Show one, what it means, what it can be.',
+        _get_parameter,
+        *(_NODE, _word('NAME', 'a parameter', _parameters)),
+    ),
+    _command(
+        'param set',
+        'Set a parameter of a running node.',
+        lambda a, *given: a.set_parameter(*given),
+        *(_NODE, _word('NAME', 'a parameter', _live)),
+        Argument('VALUE', 'a value', str, takes_rest=True, known=_choices),
+    ),
     _command('known', 'Show what is known of a place, with its proofs.', _known, _PLACE),
 )
 WHY = Command(('why',), (), 'Say why the robot goes where it goes.')

@@ -6,6 +6,7 @@ raises one line that says why: `ValueError` where it was refused, `CallError` wh
 
 from __future__ import annotations
 
+import contextlib
 import math
 import re
 import time
@@ -13,8 +14,8 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from geometry_msgs.msg import Point
-from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
-from rcl_interfaces.srv import SetParameters
+from rcl_interfaces.srv import GetParameters, ListParameters, SetParameters
+from rclpy.parameter import Parameter, parameter_value_to_python
 from std_srvs.srv import Trigger
 
 from surveillance_fsm.ros import ServiceCaller, UnavailableError
@@ -39,11 +40,15 @@ from surveillance_ontology.armor_client import (
 )
 from surveillance_ontology.patrol_ontology import facts_of
 from surveillance_operator.topics import BEHAVIOUR, CONTROLLERS
+from surveillance_runtime.configuration import argument_value, declared
 from surveillance_runtime.node import PatrolNode
+from surveillance_runtime.parameters import shown
 
 _DISCOVERY = 2.0
 """Seconds in which a node that has just started finds the services that there are."""
-_OPTIONAL = ('simulation/', 'move_arm')
+REASONER = 'reasoner'
+"""The node that decides in the behaviour patrol, with settings of its own."""
+_OPTIONAL = ('simulation/', 'move_arm', f'{REASONER}/')
 """How the names of services begin that a mission need not have."""
 ARM_SECONDS = 60.0
 """Deadline of a movement of the arm, whose answer comes when it has arrived."""
@@ -77,6 +82,7 @@ class MissionActions:
             (GoTo, 'go_to'),
             (WhyNot, 'why_not'),
             (SetParameters, f'{BEHAVIOUR}/set_parameters'),
+            (SetParameters, f'{REASONER}/set_parameters'),
             *((Trigger, f'{BEHAVIOUR}/fsm/{word}') for word in ('pause', 'step', 'resume')),
             *((ConsoleCommand, f'{name}/command') for name in CONTROLLERS),
         ):
@@ -145,13 +151,36 @@ class MissionActions:
         number = _number('threshold', seconds)
         if number != int(number):
             raise ValueError(f'{number:g} s: expected whole seconds')
-        value = ParameterValue(type=ParameterType.PARAMETER_INTEGER, integer_value=int(number))
-        return self._set('urgency_threshold', value, f'{number:g} s')
+        return self._decide_by('urgency_threshold', int(number)) + ' s'
 
     def set_policy(self, policy: str) -> str:
         """Set how a place is chosen among those that the rules allow."""
-        value = ParameterValue(type=ParameterType.PARAMETER_STRING, string_value=str(policy))
-        return self._set('policy', value, str(policy))
+        return self._decide_by('policy', str(policy))
+
+    def parameters(self, node: str) -> dict[str, Any]:
+        """Return the values that a node's parameters have now, by name."""
+        listed = self._call_node(node, ListParameters, ListParameters.Request()).result.names
+        names = sorted(listed)
+        answer = self._call_node(node, GetParameters, GetParameters.Request(names=names))
+        values = map(parameter_value_to_python, answer.values)
+        return {
+            name: value.tolist() if hasattr(value, 'tolist') else value
+            for name, value in zip(names, values, strict=False)
+        }
+
+    def set_parameter(self, node: str, name: str, text: str) -> str:
+        """Set a parameter of a running node to a value as `-p NAME:=VALUE` has it."""
+        spec = declared(node, name)
+        if spec.read_only:
+            raise ValueError(
+                f'{name} is read once, when {node} starts: give it there, as -p {node}:{name}:=...'
+            )
+        value = argument_value(text)
+        if isinstance(spec.default, str) and not isinstance(value, str):
+            value = text
+        value = spec.accept(value)
+        self._set(node, name, value)
+        return f'{name} of {node} is {shown(value)}'
 
     def move_arm(self, pose: str) -> str:
         """Move the camera arm to a named pose: left, home, right, back; or stop it."""
@@ -204,12 +233,25 @@ class MissionActions:
         except (ArmorServiceCallError, ArmorServiceInternalError) as error:
             raise ValueError(str(error)) from None
 
-    def _set(self, name: str, value: ParameterValue, shown: str) -> str:
-        request = SetParameters.Request(parameters=[Parameter(name=name, value=value)])
-        (result,) = self._call(f'{BEHAVIOUR}/set_parameters', request).results
+    def _decide_by(self, name: str, value: Any) -> str:
+        self._set(BEHAVIOUR, name, value)
+        with contextlib.suppress(UnavailableError):
+            self._set(REASONER, name, value)
+        return f'{name} is {value}'
+
+    def _set(self, node: str, name: str, value: Any) -> None:
+        parameter = Parameter(name, value=value).to_parameter_msg()
+        request = SetParameters.Request(parameters=[parameter])
+        (result,) = self._call_node(node, SetParameters, request).results
         if not result.successful:
             raise ValueError(result.reason or f'{name} was refused')
-        return f'{name} is {shown}'
+
+    def _call_node(self, node: str, kind: Any, request: Any) -> Any:
+        words = {GetParameters: 'get', ListParameters: 'list', SetParameters: 'set'}
+        service = f'{node}/{words[kind]}_parameters'
+        if service not in self._callers:
+            self._callers[service] = ServiceCaller(self._node, kind, service)
+        return self._call(service, request)
 
     def _told(self, service: str, request: Any, timeout: float | None = None) -> str:
         answer = self._call(service, request, timeout)

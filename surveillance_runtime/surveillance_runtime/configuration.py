@@ -150,6 +150,21 @@ def read_schema(path: Path = SCHEMA) -> Mapping[str, NodeSchema]:
     return {node: _node_schema(body) for node, body in stored.items()}
 
 
+def declared(node: str, name: str) -> ParameterSpec:
+    """Return what is known of a node's parameter.
+
+    Raises:
+        ParameterError: There is no such node, or it declares no such parameter.
+    """
+    nodes = read_schema()
+    if node not in nodes:
+        raise ParameterError(f'there is no node {_short(node)}: expected {nearest(node, nodes)}')
+    if (spec := nodes[node].spec(name)) is None:
+        near = nearest(name, nodes[node].parameters)
+        raise ParameterError(f'{node} has no parameter {_short(name)}: expected {near}')
+    return spec
+
+
 def _node_schema(body: Mapping[str, Any]) -> NodeSchema:
     specs = {}
     for name, row in body['parameters'].items():
@@ -214,21 +229,27 @@ def argument_layer(assignments: Iterable[str]) -> Layer:
             raise ParameterError(f'-p {_short(text)}: expected NAME:=VALUE or NODE:NAME:=VALUE')
         pattern = '/**' if match['node'] is None else match['node']
         try:
-            value = _argument_value(match['value'])
-        except (*UNREADABLE, RecursionError):
-            raise ParameterError(
-                f'-p {_short(text)}: the value is not valid YAML; quote it'
-            ) from None
+            value = argument_value(match['value'])
+        except ParameterError as error:
+            raise ParameterError(f'-p {_short(text)}: {error}') from None
         entries.append(Entry(pattern, match['name'], value, f'-p {_short(text)}'))
     return Layer('the command line', tuple(entries))
 
 
-def _argument_value(text: str) -> Any:
-    if len(text) > 1_000_000 or text.count('[') + text.count('{') > 1000:
-        raise ValueError('too large')
-    value = yaml.load(text, RosLoader)
-    if isinstance(value, Mapping):
-        raise ValueError('a mapping')
+def argument_value(text: str) -> Any:
+    """Return the value that a text is as YAML, with numbers as ROS has them.
+
+    Raises:
+        ParameterError: It cannot be read.
+    """
+    try:
+        if len(text) > 1_000_000 or text.count('[') + text.count('{') > 1000:
+            raise ValueError('too large')
+        value = yaml.load(text, RosLoader)
+        if isinstance(value, Mapping):
+            raise ValueError('a mapping')
+    except (*UNREADABLE, RecursionError):
+        raise ParameterError('the value is not valid YAML; quote it') from None
     return text if value is None else value
 
 

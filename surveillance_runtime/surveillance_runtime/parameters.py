@@ -99,13 +99,13 @@ class ParameterSpec:
     def error(self, value: Any, expected: str | None = None) -> ParameterError:
         """Build the error for a value that does not fit."""
         return ParameterError(
-            f'parameter {self.name}: got {_shown(value)}, expected {expected or self.expected()}'
+            f'parameter {self.name}: got {shown(value)}, expected {expected or self.expected()}'
         )
 
     def expected(self) -> str:
         """Say in words what values are allowed."""
         if self.choices:
-            return 'one of ' + ', '.join(_shown(choice) for choice in self.choices)
+            return 'one of ' + ', '.join(shown(choice) for choice in self.choices)
         if self.element is None:
             text = _TYPE_NAMES[type(self.default)]
         else:
@@ -157,13 +157,14 @@ class ParameterSpec:
         return accepted
 
 
-def _shown(value: Any) -> str:
+def shown(value: Any) -> str:
+    """Return a value as a person writes it."""
     if isinstance(value, str):
         return repr(value)
     if isinstance(value, bool):
         return 'true' if value else 'false'
     if isinstance(value, Sequence | array) and not isinstance(value, bytes):
-        return '[' + ', '.join(_shown(element) for element in value) + ']'
+        return '[' + ', '.join(shown(element) for element in value) + ']'
     return str(value)
 
 

@@ -7,13 +7,16 @@ from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import pytest
+from rcl_interfaces.msg import SetParametersResult
 from rcl_interfaces.srv import SetParameters
 from std_srvs.srv import Trigger
 
+from surveillance_behaviour.reasoner_node import Reasoner
 from surveillance_fsm.exceptions import CallError
 from surveillance_interfaces.srv import GoTo, MarkerRoutine, PlaceObstacle, SetDoor, WhyNot
 from surveillance_ontology.armor_server_node import ArmorServer
 from surveillance_ontology.ontology_map_builder_node import OntologyMapBuilder
+from surveillance_operator.console_commands import answer
 from surveillance_operator.mission_actions import MissionActions
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.waiting import AwaitedEvent
@@ -101,8 +104,6 @@ def test_a_refusal_is_said_in_the_words_of_the_node(graph: Any, actions: Mission
 
 
 def test_a_parameter_is_set_or_the_reason_told(graph: Any, actions: MissionActions) -> None:
-    from rcl_interfaces.msg import SetParametersResult
-
     results = [SetParametersResult(successful=True)]
     asked = serve(graph, SetParameters, 'robot_behavior/set_parameters', results=results)
     assert actions.set_threshold(90) == 'urgency_threshold is 90 s'
@@ -110,6 +111,54 @@ def test_a_parameter_is_set_or_the_reason_told(graph: Any, actions: MissionActio
     results[0] = SetParametersResult(successful=False, reason='expected one of tour')
     with pytest.raises(ValueError, match='expected one of tour'):
         actions.set_policy('fast')
+
+
+def test_any_parameter_of_a_running_node_is_looked_at_and_set(
+    graph: Any, actions: MissionActions
+) -> None:
+    reasoner = graph.add(Reasoner, parameters={'urgency_threshold': 240})
+
+    def said(line: str) -> str:
+        (told,) = answer(line, actions, lambda: '')
+        return told.text
+
+    assert '* urgency_threshold' in said('param list reasoner')
+    assert said('param get reasoner urgency_threshold').splitlines() == [
+        'urgency_threshold is 240',
+        '  Seconds without a visit after which a place is URGENT.',
+        '  expected: an integer from 0 to 1000000000',
+        '  change it: param set reasoner urgency_threshold VALUE',
+    ]
+    assert said('param set reasoner robot_speed 2') == 'robot_speed of reasoner is 2.0'
+    assert said('param set reasoner policy OLDEST') == "policy of reasoner is 'oldest'"
+    assert said("param set reasoner recharge_rooms [E, '1']").endswith("is ['E', '1']")
+    values = [reasoner.get_parameter(name).value for name in ('robot_speed', 'policy')]
+    assert [*values, reasoner.get_parameter('recharge_rooms').value] == [2.0, 'oldest', ['E', '1']]
+    for line, words in (
+        ('param set reasoner policy fast', "parameter policy: got 'fast', expected one of 'tour'"),
+        ('param set reasoner robot_sped 2', "no parameter robot_sped: expected 'robot_speed'"),
+        ('param list resoner', "there is no node resoner: expected 'reasoner'"),
+        ('param set reasoner random_seed 7', 'read once, when reasoner starts: give it there, as'),
+        ('param set reasoner robot_speed [', 'the value is not valid YAML'),
+    ):
+        assert words in said(line)
+        assert '\n' not in said(line)
+    assert said('param get reasoner random_seed').endswith(
+        'only when reasoner starts, as launch.py -p reasoner:random_seed:=VALUE'
+    )
+
+
+def test_what_a_person_sets_reaches_the_node_that_decides(
+    graph: Any, actions: MissionActions
+) -> None:
+    results = [SetParametersResult(successful=True)]
+    asked = serve(graph, SetParameters, 'robot_behavior/set_parameters', results=results)
+    reasoner = graph.add(Reasoner)
+    actions.set_threshold(90)
+    actions.set_policy('oldest')
+    assert [each.parameters[0].name for each in asked] == ['urgency_threshold', 'policy']
+    assert reasoner.get_parameter('urgency_threshold').value == 90
+    assert reasoner.get_parameter('policy').value == 'oldest'
 
 
 @pytest.mark.parametrize(

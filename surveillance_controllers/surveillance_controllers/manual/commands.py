@@ -41,12 +41,14 @@ class Argument:
         expected: What a good value is, completing the sentence "expected ...".
         read: Turns the text into the value; raises `ValueError` with a detail (or an empty text).
         takes_rest: The argument takes the rest of the line, blanks included.
+        known: Values to propose, from the arguments before it.
     """
 
     name: str
     expected: str
     read: Callable[[str], object]
     takes_rest: bool = False
+    known: Callable[..., Iterable[str]] = lambda *_: ()
 
 
 @dataclass(frozen=True)
@@ -239,20 +241,20 @@ class Grammar:
         """Return the words that can stand where the last word of `text` is being typed, in
         alphabetical order.
         """
-        words = text.lower().split()
+        words = text.split()
         if not text or text[-1].isspace():
             words.append('')
         *done, typed = words
-        depth = len(done)
-        return sorted(
-            {
-                command.words[depth]
-                for command in self.commands
-                if len(command.words) > depth
-                and list(command.words[:depth]) == done
-                and command.words[depth].startswith(typed)
-            }
-        )
+        found: set[str] = set()
+        for command in self.commands:
+            count = len(command.words)
+            if list(command.words[: len(done)]) != [each.lower() for each in done[:count]]:
+                continue
+            if len(done) < count:
+                found.add(command.words[len(done)])
+            elif len(done) - count < len(command.arguments):
+                found.update(command.arguments[len(done) - count].known(*done[count:]))
+        return sorted(each for each in found if each.lower().startswith(typed.lower()))
 
 
 def _read_arguments(command: Command, line: str) -> tuple[object, ...]:
