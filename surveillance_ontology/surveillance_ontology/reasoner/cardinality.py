@@ -191,8 +191,11 @@ class AtMostCounter(_Counter):
             if z not in self._nothing.members:
                 self._enqueue((self._nothing, z))
             return
+        facts = self._label_fact(z) + self.facts(z, related)
         for one, other in self._forced(related):
-            self._merge(one, other, self.origin, self._label_fact(z) + self.facts(z, related))
+            apart = self.differences(related) if self.n > 1 else ()
+            rest = tuple(fact for fact in apart if {one, other} != {*fact[1:]})
+            self._merge(one, other, self.origin, facts + rest)
 
     def _forced(self, related: list[str]) -> Iterator[tuple[str, str]]:
         """Pairs that must be the same for the rest to fit."""

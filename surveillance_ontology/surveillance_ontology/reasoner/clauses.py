@@ -288,8 +288,9 @@ class Program:
         labels: Predicates of complex class expressions.
         required: Those of them that individuals may be asserted to belong to: what that implies is
             there.
-        thing, nothing, different, same: The predicates with fixed meaning; `same` only ever names a
-            premise.
+        thing, nothing, apart: The predicates with fixed meaning; `apart` holds of individuals that
+            clauses make different.
+        different, same: What premises alone are named with.
         partial: Labels whose members are not all recognised.
         meetings: Existentials whose individuals or values a lower bound counts.
         uses_thing: Whether the extension of owl:Thing must be kept.
@@ -318,6 +319,7 @@ class Program:
     interacting: bool = False
     thing: Predicate = field(default_factory=lambda: Predicate('class', 'owl:Thing'))
     nothing: Predicate = field(default_factory=lambda: Predicate('class', 'owl:Nothing'))
+    apart: Predicate = field(default_factory=lambda: Predicate('different', 'kept apart from'))
     different: Predicate = field(default_factory=lambda: Predicate('different', 'different from'))
     same: Predicate = field(default_factory=lambda: Predicate('different', 'same as'))
 
@@ -344,7 +346,7 @@ class Program:
 
     def predicates(self) -> Iterator[Predicate]:
         """Yield every predicate with an extension."""
-        yield from (self.thing, self.nothing, self.different)
+        yield from (self.thing, self.nothing, self.apart)
         yield from self.classes.values()
         yield from self.objects.values()
         yield from self.datas.values()

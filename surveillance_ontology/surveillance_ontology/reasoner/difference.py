@@ -46,7 +46,7 @@ class Difference:
         self._numbers: dict[DifferentIndividuals, int] = {}
         self._axioms: dict[int, DifferentIndividuals] = {}
         self._next = 0
-        self._stated = program.different.succ
+        self._apart = program.apart
         self.evidence: list[Evidence] = []
         self.through: list[EvidenceOfValues] = []
 
@@ -121,7 +121,7 @@ class Difference:
                     return True
         elif self.stated(x, y):
             return True
-        if self._stated and self._stated_by_rule(x, y):
+        if self._apart.succ and self._stated_by_rule(x, y):
             return True
         return bool(self.evidence or self.through) and self._follows(x, y)
 
@@ -148,7 +148,7 @@ class Difference:
         return False
 
     def _stated_by_rule(self, x: str, y: str) -> bool:
-        stated = self._stated
+        stated = self._apart.succ
         return y in stated.get(x, ()) or x in stated.get(y, ())
 
     def premises(self, x: str, y: str) -> Iterator[Premises]:
@@ -159,8 +159,9 @@ class Difference:
             return
         if self.stated(x, y):
             yield ()
-        if x in self._stated.get(y, ()):
-            yield ((self.predicate, y, x),)
+        for one, other in ((x, y), (y, x)):
+            if other in self._apart.succ.get(one, ()):
+                yield ((self._apart, one, other),)
         for evidence in (*self.evidence, *self.through):
             yield from evidence.premises(x, y)
 

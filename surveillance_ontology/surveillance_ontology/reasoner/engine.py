@@ -82,6 +82,8 @@ class Engine:
         self._requests: dict[Merge, None] = {}
         self.conflicts = Conflicts()
         self._touched: dict[str, None] = {}
+        # Who stands for individuals that are the same because others differ, which may be over.
+        self._doubtful: dict[str, None] = {}
         self._removed: dict[Fact, None] = {}
         self._split_happened = False
         self.proofs = ProofSearch(self.asserted)
@@ -273,6 +275,7 @@ class Engine:
         for one in related:
             for touch in self._network.touch_delete:
                 touch(one)
+            self._doubtful.update(dict.fromkeys(self.equality.resting_on_difference(one)))
         for merge in self._conflicts_about(related):
             self._withdraw_conflict(merge)
 
@@ -426,6 +429,7 @@ class Engine:
         """Put the queued facts under the names of the representatives."""
         # Nothing ceased to hold: what the removal hooks named holds of the representative.
         self._overdeleted.clear()
+        self._doubtful.clear()
         for place, fact in enumerate(self._queue):
             current = self.current(fact)
             if current != fact:
@@ -519,7 +523,7 @@ class Engine:
             if uses_thing:
                 for individual in individuals_of(axiom):
                     self._assert((self.program.thing, equality.find(individual)))
-        if self._overdeleted or splitting:
+        if self._overdeleted or splitting or self._doubtful:
             self._replace(splitting)
         self._queue.reverse()
         self._propagate()
@@ -665,7 +669,11 @@ class Engine:
 
     def _overdelete(self, fresh: list[Fact]) -> None:
         overdeleted, asserted, proves = self._overdeleted, self.asserted, self.proofs.proves
-        while overdeleted:
+        while overdeleted or self._doubtful:
+            while self._doubtful:
+                self._split(self._doubtful.popitem()[0], fresh)
+            if not overdeleted:
+                break
             fact = overdeleted.pop()
             if not fact[0].holds(fact):
                 continue

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from typing import Any
 
 from surveillance_ontology.owl.axioms import Axiom
 from surveillance_ontology.reasoner.clauses import Fact, Premises
@@ -65,6 +66,11 @@ class Conflicts:
         return {merge.first, merge.second}.union(*map(individuals_in, merge.premises))
 
 
+def _keys(fact: Fact) -> list[Any]:
+    """Return under what those who use a premise are found: a difference under each individual."""
+    return [(name,) for name in fact[1:]] if fact[0].kind == 'different' else [fact]
+
+
 class Equality:
     """Classes of individuals known to be the same, each with one representative.
 
@@ -77,7 +83,7 @@ class Equality:
         self.representative: dict[str, str] = {}
         self.members: dict[str, set[str]] = {}
         self._merges: dict[str, list[Merge]] = {}
-        self._used: dict[Fact, set[str]] = {}
+        self._used: dict[Any, set[str]] = {}
 
     def find(self, individual: str) -> str:
         """Return the representative."""
@@ -102,7 +108,8 @@ class Equality:
         merges += self._merges.pop(gone, ())
         merges.append(merge)
         for fact in merge.premises:
-            self._used.setdefault(fact, set()).add(merge.first)
+            for key in _keys(fact):
+                self._used.setdefault(key, set()).add(merge.first)
         return kept, gone
 
     def split(self, representative: str) -> set[str]:
@@ -111,12 +118,12 @@ class Equality:
         for individual in members:
             self.representative.pop(individual, None)
         for merge in self._merges.pop(representative, ()):
-            for fact in merge.premises:
-                users = self._used.get(fact)
+            for key in (key for fact in merge.premises for key in _keys(fact)):
+                users = self._used.get(key)
                 if users is not None:
                     users.discard(merge.first)
                     if not users:
-                        del self._used[fact]
+                        del self._used[key]
         return members
 
     def dependents(self, fact: Fact) -> set[str]:
@@ -132,6 +139,13 @@ class Equality:
                 for individual in self._used.get(written, ()):
                     found.add(self.find(individual))
         return {name for name in found if name in self.members}
+
+    def resting_on_difference(self, individual: str) -> set[str]:
+        """Return representatives of the classes whose justification uses a difference from an
+        individual.
+        """
+        names = self.same(individual) if self._used else ()
+        return {self.find(user) for name in names for user in self._used.get((name,), ())}
 
     def _spellings(self, fact: Fact) -> Iterator[Fact]:
         """Yield the fact with each merged individual in every of its names."""

@@ -162,9 +162,13 @@ class Reasons:
         if proof.asserted:
             return self._assertion(proof.fact, text)
         predicate = proof.fact[0]
-        if predicate is self._engine.program.different and not proof.premises:
-            return self._stated_difference(proof.fact, text)
-        if predicate is self._engine.program.same:
+        program = self._engine.program
+        if predicate is program.different:
+            if not proof.premises:
+                return self._stated_difference(proof.fact, text)
+            if proof.premises[0].fact[0] is program.apart:
+                return self._explained(proof.premises[0])
+        if predicate is program.same:
             return self._merge(self._engine.conflicts.between(*proof.fact[1:])[0])
         premises: list[Explanation] = []
         for premise in proof.premises:
@@ -200,7 +204,7 @@ class Reasons:
         """Return a fact as an assertion, where it can be written as one."""
         predicate = fact[0]
         program = self._engine.program
-        if predicate is program.different:
+        if predicate in (program.apart, program.different):
             return ax.DifferentIndividuals(frozenset(fact[1:]))
         name = predicate.expression
         if name is None or isinstance(name, tuple):
@@ -294,7 +298,7 @@ class Reasons:
         subject = local_name(fact[1])
         if predicate is program.nothing:
             return f'{subject} is contradictory'
-        if predicate is program.different:
+        if predicate in (program.apart, program.different):
             return f'{subject} is different from {local_name(fact[2])}'
         if predicate.kind == 'class':
             name = predicate.expression

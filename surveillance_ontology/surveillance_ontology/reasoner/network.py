@@ -272,7 +272,7 @@ class Network:
             evidence.append(DisjointPropertyEvidence(prop, negative, False))
             _touch_individuals(prop)
             _touch_individuals(negative)
-        program.different.touching = (1, 2)
+        program.apart.touching = (1, 2)
 
 
 def _also_touches(predicate: Predicate, position: int) -> None:

@@ -126,7 +126,7 @@ class _Keys:
         self._fixed: dict[Predicate, _Key] = {
             program.thing: 'thing',
             program.nothing: 'nothing',
-            program.different: 'different',
+            program.apart: 'apart',
             program.same: 'same',
         }
         for prop, negative in program.negatives.items():

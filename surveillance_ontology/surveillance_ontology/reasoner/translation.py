@@ -218,8 +218,7 @@ class Translation:
         self._top_and_bottom()
         self._complement_labels()
         if any(
-            isinstance(clause.head, PredicateAtom)
-            and clause.head.predicate is self.program.different
+            isinstance(clause.head, PredicateAtom) and clause.head.predicate is self.program.apart
             for clause in self.program.clauses
         ):
             self.contradict((self._differs(_X, _X),), _X)
@@ -571,7 +570,7 @@ class Translation:
                 program.unsupported.append(text)
 
     def _differs(self, x: Term, y: Term) -> PredicateAtom:
-        return PredicateAtom(self.program.different, (x, y))
+        return PredicateAtom(self.program.apart, (x, y))
 
     def _negate(self, kind: str, iri: str) -> None:
         """Add a predicate for negative assertions, which contradict the positive."""
@@ -828,6 +827,6 @@ class Translation:
                 if isinstance(atom, ex.SameIndividualAtom):
                     self.clause(body, SameAtom(pair))
                 else:
-                    self.clause(body, PredicateAtom(program.different, pair))
+                    self.clause(body, PredicateAtom(program.apart, pair))
             else:
                 raise UnsupportedError('a built-in or data range in the head has no meaning here')

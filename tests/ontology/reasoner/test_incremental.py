@@ -19,6 +19,7 @@ from surveillance_ontology.owl.axioms import (
     ClassAssertion,
     DataPropertyAssertion,
     Declaration,
+    DisjointClasses,
     EquivalentClasses,
     FunctionalObjectProperty,
     ObjectPropertyRange,
@@ -29,7 +30,9 @@ from surveillance_ontology.owl.axioms import (
     TransitiveObjectProperty,
 )
 from surveillance_ontology.owl.expressions import (
+    ClassAtom,
     DataHasValue,
+    DifferentIndividualsAtom,
     Literal,
     ObjectIntersectionOf,
     ObjectMaxCardinality,
@@ -251,6 +254,56 @@ def test_a_contradiction_goes_when_its_reason_has_been_renamed(stated: str, othe
     assert not kb.reason()
     kb.remove(link('p', other, 'c'))
     assert kb.reason()
+
+
+@pytest.mark.parametrize('by_classes', [True, False])
+def test_the_same_because_others_differ_ends_with_the_difference(by_classes: bool) -> None:
+    same = SameIndividual(frozenset((n('a'), n('b'))))
+    apart: list[Axiom] = [different(pair) for pair in ('ac', 'ad', 'bc', 'bd')]
+    ends: Axiom = different('cd')
+    if by_classes:
+        ends = ClassAssertion(n('C'), n('c'))
+        apart += [DisjointClasses((n('C'), n('D'))), ClassAssertion(n('D'), n('d'))]
+    bound = ClassAssertion(ObjectMaxCardinality(3, n('p')), n('x'))
+    kb = KnowledgeBase(IRI, [*apart, ends, bound, *(link('p', 'x', name) for name in 'abcd')])
+    kb.reason()
+    assert kb.holds(same)
+    kb.remove(ends)
+    kb.reason()
+    assert not kb.holds(same)
+    kb.add(ends)
+    kb.reason()
+    assert kb.holds(same)
+
+
+def test_the_same_by_a_rule_about_different_individuals_ends_with_the_difference() -> None:
+    x, y, z, w = (Variable(f'urn:swrl#{name}') for name in 'xyzw')
+    links = [ObjectPropertyAtom(n('q'), x, z), ObjectPropertyAtom(n('q'), y, w)]
+    rule = Rule((DifferentIndividualsAtom(x, y), *links), (SameIndividualAtom(z, w),))
+    kb = KnowledgeBase(IRI, [rule, link('q', 'a', 'c'), link('q', 'b', 'd'), different('ab')])
+    kb.reason()
+    assert kb.holds(SameIndividual(frozenset((n('c'), n('d')))))
+    kb.remove(different('ab'))
+    kb.reason()
+    assert not kb.holds(SameIndividual(frozenset((n('c'), n('d')))))
+
+
+def test_a_difference_that_a_rule_made_ends_with_the_rule_and_the_assertion() -> None:
+    x, y = (Variable(f'urn:swrl#{name}') for name in 'xy')
+    body = (ClassAtom(n('A'), x), ClassAtom(n('B'), y))
+    rule = Rule(body, (DifferentIndividualsAtom(x, y),))
+    facts = [ClassAssertion(n('A'), n('a')), ClassAssertion(n('B'), n('b'))]
+    kb = KnowledgeBase(IRI, [rule, *facts])
+    kb.reason()
+    assert kb.holds(different('ab'))
+    kb.add(different('ab'))
+    kb.reason()
+    kb.remove(facts[0])
+    kb.reason()
+    assert kb.holds(different('ab'))
+    kb.remove(different('ab'))
+    kb.reason()
+    assert not kb.holds(different('ab'))
 
 
 def test_many_individuals_become_the_same_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
