@@ -255,7 +255,7 @@ def _test(argv: list[str]) -> int:
     _enter(['test', *argv], extras=('test',))
     spread = any(a.startswith(('-n', '--numprocesses', '--pdb')) or 'no:xdist' in a for a in argv)
     # On two cores three are a seventh faster than two: many tests wait for other processes.
-    words = [] if spread else ['-n', '3', '--dist', 'loadfile']
+    words = [] if spread else ['-n', '3', '--dist', 'loadfile', '--no-loadscope-reorder']
     os.chdir(CHECKOUT)
     sys.stdout.flush()
     return os.execv(sys.executable, [sys.executable, '-m', 'pytest', *words, *argv])

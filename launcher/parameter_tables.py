@@ -84,7 +84,7 @@ def _variants(node: node_table.Node) -> Iterator[dict[str, Any]]:
         layers = (file_layer(config / place),)
         settings = Configuration(layers, schema).resolve(node.name)
         described = {name: setting.value for name, setting in settings.items()}
-        for mode in node_table.MODES:
+        for mode in node_table.MODES if node.has_modes else (node_table.DEFAULT_MODE,):
             yield {**described, 'execution_mode': mode, 'behaviour': behaviour, 'console': False}
 
 

@@ -10,6 +10,7 @@ import threading
 import time
 import traceback
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any, TypeVar
 
 import hypothesis
@@ -38,17 +39,26 @@ USER_ENVIRON = dict(os.environ)
 os.environ |= launched_nodes(os.environ, network=False)
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark each test by what it needs: nothing (unit), ROS nodes (nodes), a whole mission."""
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Mark each test by what it needs: nothing (unit), ROS nodes (nodes), a whole mission.
+
+    Several processes begin with the files that take longest, and end at about the same time.
+    """
+    kinds = ('mission', 'nodes', 'unit')
+    dearest: dict[Path, int] = {}
     for item in items:
         folder = item.path.relative_to(item.config.rootpath).parts[1]
         fixtures = set(getattr(item, 'fixturenames', ()))
         if folder == 'mission' or fixtures & MISSION_FIXTURES:
-            item.add_marker(pytest.mark.mission)
+            kind = 0
         elif fixtures & NODE_FIXTURES:
-            item.add_marker(pytest.mark.nodes)
+            kind = 1
         else:
-            item.add_marker(pytest.mark.unit)
+            kind = 2
+        item.add_marker(kinds[kind])
+        dearest[item.path] = min(kind, dearest.get(item.path, kind))
+    if hasattr(config, 'workerinput'):
+        items.sort(key=lambda item: dearest[item.path])
 
 
 def pytest_collection_finish() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import random
 from functools import cache
@@ -79,14 +80,23 @@ MAPS = {
 }
 
 
+FACTORS = (0.1, 0.5, 0.75, 1.0, 2.0)
+
+
 @cache
 def settled_on(name: str, policy: str, factor: float) -> float:
     graph = MAPS[name]
     return settled(graph, policy, factor * graph.tour.length)
 
 
-@pytest.mark.parametrize('name', list(MAPS))
-@pytest.mark.parametrize('factor', [0.1, 0.5, 0.75, 1.0, 2.0])
+@pytest.mark.parametrize(
+    ('name', 'factor'),
+    [
+        *itertools.product([name for name in MAPS if name != 'large grid'], FACTORS),
+        ('large grid', 0.5),
+        ('large grid', 1.0),
+    ],
+)
 def test_the_plan_is_no_worse_than_simple_policies(name: str, factor: float) -> None:
     best = min(settled_on(name, policy, factor) for policy in ('oldest', 'lookahead'))
     assert settled_on(name, 'tour', factor) <= 1.01 * best

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import os
 import signal
 import subprocess
@@ -12,12 +13,17 @@ import pytest
 
 from tests.launcher.conftest import ROOT, gone
 
+# The first two are spent before the commands part.
 MOMENTS = [0.0, 0.03, 0.06, 0.1, 0.15, 0.2, 0.3, 0.45, 0.7, 1.1]
+LATER = MOMENTS[2:9:2]
 
 
-@pytest.mark.parametrize('moment', MOMENTS)
 @pytest.mark.parametrize(
-    'command', ['node armor_server --domain 66', 'params', 'map config/office.yaml']
+    ('command', 'moment'),
+    [
+        *itertools.product(['node armor_server --domain 66'], MOMENTS),
+        *itertools.product(['params', 'map config/office.yaml'], LATER),
+    ],
 )
 def test_ctrl_c_leaves_no_traceback(command, moment, tmp_path):
     words = [sys.executable, str(ROOT / 'launch.py'), *command.split()]

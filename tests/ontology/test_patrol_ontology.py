@@ -106,8 +106,6 @@ def test_the_robot_is_in_one_place_whoever_tells_it(transport: Counting) -> None
     armor = ArmorClient('foreign', 'map', transport)
     first.build(PLACE, ONTOLOGY, IRI, now=100)
     for order in itertools.permutations(('build', 'first', 'second', 'foreign')):
-        first.forget()
-        first.build(PLACE, ONTOLOGY, IRI, now=100)
         for step in order:
             match step:
                 case 'build':

@@ -27,6 +27,8 @@ CAMERA = CameraModel.from_field_of_view(640, 480, math.radians(60))
 DICTIONARY = dictionary_named('DICT_5X5_100')
 KNOWN = frozenset(range(11, 18))
 DETECTOR = MarkerDetector(DetectorSettings(known_ids=KNOWN))
+BUSY = ['letters', 'leaves', 'bricks', 'boards']
+"""Backdrops that were once taken for markers, if unknown ones."""
 
 
 def seen(panels, degradation=None, backdrop='clouds', seed=1, dictionary=DICTIONARY):
@@ -109,7 +111,7 @@ def test_other_ids_are_told_apart_from_known_ones():
     assert not detections[70].known
 
 
-@pytest.mark.parametrize('backdrop', BACKDROPS)
+@pytest.mark.parametrize('backdrop', sorted({*BACKDROPS} - {*BUSY}))
 def test_no_known_id_is_seen_where_there_is_none(backdrop):
     for seed in range(4):
         assert not [each for each in DETECTOR.detect(seen([], None, backdrop, seed)) if each.known]
@@ -289,7 +291,7 @@ def test_grey_code_without_a_margin_before_bright_light_is_read():
     assert [each.marker_id for each in DETECTOR.detect(image)] == [14]
 
 
-@pytest.mark.parametrize('backdrop', ['letters', 'leaves', 'bricks', 'boards'])
+@pytest.mark.parametrize('backdrop', BUSY)
 def test_busy_textures_show_no_marker(backdrop):
     for seed in range(5):
         assert not DETECTOR.detect(seen([], backdrop=backdrop, seed=seed))
