@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import threading
 import time
+from types import SimpleNamespace
 
 import pytest
+from action_msgs.msg import GoalStatus
 from geometry_msgs.msg import Point
+from rclpy.task import Future
 from rosgraph_msgs.msg import Clock
 from std_srvs.srv import Trigger
 
@@ -399,6 +402,28 @@ def test_a_result_that_is_lost_is_asked_for_again(graph, monkeypatch):
     graph.until(lambda: 'result' in server.server.asked)
     server.hold.set_result(None)
     assert end().status == 'succeeded'
+
+
+def test_a_goal_that_runs_for_hours_is_asked_for_its_result_a_few_times(monkeypatch):
+    now, asked = [0.0], []
+    monkeypatch.setattr(calls, 'time', SimpleNamespace(monotonic=lambda: now[0]))
+    handle = SimpleNamespace(
+        status=GoalStatus.STATUS_EXECUTING,
+        get_result_async=lambda: asked.append(now[0]) or Future(),
+    )
+    goal = calls._RunningGoal(handle, lambda: None, 'action')
+
+    def pass_time(seconds):
+        for _ in range(int(seconds)):
+            now[0] += 1.0
+            goal._look()
+
+    pass_time(7200.0)
+    assert len(asked) < 40
+    handle.status = GoalStatus.STATUS_SUCCEEDED
+    before = len(asked)
+    pass_time(20.0)
+    assert len(asked) - before >= 3, 'the server forgets its result soon'
 
 
 def test_a_cancel_that_is_lost_is_sent_again(graph, monkeypatch):

@@ -51,9 +51,14 @@ SERVER_PERIOD = 0.1
 """Seconds between two looks whether a server that has not answered yet is still there."""
 
 RESULT_PERIOD = 5.0
-"""Seconds after which a goal's result is asked for again: the answer may have been lost.
+"""Seconds after which the result of a goal that has ended is asked for again: it may be lost.
 
-Servers answer each request when the goal has ended, and may forget the result 10 s later."""
+Servers may forget a result 10 s after the end."""
+
+LONGEST_RESULT_PERIOD = 300.0
+"""Seconds to which that grows while the server says that the goal runs.
+
+A server keeps each request until the goal ends; but what it says may be lost, too."""
 
 CANCEL_PERIOD = 0.5
 """Seconds after which a cancel that was not answered is sent again."""
@@ -552,6 +557,8 @@ class _RunningGoal:
         self._ended = Future()
         self._requests: list[Future] = []
         self._cancelling = False
+        self._period = RESULT_PERIOD
+        self._said_to_end = False
         self._ask()
 
     def await_end(self, timeout: float | None, interrupt: Interrupt | None) -> GoalEnd:
@@ -583,8 +590,13 @@ class _RunningGoal:
 
     def _look(self) -> None:
         self._look_for_loss()
-        period = CANCEL_PERIOD if self._cancelling else RESULT_PERIOD
-        if time.monotonic() > self._asked + period:
+        if not self._said_to_end and self._handle.status in _STATUS:
+            # The result is under way.
+            self._said_to_end, self._period = True, RESULT_PERIOD
+            self._asked = time.monotonic()
+        if time.monotonic() > self._asked + (CANCEL_PERIOD if self._cancelling else self._period):
+            if not self._said_to_end:
+                self._period = min(2.0 * self._period, LONGEST_RESULT_PERIOD)
             self._ask()
 
     def _ask(self) -> None:
