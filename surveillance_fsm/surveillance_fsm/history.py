@@ -92,9 +92,11 @@ class Transition:
         sequence: Counted from 1 over all containers of the root.
         time: Seconds on the machine's clock.
         path: Path of the container.
-        from_state: Label of the state that ended.
+        from_state: Label of the state that ended; empty for all states of a concurrence, and for an
+            interrupt that ran first of all.
         outcome: What it ended with.
-        to_state: Label entered, or the container's outcome when `kind` is ``exit``.
+        to_state: Label entered, or the container's outcome when `kind` is ``exit``; empty for all
+            states of a concurrence.
         kind: ``transition``, ``exit``, ``interrupt``, ``resume``, ``forced``, or ``ended`` for a
             child of a concurrence.
         duration: Seconds that `from_state` took.
@@ -312,6 +314,8 @@ def replay(machine: Container, transitions: Iterable[Transition]) -> Iterator[St
     root = Structure(machine)
     containers = {inner.path: inner for inner in root.walk()}
     active: set[str] = set(_entered(root))
+    # What was active in a container when an interrupt came, the last one last.
+    aside: dict[str, list[set[str]]] = {path: [] for path in containers}
     for transition in transitions:
         container = containers.get(transition.path)
         if container is None:
@@ -319,10 +323,20 @@ def replay(machine: Container, transitions: Iterable[Transition]) -> Iterator[St
                 f"Transition {transition.sequence}: no container '{transition.path}'"
             )
         _check_transition(container, transition)
-        left = f'{transition.path}/{transition.from_state}'
-        active = {path for path in active if path != left and not path.startswith(f'{left}/')}
-        if transition.kind not in ('exit', 'ended'):
-            place = f'{transition.path}/{transition.to_state}'
+        path, kind = transition.path, transition.kind
+        # At an interrupt all that is in the container makes way.
+        left = path if kind == 'interrupt' else f'{path}/{transition.from_state}'
+        gone = {each for each in active if each.startswith(f'{left}/') or each == left != path}
+        active = active - gone
+        place = f'{path}/{transition.to_state}'
+        before = aside[path].pop() if kind == 'resume' and aside[path] else set()
+        if kind == 'interrupt':
+            aside[path].append(gone)
+        elif kind == 'exit' or (transition.from_state in container.interrupts and kind != 'resume'):
+            aside[path].clear()
+        if not transition.to_state or place in before:
+            active |= before
+        elif kind not in ('exit', 'ended'):
             active.add(place)
             if place in containers:
                 active |= set(_entered(containers[place]))
@@ -342,10 +356,10 @@ def _check_transition(container: Structure, transition: Transition) -> None:
     what = f'Transition {transition.sequence} in {container.path!r}'
     states, kind = container.members, transition.kind
     left, outcome, target = transition.from_state, transition.outcome, transition.to_state
-    if left not in states:
+    if left not in states and not (kind == 'interrupt' and left == ''):
         raise MachineFileError(f'{what}: no state {left!r}')
     if kind in ('interrupt', 'resume'):
-        if target not in states:
+        if target not in states and not (container.together and target == ''):
             raise MachineFileError(f'{what}: no state {target!r}')
     elif kind == 'ended':
         if outcome not in states[left].get_registered_outcomes():

@@ -20,7 +20,7 @@ from surveillance_fsm.history import (
 )
 from surveillance_fsm.testing import FakeClock, script, watching
 
-from .states import Answer, Background, Waiter, began
+from .states import Answer, Background, Waiter, began, chain
 
 
 def patrol():
@@ -100,6 +100,64 @@ def test_interrupts_and_concurrences_are_replayed(tmp_path):
         'resume',
         'exit',
     ]
+
+
+def test_interrupts_of_a_concurrence_are_recorded_and_replayed(tmp_path):
+    def build():
+        root, slow = fsm.Concurrence(['done', 'preempted'], 'done'), Waiter(100.0)
+        with root:
+            fsm.Concurrence.add('QUICK', Answer('done'))
+            fsm.Concurrence.add('SLOW', slow)
+        root.set_name('BOTH')
+        root.add_interrupt('STOP', Answer('done'))
+        return root, slow
+
+    root, slow = build()
+    path = tmp_path / 'record.jsonl'
+    quick_ended = threading.Event()
+    root.register_transition_cb(
+        lambda ud, active: quick_ended.set() if active == ['SLOW'] else None
+    )
+    with Recorder(root, path):
+        root.raise_interrupt('STOP')
+        run = Background(root)
+        began(slow)
+        assert quick_ended.wait(60.0)
+        root.raise_interrupt('STOP')
+        began(slow)
+        root.request_preempt()
+        run.result()
+    steps = list(replay(build()[0], read_record(path)))
+    assert [
+        (each.transition.from_state, each.transition.to_state, each.transition.kind, each.active)
+        for each in steps
+    ] == [
+        ('', 'STOP', 'interrupt', ('BOTH/STOP',)),
+        ('STOP', '', 'resume', ('BOTH/QUICK', 'BOTH/SLOW')),
+        ('QUICK', '', 'ended', ('BOTH/SLOW',)),
+        ('', 'STOP', 'interrupt', ('BOTH/STOP',)),
+        ('STOP', '', 'resume', ('BOTH/SLOW',)),
+        ('SLOW', '', 'ended', ()),
+    ]
+
+
+def test_a_replay_goes_back_to_where_a_nested_machine_was_before_an_interrupt(tmp_path):
+    def build():
+        root, _ = chain(Answer('done'), waiter := Waiter(100.0))
+        root.add_interrupt('STOP', Answer('done'))
+        return root, waiter
+
+    root, waiter = build()
+    with Recorder(root, tmp_path / 'record'):
+        run = Background(root)
+        began(waiter)
+        root.raise_interrupt('STOP')
+        began(waiter)
+        root.request_preempt()
+        run.result()
+    steps = list(replay(build()[0], read_record(tmp_path / 'record')))
+    resumed = next(step for step in steps if step.transition.kind == 'resume')
+    assert resumed.active[-1] == 'StateMachine/INNER/INNER/S1'
 
 
 def test_a_record_that_was_cut_off_is_read_as_far_as_it_goes(tmp_path):
