@@ -120,11 +120,16 @@ class ChildFrame(Frame):
         return self.unneeded or self.preempted is not None or self.cut is not None
 
     def stop(self) -> None:
-        """Ask the state to stop: another one has ended."""
-        if not self.thread.done:
+        """Ask the state to stop, once: another one has ended.
+
+        One that a preempt asked already is not asked again, nor when a third state ends: it may
+        have served that, and be at what it does then.
+        """
+        if not (self.thread.done or self.unneeded):
             self.unneeded = True
-            self.thread.asked()
-            self.node.state.request_preempt()
+            if self.preempted is None:
+                self.thread.asked()
+                self.node.state.request_preempt()
 
     def hold(self) -> None:
         """Leave the concurrence to its own frame."""
@@ -236,8 +241,16 @@ class ConcurrentFrame(Frame):
 
     def run_states(self) -> Any:
         """Run all states that have not ended; the outcome, or `SUSPENDED` if one made way."""
-        error = self._await_states(self._start_states())
         container, control = self.container, self.run.control
+        running = self._children_to_run()
+        error = None
+        if any(end is not None for end in self.outcomes.values()):
+            # It goes on where it was put aside: who was to stop there begins with that.
+            error = self._stop_others(running)
+        container.call_transition_cbs()
+        for child in running.values():
+            child.thread.start(child.execute)
+        error = self._await_states(running, error)
         callbacks = container.fsm_transition_cbs or container.fsm_termination_cbs
         if callbacks or control.trace is not None or self.run.chatty:
             # Its end is not told as that of one state: see `tell`.
@@ -285,8 +298,8 @@ class ConcurrentFrame(Frame):
 
     # The states.
 
-    def _start_states(self) -> dict[str, ChildFrame]:
-        """Start those that have not ended, each on a thread of its own.
+    def _children_to_run(self) -> dict[str, ChildFrame]:
+        """Return the frames of those that have not ended, each for a thread of its own.
 
         Raises:
             LeftBehindError: The machine went on without the concurrence.
@@ -294,28 +307,29 @@ class ConcurrentFrame(Frame):
         run, container = self.run, self.container
         with run.condition:
             self._check()
-            started = {
+            children = {
                 label: ChildFrame(self, node, ExecutionThread(run, node.path, self._wakeup))
                 for label, node in container.fsm_table.items()
                 if label in self.outcomes and self.outcomes[label] is None
             }
-            for child in started.values():
+            for child in children.values():
                 child.thread.stack.append(child)
-            self._children |= started
-        container.call_transition_cbs()
-        for child in started.values():
-            child.thread.start(child.execute)
-        with run.condition:
-            self._check()
+            self._children |= children
             # What was asked before there was anybody to ask.
             if container.fsm_first().state.preempt_requested():
                 self.preempt_states()
             elif self.cut is not None:
                 self.cut_states()
-        return started
+        return children
 
-    def _await_states(self, running: dict[str, ChildFrame]) -> BaseException | None:
+    def _await_states(
+        self, running: dict[str, ChildFrame], first_error: BaseException | None
+    ) -> BaseException | None:
         """Watch threads until their states have ended or made way.
+
+        Args:
+            running: The states' frames by label; emptied.
+            first_error: An error for which they were stopped already.
 
         Returns:
             The first error of one of them, which stopped the others.
@@ -323,7 +337,7 @@ class ConcurrentFrame(Frame):
         Raises:
             LeftBehindError: The machine went on without the concurrence.
         """
-        first_error: BaseException | None = None
+        self._check()
         while running:
             supervise(self.run, [child.thread for child in running.values()], self._wakeup)
             self._check()
@@ -389,14 +403,12 @@ class ConcurrentFrame(Frame):
         self.container.call_transition_cbs()
 
     def tell(self, move: Move) -> None:
-        """Tell of the beginning and the end; the states between are told one by one."""
-        if move.left is None:
-            super().tell(move)
-        elif move.target.is_exit:
+        """Tell of interrupts, the beginning and the end; the states' ends are told one by one."""
+        if move.left is self.container.fsm_first() and move.kind != 'interrupt':
             labels = list(self.container.fsm_states)
             self.container.call_termination_cbs(labels, move.target.label)
         else:
-            self.container.call_transition_cbs()
+            super().tell(move)
 
     # What others want of the states; under the run's condition.
 

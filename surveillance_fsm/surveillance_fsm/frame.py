@@ -417,7 +417,8 @@ class Frame:
         preempted = container.preempt_requested()
         if preempted and isinstance(target, Node):
             self._preempt_next(target)
-        elif self.suspending and isinstance(target, Node):
+        elif self.suspending and (isinstance(target, Node) or container.fsm_raised):
+            # At its end, too, while interrupts are to run before that: they wait with it.
             container.fsm_history = self.history_before(target)
             return ASIDE, moves if move is None or left is None else [*moves, move]
         elif container.fsm_raised and not preempted:

@@ -511,3 +511,52 @@ def test_a_state_that_the_first_end_stopped_is_not_resumed_after_an_interrupt():
     ended.set()
     assert run.result(60.0) == 'preempted'
     assert waiter.runs == 1
+
+
+def test_a_state_that_served_the_stop_is_not_stopped_again_when_another_one_ends():
+    first, work, clean, last, slow = Waiter(1.0), Waiter(), Waiter(5.0), Waiter(), Waiter()
+    cleaning, alone = threading.Event(), threading.Event()
+    slow.service_preempt = lambda: (cleaning.wait(60.0), fsm.State.service_preempt(slow))
+    machine = fsm.StateMachine(['done', 'preempted'])
+    with machine:
+        fsm.StateMachine.add('WORK', work, {'preempted': 'CLEAN'})
+        fsm.StateMachine.add('CLEAN', clean)
+    root = together(
+        machine,
+        first,
+        slow,
+        last,
+        outcome_map={'done': {'S0': 'done'}},
+        child_termination_cb=lambda ends: ['S0', 'S3'] if ends['S2'] else ['S0', 'S2'],
+    )
+    root.set_clock(clock := FakeClock())
+    root.register_transition_cb(lambda ud, active: alone.set() if active == ['S0'] else None)
+    run = Background(root)
+    clock.until_sleeping(4)
+    clock.advance(1.0)
+    began(clean)
+    cleaning.set()
+    assert alone.wait(60.0)
+    clock.until_sleeping(1)
+    clock.advance(5.0)
+    assert run.result(60.0) == 'done'
+
+
+def test_what_an_end_was_to_stop_is_stopped_after_a_checkpoint_too():
+    def build():
+        slow = Waiter(1000.0)
+        return together(Answer('done'), slow, child_termination_cb=lambda ends: True), slow
+
+    checkpoints = []
+    concurrence, _ = build()
+
+    def ended(ud, active):
+        if active == ['S1']:
+            checkpoints.append(through_json(concurrence))
+
+    concurrence.register_transition_cb(ended)
+    concurrence.execute()
+    again, slow = build()
+    history.restore(again, checkpoints[0])
+    assert Background(again).result(60.0) == 'preempted'
+    assert slow.runs == 1

@@ -175,6 +175,28 @@ def test_an_interrupt_that_came_in_a_states_last_moment_runs_before_the_exit(clo
     assert stop.runs == 1
 
 
+def test_an_interrupt_that_waits_for_the_end_of_a_container_does_not_hold_up_an_outer_one():
+    ran = []
+
+    def note(label):
+        return fsm.CBState(lambda ud: ran.append(label) or 'done', outcomes=['done'])
+
+    def both(ud):
+        inner.raise_interrupt('INNER')
+        root.raise_interrupt('OUTER')
+        return 'done'
+
+    root, inner = fsm.StateMachine(['done']), fsm.StateMachine(['done'])
+    with root:
+        fsm.StateMachine.add('TASKS', inner)
+        with inner:
+            fsm.StateMachine.add('LAST', fsm.CBState(both, outcomes=['done']))
+    inner.add_interrupt('INNER', note('INNER'))
+    root.add_interrupt('OUTER', note('OUTER'))
+    assert root.execute() == 'done'
+    assert ran == ['OUTER', 'INNER']
+
+
 def test_an_interrupt_can_be_withdrawn_until_it_begins(clock):
     patrol, stop = Patrol(clock), Answer('done')
     patrol.root.add_interrupt('STOP', stop, transitions={'done': 'stopped'})
