@@ -187,6 +187,7 @@ class ConcurrentFrame(Frame):
 
     container: Concurrence
     carried_over = (*Frame.carried_over, 'outcomes')
+    _watches = False
 
     def __init__(
         self,
@@ -220,13 +221,13 @@ class ConcurrentFrame(Frame):
 
     def active_labels(self) -> list[str]:
         """Return the labels of the states that run, or of the interrupt's."""
-        if not self.waits_for_threads():
+        if self.current is not self.container.fsm_first():
             return super().active_labels()
         return [label for label, outcome in self.outcomes.items() if outcome is None]
 
     def waits_for_threads(self) -> bool:
         """Tell whether it watches threads of its own at present, which have bounds of their own."""
-        return self.current is self.container.fsm_first()
+        return self._watches
 
     def abandoned(self, *, for_good: bool) -> None:
         """Note that the machine went on without the thread; it goes on without the states, too."""
@@ -243,7 +244,7 @@ class ConcurrentFrame(Frame):
         """Run all states that have not ended; the outcome, or `SUSPENDED` if one made way."""
         container, control = self.container, self.run.control
         running = self._children_to_run()
-        error = None
+        error: BaseException | None = None
         if any(end is not None for end in self.outcomes.values()):
             # It goes on where it was put aside: who was to stop there begins with that.
             error = self._stop_others(running)
@@ -257,19 +258,21 @@ class ConcurrentFrame(Frame):
             self.attention = True
         if error is not None:
             raise error
+        if any(end is None for end in self.outcomes.values()):
+            return SUSPENDED
+        # Not under the condition: it calls the user's code.
+        outcome = container.fsm_outcome_of(self.outcomes)
         with self.run.condition:
-            if any(end is None for end in self.outcomes.values()):
-                return SUSPENDED
-            return self._outcome()
+            self._check()
+            return self._after_preempt(outcome)
 
-    def _outcome(self) -> str:
-        """Return the outcome, all states having ended; a preempt that one of them served has its
-        own.
+    def _after_preempt(self, outcome: str) -> str:
+        """Return the outcome, all states having ended: a preempt that one of them served has its
+        own. Under the run's condition.
         """
         container = self.container
         preempted = container.preempt_requested()
         served = self._served_preempt(preempted=preempted)
-        outcome = container.fsm_outcome_of(self.outcomes)
         if not (preempted and served):
             # A request that came too late for all of them stays, for what runs next.
             return outcome
@@ -339,8 +342,13 @@ class ConcurrentFrame(Frame):
         """
         self._check()
         while running:
+            self._watches = True
             supervise(self.run, [child.thread for child in running.values()], self._wakeup)
-            self._check()
+            with self.run.condition:
+                self._check()
+                # From here on it is the callbacks that a preempt waits for.
+                self._watches = False
+                self.thread.asked_anew()
             for label in [label for label, child in running.items() if child.thread.done]:
                 error = running.pop(label).thread.error
                 if error is not None:

@@ -401,6 +401,11 @@ class ExecutionThread:
             if self.run.sleeps_on_clock:
                 self.wakeup.set()
 
+    def asked_anew(self) -> None:
+        """Begin to count again, if it was asked: something else is to stop now."""
+        if self.asked_at is not None:
+            self.asked_at = time.monotonic()
+
     def renew_request(self, node: Node) -> None:
         """Take the request of an earlier execution back from a state, but not a present one."""
         with self.run.condition:

@@ -560,3 +560,21 @@ def test_what_an_end_was_to_stop_is_stopped_after_a_checkpoint_too():
     history.restore(again, checkpoints[0])
     assert Background(again).result(60.0) == 'preempted'
     assert slow.runs == 1
+
+
+@pytest.mark.parametrize('callback', ['outcome_cb', 'child_termination_cb'])
+def test_a_callback_that_does_not_return_does_not_keep_a_preempt_away(callback):
+    begun, release = threading.Event(), threading.Event()
+
+    def hang(ends):
+        begun.set()
+        release.wait(60.0)
+
+    concurrence = together(Answer('done'), **{callback: hang})
+    concurrence.preempt_timeout = 0.2
+    run = Background(concurrence)
+    assert begun.wait(60.0)
+    assert concurrence.control.active_paths() == []
+    concurrence.request_preempt()
+    assert run.result(60.0) == 'preempted'
+    release.set()
