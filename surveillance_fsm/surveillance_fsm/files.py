@@ -7,7 +7,10 @@ from __future__ import annotations
 
 import errno
 import os
+import secrets
 import stat
+from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 
 _KINDS = {
@@ -50,6 +53,53 @@ def file_to_write(path: str | Path) -> Path:
     if target.exists():
         _expect_file(target.stat(), path)
     return target
+
+
+def replace_file(
+    path: str | Path,
+    data: bytes,
+    *,
+    durable: bool = False,
+    replace: Callable[[Path, Path], None] | None = None,
+) -> None:
+    """Write a file so that whoever reads it finds all of the old content or all of the new one.
+
+    Args:
+        path: The file, or a link to it, which stays; its folder is there.
+        data: What it is to hold.
+        durable: On return it is on the disk, and outlives a failure of power.
+        replace: Puts a draft, which is beside the file, into its place; ``os.replace`` by default.
+
+    Raises:
+        OSError: It cannot be written, or is none; the error has its name, and the old one is whole.
+    """
+    target = file_to_write(path)
+    draft = target.with_name(f'.{target.name}.{secrets.token_hex(4)}')
+    try:
+        # Not by tempfile: to give its file the usual rights, all threads' umask would change.
+        handle = os.open(draft, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o666)
+        with open(handle, 'wb') as file:
+            file.write(data)
+            file.flush()
+            if durable:
+                os.fsync(handle)
+        (replace or os.replace)(draft, target)
+    except OSError as error:
+        raise OSError(error.errno, error.strerror, str(path)) from None
+    finally:
+        with suppress(OSError):
+            draft.unlink()
+    if durable:
+        with suppress(OSError):
+            _sync_folder(target.parent)
+
+
+def _sync_folder(folder: Path) -> None:
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
 
 
 def _expect_file(found: os.stat_result, path: str | Path) -> None:

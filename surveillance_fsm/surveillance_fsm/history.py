@@ -14,7 +14,6 @@ from __future__ import annotations
 import base64
 import json
 import math
-import os
 import threading
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
@@ -28,7 +27,7 @@ from surveillance_fsm.clock import elapsed_of
 from surveillance_fsm.container import Container
 from surveillance_fsm.exceptions import MachineFileError, describe, shown
 from surveillance_fsm.execution import RawTransition
-from surveillance_fsm.files import file_to_write, read_file
+from surveillance_fsm.files import read_file, replace_file
 from surveillance_fsm.frame import History
 from surveillance_fsm.log import logerr, logwarn
 from surveillance_fsm.state import State
@@ -635,29 +634,9 @@ def save(machine: Container, path: str | Path, leave_out: Iterable[str] = ()) ->
         MachineFileError: A value cannot be kept, see `capture`.
         OSError: The file cannot be written.
     """
-    target = file_to_write(path)
     text = json.dumps(capture(machine, leave_out), ensure_ascii=False, allow_nan=False)
-    draft = target.with_name(f'.{target.name}.{os.getpid()}.{threading.get_ident()}')
-    try:
-        with open(draft, 'wb') as file:
-            # A lone surrogate is a string of Python, though none of UTF-8.
-            file.write(text.encode('utf-8', 'surrogatepass'))
-            file.flush()
-            os.fsync(file.fileno())
-        os.replace(draft, target)
-    except BaseException:
-        draft.unlink(missing_ok=True)
-        raise
-    _sync_folder(target.parent)
-
-
-def _sync_folder(folder: Path) -> None:
-    with suppress(OSError):
-        handle = os.open(folder, os.O_RDONLY)
-        try:
-            os.fsync(handle)
-        finally:
-            os.close(handle)
+    # A lone surrogate is a string of Python, though none of UTF-8.
+    replace_file(path, text.encode('utf-8', 'surrogatepass'), durable=True)
 
 
 def load(machine: Container, path: str | Path) -> None:

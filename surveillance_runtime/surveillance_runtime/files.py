@@ -66,13 +66,7 @@ def replace_text(path: Path, text: str) -> None:
     Raises:
         OSError: It cannot be written; the error has its name, and the old file is whole.
     """
-    target = files.file_to_write(path)
-    draft = target.with_name(target.name + '.new')
-    try:
-        draft.write_text(text, encoding='utf-8')
-        os.replace(draft, target)
-    except OSError as error:
-        raise OSError(error.errno, error.strerror, str(path)) from None
+    files.replace_file(path, text.encode('utf-8'))
 
 
 class LineFile:

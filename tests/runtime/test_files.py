@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import resource
 from pathlib import Path
 
 import pytest
@@ -64,11 +65,16 @@ def test_a_file_that_is_not_there_is_told_with_the_one_most_like_it(
 def test_a_file_that_cannot_be_replaced_is_named_and_stays_whole(tmp_path: Path) -> None:
     path = tmp_path / 'state.json'
     replace_text(path, 'old')
-    path.with_name('state.json.new').mkdir()
-    with pytest.raises(IsADirectoryError) as refused:
-        replace_text(path, 'new')
-    assert in_one_line(refused.value) == f'{path}: Is a directory'
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (1_000_000, before[1]))
+    try:
+        with pytest.raises(OSError, match='too large') as refused:
+            replace_text(path, 'x' * 1_000_001)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    assert in_one_line(refused.value) == f'{path}: File too large'
     assert path.read_text() == 'old'
+    assert os.listdir(tmp_path) == ['state.json'], 'a draft is left'
 
 
 def test_a_link_stays_and_what_it_leads_to_is_replaced(tmp_path: Path) -> None:

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import contextlib
-import os
 import re
-import secrets
 from collections.abc import Callable, Iterable, Mapping
 from itertools import count
 from pathlib import Path
 from xml.parsers import expat
 from xml.sax.saxutils import escape, quoteattr
 
+from surveillance_fsm.files import replace_file
 from surveillance_ontology.documents.rdf_xml import Node, Triple
 from surveillance_ontology.documents.triples import triples_of
 from surveillance_ontology.documents.xml_reading import OntologyFileError
@@ -38,7 +36,7 @@ def write_ontology(
     path: str | Path,
     format: str = 'rdfxml',
     prefixes: Mapping[str, str] | None = None,
-    replace: Callable[[Path, Path], None] = os.replace,
+    replace: Callable[[Path, Path], None] | None = None,
 ) -> None:
     """Write a document through a temporary file beside it, so that the old one stays until the new
     is whole.
@@ -49,32 +47,17 @@ def write_ontology(
         path: The file; its directory must exist.
         format: One of `FORMATS`.
         prefixes: Further namespace prefixes for RDF/XML.
-        replace: Puts the temporary file into the place of the file.
+        replace: See `replace_file`.
 
     Raises:
         OntologyFileError: The directory is not writable, the format is unknown, or RDF/XML cannot
             hold a property IRI or a character.
     """
     data = ontology_bytes(axioms, iri, format, prefixes)
-    target = Path(path)
-    temporary = target.with_name(f'.{target.name}.{secrets.token_hex(4)}')
     try:
-        # Not by tempfile: to give its file the usual rights, all threads' umask would change.
-        handle = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o666)
-        with open(handle, 'wb') as file:
-            file.write(data)
-            file.flush()
-            os.fsync(file.fileno())
-        replace(temporary, target)
+        replace_file(path, data, durable=True, replace=replace)
     except OSError as error:
-        with contextlib.suppress(OSError):
-            temporary.unlink()
-        raise OntologyFileError(error.strerror or str(error), path=str(target)) from None
-    directory = os.open(target.parent, os.O_RDONLY)
-    try:
-        os.fsync(directory)
-    finally:
-        os.close(directory)
+        raise OntologyFileError(error.strerror or str(error), path=str(path)) from None
 
 
 def ontology_bytes(
