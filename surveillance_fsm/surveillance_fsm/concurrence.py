@@ -457,6 +457,7 @@ class Concurrence(Container):
 
     together = True
     fsm_frame_type = ConcurrentFrame
+    fsm_arguments = ('remapping',)
 
     def __init__(
         self,

@@ -21,6 +21,7 @@ from surveillance_fsm.exceptions import (
     InvalidTransitionError,
     describe,
     shown,
+    unknown,
 )
 from surveillance_fsm.execution import (
     DEFAULT_PREEMPT_TIMEOUT,
@@ -87,6 +88,7 @@ class Container(State):
         fsm_raised: Interrupts that have been raised and have not begun.
         fsm_aside: The container was asked to be put aside in the moment before it began.
         fsm_frame_type: How the container is executed.
+        fsm_arguments: What else may be said of a state that is added.
         fsm_table: The nodes of states and interrupts by label, as they were last made.
         fsm_data: The dictionary behind the userdata, as it was then.
     """
@@ -95,6 +97,7 @@ class Container(State):
     """Whether all states run at the same time."""
     fsm_suspends = True
     fsm_frame_type: ClassVar[type[Frame]] = Frame
+    fsm_arguments: ClassVar[tuple[str, ...]] = ('transitions', 'remapping', 'constants')
 
     fsm_frame: Frame | None = None
     fsm_history: History | None = None
@@ -436,6 +439,9 @@ class Container(State):
             constants: Values for input keys of the state that come from no userdata.
             **limits: See `LimitOptions`.
         """
+        for name in limits.keys() - LimitOptions.__annotations__.keys():
+            known = {*self.fsm_arguments, *LimitOptions.__annotations__}
+            raise TypeError(f"State '{self.fsm_path_of(label)}': argument {unknown(name, known)}")
         self._check_new(label, state)
         checked = make_limits(self.fsm_path_of(label), state, bound, **limits)
         self.check_state_spec(

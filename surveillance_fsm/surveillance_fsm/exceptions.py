@@ -6,7 +6,8 @@ outcome or the userdata key in question, and what was expected instead.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import difflib
+from collections.abc import Callable, Iterable
 
 
 class SmachError(Exception):
@@ -97,3 +98,11 @@ def shown(value: object) -> str:
         return repr(value)
     except Exception:
         return f'<{type(value).__name__} that cannot be shown>'
+
+
+def unknown(name: object, known: Iterable[str]) -> str:
+    """Say that a name is not known, and which is nearest to it."""
+    known = sorted(each for each in known if not each.startswith('_'))
+    near = difflib.get_close_matches(str(name), known, 1)
+    hint = f"; did you mean '{near[0]}'?" if near else f'; known are {known[:20]}'
+    return f'{shown(name)} is not known{hint}'

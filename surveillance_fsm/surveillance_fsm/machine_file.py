@@ -33,7 +33,6 @@ Reading needs PyYAML.
 
 from __future__ import annotations
 
-import difflib
 import importlib
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
@@ -41,7 +40,7 @@ from typing import Any
 
 from surveillance_fsm.concurrence import Concurrence
 from surveillance_fsm.container import Container
-from surveillance_fsm.exceptions import MachineFileError, describe, shown
+from surveillance_fsm.exceptions import MachineFileError, describe, shown, unknown
 from surveillance_fsm.files import read_file
 from surveillance_fsm.state import CBState, State
 from surveillance_fsm.state_machine import Iterator, Sequence, StateMachine
@@ -178,7 +177,7 @@ class _Builder:
         entry = _mapping(place, data)
         kind = entry.get('machine', 'StateMachine')
         if kind not in KINDS:
-            raise MachineFileError(f'{place}.machine: {_unknown(kind, KINDS)}')
+            raise MachineFileError(f'{place}.machine: {unknown(kind, KINDS)}')
         initial = {'initial'} if issubclass(KINDS[kind], StateMachine) else set()
         _known_keys(place, entry, _CONTAINER | {*_OF_KIND[kind], *initial, *further})
         outcomes = _names(f'{place}.outcomes', entry.get('outcomes', []))
@@ -266,7 +265,7 @@ class _Builder:
         """Return what a value of the file stands for."""
         if isinstance(value, str) and value.startswith('$'):
             if value[1:] not in self._offered:
-                raise MachineFileError(f'{place}: {_unknown(value[1:], self._offered)}')
+                raise MachineFileError(f'{place}: {unknown(value[1:], self._offered)}')
             return self._offered[value[1:]]
         if not import_names:
             return value
@@ -277,12 +276,12 @@ class _Builder:
         module, colon, name = value.partition(':')
         if not colon:
             raise MachineFileError(
-                f'{place}: {_unknown(value, self._offered)}, or package.module:Name'
+                f'{place}: {unknown(value, self._offered)}, or package.module:Name'
             )
         found = _guarded(place, importlib.import_module, module)
         for part in name.split('.'):
             if not hasattr(found, part):
-                raise MachineFileError(f"{place}: '{module}' has no {_unknown(part, dir(found))}")
+                raise MachineFileError(f"{place}: '{module}' has no {unknown(part, dir(found))}")
             found = getattr(found, part)
         return found
 
@@ -325,12 +324,4 @@ def _known_keys(place: str, entry: Mapping[str, Any], known: Iterable[str]) -> N
     known = set(known)
     for key in entry:
         if key not in known:
-            raise MachineFileError(f'{place}: {_unknown(key, known)}')
-
-
-def _unknown(name: object, known: Iterable[str]) -> str:
-    """Say that a name is not known, and which is nearest to it."""
-    known = sorted(each for each in known if not each.startswith('_'))
-    near = difflib.get_close_matches(str(name), known, 1)
-    hint = f"; did you mean '{near[0]}'?" if near else f'; known are {known[:20]}'
-    return f'{shown(name)} is not known{hint}'
+            raise MachineFileError(f'{place}: {unknown(key, known)}')

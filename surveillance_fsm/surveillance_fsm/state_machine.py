@@ -358,6 +358,7 @@ class Iterator(Container):
     """
 
     fsm_frame_type = IteratorFrame
+    fsm_arguments = ('loop_outcomes', 'break_outcomes', 'final_outcome_map')
 
     def __init__(
         self,

@@ -156,3 +156,15 @@ def test_an_iterator_without_an_outcome_for_a_preempt_passes_it_on():
     deaf.release.set()
     assert run.result() == 'preempted'
     assert waiter.runs == 1
+
+
+@pytest.mark.parametrize(
+    ('container', 'given', 'words'),
+    [
+        (fsm.StateMachine(['done']), 'transition', r"StateMachine/S.*did you mean 'transitions'\?"),
+        (fsm.Concurrence(['done'], 'done'), 'transitions', r"known are .*'remapping'"),
+    ],
+)
+def test_an_argument_that_is_not_known_is_named_with_the_state(container, given, words):
+    with container, pytest.raises(TypeError, match=words):
+        container.add('S', Answer('done'), **{given: {}})
