@@ -302,21 +302,23 @@ def keep_bytecode(environ: MutableMapping[str, str], checkout: Path = CHECKOUT) 
     times the processor time, and each process of a test run compiles all that it imports.
 
     Where they cannot be kept all stays as it is: in a folder that it cannot write Python would
-    find not even its own library compiled, and on a full disk it leaves files that are cut off,
-    and fails to read them ever after.
+    find not even its own library compiled. On a disk that is nearly full nobody writes any: Python
+    would leave files that are cut off, and fail to read them ever after.
     """
     folder = checkout / 'build' / 'pycache'
-    if not environ.get('PYTHONDONTWRITEBYTECODE'):
-        return
-    if _KEPT_IN not in environ:
-        try:
+    try:
+        if shutil.disk_usage(checkout).free < _BYTECODE_SPACE:
+            environ['PYTHONDONTWRITEBYTECODE'] = '1'
+            return
+        if not environ.get('PYTHONDONTWRITEBYTECODE'):
+            return
+        if _KEPT_IN not in environ:
             folder.mkdir(parents=True, exist_ok=True)
-            free = shutil.disk_usage(folder).free
-        except OSError:
-            return
-        if not os.access(folder, os.W_OK) or free < _BYTECODE_SPACE:
-            return
-        environ[_KEPT_IN] = str(folder)
+            if not os.access(folder, os.W_OK):
+                return
+            environ[_KEPT_IN] = str(folder)
+    except OSError:
+        return
     del environ['PYTHONDONTWRITEBYTECODE']
 
 

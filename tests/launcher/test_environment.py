@@ -217,6 +217,14 @@ def test_where_compiled_modules_cannot_be_kept_all_stays_as_it_is(
     assert given == {'PYTHONDONTWRITEBYTECODE': '1'}
 
 
+def test_on_a_full_disk_nobody_writes_compiled_modules_that_would_be_cut_off(tmp_path, monkeypatch):
+    full = shutil.disk_usage(tmp_path)._replace(free=10**6)
+    monkeypatch.setattr(shutil, 'disk_usage', lambda _: full)
+    given = {'PYTHONPYCACHEPREFIX': str(tmp_path)}
+    keep_bytecode(given, tmp_path)
+    assert given.pop('PYTHONDONTWRITEBYTECODE') == '1'
+
+
 def test_what_a_set_up_runs_leaves_no_compiled_modules_of_its_folders(tmp_path, monkeypatch):
     (tmp_path / 'module.py').write_text('VALUE = 1\n')
     monkeypatch.delenv('PYTHONDONTWRITEBYTECODE', raising=False)
