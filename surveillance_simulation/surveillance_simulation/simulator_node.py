@@ -202,8 +202,13 @@ class Simulator(PatrolNode):
         self._go_on()
 
     def _on_estimate(self, serialized: bytes) -> None:
-        if self._drives_clock:
+        if not self._drives_clock:
+            return
+        try:
             self._rate.estimate(stamp_of_serialized(serialized))
+        except ValueError as error:
+            self.get_logger().error(f'amcl_pose: {error}')
+        else:
             self._go_on()
 
     def _on_mission_waits(self, message: Time) -> None:

@@ -186,6 +186,17 @@ def test_a_trajectory_it_cannot_follow_leaves_the_arm(graph: Any) -> None:
     assert min(b - a for a, b in itertools.pairwise(times)) == pytest.approx(0.1)
 
 
+def test_a_damaged_estimate_costs_one_line_that_names_its_topic(graph: Any) -> None:
+    node = simulator(graph)
+    estimates = graph.node.create_publisher(PoseWithCovarianceStamped, 'amcl_pose', STATE_QOS)
+    graph.until(lambda: estimates.get_subscription_count())
+    errors: list[str] = []
+    node.get_logger().error = errors.append
+    estimates.publish(b'\x00\x01\x00\x00\x05')
+    graph.until(lambda: errors)
+    assert errors == ['amcl_pose: a message of 5 bytes: expected a longer one']
+
+
 def test_doors_and_obstacles_are_seen_by_the_lidar(graph: Any) -> None:
     simulator(graph, **{'lidar.noise': 0.0})
     doors = graph.listen(DoorStates, 'door_states', STATE_QOS)
