@@ -1,22 +1,25 @@
 """What the engine leaves open: conclusions that would need reasoning by cases.
 
-Whether two individuals are the same may be unknown. Where a count or a rule depends on it, both
-cases could have a consequence in common, which the engine does not derive. It is found out when it
-is asked for, from the facts that hold then.
+Whether two individuals are the same may be unknown, and which value a property has that must have
+one. Where a count or a rule depends on it, all cases could have a consequence in common, which the
+engine does not derive. It is found out when it is asked for, from the facts that hold then.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from fractions import Fraction
 from typing import Any
 
 from surveillance_ontology.owl.axiom_text import axiom_text
 from surveillance_ontology.owl.axioms import Axiom
-from surveillance_ontology.owl.vocabulary import local_name
+from surveillance_ontology.owl.expressions import DataComplementOf, DatatypeRestriction
+from surveillance_ontology.owl.vocabulary import OWL, XSD, local_name
 from surveillance_ontology.reasoner.cardinality import AtLeastCounter, AtMostCounter
 from surveillance_ontology.reasoner.clauses import (
     AtLeast,
     Clause,
+    ComputedAtom,
     Constant,
     DifferentAtom,
     Existential,
@@ -25,13 +28,22 @@ from surveillance_ontology.reasoner.clauses import (
     Program,
     RangeAtom,
     StoppedError,
+    Term,
     closure,
 )
+from surveillance_ontology.reasoner.datatypes import literal_of
 from surveillance_ontology.reasoner.joins import JoinContext, compile_call
-from surveillance_ontology.reasoner.value_sets import EVERY, NONE, ValueSet, point
+from surveillance_ontology.reasoner.value_sets import EVERY, NONE, ValueSet, point, value_set
 
 _MOST_COMPARED = 20_000
 """Where so many values are possible, those that are known leave one."""
+_COMPARISONS = {
+    'lessThan': ('maxExclusive', 'minExclusive'),
+    'lessThanOrEqual': ('maxInclusive', 'minInclusive'),
+    'greaterThan': ('minExclusive', 'maxExclusive'),
+    'greaterThanOrEqual': ('minInclusive', 'maxInclusive'),
+}
+"""Built-ins, with the facet for a number as second and as first argument."""
 
 
 class OpenCases:
@@ -81,19 +93,47 @@ class OpenCases:
             name = self._open_instance(clause)
             if name is not None:
                 yield _sentence(clause.origin, name)
+        for clause, atom, existential in rules_on_unknown_values(self._program):
+            name = self._unknown_value(clause, atom, existential)
+            if name is not None:
+                prop = local_name(atom.predicate.name)
+                yield _sentence(clause.origin, name, f'a value of {prop} that is not known')
+
+    def _unknown_value(
+        self, clause: Clause, atom: PredicateAtom, existential: Existential
+    ) -> str | None:
+        """Return somebody for whom the rule could apply by a value that is not known."""
+        x, value = atom.terms
+        rest = [
+            other
+            for other in clause.body
+            if isinstance(other, PredicateAtom) and other is not atom and value not in other.terms
+        ]
+        found: list[str] = []
+
+        def look(z: str) -> None:
+            head = clause.head
+            if not isinstance(head, PredicateAtom) or head.terms != (x,):
+                known = False
+            else:
+                known = z in head.predicate.members
+            if not known and len(_witnesses(existential, z)) < existential.n:
+                found.append(z)
+                raise StoppedError
+
+        label = PredicateAtom(existential.label, (x,))
+        try:
+            compile_call(self._context, [label, *rest], None, (), (x,), look)()
+        except StoppedError:
+            return found[0]
+        return None
 
     def _may_add(self, existential: Existential, least: AtLeast, z: str) -> bool:
         """Tell whether what must exist could complete a count, and is not there by name."""
         known = _related(least.prop, least.inverse, z)
         if not known or len(known) + existential.n < least.n:
             return False
-        witnesses = _related(existential.prop, existential.inverse, z)
-        filler = existential.filler
-        if isinstance(filler, ValueSet):
-            witnesses = {value for value in witnesses if filler.contains(value)}
-        elif filler is not None:
-            witnesses = witnesses & filler.members.keys()
-        return len(witnesses) < existential.n
+        return len(_witnesses(existential, z)) < existential.n
 
     def _open_instance(self, clause: Clause) -> str | None:
         apart = [atom.terms for atom in clause.body if isinstance(atom, DifferentAtom)]
@@ -139,7 +179,7 @@ def values_may_split(program: Program) -> bool:
     any. Ranges are taken together here, whoever they hold for.
     """
     above: dict[Predicate, list[Predicate]] = {}
-    asked: dict[Predicate, ValueSet] = {}
+    asked: dict[Predicate, list[ValueSet]] = {}
     excluded: dict[Predicate, ValueSet] = {}
     compared: set[Predicate] = set()
     for clause in program.clauses:
@@ -158,9 +198,10 @@ def values_may_split(program: Program) -> bool:
         for atom in clause.body:
             if isinstance(atom, RangeAtom):
                 values &= atom.values
-        if values is not EVERY:
-            table = excluded if head is program.nothing else asked
-            table[prop] = table.get(prop, NONE) | values
+        if values is not EVERY and head is program.nothing:
+            excluded[prop] = excluded.get(prop, NONE) | values
+        elif values is not EVERY:
+            asked.setdefault(prop, []).append(values)
     for existential in program.existentials:
         if isinstance(existential.filler, ValueSet):
             props = closure(existential.prop, lambda one: above.get(one, ()))
@@ -169,20 +210,114 @@ def values_may_split(program: Program) -> bool:
                 left &= ~excluded.get(prop, NONE)
             if left.size <= _MOST_COMPARED and not compared.isdisjoint(props):
                 return True
-            for prop in props:
-                left &= ~asked.get(prop, NONE)
-            if left.size < existential.n and any(prop in asked for prop in props):
+            # What all its values fit follows in any case.
+            splitting = [
+                values
+                for prop in props
+                for values in asked.get(prop, ())
+                if not existential.filler.within(values)
+            ]
+            for values in splitting:
+                left &= ~values
+            if splitting and left.size < existential.n:
                 return True
     return False
+
+
+def rules_on_unknown_values(
+    program: Program,
+) -> Iterator[tuple[Clause, PredicateAtom, Existential]]:
+    """Yield the rules with an atom that a value might fit which must exist, and need not be known.
+
+    None does where enough values are left that no rule asks for.
+    """
+    unknown = [one for one in program.existentials if one.prop.kind == 'data']
+    if not unknown:
+        return
+    above: dict[Predicate, list[Predicate]] = {}
+    asking: list[tuple[Clause, PredicateAtom, ValueSet]] = []
+    for clause in program.clauses:
+        head = clause.head
+        for atom in clause.body:
+            if isinstance(atom, PredicateAtom) and atom.predicate.kind == 'data':
+                if isinstance(head, PredicateAtom) and head.terms[1:] == atom.terms[1:]:
+                    above.setdefault(atom.predicate, []).append(head.predicate)
+                asking.append((clause, atom, _asked(clause, atom)))
+    for existential in unknown:
+        filler = existential.filler if isinstance(existential.filler, ValueSet) else EVERY
+        props = closure(existential.prop, lambda one: above.get(one, ()))
+        fitting = [
+            (clause, atom, asked)
+            for clause, atom, asked in asking
+            if atom.predicate in props
+            and not (filler & asked).is_empty
+            and (clause.named_only or not filler.within(asked))
+            and (filler.size <= _MOST_COMPARED or not _is_joined(clause, atom))
+        ]
+        left = filler
+        for _, _, asked in fitting:
+            left &= ~asked
+        if left.size < existential.n:
+            for clause, atom, _ in fitting:
+                if clause.named_only:
+                    yield clause, atom, existential
+
+
+def _is_joined(clause: Clause, atom: PredicateAtom) -> bool:
+    """Tell whether a rule looks for the value of an atom among other values, which are known."""
+    others = (other for other in clause.body if other is not atom)
+    return any(
+        isinstance(other, PredicateAtom) and atom.terms[1] in other.terms for other in others
+    )
+
+
+def _asked(clause: Clause, atom: PredicateAtom) -> ValueSet:
+    """Return the values of an atom for which a rule may apply: all, unless each other atom about
+    the value compares it with what the rule itself names.
+    """
+    value = atom.terms[1]
+    if isinstance(value, Constant):
+        return point(value.value)
+    asked = EVERY
+    for other in (*clause.body, clause.head):
+        if other is not atom and value in other.terms:
+            if isinstance(other, RangeAtom):
+                asked &= other.values
+            elif isinstance(other, ComputedAtom):
+                asked &= _compared(other, value)
+    return asked
+
+
+def _compared(atom: ComputedAtom, value: Term) -> ValueSet:
+    """Return the values for which a comparison with a number holds; all, for other built-ins."""
+    facets = _COMPARISONS.get(atom.builtin)
+    number = atom.terms[atom.terms[0] == value]
+    bound = number.value if isinstance(number, Constant) else None
+    if facets is None or not isinstance(bound, int | Fraction):
+        return EVERY
+    facet = facets[atom.terms[0] != value]
+    real = OWL + 'real'
+    others = value_set(DataComplementOf(real))
+    numbers = value_set(DatatypeRestriction(real, ((XSD + facet, literal_of(bound)),)))
+    return EVERY if numbers is None or others is None else numbers | others
+
+
+def _witnesses(existential: Existential, z: str) -> set[Any]:
+    """Return what is known of that which must exist."""
+    found = _related(existential.prop, existential.inverse, z)
+    filler = existential.filler
+    if isinstance(filler, ValueSet):
+        return {value for value in found if filler.contains(value)}
+    return found if filler is None else found & filler.members.keys()
 
 
 def _related(prop: Predicate, inverse: bool, z: str) -> set[Any]:
     return set((prop.pred if inverse else prop.succ).get(z, ()))
 
 
-def _sentence(origin: Axiom | None, name: str) -> str:
+def _sentence(origin: Axiom | None, name: str, what: str = 'which individuals are the same') -> str:
     subject = 'the ontology' if origin is None else axiom_text(origin)
     return (
-        f'{subject}: for {local_name(name)} it depends on which individuals are the same,'
+        f'{subject}: for {local_name(name)} it depends on {what},'
         ' which would need reasoning by cases'
     )

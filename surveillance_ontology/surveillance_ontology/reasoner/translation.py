@@ -254,14 +254,15 @@ class Translation:
         self._variables += 1
         return self._variables
 
-    def clause(self, body: Body, head: HeadAtom) -> None:
+    def clause(self, body: Body, head: HeadAtom, defines: bool = False) -> None:
+        """Add a clause; one of a rule is about named individuals, unless it defines a label."""
         program = self.program
         bound = {term for atom in body for term in atom.terms if isinstance(term, int)}
         loose = [term for term in head.terms if isinstance(term, int) and term not in bound]
         for term in dict.fromkeys(loose):
             program.uses_thing = True
             body = (*body, PredicateAtom(program.thing, (term,)))
-        named_only = isinstance(self._origin, ax.Rule)
+        named_only = isinstance(self._origin, ax.Rule) and not defines
         program.clauses.append(Clause(tuple(dict.fromkeys(body)), head, self._origin, named_only))
 
     def _label(self, expression: ClassExpression) -> Predicate:
@@ -283,7 +284,7 @@ class Translation:
             self._recognised.add(expression)
             for body in self.bodies(expression, _X):
                 if body != (PredicateAtom(label, (_X,)),):
-                    self.clause(body, PredicateAtom(label, (_X,)))
+                    self.clause(body, PredicateAtom(label, (_X,)), defines=True)
         return label
 
     def _filler(self, expression: ClassExpression) -> Predicate | None:
@@ -725,7 +726,9 @@ class Translation:
         alternatives: list[list[tuple[BodyAtom, ...]]] = []
         for atom in rule.body:
             if isinstance(atom, ex.ClassAtom):
-                alternatives.append(self.bodies(atom.cls, terms.individual(atom.argument)))
+                # What it relates to need have no name: that is the label's matter.
+                term = terms.individual(atom.argument)
+                alternatives.append(self._simple_bodies(atom.cls, term))
             elif isinstance(atom, ex.DataRangeAtom):
                 term, admitted = terms.value(atom.argument), self.test(atom.range)
                 if admitted is not None:

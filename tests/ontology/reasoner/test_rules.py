@@ -13,14 +13,21 @@ from surveillance_ontology.owl.axioms import (
 from surveillance_ontology.owl.expressions import (
     BuiltinAtom,
     ClassAtom,
+    ClassExpression,
+    DataOneOf,
     DataPropertyAtom,
+    DataRange,
+    DataSomeValuesFrom,
+    DatatypeRestriction,
     DifferentIndividualsAtom,
     Literal,
+    ObjectIntersectionOf,
     ObjectPropertyAtom,
     ObjectSomeValuesFrom,
     SameIndividualAtom,
+    Variable,
 )
-from surveillance_ontology.owl.vocabulary import XSD
+from surveillance_ontology.owl.vocabulary import THING, XSD
 from surveillance_ontology.reasoner.datatypes import value_of
 
 from .small_ontologies import (
@@ -192,3 +199,63 @@ def test_a_rule_makes_individuals_different() -> None:
     assert kb.holds(differ(j, k))
     assert not kb.holds(differ(i, k))
     assert not kb.holds(differ(i, j, k))
+
+
+_NUMBER = XSD + 'integer'
+_AT_LEAST_18 = DatatypeRestriction(_NUMBER, ((XSD + 'minInclusive', num(18)),))
+
+
+@pytest.mark.parametrize(
+    ('member', 'cls'),
+    [
+        (ObjectSomeValuesFrom(P, ObjectIntersectionOf((A, C))), ObjectSomeValuesFrom(P, A)),
+        (
+            ObjectSomeValuesFrom(P, ObjectSomeValuesFrom(Q, A)),
+            ObjectSomeValuesFrom(P, ObjectSomeValuesFrom(Q, THING)),
+        ),
+        (DataSomeValuesFrom(S, _AT_LEAST_18), DataSomeValuesFrom(S, _NUMBER)),
+        (
+            ObjectIntersectionOf((A, ObjectSomeValuesFrom(P, C))),
+            ObjectIntersectionOf((A, ObjectSomeValuesFrom(P, C))),
+        ),
+    ],
+)
+def test_whom_a_class_of_a_rule_relates_to_needs_no_name(
+    member: ClassExpression, cls: ClassExpression
+) -> None:
+    kb = base(Rule((ClassAtom(cls, X),), (ClassAtom(B, X),)), is_a(member, i))
+    assert kb.reason()
+    assert kb.instances(B) == {i}
+    assert not kb.unsupported
+
+
+@pytest.mark.parametrize(
+    ('values', 'tests', 'named', 'witness'),
+    [
+        (DataOneOf((num(1), num(2))), [num(1), num(2)], 2, num(2)),
+        (DataOneOf((num(1), num(2), num(3))), [num(1), num(2)], 0, num(2)),
+        (XSD + 'boolean', [TRUE, FALSE], 2, TRUE),
+        (_NUMBER, [V], 1, num(5)),
+        (_AT_LEAST_18, [('greaterThan', 17)], 1, num(20)),
+        (_NUMBER, [('greaterThan', 17)], 0, num(20)),
+    ],
+)
+def test_a_rule_that_a_value_which_is_not_known_may_fit_is_named(
+    values: DataRange,
+    tests: list[Literal | Variable | tuple[str, int]],
+    named: int,
+    witness: Literal,
+) -> None:
+    kb = base(SubClassOf(A, DataSomeValuesFrom(S, values)), is_a(A, i))
+    for test in tests:
+        more = [computed(test[0], V, test[1])] if isinstance(test, tuple) else []
+        value = V if isinstance(test, tuple) else test
+        kb.add(Rule((DataPropertyAtom(S, X, value), *more), (ClassAtom(B, X),)))
+    assert kb.reason()
+    assert kb.instances(B) == set()
+    assert len(kb.unsupported) == named
+    assert all('it depends on a value of' in sentence for sentence in kb.unsupported)
+    kb.add(has(S, i, witness))
+    assert kb.reason()
+    assert kb.instances(B) == {i}
+    assert kb.unsupported == ()
