@@ -25,7 +25,7 @@ from surveillance_operator.console_commands import (
 )
 from surveillance_operator.mission_actions import MissionActions
 from surveillance_operator.mission_feed import MissionFeed
-from surveillance_operator.snapshot import Snapshot, decision_line
+from surveillance_operator.snapshot import Snapshot, why
 from surveillance_runtime.logging import clean, print_lines
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.process import run_node
@@ -93,11 +93,11 @@ class ConsoleNode(PatrolNode):
 
     def _why(self) -> str:
         deadline = time.monotonic() + self._timeout
-        while (snapshot := self._feed.snapshot).decision is None:
+        while (said := why(self._feed.snapshot)) is None:
             # The feed of a console that was just opened has not heard of it yet.
             if time.monotonic() > deadline or self.stopping.wait(FEED_PERIOD):
                 return 'no decision yet'
-        return f'{decision_line(snapshot)}\n{snapshot.decision.reason}'
+        return '\n'.join(said)
 
 
 def status_line(snapshot: Snapshot) -> str:

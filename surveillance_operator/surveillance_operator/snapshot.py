@@ -304,7 +304,7 @@ def changes(old: Snapshot, new: Snapshot) -> Iterator[Change]:
     if new.status is not None and new.status != old.status:
         yield from _status_changes(old.status, new.status)
     if new.decision is not None and (new.decision, new.number) != (old.decision, old.number):
-        yield Change(decision_line(new), detail=new.decision.reason)
+        yield Change(_decision_line(new), detail=new.decision.reason)
     if new.battery is not None:
         before = None if old.battery is None else math.ceil(old.battery / BATTERY_STEP)
         if before != math.ceil(new.battery / BATTERY_STEP):
@@ -333,11 +333,19 @@ def changes(old: Snapshot, new: Snapshot) -> Iterator[Change]:
     yield from _node_changes(old, new)
 
 
-def decision_line(snapshot: Snapshot) -> str:
+def _decision_line(snapshot: Snapshot) -> str:
     """Return the decision without its reason."""
     decision = snapshot.decision
     assert decision is not None
     return f'decision {snapshot.number}: {decision.from_place} → {decision.place} [{decision.rule}]'
+
+
+def why(snapshot: Snapshot) -> tuple[str, str] | None:
+    """Return what the robot is about and the reason: the decision, or what it waits for."""
+    status, decision = snapshot.status, snapshot.decision
+    if status is not None and status.waiting_for_help:
+        return 'the robot waits for help', status.text.removeprefix('waiting for help: ')
+    return None if decision is None else (_decision_line(snapshot), decision.reason)
 
 
 def _node_changes(old: Snapshot, new: Snapshot) -> Iterator[Change]:

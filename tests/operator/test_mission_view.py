@@ -62,6 +62,18 @@ def shown(snapshot: Snapshot, width: int = 100, height: int = 30, colours: bool 
     return capture.get()
 
 
+@pytest.mark.parametrize('page', ['map', 'decision'])
+def test_a_robot_that_waits_for_help_says_for_what_in_the_place_of_its_decision(page: str) -> None:
+    status = replace(STATUS, waiting_for_help=True, text='waiting for help: D is shut; open it')
+    console = Console(width=100, height=30, color_system=None)
+    with console.capture() as capture:
+        console.print(MissionView(replace(whole(), status=status), page=page), end='')
+    text = capture.get()
+    assert 'the robot waits for help' in text
+    assert text.count('D is shut; open it') == 1
+    assert 'B waits longest' not in text
+
+
 @settings(max_examples=60)
 @given(st.integers(1, 90), st.integers(1, 50), st.integers(1, 90), st.integers(1, 50), st.data())
 def test_every_wall_is_in_the_picture_where_its_points_are(height, width, columns, rows, data):

@@ -81,6 +81,12 @@ STATES = {
     'begins': replace(Snapshot(), nodes={'armor_server': frozenset('1')}),
     'hostile': mission(HOSTILE),
     'large': mission(ROOMS),
+    'help': replace(
+        mission(('A', 'B')),
+        status=Status(
+            5000.0, 'm', 'WAIT_FOR_HELP', 'A', 'B', True, 'waiting for help: shut in', ()
+        ),
+    ),
     'ended': replace(mission(('A', 'B')), nodes={}, ended=frozenset({'A', 'B'})),
 }
 
@@ -104,6 +110,20 @@ def show(hub: Hub, viewer: Viewer, name: str) -> None:
     """Show a state of a mission, and wait until the page has it."""
     hub.show(replace(STATES[name], policy=name))
     viewer.until(lambda: viewer.js('return mission.state.mission?.policy') == name)
+
+
+def test_what_a_waiting_robot_waits_for_stands_in_the_place_of_its_decision(
+    hub: Hub, viewer: Viewer
+) -> None:
+    for name, line, reason, rows in (
+        ('ended', 'decision 3: A → B [URGENT]', 'A', 4),
+        ('help', 'the robot waits for help', 'shut in', 0),
+    ):
+        show(hub, viewer, name)
+        assert viewer.js('return document.getElementById("decision-line").textContent') == line
+        assert viewer.js('return document.getElementById("reason").textContent') == reason
+        count = 'return document.querySelectorAll("#scores tr").length'
+        assert viewer.js(count) == rows - bool(rows)
 
 
 def visible(viewer: Viewer, selector: str) -> bool:

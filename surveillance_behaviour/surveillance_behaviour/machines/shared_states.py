@@ -10,7 +10,7 @@ from typing import Any
 import surveillance_fsm as fsm
 from surveillance_behaviour.decision import NowhereToGoError
 from surveillance_behaviour.mission.mission import Mission
-from surveillance_behaviour.mission.recovery import Step
+from surveillance_behaviour.mission.recovery import Failure, Step
 from surveillance_behaviour.peers.ports import Point
 from surveillance_fsm.exceptions import CallError, CallInterruptedError, UnavailableError
 
@@ -112,6 +112,15 @@ WAY_PERIOD = 1.0
 """Seconds between two questions to the ontology whether a way has opened."""
 
 
+def _what_helps(failure: Failure | None) -> str:
+    """Return what ends the pause, and what a person can do."""
+    if failure is not None and failure.is_over is not None:
+        return 'goes on as soon as that answers'
+    if failure is not None and failure.charging:
+        return 'look at the charging place'
+    return 'open a door or take away what stands in the way'
+
+
 class WaitForHelp(MissionState):
     """Says what is wrong and waits; then everything is tried anew, with longer pauses each time.
 
@@ -128,8 +137,8 @@ class WaitForHelp(MissionState):
         reason = 'nothing works' if failure is None else f'{failure.what} failed: {failure.reason}'
         seconds = mission.recovery.pause()
         mission.ports.announcer.waiting_for_help(
-            f'{reason} (in {mission.place or "an unknown place"}, {mission.battery.level_text()}; '
-            f'trying again in {seconds:g} s)'
+            f'{reason} (in {mission.place or "an unknown place"}, {mission.battery.level_text()}); '
+            f'{_what_helps(failure)}, else trying again in {seconds:g} s'
         )
         is_over, period = mission.watch_ways(interrupt), WAY_PERIOD
         if failure is not None and failure.is_over is not None:

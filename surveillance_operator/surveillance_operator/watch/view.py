@@ -27,7 +27,7 @@ from rich.text import Text
 
 from surveillance_fsm import Interrupt
 from surveillance_operator.frames import health
-from surveillance_operator.snapshot import Box, Snapshot, decision_line
+from surveillance_operator.snapshot import Box, Snapshot, why
 from surveillance_operator.watch import raster
 from surveillance_operator.watch.raster import Canvas, Frame, rasterise
 
@@ -184,8 +184,8 @@ def state_lines(snapshot: Snapshot) -> list[Text]:
         Text.assemble((status.state or 'not started', 'bold cyan'), (age, DIM)),
         Text(status.whereabouts),
     ]
-    if status.text:
-        lines.append(Text(status.text, style=URGENT if status.waiting_for_help else 'none'))
+    if status.text and not status.waiting_for_help:
+        lines.append(Text(status.text))
     return lines
 
 
@@ -202,10 +202,12 @@ def battery_line(snapshot: Snapshot, width: int) -> Text:
 
 
 def decision_lines(snapshot: Snapshot) -> list[Text]:
-    """Return the present decision and its reason."""
-    if snapshot.decision is None:
+    """Return the present decision and its reason, or what the robot waits for."""
+    said = why(snapshot)
+    if said is None:
         return [_nothing(snapshot, 'decision')]
-    return [Text(decision_line(snapshot), style='bold'), Text(snapshot.decision.reason)]
+    waits = snapshot.status is not None and snapshot.status.waiting_for_help
+    return [Text(said[0], URGENT if waits else 'bold'), Text(said[1])]
 
 
 def doors_line(snapshot: Snapshot) -> Text:
@@ -224,8 +226,8 @@ def doors_line(snapshot: Snapshot) -> Text:
 def decision_page(snapshot: Snapshot) -> list[Text]:
     """Return the decision in full, with the score of each candidate."""
     lines = decision_lines(snapshot)
-    decision = snapshot.decision
-    if decision is None:
+    status, decision = snapshot.status, snapshot.decision
+    if decision is None or (status is not None and status.waiting_for_help):
         return lines
     lines.append(Text(f'policy {decision.policy}, target {decision.target}'))
     for place, score in sorted(decision.scores.items(), key=lambda each: -each[1]):

@@ -35,7 +35,7 @@ function header() {
   const ended = mission && !mission.running && status;
   set('title', status ? `${status.machine}${mission?.mode ? ' · ' + mission.mode : ''}` : mission?.running ? 'a mission begins' : 'no mission yet');
   document.title = status ? `${status.place || '?'} · ${status.machine}` : 'Mission';
-  const words = status ? [ended && 'the mission has ended', status.state, status.whereabouts, status.text] : [`waiting on ${mission?.where ?? ''}`];
+  const words = status ? [ended && 'the mission has ended', status.state, status.whereabouts, status.help ? 'waiting for help' : status.text] : [`waiting on ${mission?.where ?? ''}`];
   set('state', words.filter(Boolean).join(' · '));
   $('state').classList.toggle('warn', Boolean(status?.help || ended));
   set('battery', battery ? `battery ${Math.round(battery.level)} %${battery.low ? ' (low)' : ''}` : 'battery –');
@@ -72,7 +72,7 @@ const MAP_PARTS = ['status', 'grid', 'places', 'regions', 'links', 'doors', 'pla
 const SHOW = {
   present: [['grid', 'places', 'machine', 'mission', 'health'], present],
   header: [['status', 'mission', 'battery'], header],
-  why: [['decision', 'places'], () => why.show()],
+  why: [['decision', 'places', 'status'], () => why.show()],
   lists: [['events', 'markers', 'transitions'], lists],
   health: [['health', 'figures'], () => showHealth(state)],
   machine: [['machine'], () => drawMachine($('machine'), state.machine ?? [])],

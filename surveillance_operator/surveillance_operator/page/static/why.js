@@ -18,8 +18,13 @@ export class Why {
   }
 
   show() {
-    const {decision, places} = this.state;
-    if (!decision) {
+    const {decision, places, status} = this.state;
+    $('decision-line').classList.toggle('warn', Boolean(status?.help));
+    if (status?.help) {
+      $('decision-line').textContent = 'the robot waits for help';
+      $('reason').textContent = status.text.replace(/^waiting for help: /, '');
+      $('scores').replaceChildren();
+    } else if (!decision) {
       $('decision-line').textContent = 'no decision yet';
       for (const id of ['reason', 'scores', 'answer', 'facts']) $(id).replaceChildren();
     } else {
