@@ -225,5 +225,5 @@ def _add_page_options(group: argparse._ArgumentGroup) -> None:
     group.add_argument(
         '--web-address',
         metavar='HOST:PORT',
-        help='where the page is: beyond 127.0.0.1 it needs the token (default: 127.0.0.1:8080)',
+        help='as --web, and where: beyond 127.0.0.1 it needs the token (default: 127.0.0.1:8080)',
     )

@@ -119,9 +119,14 @@ class Run:
         names = []
         if self.record != NOT_RECORDED and not self.only:
             names += [RECORDER, MARKERS]
-        if self.web or self.web_control:
+        if self.has_page:
             names.append(PAGE)
         return tuple(node_table.find(name) for name in names)
+
+    @property
+    def has_page(self) -> bool:
+        """Whether the mission is shown in browsers; an address alone asks for that, too."""
+        return self.web or self.web_control or self.web_address is not None
 
 
 def page_address(text: str) -> tuple[str, int]:

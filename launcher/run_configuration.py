@@ -99,7 +99,7 @@ def _observer_entries(run: Run, folder: Path) -> Iterator[Entry]:
     """Yield what the recorder and the page are told."""
     yield for_node(RECORDER, 'folder', str(folder / RECORDING), 'this run')
     yield for_node(RECORDER, 'keep', float(run.keep), '--keep')
-    if run.web or run.web_control:
+    if run.has_page:
         yield for_node(PAGE, 'control', run.web_control, '--web-control')
         # Made here, so that a page that is started again keeps it.
         yield for_node(PAGE, 'token', secrets.token_urlsafe(24), 'this run')

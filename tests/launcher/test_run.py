@@ -289,6 +289,7 @@ def test_only_starts_what_is_named_and_may_be_repeated():
     assert run.observers() == ()
     assert [node.name for node in Run(record=None).observers()] == [RECORDER, MARKERS]
     assert [node.name for node in replace(run, web=True).observers()] == [PAGE]
+    assert [node.name for node in replace(run, web_address=':80').observers()] == [PAGE]
 
 
 def test_the_hint_to_watch_leads_to_this_run(monkeypatch):
