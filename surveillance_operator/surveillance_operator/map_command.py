@@ -12,7 +12,7 @@ from pathlib import Path
 from surveillance_behaviour.mission import mission_log
 from surveillance_behaviour.policy.graph import PatrolGraph
 from surveillance_runtime.command_line import EXIT_BAD_INPUT, CommandParser
-from surveillance_runtime.files import FileError
+from surveillance_runtime.files import RECORD, FileError
 from surveillance_runtime.place import Place, read_place_file
 from surveillance_runtime.place.drawing import Run, draw_place
 from surveillance_runtime.place.floor_plan import FloorPlan
@@ -145,7 +145,7 @@ def _parse(argv: Sequence[str] | None) -> argparse.Namespace:
     )
     parser.add_argument('place', type=Path, metavar='FILE', help='the place, a file of config/')
     parser.add_argument(
-        '--record', type=Path, metavar='RUN.jsonl', help='draw this run through the place'
+        '--record', type=Path, metavar='RUN', help='draw this run: its folder or its mission.jsonl'
     )
     parser.add_argument(
         '-o', '--output', type=Path, metavar='PNG', help='the picture (default: FILE.png here)'
@@ -164,8 +164,8 @@ def _draw(options: argparse.Namespace) -> list[str]:
     run = None
     lines = [f'{options.place}: {facts(plan)}']
     if options.record:
-        events = mission_log.read(options.record)
-        run = run_of(events, plan.place, str(options.record))
+        record = options.record / RECORD if options.record.is_dir() else options.record
+        run = run_of(mission_log.read(record), plan.place, str(record))
         lines.append(f'{options.record}: {run.summary}')
     title = options.place.stem.replace('_', ' ')
     picture = draw_place(plan, title[:1].upper() + title[1:], facts(plan), run)

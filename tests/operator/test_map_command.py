@@ -74,10 +74,11 @@ def test_the_tour_of_a_place_is_measured_over_the_doors() -> None:
 def test_a_run_is_drawn_with_its_waits(
     record: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
+    record.rename(tmp_path / 'mission.jsonl')
     output = tmp_path / 'run.png'
     place = CONFIG / 'seven_rooms.yaml'
-    assert map_command.main([str(place), '--record', str(record), '-o', str(output)]) == 0
-    line = f'{record}: 1 min 0 s of patrol · 2 visits · 8 m driven · 0 recharges · 2 failures'
+    assert map_command.main([str(place), '--record', str(tmp_path), '-o', str(output)]) == 0
+    line = f'{tmp_path}: 1 min 0 s of patrol · 2 visits · 8 m driven · 0 recharges · 2 failures'
     assert line in capsys.readouterr().out
     plain = draw_place(read_world(place).plan, 'x', 'y')
     with Image.open(output) as picture:
