@@ -126,6 +126,21 @@ def test_what_a_waiting_robot_waits_for_stands_in_the_place_of_its_decision(
         assert viewer.js(count) == rows - bool(rows)
 
 
+def test_a_connection_that_falls_silent_is_said_to_and_made_anew(
+    hub: Hub, viewer: Viewer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr('surveillance_operator.page.hub.HEARTBEAT', 1000.0)
+    show(hub, viewer, 'begins')
+    viewer.js('mission.real = performance.now.bind(performance)')
+    try:
+        viewer.js('performance.now = () => mission.real() + 10000')
+        viewer.until(lambda: viewer.text('#connection') == 'nothing comes from the mission')
+        viewer.js('performance.now = () => mission.real() + 50000')
+        viewer.until(lambda: viewer.text('#connection') == 'live')
+    finally:
+        viewer.js('performance.now = mission.real')
+
+
 def visible(viewer: Viewer, selector: str) -> bool:
     script = 'return document.querySelector(arguments[0]).getClientRects().length > 0'
     return bool(viewer.js(script, selector))

@@ -115,14 +115,31 @@ function connection(kind, text) {
   set('connection', text);
 }
 
+// The server tells the time every 2 s. A connection that a sleeping laptop or a gateway forgot stays open in silence.
+const SILENT = 6000;
+const DEAD = 30000;
+let source = null;
+let heard = 0;
+
 function connect() {
-  const source = new EventSource('/events');
-  source.onopen = () => connection('on', replaying ? 'replay' : 'live');
-  source.onmessage = (event) => receive(JSON.parse(event.data));
+  source?.close();
+  heard = performance.now();
+  source = new EventSource('/events');
+  source.onmessage = (event) => {
+    heard = performance.now();
+    connection('on', replaying ? 'replay' : 'live');
+    receive(JSON.parse(event.data));
+  };
   source.onerror = () => {
     connection('off', 'connection lost, trying again');
     if (source.readyState === EventSource.CLOSED) setTimeout(connect, 2000);
   };
+}
+
+function listen() {
+  const silent = performance.now() - heard;
+  if (silent > DEAD) connect();
+  else if (silent > SILENT) connection('off', 'nothing comes from the mission');
 }
 
 function camera() {
@@ -141,5 +158,5 @@ $('replay').hidden = !replaying;
 for (const each of document.querySelectorAll('.hands')) each.hidden = !may || replaying;
 present();
 connect();
-setInterval(() => { map.tick(state, now()); drawStrips($('strips'), state, now()); }, 1000);
+setInterval(() => { listen(); map.tick(state, now()); drawStrips($('strips'), state, now()); }, 1000);
 setInterval(camera, 700);
