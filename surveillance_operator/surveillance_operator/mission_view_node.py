@@ -1,6 +1,6 @@
 """The node `mission_view`: shows a running mission in its terminal; it only listens and asks.
 
-In a terminal it draws, elsewhere it prints one line for each change.
+In a terminal that can it draws, elsewhere it prints one line for each change.
 """
 
 from __future__ import annotations
@@ -33,7 +33,9 @@ class MissionViewNode(PatrolNode):
             'timeout', 5.0, 'With once: longest wait for a mission, seconds.', minimum=0.1
         )
         self._console = Console(highlight=False)
-        self._draws = self._once or self._console.is_terminal
+        self._draws = self._once or (
+            self._console.is_terminal and not self._console.is_dumb_terminal
+        )
         self._feed = MissionFeed(self, POLL_PERIOD, self._tell)
         if self._draws:
             self.spawn(self._draw, 'display')

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import PoseWithCovarianceStamped
 from nav_msgs.msg import OccupancyGrid
 from rclpy.qos import QoSProfile
+from rich.console import Console
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Bool, UInt8
 
@@ -190,3 +192,12 @@ def test_that_the_observers_of_an_ended_mission_are_gone_is_no_fault(
     graph.until(lambda: [each.level for each in view.snapshot.health.values()] == [3, 3])
     graph.node.destroy_publisher(status)
     graph.until(lambda: view.snapshot.health.keys() == {'arm_controller'})
+
+
+def test_a_terminal_that_cannot_draw_gets_lines(
+    graph: Any, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    dumb = partial(Console, force_terminal=True, _environ={'TERM': 'dumb'})
+    monkeypatch.setattr(mission_view_node, 'Console', dumb)
+    graph.add(MissionViewNode)
+    assert capsys.readouterr().out.startswith('watching ROS domain')
