@@ -38,6 +38,18 @@ def test_distortion_that_cannot_be_taken_back_gives_no_rays():
     assert CameraModel(640, 480, K, np.array([-90.0, 5.0, 0.0, 0.0, 0.0])).rays(PIXELS) is None
 
 
+@pytest.mark.parametrize(('model', 'numbers'), MODELS.items())
+def test_zeros_beyond_the_coefficients_of_a_model_say_nothing(model, numbers):
+    # ros_gz sends five and depthai eight or fourteen numbers for equidistant as for the others
+    padded = np.array([*numbers, *[0.0] * (20 - len(numbers))])
+    camera = CameraModel(640, 480, K, padded, model)
+    expected = CameraModel(640, 480, K, np.array(numbers), model)
+    assert camera.rays(PIXELS) == pytest.approx(expected.rays(PIXELS))
+    padded[-1] = 0.01
+    with pytest.raises(ValueError, match='20 distortion coefficients'):
+        CameraModel(640, 480, K, padded, model)
+
+
 @pytest.mark.parametrize(
     ('changes', 'reason'),
     [
@@ -45,9 +57,12 @@ def test_distortion_that_cannot_be_taken_back_gives_no_rays():
         ({'matrix': K * np.array([[1, 1, 1], [1, 1, 1], [1, 1, 0]])}, 'must have the form'),
         ({'matrix': K + np.array([[0, 0, np.nan], [0, 0, 0], [0, 0, 0]])}, 'finite'),
         ({'distortion': np.zeros(3)}, '3 distortion coefficients, expected 0 or 4 or 5'),
-        ({'distortion': np.zeros(6)}, '6 distortion coefficients'),
+        ({'distortion': np.ones(6)}, '6 distortion coefficients'),
         ({'distortion': np.array([np.nan, 0, 0, 0, 0])}, 'must be finite'),
-        ({'distortion_model': 'equidistant'}, 'expected 4 for equidistant'),
+        (
+            {'distortion': np.ones(5), 'distortion_model': 'equidistant'},
+            'expected 4 for equidistant',
+        ),
         ({'width': 0}, 'no area'),
     ],
 )

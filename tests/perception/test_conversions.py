@@ -122,7 +122,7 @@ def test_camera_there_and_back():
         ({'d': [float('nan')] * 5}, 'must be finite'),
         ({'k': [500.0, 0.0, 320.0, 0.0, 500.0, 240.0, 0.0, 0.0, 0.0]}, 'must have the form'),
         ({'distortion_model': 'thin\nprism'}, r"distortion model 'thin\\nprism', expected one of"),
-        ({'distortion_model': 'equidistant'}, 'expected 4 for equidistant'),
+        ({'d': [0.1] * 5, 'distortion_model': 'equidistant'}, 'expected 4 for equidistant'),
         ({'width': 0}, 'no area'),
     ],
 )

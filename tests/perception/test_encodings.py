@@ -67,6 +67,13 @@ def test_planar_yuv_gives_its_brightness(encoding):
         read(encoding, GREY)
 
 
+def test_colour_as_fine_as_brightness_behind_it_is_left_out():
+    values = np.concatenate([GREY, np.full((8, 6), 77, np.uint8)])
+    assert (read('nv24', values, step=6) == GREY).all()
+    with pytest.raises(ImageError, match='has 24 bytes, expected 72'):
+        read('nv24', GREY)
+
+
 @pytest.mark.parametrize(
     ('pattern', 'red', 'blue'),
     [

@@ -40,6 +40,7 @@ class CameraModel:
         height: Image height in pixels.
         matrix: (3, 3) camera matrix K.
         distortion: (n,) coefficients in the model's order; empty or zeros mean a rectified image.
+            Zeros beyond the model's own are left out: bridges and drivers send as many for each.
         distortion_model: One of `DISTORTION_MODELS`.
 
     Raises:
@@ -73,6 +74,8 @@ class CameraModel:
         allowed = _COEFFICIENTS.get(self.distortion_model)
         if allowed is None:
             raise ValueError(f'distortion model {self.distortion_model!r} is not known')
+        if len(self.distortion) > max(allowed) and not self.distortion[max(allowed) :].any():
+            object.__setattr__(self, 'distortion', self.distortion[: max(allowed)])
         if len(self.distortion) not in allowed:
             raise ValueError(
                 f'{len(self.distortion)} distortion coefficients, expected '

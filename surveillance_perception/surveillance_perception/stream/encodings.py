@@ -30,7 +30,8 @@ class _Encoding:
         wide: Whether a value has 16 bits.
         conversion: OpenCV's conversion to grey or BGR; None takes the values as they are.
         multiple: Width and height must be multiples of these.
-        planes: Rows of data for each row of pixels, times two (3: 4:2:0 with its colour behind).
+        planes: Rows of data for each row of pixels, times two (3: 4:2:0 with its colour behind,
+            6: 4:4:4).
     """
 
     channels: int
@@ -65,6 +66,7 @@ def _table() -> dict[str, _Encoding]:
     for name in ('nv12', 'nv21'):
         # the rows of brightness come first, those of colour are not looked at
         table[name] = _Encoding(1, multiple=(2, 2), planes=3)
+    table['nv24'] = _Encoding(1, planes=6)
     return table
 
 
