@@ -152,6 +152,25 @@ def test_a_process_whose_threads_do_not_end_ends_all_the_same() -> None:
     assert 'one, two did not end in 0.1 s' in done.stderr
 
 
+QUICK = """
+import sys
+from surveillance_runtime import node, process
+
+class Quick(node.PatrolNode):
+    def __init__(self):
+        super().__init__('quick')
+        print('lark' in sys.modules)
+        self.create_timer(0.0, self.finish)
+
+sys.exit(process.run_node(Quick, []))
+"""
+
+
+def test_a_node_starts_without_the_code_generator_of_ros() -> None:
+    done = subprocess.run([sys.executable, '-c', QUICK], capture_output=True, text=True, timeout=60)
+    assert (done.returncode, done.stdout) == (0, 'False\n'), done.stderr
+
+
 HANGING = """
 import sys, threading
 from surveillance_runtime import node, process
