@@ -7,13 +7,18 @@ from collections.abc import Iterator
 from typing import Any
 
 from surveillance_ontology.documents.structural import MOST_DIGITS, Axioms, Call, blank_label
-from surveillance_ontology.documents.xml_reading import DEEPEST, OntologyFileError, resolve
+from surveillance_ontology.documents.xml_reading import (
+    DEEPEST,
+    OntologyFileError,
+    legal,
+    resolve,
+)
 from surveillance_ontology.owl.expressions import Literal, language_tag
 from surveillance_ontology.owl.vocabulary import RDF
 
 _START = re.compile(rb'(?:\s++|#[^\n]*+\n)*+(?:Prefix|Ontology)\s*\(')
 _TOKEN = re.compile(
-    r'(?P<space>\s+|#[^\n]*)|<(?P<iri>[^<>"\s]*)>|"(?P<text>[^"\\]*+(?:\\.[^"\\]*+)*+)"'
+    r'(?P<space>\s+|#[^\n]*)|<(?P<iri>[^<>"\r\n]*)>|"(?P<text>[^"\\]*+(?:\\.[^"\\]*+)*+)"'
     r'|(?P<mark>\^\^|[()=])'
     r'|@(?P<language>[A-Za-z0-9-]+)|(?P<name>[^\s()<>"=^@]+)',
     re.DOTALL,
@@ -168,7 +173,7 @@ class _Parser:
         iri = self._iris.get(reference)
         if iri is None:
             try:
-                iri = resolve(self._base, reference)
+                iri = resolve(self._base, legal(reference, {}, self.stated.unsupported))
                 self._iris[reference] = iri
             except OntologyFileError as error:
                 raise self._fail(error.message, place) from None

@@ -7,7 +7,6 @@ this package, so that errors name their place also where the syntax is good and 
 from __future__ import annotations
 
 import codecs
-import contextlib
 import re
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
@@ -19,7 +18,7 @@ from surveillance_ontology.documents.mapping import Mapping
 from surveillance_ontology.documents.owl_xml import is_owl_xml, parse_owl_xml
 from surveillance_ontology.documents.rdf_xml import Graph, Node, parse_rdf_xml
 from surveillance_ontology.documents.structural import Axioms
-from surveillance_ontology.documents.xml_reading import FORBIDDEN, OntologyFileError
+from surveillance_ontology.documents.xml_reading import OntologyFileError, is_absolute, legal
 from surveillance_ontology.memory import uncollected
 from surveillance_ontology.owl.axioms import Axiom, Import
 from surveillance_ontology.owl.entities import entities_of, renamed
@@ -219,14 +218,13 @@ def _text(data: bytes) -> str:
         raise OntologyFileError(f'not UTF-8: {error.reason}', line, 1) from None
 
 
-def _rdf_text(data: bytes, iri: str, form: str, lenient: bool = False) -> Graph:
+def _rdf_text(data: bytes, iri: str, form: str) -> Graph:
     """Parse a document; the graph knows no places.
 
     Args:
         data: The document.
         iri: Base for relative IRIs where the document gives none.
         form: 'turtle', 'ntriples' or 'jsonld'.
-        lenient: Take names that are no IRIs, such as those with two '#', and languages as they are.
 
     Raises:
         OntologyFileError: Not of that format, or with statements that are no plain triples.
@@ -240,9 +238,16 @@ def _rdf_text(data: bytes, iri: str, form: str, lenient: bool = False) -> Graph:
         'jsonld': pyoxigraph.RdfFormat.JSON_LD,
     }[form]
     graph = Graph()
+    known: dict[str, str] = {}
+
+    def name(node: object) -> str:
+        text = str(node)
+        return text if text.startswith('_:') else legal(text[1:-1], known, graph.unsupported)
+
     try:
         base = None if form == 'ntriples' else iri
-        for quad in pyoxigraph.parse(data, format=source, base_iri=base, lenient=lenient):
+        # Lenient: names that are no IRIs, which JSON-LD would drop in silence, come as they are.
+        for quad in pyoxigraph.parse(data, format=source, base_iri=base, lenient=True):
             if quad.graph_name != pyoxigraph.DefaultGraph():
                 raise OntologyFileError('named graphs are not read')
             node = quad.object
@@ -250,27 +255,25 @@ def _rdf_text(data: bytes, iri: str, form: str, lenient: bool = False) -> Graph:
                 raise OntologyFileError('triples about triples (RDF 1.2) are not read')
             value: Node
             if not isinstance(node, pyoxigraph.Literal):
-                value = _name(node)
+                value = name(node)
             elif node.language:
-                value = Literal(node.value, RDF + 'langString', language_tag(node.language))
+                try:
+                    value = Literal(node.value, RDF + 'langString', language_tag(node.language))
+                except ValueError as error:
+                    graph.unsupported.append(str(error))
+                    value = Literal(node.value)
             else:
-                value = Literal(node.value, node.datatype.value)
-            graph.triples.append((_name(quad.subject), quad.predicate.value, value))
+                value = Literal(node.value, name(node.datatype))
+            subject, predicate = name(quad.subject), name(quad.predicate)
+            if is_absolute(predicate):
+                graph.triples.append((subject, predicate, value))
+            else:
+                what = f'a statement about {local_name(subject)} is left out'
+                graph.unsupported.append(f'{what}: its property {predicate!r} is no IRI')
     except SyntaxError as error:
         message = _PARSER_PLACE.sub('', str(error.msg), count=1)
         place = error.lineno or 0, error.offset or 0
-        if not lenient:
-            with contextlib.suppress(OntologyFileError):
-                graph = _rdf_text(data, iri, form, lenient=True)
-                names = {n for triple in graph.triples for n in triple if isinstance(n, str)}
-                if not any(map(FORBIDDEN.search, names)):
-                    return graph
         raise OntologyFileError(f'not {_NAMES[form]}: {message}', *place) from None
     if not graph.triples:
         raise OntologyFileError(f'not {_NAMES[form]}: it states nothing')
     return graph
-
-
-def _name(node: object) -> str:
-    text = str(node)
-    return text if text.startswith('_:') else text[1:-1]

@@ -12,7 +12,7 @@ from xml.sax.saxutils import escape, quoteattr
 from surveillance_fsm.files import replace_file
 from surveillance_ontology.documents.rdf_xml import Node, Triple
 from surveillance_ontology.documents.triples import triples_of
-from surveillance_ontology.documents.xml_reading import OntologyFileError
+from surveillance_ontology.documents.xml_reading import FORBIDDEN, OntologyFileError
 from surveillance_ontology.owl.axioms import (
     Axiom,
     ClassAssertion,
@@ -139,7 +139,7 @@ class _RdfXml:
         named = {prefix: iri for prefix, iri in prefixes.items() if _is_prefix(prefix)}
         named = {**_PREFIXES, **named, **_PREFIXES, '': iri.rstrip('#/') + '#'}
         for prefix, namespace in named.items():
-            if namespace and not namespace.startswith(_XML):
+            if namespace and not namespace.startswith(_XML) and not FORBIDDEN.search(namespace):
                 self._namespaces.setdefault(namespace, prefix)
         self._further = (p for number in count(1) if (p := f'ns{number}') not in named)
         self._lines: list[str] = []

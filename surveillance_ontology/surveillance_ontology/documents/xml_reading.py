@@ -7,7 +7,7 @@ way); entities inside entities, external ones and parameter entities are refused
 from __future__ import annotations
 
 import re
-from urllib.parse import urljoin
+from urllib.parse import quote, urljoin
 from xml.parsers import expat
 
 from surveillance_ontology.owl.expressions import language_tag
@@ -52,15 +52,29 @@ def is_absolute(reference: str) -> bool:
     return _ABSOLUTE.match(reference) is not None
 
 
+def legal(iri: str, known: dict[str, str], reports: list[str]) -> str:
+    """Return an IRI, in which each character that none may hold is percent-encoded.
+
+    The OWL API takes such names as they are, and writes files that others cannot read.
+
+    Args:
+        iri: The IRI or relative reference.
+        known: What was returned for those that were reported.
+        reports: Where the first use of each is reported.
+    """
+    found = FORBIDDEN.search(iri)
+    if found and iri not in known:
+        known[iri] = FORBIDDEN.sub(lambda character: quote(character[0]), iri)
+        reports.append(f'IRI {iri!r} contains {found[0]!r}, it is read as <{known[iri]}>')
+    return known[iri] if found else iri
+
+
 def resolve(base: str, reference: str) -> str:
     """Return an IRI reference against a base IRI (RFC 3986).
 
     Raises:
-        OntologyFileError: It has a forbidden character.
+        OntologyFileError: It is none.
     """
-    found = FORBIDDEN.search(reference)
-    if found:
-        raise OntologyFileError(f'IRI {reference!r} contains {found.group()!r}')
     if is_absolute(reference):
         return reference
     stem = base.partition('#')[0]
@@ -83,13 +97,14 @@ class XmlReader:
         data: The document, UTF-8 whatever it declares.
 
     Attributes:
-        unsupported: One sentence for each language that is none.
+        unsupported: One sentence for each language or IRI that is none.
     """
 
     def __init__(self, data: bytes) -> None:
         self.data = data
         self.depth = 0
         self.unsupported: list[str] = []
+        self._legal: dict[str, str] = {}
         self._entities = {b'amp', b'lt', b'gt', b'quot', b'apos'}
         parser = expat.ParserCreate('UTF-8', namespace_separator='')
         parser.buffer_text = True
@@ -152,7 +167,7 @@ class XmlReader:
     def resolve(self, base: str, reference: str) -> str:
         """Return an IRI reference against a base IRI."""
         try:
-            return resolve(base, reference)
+            return resolve(base, legal(reference, self._legal, self.unsupported))
         except OntologyFileError as error:
             raise self.fail(error.message) from None
 
