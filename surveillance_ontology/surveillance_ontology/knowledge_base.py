@@ -439,12 +439,23 @@ class KnowledgeBase:
         known = self._classification
         if known is None:
             return set()
-        found = set(known.classes()) if cls == THING else known.subclasses(cls)
+        found = self._classes() if cls == THING else known.subclasses(cls)
         if known.within and cls != THING:
             found.update(name for name in known.within if cls in self.superclasses(name))
         if self._told.schema_changed or cls == THING:
             found |= self._asserted_below(found | {cls})
         return found - {cls}
+
+    def _classes(self) -> set[str]:
+        """Named classes in the hierarchy, and those that only individuals are said to be of."""
+        assert self._classification is not None
+        found = set(self._classification.classes())
+        for axiom in self._told.axioms:
+            if isinstance(axiom, ClassAssertion) and isinstance(axiom.cls, str):
+                found.add(axiom.cls)
+        for axiom in self._told.complex:
+            found.update(name for kind, name in entities_of(axiom) if kind == 'class')
+        return found - {NOTHING}
 
     def _asserted_below(self, classes: set[str]) -> set[str]:
         below: dict[ClassExpression, list[str]] = {}

@@ -190,6 +190,16 @@ def test_existential_knowledge_reaches_the_class_hierarchy() -> None:
     assert kb.subclasses(THING) == {A, B, C, D}
 
 
+def test_a_class_that_only_an_assertion_names_is_below_thing() -> None:
+    kb = base(is_a(A, i), is_a(ObjectUnionOf((B, C)), i), is_a(ObjectComplementOf(NOTHING), i))
+    assert kb.subclasses(THING) == {A, B, C}
+    kb.add(is_a(D, i))
+    assert kb.subclasses(THING) == {A, B, C, D}
+    kb.remove(is_a(A, i))
+    kb.reason()
+    assert kb.subclasses(THING) == {B, C, D}
+
+
 def test_a_class_that_can_have_no_member_is_below_all() -> None:
     kb = base(
         *(Declaration('class', name) for name in (A, B, C)),
