@@ -6,9 +6,11 @@ A pipe or a device may have no end, and to replace one takes it away from everyb
 from __future__ import annotations
 
 import errno
+import glob
 import os
 import secrets
 import stat
+import time
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
@@ -55,6 +57,10 @@ def file_to_write(path: str | Path) -> Path:
     return target
 
 
+ABANDONED = 3600.0
+"""Seconds after which a draft that nobody writes to is one of a process that was killed."""
+
+
 def replace_file(
     path: str | Path,
     data: bytes,
@@ -74,6 +80,7 @@ def replace_file(
         OSError: It cannot be written, or is none; the error has its name, and the old one is whole.
     """
     target = file_to_write(path)
+    _remove_abandoned(target)
     draft = target.with_name(f'.{target.name}.{secrets.token_hex(4)}')
     try:
         # Not by tempfile: to give its file the usual rights, all threads' umask would change.
@@ -92,6 +99,14 @@ def replace_file(
     if durable:
         with suppress(OSError):
             _sync_folder(target.parent)
+
+
+def _remove_abandoned(target: Path) -> None:
+    """Remove drafts of a file whose writers were killed: each has a name of its own."""
+    with suppress(OSError):
+        for draft in target.parent.glob(f'.{glob.escape(target.name)}.{"[0-9a-f]" * 8}'):
+            if time.time() - draft.stat().st_mtime > ABANDONED:
+                draft.unlink()
 
 
 def _sync_folder(folder: Path) -> None:

@@ -28,6 +28,19 @@ def test_what_is_no_file_is_neither_read_nor_replaced(tmp_path: Path, kind: str)
     assert not path.is_file()
 
 
+def test_drafts_of_killed_writers_do_not_add_up(tmp_path: Path) -> None:
+    old, new, other, own = (
+        tmp_path / name
+        for name in ('.[a].0123abcd', '.[a].4567cdef', '.[b].0123abcd', '.[a].notes.txt')
+    )
+    for path in (old, new, other, own):
+        path.touch()
+    for path in (old, other, own):
+        os.utime(path, (0, 0))
+    replace_text(tmp_path / '[a]', 'new')
+    assert {*tmp_path.iterdir()} == {tmp_path / '[a]', new, other, own}
+
+
 def test_a_file_is_read_up_to_a_bound(tmp_path: Path) -> None:
     path = tmp_path / 'path'
     path.write_bytes(b'12345')
