@@ -58,7 +58,7 @@ def process_of(launched: Started, node: str, after: int = 0) -> int:
 
 @pytest.mark.parametrize('moment', ['surveillance in mode', 'started armor_server'])
 def test_ctrl_c_in_the_middle_of_the_start_ends_it(launch, moment):
-    mission = launch('--mode', 'RANDOM')
+    mission = launch('--mode', 'RANDOM', '--record', 'off')
     mission.until(moment)
     code, seconds = mission.end(signal.SIGINT)
     assert code in (0, 130)
@@ -119,7 +119,7 @@ def test_all_nodes_in_one_process(launch, clock):
 
 
 def test_one_console_serves_the_three_controllers(launch, clock):
-    mission = launch('--mode', 'MANUAL')
+    mission = launch('--mode', 'MANUAL', '--record', 'off')
     mission.write('fly')
     mission.until(r"console +\| 'fly' is no command: expected one of battery, plan, ")
     mission.until(r'planner_controller +\| New request')
