@@ -84,15 +84,12 @@ class Course:
         skip: Targets visited more lately than this are skipped, seconds.
         patience: A target that may be entered only when it is URGENT is waited for so long, else
             skipped, seconds.
-        steps: Whether targets are the steps of a walk: a neighbour is entered by the leg to it,
-            even where the way round by another place is shorter.
     """
 
     targets: tuple[int, ...]
     back: int = 0
     skip: float = 0.0
     patience: float = 0.0
-    steps: bool = False
 
     def choose(self, rules: RuleMap, state: State) -> int:
         """Choose the next place on the way to the next target; see `rollout.Choice`.
@@ -103,8 +100,7 @@ class Course:
         allowed = rules.allowed(state)
         if not allowed:
             return state.place
-        is_step = self.steps and target in rules.legs[state.place]
-        hop = target if is_step else rules.hop(state.place, target)
+        hop = rules.hop(state.place, target)
         if hop in allowed:
             return hop
         legs, away = rules.legs[state.place], rules.away
@@ -265,7 +261,7 @@ class Plan:
         self._climb(self._first_courses(filled), work / 2.0)
         for walk in walks:
             if (back := walk.repeated_from(rules.count)) is not None:
-                self._try(Course(tuple(walk.walk), back, patience=math.inf, steps=True))
+                self._try(Course(tuple(walk.walk), back, patience=math.inf))
 
     def _find_rounds(
         self, rounds: list[tuple[int, ...]], walks: list[Outcome], work: float

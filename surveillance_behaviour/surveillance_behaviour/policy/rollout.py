@@ -40,7 +40,8 @@ class RuleMap:
 
     Attributes:
         legs: For each place, the seconds to each neighbour, dwell included.
-        away: Seconds from each place to each other, shape (n, n).
+        away: Seconds from each place to each other, shape (n, n). A neighbour is entered by the leg
+            to it: where a way round by another place is shorter, the rules may not allow that.
         overdue: A place that went unvisited for longer is URGENT, seconds.
     """
 
@@ -56,9 +57,21 @@ class RuleMap:
             {index[other]: seconds + graph.dwell for other, seconds in sorted(ways.items())}
             for ways in (graph.legs[place] for place in graph.places)
         ]
-        self.away: list[list[float]] = graph.distances.tolist()
+        self._shortest: list[list[float]] = graph.distances.tolist()
         self._hops: dict[int, int] = {}
         self._paths: dict[int, list[int]] = {}
+        self.away = self._seconds_away()
+
+    def _seconds_away(self) -> list[list[float]]:
+        shortest, legs = self.graph.distances, self.graph.direct
+        away: list[list[float]] = shortest.tolist()
+        longer = np.isfinite(legs) & (legs > shortest + HALF_OPEN)
+        for target in np.flatnonzero(longer.any(axis=0)).tolist():
+            for place in np.argsort(shortest[:, target], kind='stable').tolist():
+                if place != target and math.isfinite(shortest[place, target]):
+                    hop = self.hop(place, target)
+                    away[place][target] = self.legs[place][hop] + away[hop][target]
+        return away
 
     @cached_property
     def gates(self) -> list[int]:
@@ -114,17 +127,19 @@ class RuleMap:
         return sum(away[a][b] for a, b in zip(targets, (*targets[1:], targets[0]), strict=True))
 
     def hop(self, place: int, target: int) -> int:
-        """Return the first place on the shortest way to a target."""
+        """Return the first place on the way to a target."""
         key = place * self.count + target
         found = self._hops.get(key)
         if found is None:
-            ways, away = self.legs[place], self.away
-            found = min(ways, key=lambda other: ways[other] + away[other][target])
+            ways, away = self.legs[place], self._shortest
+            found = target
+            if target not in ways:
+                found = min(ways, key=lambda other: ways[other] + away[other][target])
             self._hops[key] = found
         return found
 
     def path(self, place: int, target: int) -> list[int]:
-        """Return the places on the shortest way to a target, without the first."""
+        """Return the places on the way to a target, without the first."""
         key = place * self.count + target
         found = self._paths.get(key)
         if found is None:
