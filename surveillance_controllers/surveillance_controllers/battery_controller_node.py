@@ -13,7 +13,6 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any, TextIO
 
-from builtin_interfaces.msg import Duration
 from geometry_msgs.msg import PoseWithCovarianceStamped
 from rclpy.callback_groups import ReentrantCallbackGroup
 from sensor_msgs.msg import BatteryState
@@ -32,7 +31,7 @@ from surveillance_controllers.controller_parameters import (
 from surveillance_controllers.manual.commands import BATTERY, BATTERY_SET, ParsedCommand
 from surveillance_controllers.manual.requests import CommandConsole
 from surveillance_fsm.ros import ClockWait
-from surveillance_runtime.conversions import seconds_of
+from surveillance_runtime.conversions import trajectory_from
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.process import run_node
 from surveillance_runtime.qos import STATE_QOS
@@ -205,8 +204,7 @@ class RobotBattery:
             self._use.see_pose(pose_of_serialized(serialized), self._wait.elapsed())
 
     def _on_trajectory(self, message: JointTrajectory) -> None:
-        end = message.points[-1].time_from_start if message.points else Duration()
-        self._use.move_arm(seconds_of(end), self._wait.elapsed())
+        self._use.move_arm(*trajectory_from(message), self._wait.elapsed())
 
     def _on_drain(self, message: Float32) -> None:
         # What is no number drains nothing.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from functools import cache
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from builtin_interfaces.msg import Duration, Time
@@ -15,6 +15,10 @@ from numpy.typing import NDArray
 from sensor_msgs.msg import PointCloud2, PointField
 
 from surveillance_runtime.logging import without_controls
+from surveillance_runtime.robot_arm import TrajectoryPoint
+
+if TYPE_CHECKING:
+    from trajectory_msgs.msg import JointTrajectory
 
 PlanarPose = tuple[float, float, float]
 """x, y in metres and yaw in radians."""
@@ -121,7 +125,7 @@ def map_from(
         most_cells: A larger one is refused.
 
     Raises:
-        ValueError: It has no cells, not as many as it says, too many, or is turned.
+        ValueError: It has no cells, not as many as it says, or too many.
     """
     info = message.info
     size = f'{info.width} x {info.height}'
@@ -137,9 +141,49 @@ def map_from(
             f'a map of {info.resolution:g} m a cell: expected between 0.0001 and 100 m'
         )
     x, y, yaw = pose_from(info.origin)
+    cells, side = cells.reshape(info.height, info.width), float(info.resolution)
     if abs(yaw) > 1e-6:
-        raise ValueError(f'a map turned by {yaw:.3f} rad: expected one that is not turned')
-    return cells.reshape(info.height, info.width), float(info.resolution), (x, y)
+        return _straightened(cells, side, (x, y, yaw), most_cells)
+    return cells, side, (x, y)
+
+
+def _straightened(
+    cells: NDArray[np.int8], side: float, origin: PlanarPose, most_cells: int
+) -> tuple[NDArray[np.int8], float, tuple[float, float]]:
+    """Return a map whose cells are turned drawn with cells that are not; beside it is unknown.
+
+    The new cells are smaller, so that no wall gets a gap.
+    """
+    x, y, yaw = origin
+    cos, sin = math.cos(yaw), math.sin(yaw)
+    rows, columns = cells.shape
+    corners = side * np.array([(0, 0), (columns, 0), (0, rows), (columns, rows)])
+    seen = corners @ np.array([(cos, sin), (-sin, cos)])
+    west, south = seen.min(axis=0)
+    drawn_side = side / math.sqrt(2.0)
+    width, height = np.ceil((seen.max(axis=0) - (west, south)) / drawn_side - 1e-6).astype(int)
+    if width * height > most_cells:
+        raise ValueError(f'a turned map of {width} x {height} cells: expected {most_cells} at most')
+    drawn = np.full((height, width), -1, np.int8)
+    right = west + (np.arange(width) + 0.5) * drawn_side
+    for row in range(height):
+        up = south + (row + 0.5) * drawn_side
+        column = np.floor((cos * right + sin * up) / side).astype(int)
+        line = np.floor((cos * up - sin * right) / side).astype(int)
+        inside = (column >= 0) & (column < columns) & (line >= 0) & (line < rows)
+        drawn[row, inside] = cells[line[inside], column[inside]]
+    return drawn, drawn_side, (x + west, y + south)
+
+
+def trajectory_from(message: JointTrajectory) -> tuple[list[str], list[TrajectoryPoint]]:
+    """Return a trajectory's joint names and points."""
+    points = [
+        TrajectoryPoint(
+            seconds_of(point.time_from_start), tuple(point.positions), tuple(point.velocities)
+        )
+        for point in message.points
+    ]
+    return list(message.joint_names), points
 
 
 _FLOATS = {PointField.FLOAT32: 'f4', PointField.FLOAT64: 'f8'}

@@ -19,6 +19,8 @@ Array = npt.NDArray[np.float64]
 REST_PATIENCE = 30.0
 """Seconds of real time for which a scan may wait for pictures at a view, beyond its rest there:
 whoever listens to a scan waits for longer before it counts as dead."""
+_TOLERANCE = 1e-6
+"""What a position may be beyond a limit, rad."""
 
 
 @dataclass(frozen=True)
@@ -44,6 +46,21 @@ class Joint:
     speed: float = 1.5
     acceleration: float = 3.0
     jerk: float = 15.0
+
+
+@dataclass(frozen=True)
+class TrajectoryPoint:
+    """Where the joints are to be at a time.
+
+    Attributes:
+        time: Seconds from the trajectory's start.
+        positions: Positions in the order of the trajectory's joint names, rad.
+        velocities: Velocities likewise, rad/s; empty when not given.
+    """
+
+    time: float
+    positions: tuple[float, ...]
+    velocities: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -117,6 +134,46 @@ class Arm:
         # x right is -y, y down is -z, z forward is x.
         frame[:3, :3] = frame[:3, :3] @ _OPTICAL
         return frame
+
+    def check(self, names: Sequence[str], points: Sequence[TrajectoryPoint]) -> None:
+        """Refuse a trajectory that the arm cannot follow.
+
+        Args:
+            names: The joints that it moves.
+            points: Where they are to be.
+
+        Raises:
+            ValueError: A joint is unknown or named twice, a point has the wrong number of
+                values or one that is not finite or beyond a limit, or the times do not rise.
+        """
+        known = self.names
+        for name in names:
+            if name not in known:
+                raise ValueError(f"no joint '{name}': expected {', '.join(known)}")
+        if len(set(names)) != len(names):
+            raise ValueError(f'joint named twice in {", ".join(names)}')
+        reached = -math.inf
+        limits = {joint.name: (joint.lower, joint.upper) for joint in self.joints}
+        for number, point in enumerate(points, start=1):
+            if len(point.positions) != len(names) or len(point.velocities) not in (0, len(names)):
+                raise ValueError(
+                    f'point {number}: {len(point.positions)} positions and '
+                    f'{len(point.velocities)} velocities for {len(names)} joints'
+                )
+            if not all(map(math.isfinite, (point.time, *point.positions, *point.velocities))):
+                raise ValueError(f'point {number}: expected finite numbers')
+            if point.time < 0 or point.time <= reached:
+                raise ValueError(
+                    f'point {number}: time {point.time:g} s: expected more than the point before'
+                )
+            reached = point.time
+            for name, position in zip(names, point.positions, strict=True):
+                lower, upper = limits[name]
+                if not lower - _TOLERANCE <= position <= upper + _TOLERANCE:
+                    raise ValueError(
+                        f'point {number}: {name} at {position:g} rad: '
+                        f'expected {lower:g} to {upper:g}'
+                    )
 
 
 _OPTICAL = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])

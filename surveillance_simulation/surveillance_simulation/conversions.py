@@ -11,7 +11,6 @@ from builtin_interfaces.msg import Time
 from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped, TransformStamped
 from nav_msgs.msg import OccupancyGrid, Odometry
 from sensor_msgs.msg import CameraInfo, Image, JointState, LaserScan
-from trajectory_msgs.msg import JointTrajectory
 
 from surveillance_interfaces.msg import DoorStates
 from surveillance_interfaces.srv import SetMarker
@@ -19,13 +18,11 @@ from surveillance_runtime.conversions import (
     planar_covariance,
     pose_estimate,
     pose_message,
-    seconds_of,
 )
 from surveillance_runtime.place.floor_plan import Marker
 from surveillance_runtime.place.floor_plan import Pose as PlanePose
 from surveillance_runtime.place.occupancy_grid import Grid
 from surveillance_simulation.camera.model import Camera, Picture
-from surveillance_simulation.robot.arm_motion import TrajectoryPoint
 from surveillance_simulation.robot.lidar import LidarModel
 from surveillance_simulation.world.world import World
 
@@ -120,19 +117,6 @@ def joints_to_ros(
     )
     message.header.stamp = stamp
     return message
-
-
-def trajectory_from_ros(message: JointTrajectory) -> tuple[list[str], list[TrajectoryPoint]]:
-    """Convert a message to joint names and the points of their trajectory."""
-    points = [
-        TrajectoryPoint(
-            seconds_of(point.time_from_start),
-            tuple(point.positions),
-            tuple(point.velocities),
-        )
-        for point in message.points
-    ]
-    return list(message.joint_names), points
 
 
 def image_to_ros(picture: Picture, frame: str, stamp: Time) -> Image:

@@ -21,7 +21,7 @@ from trajectory_msgs.msg import JointTrajectory
 
 from surveillance_interfaces.msg import MarkerDetectionArray, RobotPlace
 from surveillance_runtime.configuration import PLACE_TABLES
-from surveillance_runtime.conversions import seconds_of
+from surveillance_runtime.conversions import seconds_of, trajectory_from
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.parameters import ParameterError
 from surveillance_runtime.place import PlaceError
@@ -239,7 +239,7 @@ class Simulator(PatrolNode):
         self._go_on()
 
     def _on_trajectory(self, message: JointTrajectory) -> None:
-        names, points = conversions.trajectory_from_ros(message)
+        names, points = trajectory_from(message)
         try:
             with self._changing:
                 self.robot.arm.follow(names, points, self.robot.time)

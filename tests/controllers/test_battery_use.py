@@ -8,6 +8,7 @@ import pytest
 
 from surveillance_controllers.battery.model import Battery, BatteryParameters
 from surveillance_controllers.battery.use import BatteryInUse
+from surveillance_runtime.robot_arm import TrajectoryPoint
 
 PARAMETERS = BatteryParameters(
     capacity=1.0,
@@ -22,6 +23,10 @@ PARAMETERS = BatteryParameters(
 def in_use(level: float = 50.0) -> tuple[Battery, BatteryInUse]:
     battery = Battery(PARAMETERS, level)
     return battery, BatteryInUse(battery, (1.0, 0.0, 0.0), 0.5, since=0.0)
+
+
+def move_arm(use: BatteryInUse, seconds: float, now: float, pan: float = 1.0) -> None:
+    use.move_arm(['arm_pan'], [TrajectoryPoint(seconds, (pan,))], now)
 
 
 def test_way_and_turn_are_paid_for() -> None:
@@ -46,23 +51,39 @@ def test_the_arm_is_paid_for_while_it_moves() -> None:
     battery, use = in_use()
     use.advance(1.0)
     assert battery.energy == 0.5
-    use.move_arm(5.0, now=1.0)
+    move_arm(use, 5.0, now=1.0)
     use.advance(2.0)
     assert battery.energy == pytest.approx(0.49)
-    use.move_arm(0.5, now=2.5)
+    move_arm(use, 0.5, now=2.5)
     use.advance(4.0)
     assert battery.energy == pytest.approx(0.48)
     use.advance(5.0)
     assert battery.energy == pytest.approx(0.48)
 
 
+def test_a_trajectory_that_the_arm_refuses_costs_nothing_and_stops_nothing() -> None:
+    battery, use = in_use()
+    use.advance(1.0)
+    move_arm(use, 5.0, now=1.0, pan=9.0)
+    use.advance(2.0)
+    assert battery.energy == 0.5
+    move_arm(use, 2.0, now=2.0)
+    use.move_arm(['elbow'], [], now=2.5)
+    use.advance(6.0)
+    assert battery.energy == pytest.approx(0.48)
+    move_arm(use, 5.0, now=6.0)
+    use.move_arm([], [], now=7.0)
+    use.advance(9.0)
+    assert battery.energy == pytest.approx(0.47)
+
+
 def test_a_trajectory_without_an_end_does_not_drain_the_battery() -> None:
     battery, use = in_use()
     use.advance(0.0)
-    use.move_arm(2.0**31, now=0.0)
+    move_arm(use, 2.0**31, now=0.0)
     use.advance(600.0)
     drawn = 0.5 - battery.energy
-    use.move_arm(20.0, now=600.0)
+    move_arm(use, 20.0, now=600.0)
     use.advance(1200.0)
     assert 0.5 - battery.energy == pytest.approx(2.0 * drawn)
 

@@ -8,8 +8,8 @@ import re
 import numpy as np
 import pytest
 
-from surveillance_runtime.robot_arm import ARM
-from surveillance_simulation.robot.arm_motion import ArmMotion, TrajectoryPoint
+from surveillance_runtime.robot_arm import ARM, TrajectoryPoint
+from surveillance_simulation.robot.arm_motion import ArmMotion
 
 NAMES = ARM.names
 

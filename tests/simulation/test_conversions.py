@@ -9,7 +9,6 @@ import pytest
 from builtin_interfaces.msg import Duration, Time
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from surveillance_controllers import conversions as received
 from surveillance_interfaces.srv import SetMarker
@@ -78,19 +77,6 @@ def test_an_uncertain_pose_carries_its_variances() -> None:
     message = conversions.uncertain_pose_to_ros((1.0, 2.0, 0.5), 'map', STAMP, 0.1, 0.2)
     assert message.pose.covariance[0] == pytest.approx(0.01)
     assert message.pose.covariance[35] == pytest.approx(0.04)
-
-
-def test_a_trajectory_keeps_names_times_and_values() -> None:
-    point = JointTrajectoryPoint(positions=[0.1, 0.2], velocities=[1.0, 2.0])
-    point.time_from_start = Duration(sec=1, nanosec=250_000_000)
-    message = JointTrajectory(joint_names=['arm_pan', 'arm_lift'], points=[point])
-    names, points = conversions.trajectory_from_ros(message)
-    assert names == ['arm_pan', 'arm_lift']
-    assert (points[0].time, points[0].positions, points[0].velocities) == (
-        1.25,
-        (0.1, 0.2),
-        (1.0, 2.0),
-    )
 
 
 def test_a_picture_and_its_camera_keep_size_and_pixels() -> None:

@@ -8,9 +8,11 @@ driven, so the counted way and turn are held to what the robot's top speeds allo
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 from surveillance_controllers.battery.model import Battery
 from surveillance_controllers.geometry import Pose, angle_between
+from surveillance_runtime.robot_arm import ARM, TrajectoryPoint
 
 LONGEST_AWAY = 86_400.0
 """A longer time between two steps is none, but a jump of the clock, seconds."""
@@ -65,10 +67,15 @@ class BatteryInUse:
             self._radians += min(turn, TOP_TURN * passed)
         self.pose, self._seen_at = pose, now
 
-    def move_arm(self, seconds: float, now: float) -> None:
-        """Take that the arm moves from `now` on, instead of what it did before; seconds."""
+    def move_arm(self, names: Sequence[str], points: Sequence[TrajectoryPoint], now: float) -> None:
+        """Take that the arm follows a trajectory from `now` (seconds) on, instead of what it did
+        before, unless it cannot follow that."""
+        try:
+            ARM.check(names, points)
+        except ValueError:
+            return  # Whoever moves the arm says so.
         self._count_arm(now)
-        self._arm_moves = now, now + min(seconds, LONGEST_MOTION)
+        self._arm_moves = now, now + min(points[-1].time if points else 0.0, LONGEST_MOTION)
 
     def _count_arm(self, now: float) -> None:
         since, until = self._arm_moves

@@ -7,30 +7,11 @@ new trajectory starts from where the arm is at that moment.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
-from surveillance_runtime.robot_arm import Arm, Array
-
-_TOLERANCE = 1e-6
-
-
-@dataclass(frozen=True)
-class TrajectoryPoint:
-    """Where the joints are to be at a time.
-
-    Attributes:
-        time: Seconds from the trajectory's start.
-        positions: Positions in the order of the trajectory's joint names, rad.
-        velocities: Velocities likewise, rad/s; empty when not given.
-    """
-
-    time: float
-    positions: tuple[float, ...]
-    velocities: tuple[float, ...] = ()
+from surveillance_runtime.robot_arm import Arm, Array, TrajectoryPoint
 
 
 class ArmMotion:
@@ -57,10 +38,9 @@ class ArmMotion:
             now: Time of the start, seconds.
 
         Raises:
-            ValueError: A joint is unknown or named twice, a point has the wrong number of
-                values or one that is not finite or beyond a limit, or the times do not rise.
+            ValueError: The arm cannot follow it; see `Arm.check`.
         """
-        self._check(names, points)
+        self._arm.check(names, points)
         start = self.positions(now)
         velocity = self.velocities(now)
         column = [self._arm.names.index(name) for name in names]
@@ -117,33 +97,3 @@ class ArmMotion:
             + (3 * square - 2 * share) * last_speed
         )
         return np.clip(position, self._arm.lower, self._arm.upper), velocity
-
-    def _check(self, names: Sequence[str], points: Sequence[TrajectoryPoint]) -> None:
-        known = self._arm.names
-        for name in names:
-            if name not in known:
-                raise ValueError(f"no joint '{name}': expected {', '.join(known)}")
-        if len(set(names)) != len(names):
-            raise ValueError(f'joint named twice in {", ".join(names)}')
-        reached = -math.inf
-        limits = {joint.name: (joint.lower, joint.upper) for joint in self._arm.joints}
-        for number, point in enumerate(points, start=1):
-            if len(point.positions) != len(names) or len(point.velocities) not in (0, len(names)):
-                raise ValueError(
-                    f'point {number}: {len(point.positions)} positions and '
-                    f'{len(point.velocities)} velocities for {len(names)} joints'
-                )
-            if not all(map(math.isfinite, (point.time, *point.positions, *point.velocities))):
-                raise ValueError(f'point {number}: expected finite numbers')
-            if point.time < 0 or point.time <= reached:
-                raise ValueError(
-                    f'point {number}: time {point.time:g} s: expected more than the point before'
-                )
-            reached = point.time
-            for name, position in zip(names, point.positions, strict=True):
-                lower, upper = limits[name]
-                if not lower - _TOLERANCE <= position <= upper + _TOLERANCE:
-                    raise ValueError(
-                        f'point {number}: {name} at {position:g} rad: '
-                        f'expected {lower:g} to {upper:g}'
-                    )
