@@ -11,8 +11,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any, TextIO
 
-import numpy as np
-
 from surveillance_controllers import conversions, geometry, stimuli
 from surveillance_controllers.controller_parameters import MotionSettings, execution_mode
 from surveillance_controllers.geometry import Points
@@ -159,10 +157,12 @@ def _checked(points: Sequence[Any]) -> Points:
     path = conversions.array_from_points(points)
     if len(path) == 0:
         raise GoalAbortedError('no points, expected at least one')
-    if not np.isfinite(path).all():
-        raise GoalAbortedError('a point is not finite')
-    if np.abs(path).max() > FARTHEST:
-        raise GoalAbortedError(f'a point is farther than {FARTHEST:g} m away')
+    for number, point in enumerate(path.tolist(), start=1):
+        if not all(abs(coordinate) <= FARTHEST for coordinate in point):
+            raise GoalAbortedError(
+                f'point {number} is {commands.point(point)}: '
+                f'expected finite numbers up to {FARTHEST:g} m'
+            )
     return path
 
 

@@ -79,7 +79,7 @@ def test_a_path_that_cannot_be_followed_is_aborted_with_the_reason(
     assert follow(graph, path).status == 'aborted'
     caller = GoalCaller(graph.node, Control, 'motion/controller')
     assert caller.run(Control.Goal(point_set=path), accept_timeout=60.0).status == 'aborted'
-    reason = 'a point is not finite' if path else 'no points, expected at least one'
+    reason = 'point 1 is (inf, 0, 0)' if path else 'no points, expected at least one'
     logged = capfd.readouterr().err
     assert f'follow_path: follow_path: {reason}' not in logged
     assert f'follow_path: {reason}' in logged
