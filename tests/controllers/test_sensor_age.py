@@ -7,11 +7,7 @@ import random
 
 import pytest
 
-from surveillance_controllers.motion.sensor_age import (
-    REACTION,
-    STANDSTILL,
-    SensorAge,
-)
+from surveillance_controllers.motion.sensor_age import LEAD, REACTION, STANDSTILL, SensorAge
 
 DECELERATION = 2.5
 LOOK_PERIOD = 0.01
@@ -31,6 +27,20 @@ def test_a_robot_stands_in_time_after_the_first_missed_message(period: float, sp
         driven = max(allowed, driven - DECELERATION * LOOK_PERIOD)
     # The base obeys up to the reaction later than here.
     assert at + REACTION <= missed + STANDSTILL + LOOK_PERIOD + 1e-9
+
+
+def test_commands_to_brake_that_come_late_do_not_make_the_way_longer() -> None:
+    age = SensorAge(['scan'], DECELERATION)
+    for count in range(30):
+        age.hear('scan', 0.1 * count)
+    at = 2.9 + age.seconds_to_brake(0.6, 2.9)
+    commanded, driven, next_command = 0.6, 0.6, at
+    while driven > 0.0 and at < 9.0:
+        if at >= next_command:
+            commanded, next_command = 0.6 * age.share(0.6, at + LEAD), at + 0.09
+        at += LOOK_PERIOD
+        driven = max(commanded, driven - DECELERATION * LOOK_PERIOD)
+    assert at + REACTION <= 3.0 + STANDSTILL + LOOK_PERIOD + 1e-9
 
 
 @pytest.mark.parametrize('rate', [5.0, 7.0, 10.0])

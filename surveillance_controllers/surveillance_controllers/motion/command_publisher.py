@@ -13,14 +13,11 @@ from geometry_msgs.msg import Twist
 
 from surveillance_controllers import conversions
 from surveillance_controllers.motion.path_following import Velocity
-from surveillance_controllers.motion.sensor_age import STANDSTILL, SensorAge
+from surveillance_controllers.motion.sensor_age import LEAD, STANDSTILL, SensorAge
 from surveillance_runtime.node import PatrolNode
 
 WATCH_PERIOD = 0.01
 """Time between two commands of a robot that is stopped, seconds."""
-LEAD = 0.03
-"""Such a command is for this much later, seconds: a base that waits for a late one loses time that
-it cannot make up, since it brakes as hard as it can."""
 
 
 class CommandPublisher:

@@ -15,6 +15,9 @@ STANDSTILL = 0.3
 """The robot stands this long after the first message that did not come, seconds."""
 REACTION = 0.05
 """Time between a decision and the base's obedience, seconds."""
+LEAD = 0.1
+"""A command to brake is for this much later, seconds: a base that waits for a late one loses time
+that it cannot make up, since it brakes as hard as it can."""
 LONGEST_PERIOD = 0.25
 """A sensor that is slower than this lets the robot drive slowly, or not at all; seconds."""
 _COUNT = 10
