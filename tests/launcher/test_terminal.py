@@ -11,11 +11,16 @@ import struct
 import subprocess
 import sys
 import termios
+import threading
 import time
+from functools import partial
 from pathlib import Path
 
 import pytest
+from geometry_msgs.msg import Point
 
+from surveillance_fsm.ros import GoalCaller
+from surveillance_interfaces.action import ComputePath, FollowPath
 from tests.launcher.conftest import USER_ENVIRON
 
 PROCESS = str(Path(__file__).with_name('mission_process.py'))
@@ -70,13 +75,31 @@ def terminal(tmp_path, ros_domain):
     terminal.close()
 
 
-def test_commands_are_completed_and_ctrl_c_gives_the_terminal_back(terminal):
+def test_a_person_answers_a_mission_and_ctrl_c_gives_the_terminal_back(terminal, graph):
+    def sent(action, name, goal):
+        run = partial(GoalCaller(graph.node, action, name).run, goal, accept_timeout=60.0)
+        ends = []
+        threading.Thread(target=lambda: ends.append(run()), daemon=True).start()
+        return ends
+
     terminal.until(rb'patrol>')
     terminal.until(rb'battery_controller.*MANUAL mode')
     terminal.type('bat\t')
     terminal.until(rb'tery')
     terminal.type(' set 15\r')
     terminal.until(rb'The battery is at 15 %')
+    terminal.until(rb'battery low: 15 %')
+    planned = sent(ComputePath, 'compute_path', ComputePath.Goal(goal=Point(x=3.0)))
+    terminal.until(rb'New request: compute a path')
+    terminal.type('plan set [[1, 2, 0]]\r')
+    graph.until(lambda: planned)
+    path = planned[0].result.path
+    assert [(point.x, point.y) for point in path] == [(0.0, 0.0), (1.0, 2.0), (3.0, 0.0)]
+    moved = sent(FollowPath, 'follow_path', FollowPath.Goal(path=path))
+    terminal.until(rb'New request: follow')
+    terminal.type('move 0.1 0\r')
+    graph.until(lambda: moved)
+    assert moved[0].status == 'succeeded'
     terminal.type('exit planner_controller\r')
     terminal.until(rb'planner_controller has ended by itself')
     terminal.type('\x03')
