@@ -439,10 +439,17 @@ class GoalCaller:
         action_type: The action's type.
         name: The action's name, relative to the node's namespace.
         cancel_timeout: Seconds that a server may take to end a cancelled goal.
+        executor_patience: Seconds without a sign of the node's executor after which it is looked
+            for, and again after which a goal that runs is given up; by default that is left alone.
     """
 
     def __init__(
-        self, node: Node, action_type: Any, name: str, cancel_timeout: float = 2.0
+        self,
+        node: Node,
+        action_type: Any,
+        name: str,
+        cancel_timeout: float = 2.0,
+        executor_patience: float = math.inf,
     ) -> None:
         self._node = node
         self._client = _ActionClient(
@@ -453,12 +460,32 @@ class GoalCaller:
         self._what = f'action {name}'
         results = node.resolve_service_name(f'{name}/_action/get_result')
         self._servers = _Servers(node, results, self.is_ready, self._what)
+        self._executor_patience = executor_patience
+        self._spun = threading.Event()
+        self._spin = node.create_guard_condition(self._spun.set)
         self.name = name
         self.round_trips = RoundTrips()
 
     def is_ready(self) -> bool:
         """Tell whether the server is there now."""
         return bool(self._client.server_is_ready())
+
+    def _look_at_executor(self) -> Callable[[], None]:
+        """Return a look that raises `UnavailableError` once the executor does not spin."""
+        due = time.monotonic() + self._executor_patience
+        self._spun.set()
+
+        def look() -> None:
+            nonlocal due
+            if time.monotonic() < due:
+                return
+            if not self._spun.is_set():
+                raise UnavailableError(f"{self._what}: the node's executor does not spin")
+            self._spun.clear()
+            self._spin.trigger()
+            due = time.monotonic() + self._executor_patience
+
+        return look
 
     def run(
         self,
@@ -481,7 +508,8 @@ class GoalCaller:
             on_feedback: Called with each feedback message, in the executor's thread.
 
         Raises:
-            UnavailableError: No server within the time, or it went away in the middle.
+            UnavailableError: No server within the time, or it went away in the middle, or the
+                executor did.
             CallTimeoutError: No yes or no, or no result, within the time.
             CallInterruptedError: The interrupt was raised; the server was told to cancel and has
                 ended the goal, or had `cancel_timeout` to do so.
@@ -494,7 +522,13 @@ class GoalCaller:
         handle = self._send(goal, deadline, interrupt, on_feedback)
         if not handle.accepted:
             return GoalEnd('rejected', None)
-        running = _RunningGoal(handle, look, self._what)
+        look_at_executor = self._look_at_executor()
+
+        def look_at_both() -> None:
+            look()
+            look_at_executor()
+
+        running = _RunningGoal(handle, look_at_both, self._what)
         try:
             return running.await_end(result_timeout, interrupt)
         except UnavailableError:

@@ -9,8 +9,7 @@ from __future__ import annotations
 import math
 import threading
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 from action_msgs.msg import GoalStatus
@@ -18,7 +17,6 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 
 import surveillance_fsm as fsm
-from surveillance_fsm.clock import Interrupt
 from surveillance_fsm.exceptions import CallError, CallInterruptedError, describe
 from surveillance_fsm.ros.calls import GoalCaller, ServiceCaller
 from surveillance_fsm.ros.exchange import (
@@ -232,9 +230,12 @@ class SimpleActionState(RosState):
         self._exec_timeout = seconds(exec_timeout)
         self._server_wait_timeout = seconds(server_wait_timeout) or 0.0
         self._caller = GoalCaller(
-            node, action_spec, action_name, cancel_timeout=seconds(preempt_timeout) or 0.0
+            node,
+            action_spec,
+            action_name,
+            cancel_timeout=seconds(preempt_timeout) or 0.0,
+            executor_patience=max(1.0, self._server_wait_timeout),
         )
-        self._watchdog = _ExecutorWatchdog(node, max(1.0, self._server_wait_timeout))
 
     def execute(self, ud: Any) -> str:
         """Run the action."""
@@ -242,23 +243,19 @@ class SimpleActionState(RosState):
             return self._preempted()
         try:
             goal = self._goal.make(ud)
-            with self._watchdog.watched(self.interrupt) as interrupt:
-                end = self._caller.run(
-                    goal,
-                    accept_timeout=self._server_wait_timeout,
-                    result_timeout=self._exec_timeout,
-                    interrupt=interrupt,
-                    on_feedback=self._on_feedback(ud),
-                )
+            end = self._caller.run(
+                goal,
+                accept_timeout=self._server_wait_timeout,
+                result_timeout=self._exec_timeout,
+                interrupt=self.interrupt,
+                on_feedback=self._on_feedback(ud),
+            )
             if end.status == 'rejected':
                 fsm.logerr(f"Action '{self._caller.name}': the server rejected the goal")
                 return 'aborted'
             status = getattr(GoalStatus, f'STATUS_{end.status.upper()}')
             outcome = self._result.take(ud, status, end.result)
         except CallInterruptedError:
-            if not self.preempt_requested():
-                fsm.logerr(f"Action '{self._caller.name}': the node's executor does not spin")
-                return 'aborted'
             return self._preempted()
         except (CallError, fsm.InvalidUserCodeError) as error:
             fsm.logerr(f"Action '{self._caller.name}': {error}")
@@ -446,41 +443,3 @@ class ConditionState(RosState):
                     return 'false'
             self._clock.sleep(left, self.interrupt)
         return self._preempted()
-
-
-class _ExecutorWatchdog:
-    """Raises an interrupt when the executor has not spun for a while.
-
-    Args:
-        node: The node.
-        patience: Seconds (steady time) without a sign of it after which it counts as dead.
-    """
-
-    def __init__(self, node: Node, patience: float) -> None:
-        self._patience = patience
-        self._spun = threading.Event()
-        self._guard = node.create_guard_condition(self._spun.set)
-
-    @contextmanager
-    def watched(self, interrupt: Interrupt) -> Iterator[Interrupt]:
-        """Give an interrupt that is raised by `interrupt` or when the executor is dead."""
-        either, done = Interrupt(), threading.Event()
-        remove = interrupt.subscribe(either.set)
-
-        def watch() -> None:
-            while not done.wait(self._patience):
-                self._spun.clear()
-                self._guard.trigger()
-                if not self._spun.wait(self._patience):
-                    if not done.is_set():
-                        either.set()
-                    return
-
-        thread = threading.Thread(target=watch, name='executor watchdog', daemon=True)
-        thread.start()
-        try:
-            yield either
-        finally:
-            done.set()
-            self._spun.set()
-            remove()
