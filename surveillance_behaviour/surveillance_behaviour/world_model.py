@@ -85,7 +85,9 @@ class Experience:
         if self.path is None or not self.path.exists():
             return ''
         try:
-            kept: dict[str, Any] = json.loads(read_file(self.path, _LARGEST))
+            kept: dict[str, Any] = json.loads(
+                read_file(self.path, _LARGEST), parse_float=_finite, parse_constant=_finite
+            )
             self.visits = {str(place): float(at) for place, at in kept['visits'].items()}
             self.leg_times.restore(kept['leg_times'])
             self.draw.restore(kept['draw'])
@@ -270,6 +272,14 @@ class WorldModel:
             self.target = None
         if place == self.experience.requested:
             self.experience.requested = ''
+
+
+def _finite(text: str) -> float:
+    """Return a number of a file; one that is none would make every comparison false in silence."""
+    number = float(text)
+    if not math.isfinite(number):
+        raise ValueError(f'got {text}, expected a finite number')
+    return number
 
 
 def _distance(start: Point, goal: Point) -> float:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import math
 import os
 import threading
 from collections.abc import Callable
@@ -134,7 +136,24 @@ def test_the_shortest_tour_is_looked_for_when_the_map_changes_not_with_each_leg(
     assert warnings == ['too short']
 
 
-@pytest.mark.parametrize('damage', [lambda path: path.write_text('[' * 9_000), os.mkfifo])
+NOT_FINITE = json.dumps(
+    {
+        'visits': {},
+        'leg_times': {'legs': [], 'errors': []},
+        'draw': [math.nan],
+        'sent_to_charge': '',
+    }
+)
+
+
+@pytest.mark.parametrize(
+    'damage',
+    [
+        lambda path: path.write_text('[' * 9_000),
+        lambda path: path.write_text(NOT_FINITE),
+        os.mkfifo,
+    ],
+)
 def test_what_was_learned_and_cannot_be_read_is_said(
     tmp_path: Path, damage: Callable[[Path], object]
 ) -> None:
