@@ -26,7 +26,7 @@ from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.parameters import parameter
 from surveillance_runtime.process import run_node
 from surveillance_runtime.qos import SENSOR_QOS
-from surveillance_runtime.robot_base import ROBOT_DECELERATION, ROBOT_RADIUS
+from surveillance_runtime.robot_base import robot_deceleration, robot_radius
 
 MONITORED = 'cmd_vel_monitored'
 """Topic that the base listens to."""
@@ -40,17 +40,9 @@ LATENCY = 0.15
 class MonitorSettings:
     """What the monitor allows."""
 
-    radius: float = parameter(
-        ROBOT_RADIUS, 'Radius of the robot, m.', 0.01, 20.0, name='robot_radius'
-    )
+    radius: float = robot_radius()
     margin: float = parameter(0.02, 'Kept free beside the robot, m.', 0.0, 20.0)
-    deceleration: float = parameter(
-        ROBOT_DECELERATION,
-        'With which the base brakes when it must, m/s^2.',
-        0.05,
-        20.0,
-        name='robot_deceleration',
-    )
+    deceleration: float = robot_deceleration()
     longest_silence: float = parameter(
         STANDSTILL,
         'The robot stands when scan or cmd_vel is overdue by this, and brakes before, '

@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike
 from surveillance_controllers import geometry
 from surveillance_controllers.geometry import Points, Pose, angle_between
 from surveillance_runtime.parameters import parameter
-from surveillance_runtime.robot_base import ROBOT_DECELERATION, ROBOT_RADIUS
+from surveillance_runtime.robot_base import robot_deceleration, robot_radius
 
 
 @dataclass(frozen=True)
@@ -44,20 +44,12 @@ class DriveParameters:
         latency: Time between seeing and braking, seconds; two periods of the lidar and a half.
     """
 
-    radius: float = parameter(
-        ROBOT_RADIUS, 'Radius of the robot, m.', 0.01, 20.0, name='robot_radius'
-    )
+    radius: float = robot_radius()
     margin: float = parameter(0.04, 'Kept from what the lidar sees, m.', 0.01, 20.0)
     speed: float = parameter(0.6, 'Top speed, m/s.', 0.01, 20.0)
     turn: float = parameter(1.5, 'Top turning speed, rad/s.', 0.01, 20.0)
     acceleration: float = parameter(0.8, 'Acceleration, m/s^2.', 0.01, 20.0)
-    deceleration: float = parameter(
-        ROBOT_DECELERATION,
-        'With which the base brakes when it must, m/s^2.',
-        0.05,
-        20.0,
-        name='robot_deceleration',
-    )
+    deceleration: float = robot_deceleration()
     turn_acceleration: float = parameter(3.0, 'Turning acceleration, rad/s^2.', 0.01, 20.0)
     jerk: float = 4.0
     shortest_look: float = 0.25

@@ -25,7 +25,7 @@ from surveillance_controllers.geometry import Points
 from surveillance_controllers.planning.grid_map import GridMap, distance_to, points_on, with_walls
 from surveillance_controllers.planning.grid_search import Cell, GridSearch
 from surveillance_runtime.parameters import parameter
-from surveillance_runtime.robot_base import ROBOT_RADIUS
+from surveillance_runtime.robot_base import robot_radius
 
 Lines = Mapping[str, tuple[float, float, float, float]]
 """Named segments x1, y1, x2, y2, metres."""
@@ -54,9 +54,7 @@ class PlanningParameters:
         corner: Longest part of a straight line that rounding a corner may take, metres.
     """
 
-    radius: float = parameter(
-        ROBOT_RADIUS, 'Radius of the robot, m.', 0.0, 20.0, name='robot_radius'
-    )
+    radius: float = robot_radius()
     margin: float = parameter(0.05, 'Kept beyond the radius, m.', 0.0, 20.0)
     comfort: float = parameter(0.5, 'Room that a path prefers, m.', 0.0, 20.0)
     aversion: float = parameter(3.0, 'How much more a path near obstacles costs.', 0.0, 20.0)

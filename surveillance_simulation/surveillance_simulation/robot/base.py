@@ -15,7 +15,7 @@ import numpy as np
 
 from surveillance_runtime.parameters import parameter
 from surveillance_runtime.place.floor_plan import Pose
-from surveillance_runtime.robot_base import ROBOT_DECELERATION, ROBOT_RADIUS
+from surveillance_runtime.robot_base import robot_deceleration, robot_radius
 from surveillance_simulation.world.world import World
 
 _CONTACT = 1e-3
@@ -33,19 +33,11 @@ class BaseModel:
         speed: Greatest forward and backward speed, m/s.
     """
 
-    radius: float = parameter(
-        ROBOT_RADIUS, 'Radius of the robot, metres.', 0.01, 20.0, name='robot_radius'
-    )
+    radius: float = robot_radius()
     speed: float = parameter(0.6, 'Greatest speed, m/s.', 0.01, 20.0)
     turn_speed: float = parameter(1.5, 'Greatest turn speed, rad/s.', 0.01, 20.0)
     acceleration: float = parameter(1.0, 'Greatest acceleration, m/s^2.', 0.01, 20.0)
-    deceleration: float = parameter(
-        ROBOT_DECELERATION,
-        'With which the base brakes when it must, m/s^2.',
-        0.05,
-        20.0,
-        name='robot_deceleration',
-    )
+    deceleration: float = robot_deceleration()
     turn_acceleration: float = parameter(4.0, 'Greatest turning acceleration, rad/s^2.', 0.01, 20.0)
     command_timeout: float = parameter(
         0.5, 'Seconds without a command after which the base stops.', 0.01, 20.0
