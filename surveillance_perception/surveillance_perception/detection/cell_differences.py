@@ -17,7 +17,7 @@ Gestalt Theory to Image Analysis", 2008).
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -27,6 +27,8 @@ from surveillance_perception.detection.dictionaries import MarkerCodes
 from surveillance_perception.detection.image_sampling import Array, Patches
 
 Indices = npt.NDArray[np.int64]
+Reals = npt.NDArray[np.floating[Any]]
+"""Of single precision; numpy's own types say so for some operations only."""
 
 _SATURATED = 252.0
 _LEAST_STEP = 20.0
@@ -48,7 +50,7 @@ class CellReadings(NamedTuple):
     """
 
     entries: Indices
-    correlation: Patches
+    correlation: Reals
     lead: Patches
     error: Array
 
@@ -102,7 +104,7 @@ class CellDifferences:
         inner = better[:, 1:-1, 1:-1].sum(axis=(1, 2))
         return inner, better.sum(axis=(1, 2)) - inner
 
-    def _flipped(self, seen: Patches, room: Patches, entries: Indices) -> tuple[Patches, Patches]:
+    def _flipped(self, seen: Patches, room: Patches, entries: Indices) -> tuple[Reals, Reals]:
         """Return correlations (m, 1) with codes, and (m, cells) with one cell of them flipped."""
         expected, white = room * self._codes[entries], self._white[entries]
         sign = 1.0 - 2.0 * white.reshape(len(white), -1)
