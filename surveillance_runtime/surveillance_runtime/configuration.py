@@ -43,9 +43,12 @@ SCHEMA = Path(__file__).with_name('parameter_schema.json')
 PLACE_TABLES = ('map', 'room_positions', 'walls', 'doors', 'markers')
 _PLACE = frozenset((*PLACE_KEYS, *GEOMETRY_KEYS))
 _TYPES = {'bool': bool, 'int': int, 'float': float, 'str': str}
-_OWN = {  # every rclpy node has these
-    'use_sim_time': ParameterSpec('use_sim_time', False),
-    'start_type_description_service': ParameterSpec('start_type_description_service', False),
+_OWN = {  # every rclpy node has these; a clock that changes makes all times that were taken wrong
+    name: ParameterSpec(name, False, text, read_only=True)
+    for name, text in (
+        ('use_sim_time', 'Whether the time is that of the topic /clock.'),
+        ('start_type_description_service', 'Whether ~/get_type_description is served.'),
+    )
 }
 _ORIGIN = re.compile(r'#@ (.+)$')
 _ASSIGNMENT = re.compile(r'(?:(?P<node>[^:=]+):)?(?P<name>[^:=]+):=(?P<value>.*)\Z', re.DOTALL)

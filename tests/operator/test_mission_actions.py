@@ -139,6 +139,7 @@ def test_any_parameter_of_a_running_node_is_looked_at_and_set(
         ('param set reasoner robot_sped 2', "no parameter robot_sped: expected 'robot_speed'"),
         ('param list resoner', "there is no node resoner: expected 'reasoner'"),
         ('param set reasoner random_seed 7', 'read once, when reasoner starts: give it there, as'),
+        ('param set reasoner use_sim_time true', 'use_sim_time is read once, when reasoner'),
         ('param set reasoner robot_speed [', 'the value is not valid YAML'),
     ):
         assert words in said(line)

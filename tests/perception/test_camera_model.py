@@ -40,7 +40,7 @@ def test_distortion_that_cannot_be_taken_back_gives_no_rays():
 
 @pytest.mark.parametrize(('model', 'numbers'), MODELS.items())
 def test_zeros_beyond_the_coefficients_of_a_model_say_nothing(model, numbers):
-    # ros_gz sends five and depthai eight or fourteen numbers for equidistant as for the others
+    # ros_gz copies as many numbers as come, whatever the model
     padded = np.array([*numbers, *[0.0] * (20 - len(numbers))])
     camera = CameraModel(640, 480, K, padded, model)
     expected = CameraModel(640, 480, K, np.array(numbers), model)
