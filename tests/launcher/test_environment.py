@@ -77,7 +77,7 @@ def checkout(tmp_path_factory):
     interfaces.mkdir()
     (interfaces / 'pyproject.toml').write_text(BUILD)
     (interfaces / 'backend.py').write_text(BACKEND)
-    (interfaces / 'source.py').write_text('VALUE = 1\n')
+    (interfaces / 'source.py').write_text('VALUE = 0\n')
     return folder
 
 
@@ -104,6 +104,7 @@ def value(checkout: Path) -> str:
 
 def test_a_set_up_from_nothing_to_an_edit(checkout, start):
     # A build that fails says why in one line, and the environment is not taken as finished.
+    (checkout / INTERFACES / 'source.py').write_text('VALUE = 1\n')
     failed = prepare(checkout, FAIL_BUILD='1')
     assert failed.returncode == 1
     assert failed.stderr.count('\n') == 1

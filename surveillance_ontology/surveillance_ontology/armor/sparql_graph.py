@@ -160,8 +160,13 @@ class GraphChanges:
             return None
         touched = dict.fromkeys(fact for at, fact in log.touched if at > known.sequence)
         before = hierarchy = log.hierarchy
-        ordered = now.classified != known.classified
-        if now.derived and (ordered or any(isinstance(fact, SubClassOf) for fact in touched)):
+        ordered = now.classified != known.classified or any(
+            isinstance(fact, SubClassOf)
+            # A class that assertions alone name is below owl:Thing as long as they do.
+            or (isinstance(fact, ClassAssertion) and not ref.kb.superclasses(str(fact.cls)))
+            for fact in touched
+        )
+        if now.derived and ordered:
             since = log.hierarchy_since
             if known.sequence < since[0] or known.classified < since[1]:
                 return None

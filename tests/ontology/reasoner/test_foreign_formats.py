@@ -56,7 +56,7 @@ def test_axioms_are_read_with_exact_datatypes(text, form):
         (OWL_XML.replace('IRI="#LOCATION"', ''), 5, 'Class lacks its attribute IRI'),
         (OWL_XML.replace('<Decl', '<x xmlns="http://x/"/><Decl', 1), 3, 'is not of OWL/XML'),
         (TURTLE.replace('"5"', ';;'), 7, 'not Turtle'),
-        ('@prefix : <a\nb> .\n', 1, 'not Turtle: Invalid IRI'),
+        ('@prefix : <a\nb .\n', 1, 'not Turtle: Unexpected end of file'),
     ],
 )
 def test_broken_document_names_its_place(text, line, complaint, capfd):
