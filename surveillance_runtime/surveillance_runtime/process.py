@@ -80,7 +80,7 @@ def run_nodes(
 def _run_nodes(factories: Sequence[Callable[[], PatrolNode]], args: Sequence[str] | None) -> int:
     use_one_thread_for_matrices()
     prefer_quick_discovery()
-    # Where ROS finds its code generator it loads it with a parser, which takes a sixth of a start.
+    # Where ROS finds its code generator it loads it with a parser: 0.02 to 0.09 s of CPU a process.
     sys.modules.setdefault('rosidl_generator_py.generate_py_impl', None)  # type: ignore[arg-type]
     # A client that was killed, or is not fully discovered, gets no answer and asks again.
     warnings.filterwarnings('ignore', 'failed to send response', RuntimeWarning)
