@@ -426,6 +426,21 @@ def test_a_goal_that_runs_for_hours_is_asked_for_its_result_a_few_times(monkeypa
     assert len(asked) - before >= 3, 'the server forgets its result soon'
 
 
+def test_a_result_is_asked_for_steadily_where_no_status_comes(monkeypatch):
+    now, asked = [0.0], []
+    monkeypatch.setattr(calls, 'time', SimpleNamespace(monotonic=lambda: now[0]))
+    handle = SimpleNamespace(
+        status=GoalStatus.STATUS_UNKNOWN,
+        get_result_async=lambda: asked.append(now[0]) or Future(),
+    )
+    goal = calls._RunningGoal(handle, lambda: None, 'action')
+    for _ in range(600):
+        now[0] += 1.0
+        goal._look()
+    gaps = [later - earlier for earlier, later in zip(asked, asked[1:], strict=False)]
+    assert max(gaps) <= calls.RESULT_PERIOD + 1.0
+
+
 def test_a_cancel_that_is_lost_is_sent_again(graph, monkeypatch):
     monkeypatch.setattr(calls, 'CANCEL_PERIOD', 0.1)
     server = graph.add(ScriptedActionServer)

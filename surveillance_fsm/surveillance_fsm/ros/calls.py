@@ -629,7 +629,8 @@ class _RunningGoal:
             self._said_to_end, self._period = True, RESULT_PERIOD
             self._asked = time.monotonic()
         if time.monotonic() > self._asked + (CANCEL_PERIOD if self._cancelling else self._period):
-            if not self._said_to_end:
+            # Of a goal whose status never came, no end will be told, either.
+            if not self._said_to_end and self._handle.status != GoalStatus.STATUS_UNKNOWN:
                 self._period = min(2.0 * self._period, LONGEST_RESULT_PERIOD)
             self._ask()
 
