@@ -230,6 +230,27 @@ def test_smachs_topics_tell_structure_and_status_of_each_container(graph, watche
     assert run.result() == 'preempted'
 
 
+def test_a_container_that_begins_after_the_transition_to_it_was_told_is_told_of(graph, watched):
+    root, waiter = watched
+    states = graph.listen(SmachContainerStatus, 'robot/smach/container_status', LATCHED)
+    gate = threading.Event()
+    # Called before the container begins: the transition is told with a container that is idle.
+    root.register_transition_cb(lambda *_: gate.wait(60.0))
+    run = Background(root)
+    try:
+        graph.until(
+            lambda: any(each.path == '/PATROL/INNER' and '->' in each.info for each in states)
+        )
+    finally:
+        gate.set()
+    began(waiter)
+    graph.until(
+        lambda: states[-1].path == '/PATROL/INNER' and list(states[-1].active_states) == ['WAIT']
+    )
+    root.request_preempt()
+    assert run.result() == 'preempted'
+
+
 def test_a_client_finds_servers_and_sets_where_a_container_begins(graph, watched):
     root, waiter = watched
     client = IntrospectionClient(graph.node)

@@ -90,6 +90,8 @@ class IntrospectionServer:
         self._feed: TransitionFeed | None = None
         self._sequence = 0
         self._containers: dict[str, Structure] = {}
+        # Two threads tell of a container that begins: the newer message goes out last.
+        self._smach_turn = threading.Lock()
 
         def publisher(kind: Any, name: str, depth: int) -> Any:
             return node.create_publisher(kind, name, _latched(depth))
@@ -128,6 +130,9 @@ class IntrospectionServer:
         self._publish_smach(self._containers.values(), 'initial state')
         self._feed = TransitionFeed(self._root, self._publish)
         self._root.register_start_cb(self._changed)
+        for each in self._containers.values():
+            # The transition to a container is published when that may not have begun.
+            each.container.register_start_cb(self._started, [each])
         self._root.register_termination_cb(self._changed)
         self._publish_status()
 
@@ -158,8 +163,13 @@ class IntrospectionServer:
         self._status.publish(status_message(self._root, self._sequence, self._stamp()))
 
     def _publish_smach(self, containers: Iterable[Structure], info: str) -> None:
-        for message in smach_status_messages(containers, info, self._stamp()):
-            self._smach_status.publish(message)
+        with self._smach_turn:
+            for message in smach_status_messages(containers, info, self._stamp()):
+                self._smach_status.publish(message)
+
+    def _started(self, _userdata: Any, _labels: Any, place: Structure) -> None:
+        if self._feed is not None:
+            self._publish_smach((place,), 'started')
 
     def _changed(self, *_: Any) -> None:
         if self._feed is not None:
