@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import threading
 import time
 from types import SimpleNamespace
@@ -437,7 +438,7 @@ def test_a_result_is_asked_for_steadily_where_no_status_comes(monkeypatch):
     for _ in range(600):
         now[0] += 1.0
         goal._look()
-    gaps = [later - earlier for earlier, later in zip(asked, asked[1:], strict=False)]
+    gaps = [later - earlier for earlier, later in itertools.pairwise(asked)]
     assert max(gaps) <= calls.RESULT_PERIOD + 1.0
 
 
