@@ -23,6 +23,9 @@ _KINDS = {
     stat.S_IFSOCK: 'a socket',
 }
 
+_DRAFT = '.draft'
+"""Ends the name of a file that is being written; nobody else's hidden file ends so."""
+
 
 def read_file(path: str | Path, most: int) -> bytes:
     """Return what a file holds.
@@ -81,7 +84,7 @@ def replace_file(
     """
     target = file_to_write(path)
     _remove_abandoned(target)
-    draft = target.with_name(f'.{target.name}.{secrets.token_hex(4)}')
+    draft = target.with_name(f'{_drafts(target)}{secrets.token_hex(4)}{_DRAFT}')
     try:
         # Not by tempfile: to give its file the usual rights, all threads' umask would change.
         handle = os.open(draft, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o666)
@@ -103,10 +106,17 @@ def replace_file(
 
 def _remove_abandoned(target: Path) -> None:
     """Remove drafts of a file whose writers were killed: each has a name of its own."""
-    with suppress(OSError):
-        for draft in target.parent.glob(f'.{glob.escape(target.name)}.{"[0-9a-f]" * 8}'):
-            if time.time() - draft.stat().st_mtime > ABANDONED:
+    names = f'{glob.escape(_drafts(target))}{"[0-9a-f]" * 8}{_DRAFT}'
+    for draft in target.parent.glob(names):
+        with suppress(OSError):
+            found = draft.lstat()
+            if stat.S_ISREG(found.st_mode) and time.time() - found.st_mtime > ABANDONED:
                 draft.unlink()
+
+
+def _drafts(target: Path) -> str:
+    """Return what the names of a file's drafts begin with; most file systems take 255 bytes."""
+    return f'.{os.fsdecode(os.fsencode(target.name)[:200])}.'
 
 
 def _sync_folder(folder: Path) -> None:

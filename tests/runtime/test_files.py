@@ -29,16 +29,34 @@ def test_what_is_no_file_is_neither_read_nor_replaced(tmp_path: Path, kind: str)
 
 
 def test_drafts_of_killed_writers_do_not_add_up(tmp_path: Path) -> None:
-    old, new, other, own = (
+    old, new, other, backup, folder, link = (
         tmp_path / name
-        for name in ('.[a].0123abcd', '.[a].4567cdef', '.[b].0123abcd', '.[a].notes.txt')
+        for name in (
+            '.[a].0123abcd.draft',
+            '.[a].4567cdef.draft',
+            '.[b].0123abcd.draft',
+            '.[a].20260101',
+            '.[a].aaaaaaaa.draft',
+            '.[a].ffffffff.draft',
+        )
     )
-    for path in (old, new, other, own):
+    folder.mkdir()
+    link.symlink_to(other)
+    for path in (old, new, other, backup):
         path.touch()
-    for path in (old, other, own):
+    for path in (old, other, backup, folder):
         os.utime(path, (0, 0))
     replace_text(tmp_path / '[a]', 'new')
-    assert {*tmp_path.iterdir()} == {tmp_path / '[a]', new, other, own}
+    assert {*tmp_path.iterdir()} == {tmp_path / '[a]', new, other, backup, folder, link}
+
+
+@pytest.mark.parametrize('name', ['a' * 255, 'ä' * 127])
+def test_a_file_of_the_longest_name_is_replaced(tmp_path: Path, name: str) -> None:
+    path = tmp_path / name
+    path.touch()
+    replace_text(path, 'new')
+    assert path.read_text() == 'new'
+    assert [*tmp_path.iterdir()] == [path]
 
 
 def test_a_file_is_read_up_to_a_bound(tmp_path: Path) -> None:
