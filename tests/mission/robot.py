@@ -11,6 +11,7 @@ import pytest
 import yaml
 from rclpy.parameter import Parameter
 
+from surveillance_behaviour.charging import BatteryMonitor
 from surveillance_behaviour.initial_state_node import InitialState
 from surveillance_behaviour.mission.mission_log import Event, Summary, read, summarize
 from surveillance_behaviour.reasoner_node import Reasoner
@@ -81,6 +82,7 @@ class Robot:
         self.record = record
         self._running = False
         self.nodes: dict[str, Any] = {}
+        self.heard_of_battery: dict[BatteryMonitor, tuple[float | None, bool]] = {}
         self._parameters: dict[str, dict[str, Any]] = {
             'armor_server': {},
             'ontology_map_builder': {'armor_timeout': PATIENCE, **place_parameters()},
@@ -145,7 +147,10 @@ class Robot:
     def until(self, seconds: float, timeout: float = 300.0) -> None:
         """Run the mission until ``seconds`` after its start."""
         end = START + seconds
-        self._graph.until(lambda: self.time.error or self.time.now >= end, timeout)
+        try:
+            self._graph.until(lambda: self.time.error or self.time.now >= end, timeout)
+        except AssertionError as error:
+            raise AssertionError(f'{error}: {self.time.standing()}') from None
         assert self.time.error is None, repr(self.time.error)
 
     def summary(self) -> Summary:
@@ -157,12 +162,11 @@ class Robot:
         return read(self.record)
 
     def battery_is_heard(self) -> bool:
-        """Whether the behaviour knows what the battery said last, or one of them is away."""
+        """Whether all in the behaviour were told what the battery said last, or one is away."""
         battery, behavior = map(self.nodes.get, ('battery_controller', 'robot_behavior'))
         if battery is None or behavior is None:
             return True
-        heard = behavior.mission.battery
-        return (heard.level, heard.low) == battery._said
+        return self.heard_of_battery.get(behavior.mission.battery) == battery._said
 
     def set_parameter(self, node: Any, name: str, value: Any) -> str:
         """Set a parameter at run time; why that was refused, empty: it was not."""
@@ -191,5 +195,13 @@ def mission(graph: Any, patch: pytest.MonkeyPatch, behaviour: str, record: Path)
     """Provide a robot whose time stops when the block ends."""
     with simulated_time(graph, patch) as time:
         robot = Robot(graph, time, behaviour, record)
+        tell = BatteryMonitor._tell
+
+        def told(monitor: BatteryMonitor) -> None:
+            heard = monitor.level, monitor.low
+            tell(monitor)
+            robot.heard_of_battery[monitor] = heard
+
+        patch.setattr(BatteryMonitor, '_tell', told)
         time.follow(lambda: list(robot.nodes.values()), robot.battery_is_heard)
         yield robot

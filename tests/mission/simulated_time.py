@@ -13,11 +13,12 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, NamedTuple
 
 import pytest
 from rosgraph_msgs.msg import Clock
 
+from surveillance_fsm.clock import Interrupt
 from surveillance_fsm.ros import ClockWait
 
 CARRIES_ON = ('surveillance', 'patrol', 'machine', ' goal', '_recharge')
@@ -27,8 +28,16 @@ STEP = 0.5
 """Time passes in steps of at least this many seconds; sleeps may last that much longer."""
 MOMENT = 1e-6
 """Sleeps shorter than this wait for nothing that time would bring, seconds."""
+PATIENCE = 60.0
+"""How long a node may take to follow the clock, and a sleeper to wake up, seconds of real time."""
 START = 1.0
 """The first moment, seconds; at 0 nothing has a time yet."""
+
+
+class _Sleeper(NamedTuple):
+    name: str
+    deadline: float
+    interrupt: Interrupt
 
 
 class SimulatedTime:
@@ -36,7 +45,7 @@ class SimulatedTime:
 
     Attributes:
         now: The present moment, seconds.
-        error: What an action raised; time has ended then.
+        error: What an action raised, or who does not follow the clock; time has ended then.
         unattended: Nobody carries a mission on at present; time passes all the same.
     """
 
@@ -44,7 +53,7 @@ class SimulatedTime:
         self._nodes: Callable[[], list[Any]] = list
         self._topic = graph.node.create_publisher(Clock, '/clock', 10)
         self._condition = threading.Condition()
-        self._sleepers: dict[int, tuple[float, str]] = {}
+        self._sleepers: dict[int, _Sleeper] = {}
         self._at_work: set[threading.Thread] = set()
         self._all_heard: Callable[[], bool] = lambda: True
         self._ended = False
@@ -83,11 +92,19 @@ class SimulatedTime:
             self.alarms.append((START + seconds, action))
             self.alarms.sort(key=lambda alarm: alarm[0])
 
-    def fell_asleep(self, deadline: float) -> None:
-        """Have the calling thread sleep until ``deadline``."""
+    def standing(self) -> str:
+        """Say whom time waits for."""
+        with self._condition:
+            asleep = [f'{one.name} until {one.deadline:g}' for one in self._sleepers.values()]
+            at_work = [thread.name for thread in self._at_work if thread.is_alive()]
+        heard = 'all is heard' if self._all_heard() else 'not all is heard'
+        return f'it is {self.now:g}; asleep: {asleep}; at work: {at_work}; {heard}'
+
+    def fell_asleep(self, deadline: float, interrupt: Interrupt) -> None:
+        """Have the calling thread sleep until ``deadline``, or until it is interrupted."""
         thread = threading.current_thread()
         with self._condition:
-            self._sleepers[threading.get_ident()] = (deadline, thread.name)
+            self._sleepers[threading.get_ident()] = _Sleeper(thread.name, deadline, interrupt)
             self._at_work.discard(thread)
             self._condition.notify_all()
 
@@ -102,13 +119,19 @@ class SimulatedTime:
             self._condition.notify_all()
 
     def _run(self) -> None:
+        try:
+            self._pass()
+        except BaseException as error:
+            self.error = error
+
+    def _pass(self) -> None:
         while True:
             with self._condition:
                 while not (self._ended or self._all_wait()):
                     self._condition.wait(0.01)  # no word of a thread's end, or of a message
                 if self._ended:
                     return
-                due = min(deadline for deadline, _ in self._sleepers.values())
+                due = min(one.deadline for one in self._sleepers.values())
                 due = max(due, self.now + STEP)
                 action = None
                 if self.alarms and self.alarms[0][0] <= due:
@@ -116,32 +139,32 @@ class SimulatedTime:
             self.now = max(self.now, due)
             self._publish()
             if action is not None:
-                try:
-                    action()
-                except BaseException as error:
-                    self.error = error
-                    raise
+                action()
             with self._condition:
-                self._condition.wait_for(lambda: self._ended or not self._overdue(), timeout=60.0)
+                awake = self._condition.wait_for(
+                    lambda: self._ended or not self._overdue(), PATIENCE
+                )
+            assert awake, f'a sleeper does not wake up: {self.standing()}'
 
     def _all_wait(self) -> bool:
         if any(thread.is_alive() for thread in self._at_work):
             return False
         if not self._all_heard():
             return False
-        if self.unattended:
-            return bool(self._sleepers)
-        return any(name.endswith(CARRIES_ON) for _, name in self._sleepers.values())
+        asleep = self._sleepers.values()
+        if any(one.interrupt.is_set() for one in asleep):
+            # It has only not noticed yet that it is to go on.
+            return False
+        return any(self.unattended or one.name.endswith(CARRIES_ON) for one in asleep)
 
     def _overdue(self) -> bool:
-        return any(deadline <= self.now + 1e-9 for deadline, _ in self._sleepers.values())
+        return any(one.deadline <= self.now + 1e-9 for one in self._sleepers.values())
 
     def _publish(self) -> None:
         message = Clock()
-        message.clock.sec = int(self.now)
-        message.clock.nanosec = round((self.now - int(self.now)) * 1e9) % 10**9
-        nanoseconds = message.clock.sec * 10**9 + message.clock.nanosec
-        late = time.monotonic() + 60.0
+        nanoseconds = round(self.now * 1e9)
+        message.clock.sec, message.clock.nanosec = divmod(nanoseconds, 10**9)
+        late = time.monotonic() + PATIENCE
         self._topic.publish(message)
         told = time.monotonic()
         while any(node.get_clock().now().nanoseconds < nanoseconds for node in self._nodes()):
@@ -151,6 +174,22 @@ class SimulatedTime:
                 self._topic.publish(message)
                 told = time.monotonic()
             threading.Event().wait(0.001)
+
+
+class _ToldOf:
+    """An interrupt by which a sleep tells that it has fixed when it ends.
+
+    Time that moved between the telling and the fixing would let the sleep last longer than told.
+    """
+
+    def __init__(self, interrupt: Interrupt, asleep: Callable[[], None]) -> None:
+        self._interrupt = interrupt
+        self._asleep = asleep
+        self.is_set = interrupt.is_set
+
+    def subscribe(self, callback: Callable[[], None]) -> Callable[[], None]:
+        self._asleep()
+        return self._interrupt.subscribe(callback)
 
 
 @contextmanager
@@ -163,10 +202,11 @@ def simulated_time(graph: Any, monkeypatch: pytest.MonkeyPatch) -> Iterator[Simu
         if seconds < MOMENT:
             # It only waits for time to begin.
             return sleep(self, seconds, interrupt)
-        driver.fell_asleep(self.now() + seconds)
+        ended_by = interrupt or Interrupt()
+        told = _ToldOf(ended_by, lambda: driver.fell_asleep(self.now() + seconds, ended_by))
         in_time = False
         try:
-            in_time = sleep(self, seconds, interrupt)
+            in_time = sleep(self, seconds, told)
             return in_time
         finally:
             driver.woke_up(in_time=in_time)
