@@ -7,8 +7,10 @@ first reasoning) goes to a worker thread, so that other clients are not kept wai
 from __future__ import annotations
 
 import sys
+import threading
 import time
-from collections import deque
+from collections import Counter, deque
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -16,7 +18,9 @@ from typing import Any
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.clock import Clock, ClockType
 from rclpy.event_handler import PublisherEventCallbacks
+from rclpy.task import Future
 
+from surveillance_fsm.ros.waiting import reported
 from surveillance_interfaces.msg import ArmorDirectiveRes, FactChanges
 from surveillance_interfaces.srv import ArmorDirective, ArmorDirectiveList
 from surveillance_ontology.armor.access import Settings, state_folder
@@ -43,28 +47,29 @@ MOST_WAITING = 5000
 """Requests that are taken and wait; further ones wait in the middleware."""
 WORKERS = 4
 """Threads for directives that may take long, as many for `LONG_QUERIES`, as many for documents."""
+QUERIES = 2
+"""Long queries of one ontology at a time."""
 LONG_QUERIES = ('SPARQL', 'AT', 'EXPLAIN')
 DOCUMENTS = ('LOAD', 'SAVE')
 
 
 class _Backlog:
-    """Requests that wait, taken in turn from each client that has some."""
+    """What waits, taken in turn from each client that has some."""
 
     def __init__(self) -> None:
-        self._clients: dict[str, deque[tuple[Any, Any]]] = {}
+        self._clients: dict[str, deque[Any]] = {}
         self._count = 0
 
     def __len__(self) -> int:
         return self._count
 
-    def put(self, request: Any, header: Any) -> None:
-        """Add a request with what its answer needs."""
-        name = request.armor_request.client_name
-        self._clients.setdefault(name, deque()).append((request, header))
+    def put(self, client: str, item: Any) -> None:
+        """Add what a client wants."""
+        self._clients.setdefault(client, deque()).append(item)
         self._count += 1
 
-    def take(self) -> tuple[Any, Any]:
-        """Take the oldest request of the client whose turn it is."""
+    def take(self) -> Any:
+        """Take the oldest item of the client whose turn it is."""
         name = next(iter(self._clients))
         waiting = self._clients.pop(name)
         taken = waiting.popleft()
@@ -72,6 +77,55 @@ class _Backlog:
             self._clients[name] = waiting
         self._count -= 1
         return taken
+
+
+class _Workers:
+    """Threads for directives that may take long, taken in turn from each client.
+
+    An ontology that is used for long keeps some of the threads waiting for it, the others go on.
+
+    Args:
+        node: The node whose callbacks await the results.
+        each: How many directives of one ontology run at a time.
+    """
+
+    def __init__(self, node: PatrolNode, each: int = 1) -> None:
+        self._node = node
+        self._each = each
+        self._threads = AwaitedWork(node, WORKERS)
+        self._lock = threading.Lock()
+        self._waiting: dict[str, _Backlog] = {}
+        self._running: Counter[str] = Counter()
+
+    def run(self, name: str, client: str, work: Callable[[], Any]) -> Future:
+        """Have work done on an ontology; its result is to be awaited."""
+        future, report = reported(self._node, work)
+        with self._lock:
+            self._waiting.setdefault(name, _Backlog()).put(client, report)
+            more = self._running[name] < self._each
+            self._running[name] += more
+        if more:
+            self._threads.put(partial(self._next, name))
+        return future
+
+    def stop(self) -> None:
+        """Let the threads end once they are done with what they do."""
+        self._threads.stop()
+
+    def _next(self, name: str) -> None:
+        waiting = self._waiting[name]
+        with self._lock:
+            report = waiting.take() if waiting else None
+        if report is not None:
+            report()
+        with self._lock:
+            if not waiting:
+                self._running[name] -= 1
+                if not self._running[name]:
+                    del self._waiting[name], self._running[name]
+                return
+        # Behind what waits for other ontologies.
+        self._threads.put(partial(self._next, name))
 
 
 class ArmorServer(PatrolNode):
@@ -98,9 +152,8 @@ class ArmorServer(PatrolNode):
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._pause = self.create_timer(PUBLISH_DELAY, self._on_pause, clock=steady)
         self._pause.cancel()
-        self._work = AwaitedWork(self, WORKERS)
-        self._queries = AwaitedWork(self, WORKERS)
-        self._documents = AwaitedWork(self, WORKERS)
+        self._work, self._documents = _Workers(self), _Workers(self)
+        self._queries = _Workers(self, QUERIES)
         group = ReentrantCallbackGroup()
         self._backlog = _Backlog()
         self._single = self.create_service(
@@ -141,7 +194,7 @@ class ArmorServer(PatrolNode):
                 request, header = self._single.handle.service_take_request(ArmorDirective.Request)
             if header is None:
                 break
-            self._backlog.put(request, header)
+            self._backlog.put(request.armor_request.client_name, (request, header))
         if idle and self._backlog:
             self.executor.create_task(self._answer_backlog)
 
@@ -171,11 +224,15 @@ class ArmorServer(PatrolNode):
         answer = self._service.execute_at_once(directive)
         if answer is None:
             work = self._workers(directive)
-            answer = await work.run(lambda: self._service.execute(directive))
+            answer = await work.run(
+                directive.reference_name,
+                directive.client_name,
+                lambda: self._service.execute(directive),
+            )
         fill_response(response.armor_response, answer)
         return response
 
-    def _workers(self, directive: DirectiveRequest) -> AwaitedWork:
+    def _workers(self, directive: DirectiveRequest) -> _Workers:
         """Return whose turn it is: what takes long must not keep changes and REASON waiting."""
         if directive.command.upper() in DOCUMENTS:
             return self._documents
@@ -183,7 +240,9 @@ class ArmorServer(PatrolNode):
 
     async def _on_list(self, request: Any, response: Any) -> Any:
         directives = [request_from_ros(msg) for msg in request.armor_requests]
-        answer = await self._work.run(lambda: self._service.execute_list(directives))
+        names = ' '.join(sorted({directive.reference_name for directive in directives}))
+        client = directives[0].client_name if directives else ''
+        answer = await self._work.run(names, client, lambda: self._service.execute_list(directives))
         response.success = answer.success
         response.is_consistent = answer.is_consistent
         rows = [fill_response(ArmorDirectiveRes(), row) for row in answer.responses]

@@ -17,7 +17,6 @@ import time
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
-from itertools import combinations
 from typing import Any, TypeAlias
 
 from surveillance_ontology.memory import uncollected
@@ -32,7 +31,6 @@ from surveillance_ontology.owl.axioms import (
     DifferentIndividuals,
     EquivalentClasses,
     ObjectPropertyAssertion,
-    Rule,
     SameIndividual,
     SubClassOf,
 )
@@ -194,10 +192,9 @@ def justify(
 def follows(axioms: Iterable[Axiom], goal: Axiom | None) -> bool:
     """Tell whether a fact, or with None a contradiction, follows from axioms."""
     axioms = list(axioms)
-    if not any(isinstance(axiom, Rule) for axiom in axioms):
-        found = entails(axioms, goal)
-        if found is not None:
-            return found
+    found = entails(axioms, goal)
+    if found is not None:
+        return found
     # What follows for everything follows for an individual that no axiom names.
     asked = () if goal is None else entities_of(goal)
     kb = KnowledgeBase('', [*axioms, *(Declaration(kind, name) for kind, name in asked)])
@@ -450,9 +447,17 @@ class KnowledgeBase:
         """Named classes in the hierarchy, and those that only individuals are said to be of."""
         assert self._classification is not None
         found = set(self._classification.classes())
-        for axiom in self._told.axioms:
-            if isinstance(axiom, ClassAssertion) and isinstance(axiom.cls, str):
-                found.add(axiom.cls)
+        # The engine knows every class that was asserted when it last reasoned.
+        named = {*(self._engine.program.classes if self._engine else ())}
+        named.update(
+            a.cls
+            for a in self._told.added
+            if isinstance(a, ClassAssertion) and isinstance(a.cls, str)
+        )
+        for name in named - found:
+            about = self._told.mentioning(name)
+            if any(isinstance(a, ClassAssertion) and a.cls == name for a in about):
+                found.add(name)
         for axiom in self._told.complex:
             found.update(name for kind, name in entities_of(axiom) if kind == 'class')
         return found - {NOTHING}
@@ -598,16 +603,8 @@ class KnowledgeBase:
         if engine.understands(fact) and engine.holds(fact):
             return True
         if isinstance(fact, DifferentIndividuals) and self._completion is not None:
-            apart = self._completion.entails(self._told.axioms, fact)
-            return apart or self._rules_part(fact)
+            return self._completion.entails(self._told.axioms, fact)
         return False
-
-    def _rules_part(self, fact: DifferentIndividuals) -> bool:
-        """Tell whether rules, which take no part in reasoning by cases, make individuals differ."""
-        if not any(isinstance(axiom, Rule) for axiom in self._told.schema):
-            return False
-        pairs = map(frozenset, combinations(sorted(fact.individuals), 2))
-        return all(follows([*self._told.axioms, SameIndividual(pair)], None) for pair in pairs)
 
     def _is_below(self, sub: str, sup: str) -> bool:
         if sup == NOTHING:
@@ -790,9 +787,16 @@ class KnowledgeBase:
 
     def _fits(self, engine: Engine) -> bool:
         """Tell whether the program was made for every complex class and negated property that was
-        added.
+        added, and for none that went.
         """
-        return all(map(engine.takes, self._told.added))
+        told = self._told
+        if not all(map(engine.takes, told.added)):
+            return False
+        classes, negated = Engine.needs_of(told.removed)
+        if not classes and not negated:
+            return True
+        left = Engine.needs_of(told.complex)
+        return set(classes) <= set(left[0]) and set(negated) <= set(left[1])
 
     def _classify(self) -> None:
         self.classified += 1

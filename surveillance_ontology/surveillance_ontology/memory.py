@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import ctypes
 import gc
+import threading
 import time
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
@@ -17,18 +18,27 @@ LARGE = 10_000
 PAUSE = 0.0002
 """Seconds for other threads between two parts of an ontology that is given up."""
 
+_lock = threading.Lock()
+_inside = 0
+_was_on = False
+
 
 @contextmanager
 def uncollected() -> Iterator[None]:
-    """Switch the garbage collector off for a while, where it is on."""
-    if not gc.isenabled():
-        yield
-        return
-    gc.disable()
+    """Switch the garbage collector off, where it is on, until the last thread inside is done."""
+    global _inside, _was_on
+    with _lock:
+        if not _inside:
+            _was_on = gc.isenabled()
+        _inside += 1
+        gc.disable()
     try:
         yield
     finally:
-        gc.enable()
+        with _lock:
+            _inside -= 1
+            if not _inside and _was_on:
+                gc.enable()
 
 
 def settle(axioms: int) -> None:

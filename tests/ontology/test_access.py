@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import resource
 from pathlib import Path
 
 import pytest
@@ -121,6 +122,21 @@ def test_a_log_file_is_closed_before_it_fills_the_disk(tmp_path: Path) -> None:
         ask('GET ALL REFS')
     assert (tmp_path / 'armor.log').stat().st_size < 1300
     assert said == ['directive log: 1000 bytes are reached; the log file is closed']
+
+
+def test_directives_are_answered_when_the_log_file_takes_no_more(tmp_path: Path) -> None:
+    said: list[str] = []
+    ask = asker(ArmorService(Settings(tmp_path), screen=said.append))
+    assert ask('LOG FILE ON', 'armor.log').success
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    # A file at its size limit takes what fits, as a disk does that is almost full.
+    resource.setrlimit(resource.RLIMIT_FSIZE, (150, before[1]))
+    try:
+        assert all(ask('GET ALL REFS').success for _ in range(9))
+        assert ask('LOG FILE OFF').success
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    assert said == ['directive log: No space left on device; the log file is closed']
 
 
 def test_devices_and_pipes_are_neither_read_nor_written(ask: Ask, folder: Path) -> None:

@@ -12,6 +12,7 @@ from rclpy.task import Future
 from surveillance_interfaces.srv import (
     ArmorDirective,
 )
+from surveillance_ontology.armor.protocol import DirectiveRequest
 from surveillance_ontology.armor_client import (
     ArmorClient,
     ArmorServiceCallError,
@@ -134,24 +135,43 @@ def test_a_client_beside_a_burst_of_another_is_answered_in_its_turn(graph: Any) 
     assert order.index('good') < 300
 
 
-def test_loads_that_wait_for_one_another_keep_nobody_waiting(graph: Any) -> None:
-    server = graph.add(ArmorServer)
+def test_an_ontology_that_is_used_for_long_keeps_nobody_waiting_for_another(
+    graph: Any, tmp_path: Path
+) -> None:
+    server = graph.add(ArmorServer, {'ontologies_folder': str(tmp_path)})
     armor = ArmorClient(graph.node, 'test', 'map')
     armor.utils.load_ref_from_file(ONTOLOGY, IRI)
-    loaded: list[str] = []
+    ended: list[bool] = []
+    asked = [
+        armor.request('LOAD FILE', ONTOLOGY, IRI, 'true', '', 'true'),
+        armor.request('SAVE', 'saved.owl'),
+        armor.request('ADD CLASS', 'NEW'),
+        armor.request('QUERY EXPLAIN INCONSISTENCY'),
+    ]
 
-    async def load(name: str) -> None:
-        client = ArmorClient(graph.node, 'test', name, timeout=60.0)
-        await client.utils.load_ref_from_file.call_async(ONTOLOGY, IRI)
-        loaded.append(name)
+    async def ask(request: DirectiveRequest) -> None:
+        ended.append((await armor.transport.call_async(request)).success)
 
-    with server._service.session.loading:
-        for number in range(5):
-            graph.node.executor.create_task(load, f'other{number}')
-        graph.until(lambda: server._documents._queue.qsize() == 1)
-        assert armor.manipulation.add_class('NEW')
-        assert not loaded
-    graph.until(lambda: len(loaded) == 5)
+    async def ask_all() -> None:
+        ended.append((await armor.transport.call_list_async(asked)).success)
+
+    other = ArmorClient(graph.node, 'test', 'other', timeout=60.0)
+    other.utils.get_all_refs()
+    server_waits = (server._work, server._documents, server._queries)
+    with server._service.references.find('map').lock:
+        for _ in range(5):
+            graph.node.executor.create_task(ask_all)
+            for request in asked:
+                graph.node.executor.create_task(ask, request)
+        graph.until(lambda: [len(w._waiting.get('map', ())) for w in server_waits] == [9, 9, 3])
+        other.utils.load_ref_from_file(ONTOLOGY, IRI)
+        assert other.manipulation.add_class('NEW')
+        assert other.batch([other.request('REASON')]).success
+        assert other.query.explain_inconsistency() is None
+        other.utils.save('other.owl')
+        assert not ended
+    graph.until(lambda: len(ended) == 25)
+    assert all(ended)
 
 
 def test_a_long_query_keeps_nobody_waiting(graph: Any) -> None:

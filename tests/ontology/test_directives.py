@@ -222,3 +222,15 @@ def test_names_and_languages_survive_saving_and_loading(ask: Ask) -> None:
     ]
     assert ask('REMOVE DATAPROP IND', 'label', 'R1', 'STRING', '"Raum"@DE-AT').success
     assert ask('QUERY DATAPROP IND', 'label', 'R1').queried_objects == []
+
+
+def test_a_manipulation_that_has_nothing_to_change_says_so(ask: Ask) -> None:
+    for words, args in (
+        ('DISJOINT IND', ('R1',)),
+        ('DISJOINT CLASS', ('A', 'A')),
+        ('DISJOINT IND CLASS', ('NOTHING_IN_IT',)),
+        ('MAKE EQUIVALENT CLASS', ('UNKNOWN',)),
+    ):
+        answer = ask(words, *args)
+        assert (answer.success, answer.error_description) == (True, f'{words}: nothing to change')
+    assert ask('DISJOINT IND', 'R1', 'R2').error_description == ''

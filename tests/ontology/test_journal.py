@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import resource
 import zlib
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -204,6 +205,46 @@ def test_what_a_failed_write_left_is_removed_before_the_next(
     journal.append([4])
     journal.close()
     assert reopened(tmp_path) == [1, 4]
+
+
+def test_a_folder_that_was_moved_away_takes_nothing_until_it_is_back(tmp_path: Path) -> None:
+    folder, away = tmp_path / 'store', tmp_path / 'away'
+    journal = Journal(folder)
+    journal.append([1])
+    folder.rename(away)
+    for _ in range(2):
+        with pytest.raises(FileError, match='is no longer there'):
+            journal.append([2])
+        # Another one in its place is not the one that is written to.
+        folder.mkdir(exist_ok=True)
+        (folder / 'journal-0.log').write_bytes(b'')
+    (folder / 'journal-0.log').unlink()
+    folder.rmdir()
+    away.rename(folder)
+    journal.append([3])
+    journal.close()
+    assert reopened(folder) == [1, 3]
+
+
+@pytest.mark.parametrize('begun', [False, True])
+def test_a_snapshot_touches_no_other_store_in_its_place(tmp_path: Path, begun: bool) -> None:
+    folder = tmp_path / 'store'
+    journal = Journal(folder)
+    journal.append([1])
+    number = journal.begin_snapshot() if begun else 0
+    folder.rename(tmp_path / 'away')
+    other = Journal(folder)
+    other.append(['other'])
+    snapshot = (
+        partial(journal.finish_snapshot, number, ['state']) if begun else journal.begin_snapshot
+    )
+    with pytest.raises(FileError, match='is no longer there'):
+        snapshot()
+    for each in (journal, other):
+        each.close()
+        each.close()
+    assert {path.name for path in folder.iterdir()} == {'journal-0.log', 'lock'}
+    assert reopened(folder) == ['other']
 
 
 @pytest.mark.parametrize('lost', ['snapshot-1.log', 'journal-1.log'])

@@ -3,9 +3,21 @@
 from __future__ import annotations
 
 import gc
+import threading
 import weakref
 
+import pytest
+
 from surveillance_ontology import memory
+
+
+@pytest.fixture(autouse=True)
+def nothing_else_is_released() -> None:
+    """Wait for what other tests dropped: it is released some time later, and unfreezes all."""
+    for thread in threading.enumerate():
+        if isinstance(thread, threading.Timer):
+            thread.cancel()
+            thread.join(60.0)
 
 
 class Ring:
@@ -22,6 +34,24 @@ def test_the_collector_is_off_inside_and_as_before_outside() -> None:
         with memory.uncollected():
             pass
         assert not gc.isenabled(), 'the outer one is not over'
+    assert gc.isenabled()
+
+
+def test_the_collector_stays_off_until_the_last_thread_is_done() -> None:
+    entered, done = threading.Event(), threading.Event()
+
+    def first() -> None:
+        with memory.uncollected():
+            entered.set()
+            done.wait(30.0)
+
+    thread = threading.Thread(target=first)
+    thread.start()
+    assert entered.wait(30.0)
+    with memory.uncollected():
+        done.set()
+        thread.join(30.0)
+        assert not gc.isenabled()
     assert gc.isenabled()
 
 

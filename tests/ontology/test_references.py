@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import queue
 import threading
+from collections.abc import Callable
 from functools import partial
 from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
@@ -11,6 +13,7 @@ from typing import Any
 import pytest
 
 from surveillance_ontology.armor.access import DATA, Settings
+from surveillance_ontology.armor.protocol import DirectiveRequest
 from surveillance_ontology.armor.service import ArmorService
 from surveillance_ontology.documents import writing
 from surveillance_ontology.owl.axioms import Axiom
@@ -187,19 +190,43 @@ def test_an_older_state_never_replaces_a_newer_one(
         return data
 
     monkeypatch.setattr(writing, 'ontology_bytes', slowly)
-    answers = []
-    older = threading.Thread(target=lambda: answers.append(ask('SAVE', 'map.owl')))
+    older, newer = (threading.Thread(target=ask, args=('SAVE', 'map.owl')) for _ in range(2))
     older.start()
     assert begun.wait(30)
     ask('ADD IND CLASS', 'X', 'DOOR')
-    assert ask('SAVE', 'map.owl').success
-    newer = (tmp_path / 'map.owl').read_bytes()
+    newer.start()
+    assert ask('SAVE', 'other.owl').success, 'another file does not wait'
     go_on.set()
-    older.join()
-    assert answers[0].success
-    assert (tmp_path / 'map.owl').read_bytes() == newer
-    assert [path.name for path in tmp_path.iterdir()] == ['map.owl'], 'no draft is left'
-    assert ask('SAVE', 'map.owl').success
+    for save in (older, newer):
+        save.join()
+    assert (tmp_path / 'map.owl').read_bytes() == (tmp_path / 'other.owl').read_bytes()
+    assert {path.name for path in tmp_path.iterdir()} == {'map.owl', 'other.owl'}, 'no draft'
+
+
+def test_a_list_that_saves_waits_for_no_save_that_waits_for_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    service = ArmorService(Settings(str(tmp_path)))
+    assert asker(service)('LOAD FILE', ONTOLOGY, IRI, 'false', 'PELLET', 'false').success
+    request = DirectiveRequest('me', 'map', 'SAVE', args=('map.owl',))
+    waiting, answers = threading.Semaphore(0), queue.SimpleQueue[Any]()
+    saving = service.session.saving
+
+    def told(path: Path) -> threading.Lock:
+        waiting.release()
+        return saving(path)
+
+    monkeypatch.setattr(service.session, 'saving', told)
+
+    def save(execute: Callable[[Any], Any], argument: Any) -> None:
+        answers.put(execute(argument))
+
+    with saving(tmp_path / 'map.owl'):
+        for call in ((service.execute, request), (service.execute_list, [request])):
+            threading.Thread(target=save, args=call, daemon=True).start()
+            assert waiting.acquire(timeout=30)
+    for _ in range(2):
+        assert answers.get(timeout=30).success
 
 
 def test_names_that_rdf_xml_cannot_hold_are_saved_as_ntriples(ask: Ask) -> None:

@@ -14,6 +14,7 @@ from pathlib import Path
 
 import pytest
 
+from surveillance_ontology.armor import reference as reference_module
 from surveillance_ontology.armor import store as store_module
 from surveillance_ontology.armor.access import Settings
 from surveillance_ontology.armor.protocol import DirectiveRequest
@@ -223,6 +224,29 @@ def test_one_snapshot_is_written_at_a_time(tmp_path: Path) -> None:
     assert (len(entered), failures) == (1, [])
 
 
+def test_a_snapshot_waits_for_an_ontology_in_use_and_holds_no_other_meanwhile(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(reference_module, 'UNUSED_WITHIN', 60.0)
+    server = Server(tmp_path / 'store', compact_from=1)
+    server.ask(*LOAD, 'false', '', 'true')
+    server.ask(*LOAD, 'false', '', 'true', reference='used')
+    used = server.service.references.find('used')
+    with used.lock:
+        answers: list[bool] = []
+
+        def ask_twice() -> None:
+            answers.extend(server.ask('ADD IND CLASS', name, 'DOOR').success for name in 'XY')
+
+        asking = threading.Thread(target=ask_twice)
+        asking.start()
+        asking.join(60.0)
+        assert answers == [True, True]
+    server.restart()
+    assert list((tmp_path / 'store').glob('snapshot-*'))
+    assert names(server.ask('QUERY IND CLASS', 'DOOR')) == ['X', 'Y']
+
+
 def test_references_that_come_and_go_while_a_snapshot_begins_are_not_mistaken(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -230,14 +254,14 @@ def test_references_that_come_and_go_while_a_snapshot_begins_are_not_mistaken(
     server.ask(*LOAD, 'false', '', 'true')
     server.ask(*LOAD, 'false', '', 'true', reference='early')
     registry = server.service.references
-    held = registry.held
+    held = registry.held_briefly
 
-    def held_late(found: list[str]) -> AbstractContextManager[list[Reference]]:
+    def held_late() -> AbstractContextManager[list[Reference]]:
         server.ask(*LOAD, 'false', '', 'true', reference='late')
         server.ask('DROP', reference='early')
-        return held(found)
+        return held()
 
-    monkeypatch.setattr(registry, 'held', held_late)
+    monkeypatch.setattr(registry, 'held_briefly', held_late)
     server.ask('ADD IND CLASS', 'X', 'DOOR')
     server.restart()
     assert server.ask('GET ALL REFS').queried_objects == ['late', 'map']
@@ -247,6 +271,16 @@ def test_references_that_come_and_go_while_a_snapshot_begins_are_not_mistaken(
     assert list((tmp_path / 'store').glob('snapshot-*')), 'the next change tries again'
     assert server.ask('GET ALL REFS').queried_objects == ['late', 'map']
     assert names(server.ask('QUERY IND CLASS', 'DOOR')) == ['X', 'Y']
+
+
+def test_a_closed_journal_is_free_although_a_process_that_just_starts_holds_its_files(
+    tmp_path: Path,
+) -> None:
+    journal = Journal(tmp_path / 'store')
+    inherited = os.dup(journal._lock.fileno())  # as between fork and exec
+    journal.close()
+    Journal(tmp_path / 'store').close()
+    os.close(inherited)
 
 
 def test_a_store_of_a_newer_version_is_refused(tmp_path: Path) -> None:

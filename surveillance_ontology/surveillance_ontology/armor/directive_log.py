@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import stat
+import threading
 from collections.abc import Callable
 from datetime import UTC, datetime
+from io import FileIO
 from pathlib import Path
-from typing import TextIO
 
 from surveillance_ontology.armor.protocol import (
     DirectiveError,
@@ -20,7 +22,7 @@ MAX_SHOWN = 200
 
 
 class DirectiveLog:
-    """Writes directives to a file, to the console, to both or to neither.
+    """Writes directives to a file, to the console, to both or to neither; threads may share it.
 
     Args:
         screen: Writes one line to the console.
@@ -32,7 +34,8 @@ class DirectiveLog:
     ) -> None:
         self._screen = screen
         self._max_bytes = max_bytes
-        self._file: TextIO | None = None
+        self._file: FileIO | None = None
+        self._lock = threading.Lock()
         self.on_screen = False
 
     @property
@@ -51,18 +54,21 @@ class DirectiveLog:
             descriptor = os.open(path, flags | os.O_CLOEXEC, 0o644)
         except OSError as error:
             raise DirectiveError(f'{path}: {error.strerror}') from None
-        file = os.fdopen(descriptor, 'a', encoding='utf-8', errors='backslashreplace')
+        file = FileIO(descriptor, 'a')
         if not stat.S_ISREG(os.fstat(descriptor).st_mode):
             file.close()
             raise DirectiveError(f'{path}: expected a file')
-        self.close()
-        self._file = file
+        self._replace(file)
 
     def close(self) -> None:
         """Stop writing to a file."""
-        if self._file is not None:
-            self._file.close()
-            self._file = None
+        self._replace(None)
+
+    def _replace(self, file: FileIO | None) -> None:
+        with self._lock:
+            if self._file is not None:
+                self._file.close()
+            self._file = file
 
     def write(self, request: DirectiveRequest, response: DirectiveResponse) -> None:
         """Write a directive with its answer, as one line whatever they hold."""
@@ -86,18 +92,23 @@ class DirectiveLog:
         )
         if self.on_screen:
             self._screen(line)
-        if self._file is not None:
-            self._append(self._file, line)
-
-    def _append(self, file: TextIO, line: str) -> None:
-        stamp = datetime.now(UTC).isoformat(timespec='milliseconds')
-        try:
-            file.write(f'{stamp} {line}\n')
-            file.flush()
-            full = os.fstat(file.fileno()).st_size >= self._max_bytes
-            reason = f'{self._max_bytes} bytes are reached' if full else ''
-        except OSError as error:
-            reason = str(error.strerror)
+        reason = self._append(line)
         if reason:
             self._screen(f'directive log: {reason}; the log file is closed')
             self.close()
+
+    def _append(self, line: str) -> str:
+        """Write a line to the file, if there is one; return why there can be no further one."""
+        stamp = datetime.now(UTC).isoformat(timespec='milliseconds')
+        data = f'{stamp} {line}\n'.encode('utf-8', 'backslashreplace')
+        with self._lock:
+            if self._file is None:
+                return ''
+            try:
+                # Not buffered: what a full disk refused would be tried again at closing.
+                if self._file.write(data) < len(data):
+                    return os.strerror(errno.ENOSPC)
+                full = os.fstat(self._file.fileno()).st_size >= self._max_bytes
+            except OSError as error:
+                return str(error.strerror)
+        return f'{self._max_bytes} bytes are reached' if full else ''

@@ -22,6 +22,10 @@ from surveillance_ontology.reasoner.java_reasoning import JavaKnowledgeBase
 
 LONG_BACKLOG = 500
 """Changes since the last reasoning from which on the next counts as slow."""
+UNUSED_WITHIN = 1.0
+"""Seconds for which `Registry.held_briefly` waits for a reference while it holds none."""
+AT_ONCE = 0.05
+"""Seconds for which it waits for one while it holds others."""
 SLOW = 0.01
 """Seconds of processor time of the last reasoning from which on the next counts as slow."""
 PATIENCE = 5.0
@@ -304,6 +308,17 @@ class Registry:
                 locks.enter_context(ref.lock)
             yield found
 
+    @contextlib.contextmanager
+    def held_briefly(self) -> Iterator[list[Reference]]:
+        """Hold the locks of all references, of none where somebody has one of them for long.
+
+        Whoever uses another reference does not wait for that one as well.
+        """
+        found = [ref for name in self.names() if (ref := self._references.get(name))]
+        with contextlib.ExitStack() as locks:
+            free = all(_becomes_free(ref.lock) for ref in found)
+            yield found if free and all(_taken(ref.lock, locks) for ref in found) else []
+
     def add(self, ref: Reference) -> None:
         """Enter a reference under its name."""
         with self._lock:
@@ -314,3 +329,15 @@ class Registry:
         ref.dropped = True
         with self._lock:
             self._references.pop(ref.name, None)
+
+
+def _becomes_free(lock: threading.RLock) -> bool:
+    if free := lock.acquire(timeout=UNUSED_WITHIN):
+        lock.release()
+    return free
+
+
+def _taken(lock: threading.RLock, locks: contextlib.ExitStack) -> bool:
+    if taken := lock.acquire(timeout=AT_ONCE):
+        locks.callback(lock.release)
+    return taken

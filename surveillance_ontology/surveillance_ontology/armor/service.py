@@ -182,7 +182,7 @@ class ArmorService:
                 return _response(directive.run(ref, *self._values(directive, request, ref)))
             remark = self._change(directive, request, ref)
         if self._store:
-            self._store.compact_if_large(lambda: self.references.held(self.references.names()))
+            self._store.compact_if_large(self.references.held_briefly)
         return DirectiveResponse(error_description=remark)
 
     def _change(self, directive: Directive, request: DirectiveRequest, ref: Reference) -> str:
@@ -197,7 +197,7 @@ class ArmorService:
         if self._store and changes:
             self._store.changed(ref.name, changes, self.session.clock())
         ref.heavy |= directive.schema
-        remark = ref.missing(changes)
+        remark = ref.missing(changes) if changes else f'{request.words}: nothing to change'
         ref.submit(changes)
         return remark
 

@@ -5,7 +5,6 @@ The service hands it to the directives; it knows neither of them.
 
 from __future__ import annotations
 
-import os
 import threading
 from collections import deque
 from collections.abc import Callable, Sequence
@@ -33,38 +32,6 @@ Watcher = Callable[[str, Changes | None], None]
 """Told of a reference's name and what changed in it; None: it was loaded or dropped."""
 
 
-class SaveOrder:
-    """Keeps the newest state in a file that several clients save at once.
-
-    A state is taken under the lock of its reference and written without: a later one may be there
-    first.
-    """
-
-    def __init__(self) -> None:
-        self._lock = threading.Lock()
-        self._begun = 0
-        self._written: dict[Path, int] = {}
-
-    def begin(self) -> Callable[[Path, Path], None]:
-        """Return what puts a draft of the state of this moment into the place of a file.
-
-        Where a later state is there already, the draft is deleted.
-        """
-        with self._lock:
-            self._begun += 1
-            number = self._begun
-
-        def replace(draft: Path, target: Path) -> None:
-            with self._lock:
-                if self._written.get(target, 0) > number:
-                    draft.unlink()
-                    return
-                os.replace(draft, target)
-                self._written[target] = number
-
-        return replace
-
-
 class Session:
     """The state of one directive service.
 
@@ -83,8 +50,7 @@ class Session:
         sparql: Runs SPARQL queries.
         graphs: What changed in the graphs that they see.
         references: What is loaded.
-        loading: Held while an ontology is loaded.
-        saves: Orders saves of the same file.
+        entering: Held while what was loaded gets its name.
         store: Makes references durable; None: they end with the process.
     """
 
@@ -104,8 +70,8 @@ class Session:
         self.sparql = SparqlEngine()
         self.graphs = GraphChanges()
         self.references = Registry()
-        self.loading = threading.Lock()
-        self.saves = SaveOrder()
+        self.entering = threading.Lock()
+        self._saving: dict[str, threading.Lock] = {}
         self._warn = warn
         self.clock = clock
         self.store = store
@@ -121,6 +87,10 @@ class Session:
         It is called inside the directive that caused the change and must be quick.
         """
         self._watchers.append(watcher)
+
+    def saving(self, path: Path) -> threading.Lock:
+        """Return what is held from taking a state to its being in a file: the newest stays."""
+        return self._saving.setdefault(str(path), threading.Lock())
 
     def register(self, ref: Reference) -> None:
         """Make a reference known under its name."""

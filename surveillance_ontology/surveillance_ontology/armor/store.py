@@ -130,6 +130,7 @@ class Journal:
             FileError: They could not be written; none of them is there.
         """
         self.check_open()
+        self._check_place()
         *first, last = records
         lines = b''.join([*(_line(record, more=True) for record in first), _line(last)])
         try:
@@ -153,6 +154,7 @@ class Journal:
             What `finish_snapshot` is to be called with.
         """
         self.check_open()
+        self._check_place()
         number = self._number + 1
         try:
             file = self._segment(number)
@@ -171,19 +173,25 @@ class Journal:
         path = self._path('snapshot', number)
         try:
             temporary = _written(path, records)
+            # Another store in this place would lose what is removed below.
+            self._check_place()
             self.snapshot_size = temporary.stat().st_size
             temporary.rename(path)
             self._sync_directory()
             self._remove_before(number)
-        except OSError as error:
+        except (OSError, FileError) as error:
             # It may hold the last space that there was.
             path.with_suffix('.tmp').unlink(missing_ok=True)
-            raise FileError(f'{self._directory}: {error.strerror}') from None
+            reason = error.strerror if isinstance(error, OSError) else error
+            raise FileError(f'{self._directory}: {reason}') from None
 
     def close(self) -> None:
         """Let another process open the journal."""
         self._file.close()
-        self._lock.close()
+        if not self._lock.closed:
+            # A process that another thread is just starting holds the lock, too, until it runs.
+            fcntl.flock(self._lock, fcntl.LOCK_UN)
+            self._lock.close()
 
     def check_open(self) -> None:
         """Check that records can be appended.
@@ -193,6 +201,19 @@ class Journal:
         """
         if self._file.closed:
             raise FileError(f'{self._directory}: closed')
+
+    def _check_place(self) -> None:
+        """Check that what is written is found again: a file that was removed takes all in silence.
+
+        Raises:
+            FileError: Its folder was removed or renamed, or its disk is no longer there.
+        """
+        path = self._path('journal', self._number)
+        there = False
+        with suppress(OSError):
+            there = os.path.samestat(path.stat(), os.fstat(self._file.fileno()))
+        if not there:
+            raise FileError(f'{path}: is no longer there')
 
     def _cut(self) -> None:
         """Remove what a write that failed may have left behind the records."""
@@ -482,7 +503,8 @@ class Store:
         """Write a snapshot on a thread of its own if the journal has grown.
 
         Args:
-            hold_all: Context manager under which no reference changes; gives all of them.
+            hold_all: Context manager under which no reference that it gives changes; where it does
+                not give all of them, the next change tries again.
         """
         journal = self._journal
         if self._waiting or journal.size < max(self._compact_from, journal.snapshot_size):
@@ -494,7 +516,7 @@ class Store:
                     kept = [ref for ref in references if not ref.dropped]
                     if self._waiting or {ref.name for ref in kept} != self._names:
                         # What waits is in the references already. Or one of them came or went
-                        # meanwhile. The next change tries again.
+                        # meanwhile, or is in use. The next change tries again.
                         return
                     number = journal.begin_snapshot()
                     states = [_state(ref) for ref in kept]

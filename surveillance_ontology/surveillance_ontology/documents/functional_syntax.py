@@ -104,7 +104,8 @@ class _Parser:
             _, iri, place = self._take()
             self.stated.iri = self._base = self._iri(iri, place)
             if self._next[0] == 'iri':
-                self._take()
+                _, iri, place = self._take()
+                self.stated.version(self._iri(iri, place))
         while self._next[:2] != ('mark', ')'):
             place = self._next[2]
             axiom = self._part(0)

@@ -152,12 +152,13 @@ class Mapping:
             self._subject(subject, properties)
 
     def _guess_kinds(self) -> None:
-        """Give undeclared properties the kinds that their values and ranges have.
+        """Give undeclared properties the kinds of their values, ranges and superproperties.
 
-        rdf:Property tells no kind: without values and ranges it is an object property. Nor does the
+        rdf:Property tells no kind: without any of these it is an object property. Nor does the
         header: what is used there alone annotates the ontology.
         """
         guessed: dict[str, set[str]] = {}
+        below: dict[str, list[str]] = {}
 
         def guess(name: str, are_data: Iterable[bool]) -> None:
             if name not in self._kinds and not name.startswith(BUILT_IN):
@@ -170,10 +171,24 @@ class Mapping:
             for predicate, values in properties.items():
                 if predicate == RDFS + 'range':
                     guess(subject, (isinstance(v, str) and self._is_data_range(v) for v in values))
+                elif predicate == RDFS + 'subPropertyOf':
+                    if subject not in self._kinds and not subject.startswith(BUILT_IN):
+                        for value in values:
+                            below.setdefault(str(value), []).append(subject)
                 elif subject != self._header:
                     guess(predicate, (isinstance(value, Literal) for value in values))
-        for name, kinds in guessed.items():
-            self._kinds[name] = kinds or {'object_property'}
+        self._kinds.update((name, kinds) for name, kinds in guessed.items() if kinds)
+        # A superproperty may have its kind from its own superproperty.
+        above = list(below)
+        while above:
+            name = above.pop()
+            kinds = self._value_kinds(name)
+            for sub in below.get(name, ()):
+                if not kinds <= self._kinds.get(sub, set()):
+                    self._kinds.setdefault(sub, set()).update(kinds)
+                    above.append(sub)
+        for name in guessed:
+            self._kinds.setdefault(name, {'object_property'})
 
     # --- reporting ---
 
@@ -236,9 +251,13 @@ class Mapping:
         inner = self._inside(node, lambda _: self._property(inverse))
         return inner.prop if isinstance(inner, ex.ObjectInverseOf) else ex.ObjectInverseOf(inner)
 
+    def _value_kinds(self, prop: Node) -> set[str]:
+        """Return which of object and data property a name is, as far as is known."""
+        return self._kinds.get(str(prop), set()) & {'object_property', 'data_property'}
+
     def _is_data(self, prop: str, range_node: Node | None = None) -> bool:
-        kinds = self._kinds.get(prop, ())
-        if ('object_property' in kinds) != ('data_property' in kinds):
+        kinds = self._value_kinds(prop)
+        if len(kinds) == 1:
             return 'data_property' in kinds
         return isinstance(range_node, str) and self._is_data_range(range_node)
 
@@ -532,6 +551,13 @@ class Mapping:
     def _between(self, subject: str, value: str, predicate: str) -> Axiom:
         """Read a relation of two properties."""
         of_objects, of_data = _BETWEEN[predicate]
+        kinds, others = self._value_kinds(subject), self._value_kinds(value)
+        if kinds and others and kinds.isdisjoint(others):
+            raise self._ill_formed(
+                subject,
+                f'{local_name(predicate)} of an object property and a data property,'
+                f' {local_name(subject)} and {local_name(value)}',
+            )
         if self._is_data(subject) or self._is_data(value):
             return of_data(subject, value)
         return of_objects(self._property(subject), self._property(value))

@@ -70,6 +70,8 @@ class _Reader(XmlReader):
         element = _Element(name.removeprefix(OWL), attributes, line, base, language)
         if self.depth == 1 and 'ontologyIRI' in attributes:
             self.stated.iri = self.named(base, attributes['ontologyIRI'])
+            if 'versionIRI' in attributes:
+                self.stated.version(self.named(base, attributes['versionIRI']))
         self._stack.append(element)
 
     def named(self, base: str, reference: str) -> str:

@@ -10,10 +10,11 @@ from dataclasses import dataclass, field
 from typing import TypeAlias
 
 from surveillance_ontology.documents.xml_reading import (
-    FORBIDDEN,
     XML,
     OntologyFileError,
     XmlReader,
+    legal,
+    percent_encoded,
 )
 from surveillance_ontology.owl.expressions import Literal
 from surveillance_ontology.owl.vocabulary import RDF, XSD
@@ -67,11 +68,12 @@ class _Reader(XmlReader):
         self.blank = 0
         self.ids: set[str] = set()
         self.seen_root = False
+        self.odd_names = False
 
     def namespace(self, prefix: str | None, iri: str | None) -> None:
-        if found := FORBIDDEN.search(iri or ''):
-            raise self.fail(f'namespace {iri!r} contains {found.group()!r}')
-        self.graph.prefixes.setdefault(prefix or '', iri or '')
+        namespace = legal(iri or '', self._legal, self.unsupported)
+        self.odd_names |= namespace != (iri or '')
+        self.graph.prefixes.setdefault(prefix or '', namespace)
 
     def new_blank(self) -> str:
         self.blank += 1
@@ -111,6 +113,9 @@ class _Reader(XmlReader):
             self.stack.append(_Frame('xml'))
             return
         base, language = parent.base, parent.language
+        if self.odd_names:
+            name = percent_encoded(name)
+            attributes = {percent_encoded(key): value for key, value in attributes.items()}
         if attributes:
             if XML + 'base' in attributes:
                 base = self.resolve(base, attributes.pop(XML + 'base'))

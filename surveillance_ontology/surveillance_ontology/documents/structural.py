@@ -88,6 +88,10 @@ class Axioms:
     def read(self, declared: Iterable[tuple[str, str]] = ()) -> None:
         """Nothing is left to read: each axiom says of what kind its names are."""
 
+    def version(self, iri: str) -> None:
+        """Take in the IRI of the ontology's version, which RDF has as an annotation."""
+        self.axioms[ax.AnnotationAssertion(OWL + 'versionIRI', self.iri, iri)] = None
+
     def named(self, name: str) -> str | None:
         """Return the IRI of a prefixed name; None where its prefix is not declared."""
         prefix, colon, local = name.partition(':')

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from itertools import count
 from pathlib import Path
 from xml.parsers import expat
@@ -36,7 +36,6 @@ def write_ontology(
     path: str | Path,
     format: str = 'rdfxml',
     prefixes: Mapping[str, str] | None = None,
-    replace: Callable[[Path, Path], None] | None = None,
 ) -> None:
     """Write a document through a temporary file beside it, so that the old one stays until the new
     is whole.
@@ -47,7 +46,6 @@ def write_ontology(
         path: The file; its directory must exist.
         format: One of `FORMATS`.
         prefixes: Further namespace prefixes for RDF/XML.
-        replace: See `replace_file`.
 
     Raises:
         OntologyFileError: The directory is not writable, the format is unknown, or RDF/XML cannot
@@ -55,7 +53,7 @@ def write_ontology(
     """
     data = ontology_bytes(axioms, iri, format, prefixes)
     try:
-        replace_file(path, data, durable=True, replace=replace)
+        replace_file(path, data, durable=True)
     except OSError as error:
         raise OntologyFileError(error.strerror or str(error), path=str(path)) from None
 

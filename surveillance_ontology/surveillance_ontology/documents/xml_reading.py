@@ -13,6 +13,7 @@ from xml.parsers import expat
 from surveillance_ontology.owl.expressions import language_tag
 
 _ABSOLUTE = re.compile(r'[A-Za-z][A-Za-z0-9+.\-]*:')
+_EMPTY_END = re.compile(r'(?:\?#|[?#])\Z')
 FORBIDDEN = re.compile(r'[\x00-\x20<>"{}|\\^`]')
 _REFERENCE = re.compile(rb'&([A-Za-z_][\w.-]*);')
 _MAX_ENTITY = 512
@@ -52,8 +53,13 @@ def is_absolute(reference: str) -> bool:
     return _ABSOLUTE.match(reference) is not None
 
 
+def percent_encoded(iri: str) -> str:
+    """Return an IRI in which each character that none may hold is percent-encoded."""
+    return FORBIDDEN.sub(lambda character: quote(character[0]), iri)
+
+
 def legal(iri: str, known: dict[str, str], reports: list[str]) -> str:
-    """Return an IRI, in which each character that none may hold is percent-encoded.
+    """Return an IRI as `percent_encoded` does, and report it.
 
     The OWL API takes such names as they are, and writes files that others cannot read.
 
@@ -64,7 +70,7 @@ def legal(iri: str, known: dict[str, str], reports: list[str]) -> str:
     """
     found = FORBIDDEN.search(iri)
     if found and iri not in known:
-        known[iri] = FORBIDDEN.sub(lambda character: quote(character[0]), iri)
+        known[iri] = percent_encoded(iri)
         reports.append(f'IRI {iri!r} contains {found[0]!r}, it is read as <{known[iri]}>')
     return known[iri] if found else iri
 
@@ -83,7 +89,10 @@ def resolve(base: str, reference: str) -> str:
     if reference[0] == '#':
         return stem + reference
     try:
-        return urljoin(stem, reference)
+        joined = urljoin(stem, reference)
+        # Python leaves out a query or fragment that is empty, by which two names would be one.
+        empty = _EMPTY_END.search(reference)
+        return joined + empty[0] if empty and not joined.endswith(empty[0]) else joined
     except ValueError as error:
         raise OntologyFileError(f'IRI {reference!r} with base {stem!r}: {error}') from None
 

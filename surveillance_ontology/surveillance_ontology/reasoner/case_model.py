@@ -14,6 +14,7 @@ from typing import Any, NamedTuple, TypeAlias
 
 from surveillance_ontology.reasoner.case_rules import ANYBODY, FRESH, CaseRules
 from surveillance_ontology.reasoner.clauses import StoppedError
+from surveillance_ontology.reasoner.datatypes import Value
 from surveillance_ontology.reasoner.value_sets import ValueSet
 
 Choices: TypeAlias = int
@@ -42,6 +43,7 @@ class CaseModel:
         parent, children: Whom an unnamed individual was made for; None for the others.
         values: The values of each individual.
         props, sets, owner: Each value's properties, the set it is in, and whose it is.
+        holding: The values that are known, by what they are; those that are not, by None.
         roots: Unnamed individuals that a named one counts, by what they are counted as.
     """
 
@@ -56,6 +58,7 @@ class CaseModel:
         self.props: dict[int, dict[str, Choices]] = {}
         self.sets: dict[int, tuple[ValueSet, Choices]] = {}
         self.owner: dict[int, int] = {}
+        self.holding: dict[Value | None, dict[int, None]] = {None: {}}
         self.roots: dict[Any, int] = {}
         self._groups: dict[int, dict[int, Choices]] = {}
         self._gone: dict[int, tuple[int | None, Choices]] = {}
@@ -139,8 +142,26 @@ class CaseModel:
         self.put(self.sets, v, (values, choices))
         self.put(self._groups, v, {})
         self.put(self.owner, v, x)
+        self.put(self.holding[None], v, None)
+        self._learn(v, values)
         self.revalue[x] = None
         return v
+
+    def _learn(self, v: int, values: ValueSet) -> None:
+        """Note which value it is, where one alone is left."""
+        only = values.only
+        if only is not None and v in self.holding[None]:
+            self.drop(self.holding[None], v)
+            if only not in self.holding:
+                self.put(self.holding, only, {})
+            self.put(self.holding[only], v, None)
+
+    def extend(self, v: int, prop: str, choices: Choices) -> None:
+        """State that a value is one by a further data property."""
+        for above in self.rules.data_above(prop):
+            if above not in self.props[v]:
+                self.put(self.props[v], above, choices)
+        self.revalue[self.owner[v]] = None
 
     def find(self, node: int) -> tuple[int | None, Choices]:
         """Return who stands for a node now (None: nobody), and by which choices."""
@@ -195,6 +216,7 @@ class CaseModel:
         self.put(self.sets, v, (narrowed, more | choices))
         if narrowed.is_empty:
             raise ClashError(more | choices)
+        self._learn(v, narrowed)
         self.revalue[self.owner[v]] = None
 
     def differ(self, nodes: Iterable[int], choices: Choices = 0) -> None:
@@ -419,6 +441,80 @@ class In(NamedTuple):
         model.narrow(self.v, self.values, choices)
 
 
-Alternative: TypeAlias = Has | Same | Root | In
+class Related(NamedTuple):
+    """An individual is related to another one."""
+
+    x: int
+    role: int
+    y: int
+
+    def look(self, model: CaseModel) -> Left:
+        x, choices = model.find(self.x)
+        y, others = model.find(self.y)
+        if x is None or y is None or self.role in model.out[x].get(y, ()):
+            return None
+        return Related(x, self.role, y), choices | others
+
+    def apply(self, model: CaseModel, choices: Choices) -> None:
+        model.relate(self.x, self.role, self.y, choices)
+
+
+class Valued(NamedTuple):
+    """An individual has a value in a set."""
+
+    x: int
+    prop: str
+    values: ValueSet
+
+    def look(self, model: CaseModel) -> Left:
+        x, choices = model.find(self.x)
+        if x is None or any(
+            self.prop in model.props[v] and model.sets[v][0].within(self.values)
+            for v in model.values[x]
+        ):
+            return None
+        return Valued(x, self.prop, self.values), choices
+
+    def apply(self, model: CaseModel, choices: Choices) -> None:
+        model.value(self.x, self.prop, self.values, choices)
+
+
+class Gains(NamedTuple):
+    """An individual has a value by one more data property."""
+
+    v: int
+    prop: str
+
+    def look(self, model: CaseModel) -> Left:
+        v, choices = model.find(self.v)
+        if v is None or self.prop in model.props[v]:
+            return None
+        return Gains(v, self.prop), choices
+
+    def apply(self, model: CaseModel, choices: Choices) -> None:
+        model.extend(self.v, self.prop, choices)
+
+
+class Apart(NamedTuple):
+    """Two individuals are different."""
+
+    x: int
+    y: int
+
+    def look(self, model: CaseModel) -> Left:
+        x, choices = model.find(self.x)
+        y, others = model.find(self.y)
+        choices |= others
+        if x == y:
+            return None, choices
+        if x is None or y is None or model.different(x, y) is not None:
+            return None
+        return Apart(x, y), choices
+
+    def apply(self, model: CaseModel, choices: Choices) -> None:
+        model.differ((self.x, self.y), choices)
+
+
+Alternative: TypeAlias = Has | Same | Root | In | Related | Valued | Gains | Apart
 Either: TypeAlias = Callable[[list[Alternative], Choices], None]
 """States that one of some alternatives holds, by these choices."""

@@ -12,7 +12,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from typing import TypeVar
+from itertools import count
+from typing import Any, NamedTuple, TypeAlias, TypeVar
 
 from surveillance_ontology.owl import axioms as ax
 from surveillance_ontology.owl import expressions as ex
@@ -29,11 +30,25 @@ from surveillance_ontology.owl.vocabulary import (
     TOP_DATA,
     TOP_LITERAL,
 )
-from surveillance_ontology.reasoner.clauses import UnsupportedError, closure, turned
+from surveillance_ontology.reasoner.clauses import (
+    ComputedAtom,
+    Constant,
+    DifferentAtom,
+    SameAtom,
+    Term,
+    UnsupportedError,
+    closure,
+    turned,
+)
 from surveillance_ontology.reasoner.datatypes import unfolded
 from surveillance_ontology.reasoner.normal_form import normal_form
 from surveillance_ontology.reasoner.property_chains import AnyRole, Chains
-from surveillance_ontology.reasoner.translation import directed, inclusions
+from surveillance_ontology.reasoner.translation import (
+    RuleTerms,
+    computed_atom,
+    directed,
+    inclusions,
+)
 from surveillance_ontology.reasoner.value_sets import EVERY, ValueSet, value_set
 
 _X, _Y = 0, 1
@@ -96,13 +111,51 @@ class ValueCount:
 _Counted = TypeVar('_Counted', Count, ValueCount)
 
 
-@dataclass(frozen=True, slots=True)
-class KeyRule:
-    """Named individuals with the concept that share a value of every property are the same."""
+class OfConcept(NamedTuple):
+    """An individual has a concept."""
 
     concept: int
-    roles: tuple[int, ...]
-    props: tuple[str, ...]
+    terms: tuple[Term]
+
+
+class OfRole(NamedTuple):
+    """An individual is related to another one."""
+
+    role: int
+    terms: tuple[Term, Term]
+
+
+class OfChain(NamedTuple):
+    """An individual has the concept of whoever is related, along a chain, to another one."""
+
+    concepts: dict[str, int]
+    terms: tuple[Term, Term]
+
+
+class OfProp(NamedTuple):
+    """An individual has a value by a data property."""
+
+    prop: str
+    terms: tuple[Term, Term]
+
+
+class OfRange(NamedTuple):
+    """A value is in a set."""
+
+    values: ValueSet
+    terms: tuple[Term]
+
+
+FactAtom: TypeAlias = OfConcept | OfRole | OfChain | OfProp
+NamedAtom: TypeAlias = FactAtom | OfRange | SameAtom | DifferentAtom | ComputedAtom
+
+
+@dataclass(frozen=True, slots=True)
+class NamedRule:
+    """For named individuals of whom the body holds, the head does; None: the body never holds."""
+
+    body: tuple[NamedAtom, ...]
+    head: OfConcept | OfRole | OfProp | SameAtom | DifferentAtom | None
 
 
 class CaseRules:
@@ -123,7 +176,7 @@ class CaseRules:
         nominals: Concepts of one individual; `nominal_of` the other way.
         above: Every role that a role implies, itself included; `props_above` the same for data.
         disjoint, disjoint_props: Roles (data properties) that exclude each other.
-        keys: The keys.
+        named: Rules about named individuals: those of SWRL, and keys.
         gaps: One sentence for each axiom that is not fully covered.
         has_inverse: Whether any role is used backwards.
     """
@@ -159,7 +212,10 @@ class CaseRules:
         self.props_above: dict[str, tuple[str, ...]] = {}
         self.disjoint: dict[int, set[int]] = {}
         self.disjoint_props: dict[str, dict[str, None]] = {}
-        self.keys: list[KeyRule] = []
+        self.named: list[NamedRule] = []
+        self._individuals = [
+            iri for axiom in axioms for kind, iri in entities_of(axiom) if kind == 'individual'
+        ]
         self.gaps: dict[str, None] = {}
         self.has_inverse = False
         self._positive: dict[ClassExpression, int] = {}
@@ -495,14 +551,102 @@ class CaseRules:
                 self.include(part, axiom.cls)
             self.include(axiom.cls, ex.ObjectUnionOf(axiom.classes))
         elif isinstance(axiom, ax.HasKey):
-            roles = tuple(self.role(prop) for prop in axiom.object_props)
-            if any(map(self.complex_role, axiom.object_props)):
-                raise UnsupportedError('a key uses a property with chains')
-            self.keys.append(KeyRule(self.recognised(axiom.cls), roles, axiom.data_props))
+            self._key(axiom)
         elif isinstance(axiom, ax.Rule):
-            raise UnsupportedError('rules are not used in reasoning by cases')
+            self._rule(axiom)
         else:
             self._property_axiom(axiom)
+
+    # --- rules about named individuals ---
+
+    def _key(self, key: ax.HasKey) -> None:
+        """Add the rule by which those are the same who share a value of every property."""
+        x, y = 0, 1
+        body: list[NamedAtom] = [OfConcept(self.recognised(key.cls), (one,)) for one in (x, y)]
+        for place, prop in enumerate((*key.object_props, *key.data_props), 2):
+            is_data = place >= 2 + len(key.object_props)
+            for one in (x, y):
+                pair = (one, place)
+                body.append(OfProp(str(prop), pair) if is_data else self._link(prop, *pair))
+        if len(body) > 2:
+            self.named.append(NamedRule(tuple(body), SameAtom((x, y))))
+
+    def _link(self, prop: PropertyExpression, x: Term, y: Term) -> FactAtom:
+        """Return the atom that relates two individuals."""
+        if not self.complex_role(prop):
+            return OfRole(self.role(prop), (x, y))
+        reached = {
+            name: self.recognised(ex.ObjectHasValue(prop, name))
+            for name in dict.fromkeys(self._individuals)
+        }
+        return OfChain(reached, (x, y))
+
+    def _rule(self, rule: ax.Rule) -> None:
+        """Add a rule of SWRL, one for each atom of its head."""
+        numbers = count()
+        terms = RuleTerms(lambda: next(numbers))
+        individual, value = terms.individual, terms.value
+        body: list[NamedAtom] = []
+        for atom in rule.body:
+            if isinstance(atom, ex.ClassAtom):
+                body.append(OfConcept(self.recognised(atom.cls), (individual(atom.argument),)))
+            elif isinstance(atom, ex.DataRangeAtom):
+                body.append(OfRange(self.values(atom.range), (value(atom.argument),)))
+            elif isinstance(atom, ex.ObjectPropertyAtom):
+                body.append(self._link(atom.prop, individual(atom.first), individual(atom.second)))
+            elif isinstance(atom, ex.DataPropertyAtom):
+                if atom.prop == TOP_DATA:
+                    raise UnsupportedError('owl:topDataProperty stands in a rule')
+                body.append(OfProp(atom.prop, (individual(atom.first), value(atom.second))))
+            elif isinstance(atom, ex.BuiltinAtom):
+                body.append(computed_atom(atom, terms))
+            else:
+                pair = individual(atom.first), individual(atom.second)
+                is_same = isinstance(atom, ex.SameIndividualAtom)
+                body.append(SameAtom(pair) if is_same else DifferentAtom(pair))
+        heads = [self._head(atom, terms) for atom in rule.head]
+        facts = [atom for atom in body if isinstance(atom, FactAtom)]
+        bound = {term for atom in facts for term in atom.terms}
+        in_body = dict.fromkeys(term for atom in body for term in atom.terms)
+        in_heads = [term for atom in heads for term in atom.terms]
+        if any(isinstance(term, int) and term not in in_body for term in in_heads):
+            raise UnsupportedError('a variable of the head does not stand in the body')
+        for term in dict.fromkeys((*in_body, *in_heads)):
+            if isinstance(term, Constant) and not term.is_value:
+                self.nominal(str(term.value))
+            elif term not in terms.individuals:
+                continue
+            if term not in bound:
+                body.append(OfConcept(ANYBODY, (term,)))
+        if not any(isinstance(atom, FactAtom) for atom in body):
+            raise UnsupportedError('it is about no individual')
+        self._check_values(body, terms.values)
+        self.named += [NamedRule(tuple(body), head) for head in heads or (None,)]
+
+    def _check_values(self, body: list[NamedAtom], terms: Iterable[Term]) -> None:
+        """Raise UnsupportedError where a variable has no value by facts or computation."""
+        bound = {term for atom in body if isinstance(atom, FactAtom) for term in atom.terms}
+        computing = [atom for atom in body if isinstance(atom, ComputedAtom) and atom.solve]
+        for _ in computing:
+            for first, *rest in (atom.terms for atom in computing):
+                if all(isinstance(term, Constant) or term in bound for term in rest):
+                    bound.add(first)
+        if any(isinstance(term, int) and term not in bound for term in terms):
+            raise UnsupportedError('a variable is bound by no other atom')
+
+    def _head(self, atom: ex.Atom, terms: RuleTerms) -> OfConcept | OfRole | OfProp | Any:
+        """Return what a rule says of those of whom its body holds."""
+        individual = terms.individual
+        if isinstance(atom, ex.ClassAtom):
+            return OfConcept(self.positive(atom.cls), (individual(atom.argument),))
+        if isinstance(atom, ex.DataPropertyAtom):
+            return OfProp(atom.prop, (individual(atom.first), terms.value(atom.second)))
+        if isinstance(atom, ex.DataRangeAtom | ex.BuiltinAtom):
+            raise UnsupportedError('a built-in or data range in the head has no meaning here')
+        pair = individual(atom.first), individual(atom.second)
+        if isinstance(atom, ex.ObjectPropertyAtom):
+            return OfRole(self.role(atom.prop), pair)
+        return SameAtom(pair) if isinstance(atom, ex.SameIndividualAtom) else DifferentAtom(pair)
 
     def _all_disjoint(self, classes: tuple[ClassExpression, ...]) -> None:
         for pair in ax.pairs_of(classes):

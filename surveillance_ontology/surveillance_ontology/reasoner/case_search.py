@@ -17,6 +17,7 @@ from collections.abc import Callable, Iterable
 from itertools import combinations
 from typing import Any, NamedTuple, TypeAlias
 
+from surveillance_ontology.reasoner.case_joins import CaseJoins
 from surveillance_ontology.reasoner.case_model import (
     Alternative,
     CaseModel,
@@ -33,7 +34,6 @@ from surveillance_ontology.reasoner.case_rules import (
     Count,
     EdgeRule,
     Heads,
-    KeyRule,
 )
 from surveillance_ontology.reasoner.case_values import CaseValues
 
@@ -81,7 +81,9 @@ class CaseSearch:
         self.rules = rules
         self.model = CaseModel(rules, most_steps)
         self._values = CaseValues(self.model, self._either)
+        self._named = CaseJoins(self.model, self._either)
         self.gaps = self._values.gaps
+        self._named.gaps = self.gaps
         self.depends = False
         self.blocked: dict[int, int] = {}
         self._stack: list[_Choice] = []
@@ -95,7 +97,7 @@ class CaseSearch:
         self._chosen: dict[int, None] = {}
         # Individuals and the concepts for which they may need others.
         self._needs: dict[tuple[int, int], None] = {}
-        self._stated: dict[tuple[type, tuple[Alternative, ...]], bool] = {}
+        self._stated: dict[tuple[tuple[type, Alternative], ...], bool] = {}
         self._signs: dict[int, frozenset[int]] = {}
         self._known_conditions: dict[tuple[frozenset[int], tuple[int, ...]], _Conditions] = {}
         self._functional: dict[int, Count] = {limit.role: limit for limit in rules.functional}
@@ -139,7 +141,7 @@ class CaseSearch:
         while True:
             try:
                 self._saturate()
-                if not (self._branch() or self._keys() or self._expand() or self._resume()):
+                if not (self._branch() or self._expand() or self._resume()):
                     return True
             except ClashError as clash:
                 if not self._go_back(clash.choices):
@@ -166,6 +168,7 @@ class CaseSearch:
                 x, _ = revalue.popitem()
                 if not is_gone(x):
                     self._values.check(x)
+                    self._named.on_values(x)
 
     # --- choices ---
 
@@ -176,8 +179,9 @@ class CaseSearch:
         if len(alternatives) == 1:
             alternatives[0].apply(self.model, choices)
             return
-        distinct = tuple(dict.fromkeys(alternatives))
-        key = type(distinct[0]), distinct
+        # Alternatives of two kinds may be equal as tuples.
+        key = tuple(dict.fromkeys((type(one), one) for one in alternatives))
+        distinct = tuple(one for _, one in key)
         if key not in self._stated:
             self.model.put(self._stated, key, True)
             self._append(_Either(distinct, choices))
@@ -350,6 +354,7 @@ class CaseSearch:
             or concept in rules.of_values
         ):
             model.revalue[x] = None
+        self._named.on_concept(x, concept)
 
     def _on_relation(self, x: int, role: int, y: int) -> None:
         model, rules = self.model, self.rules
@@ -370,6 +375,7 @@ class CaseSearch:
             limited = not rules.at_most.keys().isdisjoint(model.labels[one])
             if limited or way in self._functional:
                 model.recount[one] = None
+        self._named.on_relation(x, role, y)
 
     def _fire(self, rule: EdgeRule, x: int, y: int) -> None:
         model = self.model
@@ -512,10 +518,10 @@ class CaseSearch:
                 if core is not None:
                     found[x] = core
                 continue
+            if self._is_its_own(x):
+                continue
             sign: Any = self._sign(x)
             if self.rules.is_pairwise:
-                if model.parent[parent] is None:
-                    continue
                 roles = model.out[parent].get(x, {})
                 sign = sign, self._sign(parent), frozenset(roles)
             first = seen.setdefault(sign, x)
@@ -523,6 +529,16 @@ class CaseSearch:
                 found[x] = first
                 cores.pop(x, None)
         return found
+
+    def _is_its_own(self, x: int) -> bool:
+        """Tell whether an individual was made for a named one, and so is nobody else.
+
+        The other may be related to that named individual as well, which numbers, and roles that
+        exclude each other, may not allow of one.
+        """
+        parent, rules = self.model.parent[x], self.rules
+        assert parent is not None
+        return self.model.parent[parent] is None and (rules.is_pairwise or bool(rules.disjoint))
 
     def _needs_no_choice(self, x: int) -> bool:
         """Tell whether an individual seems to be blocked, or its parent is."""
@@ -537,6 +553,8 @@ class CaseSearch:
         own, known = model.labels[x].keys(), self.blocked.get(x)
         parent = model.parent[x]
         assert parent is not None
+        if self._is_its_own(x):
+            return None
         unwanted, conditions = self._conditions(self._sign(parent), tuple(model.out[parent][x]))
         for y in cores if known is None else (known, *cores):
             if y in blocked or y in put_off or y >= x or model.is_gone(y):
@@ -582,40 +600,3 @@ class CaseSearch:
         if known is None or len(known) < len(labels):
             known = self._signs[x] = frozenset(labels)
         return known
-
-    # --- keys ---
-
-    def _keys(self) -> bool:
-        """Make one of named individuals that share a key; whether something was added."""
-        model = self.model
-        for key in self.rules.keys:
-            members = [
-                x for x in model.alive() if model.names[x] and key.concept in model.labels[x]
-            ]
-            for x, y in combinations(members, 2):
-                choices = self._shared(x, y, key)
-                if choices is not None:
-                    both = model.labels[x][key.concept] | model.labels[y][key.concept]
-                    model.same(x, y, choices | both)
-                    return True
-        return False
-
-    def _shared(self, x: int, y: int, key: KeyRule) -> Choices | None:
-        """Return the choices by which two individuals share a value of every property."""
-        model = self.model
-        found = 0
-        for role in key.roles:
-            for z, roles in model.out[x].items():
-                theirs = model.out[y].get(z, {})
-                if model.names[z] and role in roles and role in theirs:
-                    found |= roles[role] | theirs[role]
-                    break
-            else:
-                return None
-        for prop in key.props:
-            mine, others = self._values.known(x, prop), self._values.known(y, prop)
-            shared = next((value for value in mine if value in others), None)
-            if shared is None:
-                return None
-            found |= mine[shared] | others[shared]
-        return found

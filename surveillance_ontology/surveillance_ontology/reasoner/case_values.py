@@ -53,20 +53,6 @@ class CaseValues:
             self._limit(x, rules.values_at_most[concept], labels[concept])
         self._assign(x)
 
-    def known(self, x: int, prop: str) -> dict[Value, Choices]:
-        """Return the values of a property that are known."""
-        model = self._model
-        found: dict[Value, Choices] = {}
-        for v in model.values[x]:
-            if prop in model.props[v]:
-                values, choices = model.sets[v]
-                only = values.only
-                if only is None:
-                    self.gaps['whether unknown values are those of a key'] = None
-                else:
-                    found[only] = choices | model.props[v][prop]
-        return found
-
     def _need(self, x: int, concept: int, needed: ValueCount) -> None:
         model = self._model
         choices = model.labels[x][concept]

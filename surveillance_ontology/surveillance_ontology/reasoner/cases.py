@@ -65,6 +65,8 @@ class CaseReasoner:
         self._possible = self._search.attempt(self._begin)
         self._base = self._search.mark()
         self._consistent: bool | None = None
+        # The steps from each state of what accepts a property's chains.
+        self._automata: dict[str, dict[int, list[tuple[int | None, int]]]] = {}
 
     def _begin(self) -> None:
         """State everything that is asserted."""
@@ -120,7 +122,11 @@ class CaseReasoner:
     def consistent(self) -> bool:
         """Tell whether there is a model; True where that was not found out."""
         if self._consistent is None:
-            found = self._possible and self._search.settle()
+            try:
+                found = self._possible and self._search.settle()
+            except StoppedError:
+                self.stopped = self._consistent = True
+                return True
             self._base = self._search.mark()
             self._consistent = found and self._is_possible(lambda: None)
             self._search.undo(self._base)
@@ -232,9 +238,10 @@ class CaseReasoner:
                 for role, choices in roles.items():
                     if role > 0 and not rules.is_complex(rules.role_names[role]):
                         yield rules.role_names[role], y, choices
-        for prop in rules.complex_props():
-            if prop != TOP:
-                yield from self._along(x, prop)
+        if model.out[x] or x in self._search.blocked:
+            for prop in rules.complex_props():
+                if prop != TOP:
+                    yield from self._along(x, prop)
 
     def _along(self, x: int, prop: str) -> Iterator[tuple[str, int, Choices]]:
         """Follow a property that chains imply through the model.
@@ -243,9 +250,11 @@ class CaseReasoner:
         what is reached through these is asked for.
         """
         search, model = self._search, self._search.model
-        steps: dict[int, list[tuple[int | None, int]]] = {}
-        for before, step, after in self._rules.steps(prop):
-            steps.setdefault(before, []).append((step, after))
+        steps = self._automata.get(prop)
+        if steps is None:
+            steps = self._automata[prop] = {}
+            for before, step, after in self._rules.steps(prop):
+                steps.setdefault(before, []).append((step, after))
         reached: dict[tuple[int, int], int] = {(x, 0): 0}
         pending = [(x, 0)]
         while pending:

@@ -229,13 +229,17 @@ class Classification:
         labels = list(dict.fromkeys(existential.label for existential in program.existentials))
         alone: set[HeadAtom] = set()
         for label in labels:
-            heads = contexts.heads(frozenset((label,)))
-            if heads is None:
-                heads = frozenset((PredicateAtom(program.nothing, (_X,)),))
-            else:
-                alone |= heads
-            for head in heads:
-                self._add_clause((label,), head)
+            context = contexts.context((label,))
+            if context.clash:
+                self._add_clause((label,), PredicateAtom(program.nothing, (_X,)))
+                continue
+            stated = PredicateAtom(label, (_X,))
+            for head in dict.fromkeys(contexts.heads_of(context)):
+                if head != stated:
+                    alone.add(head)
+                    # What its classes alone imply has clauses already.
+                    if head.terms != (_X,) or head.predicate in context.beyond:
+                        self._add_clause((label,), head)
         relevant = self._relevant(labels)
         if not labels or not relevant or program.unsupported:
             return  # What is left out is found by cases in any event.

@@ -11,8 +11,8 @@ from surveillance_ontology.owl.assertions import is_assertion
 from surveillance_ontology.owl.axioms import Axiom, ClassAssertion, Rule
 from surveillance_ontology.reasoner.cases import CaseReasoner, entails
 from surveillance_ontology.reasoner.classification import Classification
-from surveillance_ontology.reasoner.clauses import BodyAtom, Constant, Program, SameAtom
-from surveillance_ontology.reasoner.engine import Engine, FactView
+from surveillance_ontology.reasoner.clauses import BodyAtom, Constant, Program
+from surveillance_ontology.reasoner.engine import Engine
 from surveillance_ontology.reasoner.normal_form import is_positive
 from surveillance_ontology.reasoner.open_cases import values_may_split
 from surveillance_ontology.reasoner.property_chains import chains_turn_back
@@ -62,8 +62,6 @@ class Completion:
             self._forget_classes()
             self.unsupported = (*self._native, 'the assertions: too many for reasoning by cases')
             return
-        if self._has_rules:
-            assertions += FactView(engine).derived()
         reasoner = CaseReasoner([*self._schema, *assertions])
         if not reasoner.consistent():
             engine.take_from_cases(None)
@@ -97,19 +95,19 @@ class Completion:
     def _may_lack(self, program: Program) -> bool:
         """Tell whether the clauses may leave something out without saying so.
 
-        They do not where nothing unnamed must exist, nor where each class that requires somebody
-        says all by itself, no chain comes back from somebody unnamed, and nothing is counted or
-        excluded. Nor where there are rules, which take no part in cases, and no value that must
-        exist is one of several that matter.
+        They do not where nothing unnamed must exist and no class requires something of a certain
+        individual, nor where each class that requires somebody says all by itself, no chain comes
+        back from somebody unnamed, and nothing is counted or excluded. Nor where there are rules,
+        and no value that must exist is one of several that matter.
         """
         if program.unsupported or program.interacting:
             return True
         clauses = [clause for clause in program.clauses if not clause.named_only]
-        if any(isinstance(c.head, SameAtom) and _names(c.head) for c in clauses):
-            return True  # What a class of one individual is below depends on the individual.
+        if any(_names(clause.head) for clause in clauses if clause.body):
+            return True  # Whether the class can have members depends on the individual.
         if not program.existentials:
             return False
-        if any(_names(atom) for clause in clauses for atom in (*clause.body, clause.head)):
+        if any(_names(atom) for clause in clauses for atom in clause.body):
             return True
         if chains_turn_back(program):
             return True
@@ -121,9 +119,13 @@ class Completion:
         return values or bool(program.at_most) or not all(map(is_positive, classes))
 
     def _is_wanted(self) -> bool:
-        if self._wanted or self._has_rules:
-            return self._wanted
-        return next(self._engine.open_cases(), None) is not None
+        """Tell whether the clauses may leave something out as things stand.
+
+        Where there are rules, that may take too long where it is but open who is the same.
+        """
+        if self._wanted or self._engine.unknown_values_matter():
+            return True
+        return not self._has_rules and next(self._engine.open_cases(), None) is not None
 
     def _is_known(self, fact: Axiom) -> bool:
         if isinstance(fact, ClassAssertion) and not isinstance(fact.cls, str):

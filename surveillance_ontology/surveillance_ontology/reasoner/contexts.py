@@ -105,12 +105,13 @@ class Context:
         looped: How much was known when the rules were last applied to its loops.
         begun: Whether what its tokens imply was drawn once.
         derived: Tokens found by rules, whether the core had them already or not.
+        beyond: Tokens found by what it is related to, not by its classes alone.
         users: Contexts with an edge to this one, or that wait for its clash.
     """
 
     __slots__ = (
-        *('bare', 'begun', 'clash', 'core', 'derived', 'done', 'edges', 'looped', 'loops'),
-        *('names', 'tokens', 'unclosed', 'unrelated', 'users', 'values'),
+        *('bare', 'begun', 'beyond', 'clash', 'core', 'derived', 'done', 'edges', 'looped'),
+        *('loops', 'names', 'tokens', 'unclosed', 'unrelated', 'users', 'values'),
     )
 
     def __init__(self, core: Tokens, bare: bool) -> None:
@@ -118,6 +119,7 @@ class Context:
         self.tokens: set[Token] = set(core)
         self.clash = self.begun = False
         self.derived: set[Token] = set()
+        self.beyond: set[Token] = set()
         self.edges: list[_Edge] = []
         self.values: list[_Values] = []
         self.loops: set[Role] = set()
@@ -191,7 +193,6 @@ class Contexts:
         self._known: dict[tuple[Tokens, bool], Context] = {}
         self._opened: list[Context] = []
         self._waiting: dict[Context, None] = {}
-        self._heads: dict[Tokens, frozenset[HeadAtom] | None] = {}
         self._always: list[tuple[Token | None, Axiom | None]] = []
         self._class_rules: dict[Token, list[tuple[Tokens, Token | None]]] = {}
         self.edge_rules: dict[Role, list[_EdgeRule]] = {}
@@ -390,17 +391,6 @@ class Contexts:
         }
         return list(found)
 
-    def heads(self, core: Tokens) -> frozenset[HeadAtom] | None:
-        """Return what an individual 0 with all tokens is, as heads of clauses; None: there is
-        none.
-        """
-        if core in self._heads:
-            return self._heads[core]
-        context = self.context(core)
-        heads = None if context.clash else frozenset(self.heads_of(context)) - _stated(core)
-        self._heads[core] = heads
-        return heads
-
     def heads_of(self, context: Context) -> Iterator[HeadAtom]:
         """Yield the tokens and edges of a context as heads of clauses about individual 0."""
         for token in context.tokens:
@@ -474,9 +464,11 @@ class Contexts:
     def _clash(self, context: Context) -> None:
         context.clash = self._changed = True
 
-    def _add(self, context: Context, token: Token) -> None:
+    def _add(self, context: Context, token: Token, *, beyond: bool = True) -> None:
         context.derived.add(token)
         if token not in context.tokens:
+            if beyond:
+                context.beyond.add(token)
             context.tokens.add(token)
             context.unclosed.append(token)
             context.unrelated.append(token)
@@ -493,7 +485,7 @@ class Contexts:
             if token is None:
                 self._clash(context)
             elif token not in tokens:
-                self._add(context, token)
+                self._add(context, token, beyond=False)
         while context.unclosed:
             one = context.unclosed.pop()
             for body, token in self._class_rules.get(one, ()):
@@ -501,7 +493,7 @@ class Contexts:
                     if token is None:
                         self._clash(context)
                         return
-                    self._add(context, token)
+                    self._add(context, token, beyond=False)
 
     def _relate(self, context: Context) -> None:
         """Add the edges and values that the tokens require."""
@@ -848,7 +840,3 @@ def _is_redundant(edge: _Edge, others: list[_Edge]) -> bool:
             if mine <= theirs and not (equal and others.index(edge) < others.index(other)):
                 return True
     return False
-
-
-def _stated(core: Tokens) -> frozenset[HeadAtom]:
-    return frozenset(PredicateAtom(token, (0,)) for token in core if isinstance(token, Predicate))

@@ -91,6 +91,7 @@ class Engine:
         self._cases = Predicate('class', 'found by cases')
         self.changed: dict[Fact, bool] | None = None
         self.renamed = False
+        self._open: OpenCases | None = None
         self._network = Network(
             program,
             self.equality.representative,
@@ -235,9 +236,20 @@ class Engine:
 
     def open_cases(self) -> Iterator[str]:
         """Yield sentences about what is not derived because it would need reasoning by cases."""
-        network = self._network
-        cases = OpenCases(self.program, network.context, network.lower, network.counters)
-        yield from cases.sentences()
+        yield from self._open_cases().sentences()
+
+    def unknown_values_matter(self) -> bool:
+        """Tell whether reasoning by cases is needed for a rule or key that could apply by a value
+        which must exist and is not known.
+        """
+        return self._open_cases().unknown_values_matter()
+
+    def _open_cases(self) -> OpenCases:
+        known, program, network = self._open, self.program, self._network
+        if known is None or known.clauses is not program.clauses:
+            known = OpenCases(program, network.context, network.lower, network.counters)
+            self._open = known
+        return known
 
     # --- touching ---
 
@@ -342,8 +354,14 @@ class Engine:
         holds: bool = fact[0].holds(fact)
         return holds
 
-    def _facts_about(self, individual: str) -> Iterator[Fact]:
-        for predicate in dict.fromkeys(self.program.predicates()):
+    def _filled(self) -> list[Predicate]:
+        """Return the predicates that hold of somebody."""
+        predicates = dict.fromkeys(self.program.predicates())
+        return [one for one in predicates if one.members or one.succ]
+
+    @staticmethod
+    def _facts_about(individual: str, predicates: Iterable[Predicate]) -> Iterator[Fact]:
+        for predicate in predicates:
             if predicate.kind == 'class':
                 if individual in predicate.members:
                     yield predicate, individual
@@ -395,6 +413,7 @@ class Engine:
         pending = tuple(self._requests)
         self._requests.clear()
         equality, merged = self.equality, False
+        filled = self._filled() if pending else []  # Merging takes facts away and adds none.
         for merge in pending:
             origin = merge.origin
             if isinstance(origin, SameIndividual) and origin not in self.told.axioms:
@@ -406,16 +425,16 @@ class Engine:
                 self.conflicts.add(merge)
                 self._queue.append((self._nothing, x))
                 continue
-            self._merge(merge)
+            self._merge(merge, filled)
             merged = True
         if merged:
             self._after_merges()
 
-    def _merge(self, merge: Merge) -> None:
+    def _merge(self, merge: Merge, filled: list[Predicate]) -> None:
         self.renamed = True
         kept, gone = self.equality.join(merge)
         self.difference.merge(kept, self.equality.members[kept])
-        moved = list(self._facts_about(gone))
+        moved = list(self._facts_about(gone, filled))
         for fact in moved:
             for fire in fact[0].on_delete:
                 fire(*fact[1:])
@@ -452,7 +471,7 @@ class Engine:
         if representative not in self.equality.members:
             return
         self.renamed = self._split_happened = True
-        facts = list(self._facts_about(representative))
+        facts = list(self._facts_about(representative, self._filled()))
         for fact in facts:
             if self.asserted.pop(fact, None) and self.changed is not None:
                 self.changed.setdefault(fact, False)

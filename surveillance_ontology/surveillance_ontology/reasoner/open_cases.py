@@ -1,21 +1,21 @@
 """What the engine leaves open: conclusions that would need reasoning by cases.
 
 Whether two individuals are the same may be unknown, and which value a property has that must have
-one. Where a count or a rule depends on it, all cases could have a consequence in common, which the
-engine does not derive. It is found out when it is asked for, from the facts that hold then.
+one. Where a count, a rule or a key depends on it, all cases could have a consequence in common,
+which the engine does not derive. It is found out when it is asked for, from the facts that hold
+then.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from fractions import Fraction
-from typing import Any
+from typing import Any, NamedTuple
 
 from surveillance_ontology.owl.axiom_text import axiom_text
 from surveillance_ontology.owl.axioms import Axiom
-from surveillance_ontology.owl.expressions import DataComplementOf, DatatypeRestriction
-from surveillance_ontology.owl.vocabulary import OWL, XSD, local_name
+from surveillance_ontology.owl.vocabulary import local_name
 from surveillance_ontology.reasoner.cardinality import AtLeastCounter, AtMostCounter
+from surveillance_ontology.reasoner.case_joins import MOST_TRIED, compared
 from surveillance_ontology.reasoner.clauses import (
     AtLeast,
     Clause,
@@ -28,22 +28,13 @@ from surveillance_ontology.reasoner.clauses import (
     Program,
     RangeAtom,
     StoppedError,
-    Term,
     closure,
 )
-from surveillance_ontology.reasoner.datatypes import literal_of
 from surveillance_ontology.reasoner.joins import JoinContext, compile_call
-from surveillance_ontology.reasoner.value_sets import EVERY, NONE, ValueSet, point, value_set
+from surveillance_ontology.reasoner.value_sets import EVERY, NONE, ValueSet, point
 
 _MOST_COMPARED = 20_000
 """Where so many values are possible, those that are known leave one."""
-_COMPARISONS = {
-    'lessThan': ('maxExclusive', 'minExclusive'),
-    'lessThanOrEqual': ('maxInclusive', 'minInclusive'),
-    'greaterThan': ('minExclusive', 'maxExclusive'),
-    'greaterThanOrEqual': ('minInclusive', 'maxInclusive'),
-}
-"""Built-ins, with the facet for a number as second and as first argument."""
 
 
 class OpenCases:
@@ -53,6 +44,9 @@ class OpenCases:
         program: What the engine runs.
         context: The engine's tables.
         lower, upper: The engine's counters.
+
+    Attributes:
+        clauses: The program's clauses when this was made; a changed program has another list.
     """
 
     def __init__(
@@ -63,6 +57,8 @@ class OpenCases:
         upper: list[AtMostCounter],
     ) -> None:
         self._program, self._context = program, context
+        self.clauses = program.clauses
+        self._asked = tuple(_asked_for_unknown(program))
         self._lower = [counter for counter in lower if not counter.is_data]
         self._upper = [counter for counter in upper if not counter.is_data and counter.n > 1]
         self._clauses = [
@@ -93,37 +89,42 @@ class OpenCases:
             name = self._open_instance(clause)
             if name is not None:
                 yield _sentence(clause.origin, name)
-        for clause, atom, existential in rules_on_unknown_values(self._program):
-            name = self._unknown_value(clause, atom, existential)
-            if name is not None:
-                prop = local_name(atom.predicate.name)
-                yield _sentence(clause.origin, name, f'a value of {prop} that is not known')
+        for asked in self._asked:
+            name = None if asked.is_decided else self._with_unknown(asked)
+            if name is not None and asked.clause is not None:
+                prop = local_name(asked.atom.predicate.name)
+                yield _sentence(asked.clause.origin, name, f'a value of {prop} that is not known')
 
-    def _unknown_value(
-        self, clause: Clause, atom: PredicateAtom, existential: Existential
-    ) -> str | None:
-        """Return somebody for whom the rule could apply by a value that is not known."""
-        x, value = atom.terms
-        rest = [
-            other
-            for other in clause.body
-            if isinstance(other, PredicateAtom) and other is not atom and value not in other.terms
-        ]
+    def unknown_values_matter(self) -> bool:
+        """Tell whether reasoning by cases is needed for a rule or key that could apply by a value
+        which must exist and is not known.
+        """
+        return any(
+            asked.is_decided and self._with_unknown(asked) is not None for asked in self._asked
+        )
+
+    def _with_unknown(self, asked: _Asked) -> str | None:
+        """Return somebody for whom a rule, or a key, could apply by such a value."""
+        clause, existential = asked.clause, asked.existential
+        if not existential.label.members:
+            return None
+        x = asked.atom.terms[0]
+        head = None if clause is None else clause.head
         found: list[str] = []
 
         def look(z: str) -> None:
-            head = clause.head
-            if not isinstance(head, PredicateAtom) or head.terms != (x,):
-                known = False
-            else:
-                known = z in head.predicate.members
+            known = (
+                isinstance(head, PredicateAtom)
+                and head.terms == (x,)
+                and z in head.predicate.members
+            )
             if not known and len(_witnesses(existential, z)) < existential.n:
                 found.append(z)
                 raise StoppedError
 
         label = PredicateAtom(existential.label, (x,))
         try:
-            compile_call(self._context, [label, *rest], None, (), (x,), look)()
+            compile_call(self._context, [label, *asked.known], None, (), (x,), look)()
         except StoppedError:
             return found[0]
         return None
@@ -224,10 +225,22 @@ def values_may_split(program: Program) -> bool:
     return False
 
 
-def rules_on_unknown_values(
-    program: Program,
-) -> Iterator[tuple[Clause, PredicateAtom, Existential]]:
-    """Yield the rules with an atom that a value might fit which must exist, and need not be known.
+class _Asked(NamedTuple):
+    """A rule (None: a key) with an atom that a value might fit which must exist.
+
+    `known`: other atoms, which no such value fits. `is_decided`: whether reasoning by cases finds
+    out what follows.
+    """
+
+    clause: Clause | None
+    atom: PredicateAtom
+    existential: Existential
+    known: list[PredicateAtom]
+    is_decided: bool
+
+
+def _asked_for_unknown(program: Program) -> Iterator[_Asked]:
+    """Yield the rules and keys for which it may matter which value there is.
 
     None does where enough values are left that no rule asks for.
     """
@@ -235,7 +248,12 @@ def rules_on_unknown_values(
     if not unknown:
         return
     above: dict[Predicate, list[Predicate]] = {}
-    asking: list[tuple[Clause, PredicateAtom, ValueSet]] = []
+    asking: list[tuple[Clause | None, PredicateAtom, ValueSet]] = [
+        (None, PredicateAtom(prop, (0, 1)), EVERY)
+        for key in program.keys
+        for prop, _ in key.props
+        if prop.kind == 'data'
+    ]
     for clause in program.clauses:
         head = clause.head
         for atom in clause.body:
@@ -243,31 +261,52 @@ def rules_on_unknown_values(
                 if isinstance(head, PredicateAtom) and head.terms[1:] == atom.terms[1:]:
                     above.setdefault(atom.predicate, []).append(head.predicate)
                 asking.append((clause, atom, _asked(clause, atom)))
+    reached = {one.prop: closure(one.prop, lambda sub: above.get(sub, ())) for one in unknown}
+    filled = {prop for props in reached.values() for prop in props}
     for existential in unknown:
         filler = existential.filler if isinstance(existential.filler, ValueSet) else EVERY
-        props = closure(existential.prop, lambda one: above.get(one, ()))
+        props = reached[existential.prop]
         fitting = [
-            (clause, atom, asked)
-            for clause, atom, asked in asking
+            (one, atom, asked)
+            for one, atom, asked in asking
             if atom.predicate in props
             and not (filler & asked).is_empty
-            and (clause.named_only or not filler.within(asked))
-            and (filler.size <= _MOST_COMPARED or not _is_joined(clause, atom))
+            and (one is None or one.named_only or not filler.within(asked))
+            and (filler.size <= _MOST_COMPARED or not _is_joined(one, atom))
         ]
         left = filler
         for _, _, asked in fitting:
             left &= ~asked
         if left.size < existential.n:
-            for clause, atom, _ in fitting:
-                if clause.named_only:
-                    yield clause, atom, existential
+            for one, atom, _ in fitting:
+                if one is None or one.named_only:
+                    known = [
+                        other
+                        for other in (() if one is None else one.body)
+                        if isinstance(other, PredicateAtom)
+                        and other.predicate not in filled
+                        and atom.terms[1] not in other.terms
+                    ]
+                    decided = filler.size <= MOST_TRIED or not _is_computed(one, atom)
+                    yield _Asked(one, atom, existential, known, decided)
 
 
-def _is_joined(clause: Clause, atom: PredicateAtom) -> bool:
-    """Tell whether a rule looks for the value of an atom among other values, which are known."""
+def _is_joined(clause: Clause | None, atom: PredicateAtom) -> bool:
+    """Tell whether a rule, or a key, looks for the value of an atom among other values."""
+    if clause is None:
+        return True
     others = (other for other in clause.body if other is not atom)
     return any(
         isinstance(other, PredicateAtom) and atom.terms[1] in other.terms for other in others
+    )
+
+
+def _is_computed(clause: Clause | None, atom: PredicateAtom) -> bool:
+    """Tell whether a rule computes with the value of an atom."""
+    value = atom.terms[1]
+    return clause is not None and any(
+        isinstance(other, ComputedAtom) and value in other.terms and compared(other, value) is None
+        for other in clause.body
     )
 
 
@@ -284,22 +323,8 @@ def _asked(clause: Clause, atom: PredicateAtom) -> ValueSet:
             if isinstance(other, RangeAtom):
                 asked &= other.values
             elif isinstance(other, ComputedAtom):
-                asked &= _compared(other, value)
+                asked &= compared(other, value) or EVERY
     return asked
-
-
-def _compared(atom: ComputedAtom, value: Term) -> ValueSet:
-    """Return the values for which a comparison with a number holds; all, for other built-ins."""
-    facets = _COMPARISONS.get(atom.builtin)
-    number = atom.terms[atom.terms[0] == value]
-    bound = number.value if isinstance(number, Constant) else None
-    if facets is None or not isinstance(bound, int | Fraction):
-        return EVERY
-    facet = facets[atom.terms[0] != value]
-    real = OWL + 'real'
-    others = value_set(DataComplementOf(real))
-    numbers = value_set(DatatypeRestriction(real, ((XSD + facet, literal_of(bound)),)))
-    return EVERY if numbers is None or others is None else numbers | others
 
 
 def _witnesses(existential: Existential, z: str) -> set[Any]:

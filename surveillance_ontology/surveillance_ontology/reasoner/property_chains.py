@@ -3,7 +3,9 @@
 A clause about R(x, y), where R follows from a chain, also holds where the chain runs over
 individuals that must exist but are not known. So each such clause gets an automaton that accepts
 the chains of R (Horrocks and Sattler, "Decidability of SHIQ with complex role inclusion axioms",
-2004): its states are labels, its steps are clauses over single properties.
+2004): its states are labels, its steps are clauses over single properties. Automata that begin with
+the same class share what they have in common: a label stands for all that members of a class are
+related to by a property.
 """
 
 from __future__ import annotations
@@ -14,6 +16,7 @@ from itertools import count
 from typing import Any, TypeAlias
 
 from surveillance_ontology.owl.axiom_text import axiom_text
+from surveillance_ontology.owl.axioms import Axiom
 from surveillance_ontology.reasoner.clauses import (
     BodyAtom,
     Clause,
@@ -80,6 +83,8 @@ class Chains:
     def __init__(self) -> None:
         self._chains: dict[AnyRole, list[tuple[AnyRole, ...]]] = {}
         self._below: dict[AnyRole, dict[AnyRole, None]] = {}
+        self._automata: dict[AnyRole, list[Step]] = {}
+        self._complex: dict[AnyRole, bool] = {}
 
     def __bool__(self) -> bool:
         return bool(self._chains)
@@ -89,6 +94,8 @@ class Chains:
 
     def imply(self, chain: tuple[AnyRole, ...], role: AnyRole) -> None:
         """Note that a chain, or with one part a property, implies a role."""
+        self._automata.clear()
+        self._complex.clear()
         back = tuple(turned(one) for one in reversed(chain))
         if len(chain) == 1:
             self._below.setdefault(role, {})[chain[0]] = None
@@ -101,18 +108,30 @@ class Chains:
         """Return the role and every role that implies it by itself."""
         return list(closure(role, lambda one: self._below.get(one, ())))
 
+    def stated_below(self, role: AnyRole) -> list[AnyRole]:
+        """Return the roles that are stated to imply the role by themselves."""
+        return list(self._below.get(role, ()))
+
     def complex_roles(self) -> list[AnyRole]:
         """Return the roles that a chain implies."""
         return [role for role in {**self._chains, **self._below} if self.is_complex(role)]
 
     def is_complex(self, role: AnyRole) -> bool:
         """Whether a chain implies the role."""
-        return any(one in self._chains for one in self.roles_below(role))
+        found = self._complex.get(role)
+        if found is None:
+            found = any(one in self._chains for one in self.roles_below(role))
+            self._complex[role] = found
+        return found
+
+    def implying(self, role: AnyRole) -> list[tuple[AnyRole, ...]]:
+        """Return the chains that are stated to imply the role."""
+        return self._chains.get(role, [])
 
     def ends_in(self, role: AnyRole) -> bool:
         """Tell whether the last step of every chain that implies the role does so by itself."""
         below = self.roles_below(role)
-        return all(chain[-1] in below for one in below for chain in self._chains.get(one, ()))
+        return all(chain[-1] in below for one in below for chain in self.implying(one))
 
     def steps(self, role: AnyRole) -> list[Step]:
         """Return the automaton of a role: its steps from state 0 to state 1.
@@ -120,8 +139,11 @@ class Chains:
         Raises:
             UnsupportedError: The role's chains use a role that depends on it.
         """
-        found: list[Step] = []
-        self._accept(role, 0, 1, found, (), count(2))
+        found = self._automata.get(role)
+        if found is None:
+            found = []
+            self._accept(role, 0, 1, found, (), count(2))
+            self._automata[role] = found
         return found
 
     def _accept(
@@ -147,7 +169,7 @@ class Chains:
         for one in below:
             if one not in equal and one in self._chains:
                 self._detour(one, first, last, steps, stack, fresh)
-        for chain in [chain for one in equal for chain in self._chains.get(one, ())]:
+        for chain in [chain for one in equal for chain in self.implying(one)]:
             inner, start, end = list(chain), first, last
             if len(inner) == 2 and inner[0] in equal and inner[1] in equal:
                 steps.append((last, None, first))
@@ -187,7 +209,8 @@ class _Spelling:
     def __init__(self, program: Program) -> None:
         self._program = program
         self.chains = Chains()
-        self._numbers = count(1)
+        self._sources: dict[tuple[BodyAtom, ...], Predicate] = {}
+        self._reached: dict[tuple[Predicate | None, AnyRole], Predicate] = {}
         for clause in program.clauses:
             if not clause.named_only:
                 self._read(clause)
@@ -279,43 +302,107 @@ class _Spelling:
         head: HeadAtom,
         clause: Clause,
     ) -> None:
+        moved = tuple(_moved(atom, start, _X) for atom in source)
+        if isinstance(start, Constant):
+            moved = (*moved, SameAtom((_X, start)))
         try:
-            steps = self.chains.steps(role)
+            reached = self._reach(self._source(moved, clause.origin), role, (), clause.origin)
         except UnsupportedError as reason:
             text = 'the ontology' if clause.origin is None else axiom_text(clause.origin)
             sentence = f'{text}: {reason}'
             if sentence not in self._program.unsupported:
                 self._program.unsupported.append(sentence)
             return
-        name = f'{next(self._numbers)}'
-        labels: dict[int, Predicate] = {}
+        last = (PredicateAtom(reached, (_X,)), *(_moved(atom, end, _X) for atom in target))
+        self._add(Clause(last, _moved(head, end, _X), clause.origin))  # type: ignore[arg-type]
 
-        def state(number: int) -> Predicate:
-            label = labels.get(number)
-            if label is None:
-                key = ('state', name, number)
-                label = labels[number] = Predicate('class', f'state {name}.{number}', key)
-                self._program.labels[key] = label  # type: ignore[index]
-            return label
+    def _add(self, clause: Clause) -> None:
+        self._program.clauses.append(clause)
 
-        add = self._program.clauses.append
-        moved = tuple(_moved(atom, start, _X) for atom in source)
-        if isinstance(start, Constant):
-            moved = (*moved, SameAtom((_X, start)))
-        if not moved:
-            self._program.uses_thing = True
-            moved = (PredicateAtom(self._program.thing, (_X,)),)
-        add(Clause(moved, PredicateAtom(state(0), (_X,)), clause.origin))
-        for before, step, after in steps:
-            here = PredicateAtom(state(before), (_X,))
-            if step is None:
-                add(Clause((here,), PredicateAtom(state(after), (_X,)), clause.origin))
+    def _label(self, *parts: Any) -> Predicate:
+        label = Predicate('class', f'reached {len(self._program.labels)}', ('reached', *parts))
+        self._program.labels[label.expression] = label
+        return label
+
+    def _source(self, atoms: tuple[BodyAtom, ...], origin: Axiom | None) -> Predicate | None:
+        """Return a label of whom the atoms hold, None for everybody."""
+        if not atoms:
+            return None
+        first = atoms[0]
+        if len(atoms) == 1 and isinstance(first, PredicateAtom) and first.predicate.kind == 'class':
+            return None if first.predicate is self._program.thing else first.predicate
+        label = self._sources.get(atoms)
+        if label is None:
+            label = self._sources[atoms] = self._label('source', len(self._sources))
+            self._add(Clause(atoms, PredicateAtom(label, (_X,)), origin))
+        return label
+
+    def _reach(
+        self,
+        start: Predicate | None,
+        role: AnyRole,
+        above: tuple[AnyRole, ...],
+        origin: Axiom | None,
+    ) -> Predicate:
+        """Return the label of all that members of a class (None: everybody) are related to by a
+        role.
+
+        Raises:
+            UnsupportedError: The role's chains use a role that depends on it.
+        """
+        key = (start, role)
+        if key in self._reached:
+            return self._reached[key]
+        chains = self.chains
+        below = chains.roles_below(role)
+        if any(one in above for one in below):
+            raise UnsupportedError(_CIRCLE)
+        equal = [one for one in below if role in chains.roles_below(one)]
+        stack = (*above, *equal)
+        end = self._label(start and (start.expression or start.name), role[0].name, role[1])
+
+        def step(here: Predicate | None, part: AnyRole, there: Predicate) -> None:
+            pair = (_Y, _X) if part[1] else (_X, _Y)
+            members = () if here is None else (PredicateAtom(here, (_X,)),)
+            body = (*members, PredicateAtom(part[0], pair))
+            self._add(Clause(body, PredicateAtom(there, (_Y,)), origin))
+
+        def pass_on(here: Predicate, there: Predicate) -> None:
+            body = (PredicateAtom(here, (_X,)),)
+            self._add(Clause(body, PredicateAtom(there, (_X,)), origin))
+
+        def repeats(chain: tuple[AnyRole, ...]) -> bool:
+            return chain[-1] in equal and (len(chain) == 2 or chain[0] not in equal)
+
+        own = [chain for one in equal for chain in chains.implying(one)]
+        if start is not None and any(map(repeats, own)):
+            first = self._label('first', end.expression)
+            pass_on(start, first)
+            start = first
+        step(start, role, end)
+        for one in dict.fromkeys(one for each in equal for one in chains.stated_below(each)):
+            if one not in equal and chains.is_complex(one):
+                pass_on(self._reach(start, one, stack, origin), end)
+        for chain in own:
+            here, there, inner = start, end, chain
+            if chain[0] in equal and chain[-1] in equal and len(chain) == 2:
+                if start is not None:
+                    pass_on(end, start)
+                continue
+            if chain[0] in equal:
+                here, inner = end, chain[1:]
+            elif chain[-1] in equal:
+                if start is None:
+                    continue  # Whoever the chain leads to begins one anyway.
+                there, inner = start, chain[:-1]
+            for part in inner[:-1]:
+                here = self._reach(here, part, stack, origin)
+            if chains.is_complex(inner[-1]):
+                pass_on(self._reach(here, inner[-1], stack, origin), there)
             else:
-                pair = (_Y, _X) if step[1] else (_X, _Y)
-                body = (here, PredicateAtom(step[0], pair))
-                add(Clause(body, PredicateAtom(state(after), (_Y,)), clause.origin))
-        last = (PredicateAtom(state(1), (_X,)), *(_moved(atom, end, _X) for atom in target))
-        add(Clause(last, _moved(head, end, _X), clause.origin))  # type: ignore[arg-type]
+                step(here, inner[-1], there)
+        self._reached[key] = end
+        return end
 
     def _individuals(self) -> None:
         """Chains that end at an individual the classes name."""

@@ -123,16 +123,17 @@ _RELATING = (
 )
 
 
-class _Terms:
-    """Numbers a rule's variables; tells individuals from values."""
+class RuleTerms:
+    """Numbers a rule's variables by `fresh`; tells individuals from values."""
 
-    def __init__(self, translation: Translation) -> None:
-        self._translation = translation
+    def __init__(self, fresh: Callable[[], int]) -> None:
+        self._fresh = fresh
         self._numbers: dict[ex.Variable, int] = {}
         self.individuals: set[int] = set()
         self.values: set[int] = set()
 
     def individual(self, argument: ex.IndividualArgument) -> Term:
+        """Return the term of an argument that is an individual."""
         if isinstance(argument, ex.Variable):
             number = self._number(argument)
             self.individuals.add(number)
@@ -140,6 +141,11 @@ class _Terms:
         return Constant(argument)
 
     def value(self, argument: ex.DataArgument) -> Term:
+        """Return the term of an argument that is a value.
+
+        Raises:
+            UnsupportedError: It is neither a literal nor a variable.
+        """
         if isinstance(argument, ex.Variable):
             number = self._number(argument)
             self.values.add(number)
@@ -151,11 +157,16 @@ class _Terms:
     def _number(self, variable: ex.Variable) -> int:
         number = self._numbers.get(variable)
         if number is None:
-            number = self._numbers[variable] = self._translation.fresh()
+            number = self._numbers[variable] = self._fresh()
         return number
 
 
-def _computed(atom: ex.BuiltinAtom, terms: _Terms) -> ComputedAtom:
+def computed_atom(atom: ex.BuiltinAtom, terms: RuleTerms) -> ComputedAtom:
+    """Return a rule's built-in.
+
+    Raises:
+        UnsupportedError: It is not known.
+    """
     name = atom.builtin.removeprefix(SWRLB)
     known = builtin(name, len(atom.arguments)) if atom.builtin.startswith(SWRLB) else None
     if known is None:
@@ -722,7 +733,7 @@ class Translation:
 
     def _rule(self, rule: ax.Rule) -> None:
         """Add the clauses of one rule to the self's program."""
-        program, terms = self.program, _Terms(self)
+        program, terms = self.program, RuleTerms(self.fresh)
         alternatives: list[list[tuple[BodyAtom, ...]]] = []
         for atom in rule.body:
             if isinstance(atom, ex.ClassAtom):
@@ -747,12 +758,12 @@ class Translation:
                 pair = terms.individual(atom.first), terms.individual(atom.second)
                 alternatives.append([(DifferentAtom(pair),)])
             else:
-                alternatives.append([(_computed(atom, terms),)])
+                alternatives.append([(computed_atom(atom, terms),)])
         for parts in product(*alternatives):
             body = tuple(atom for part in parts for atom in part)
             self._heads(rule, self._bound(body, terms), terms)
 
-    def _bound(self, body: tuple[BodyAtom, ...], terms: _Terms) -> tuple[BodyAtom, ...]:
+    def _bound(self, body: tuple[BodyAtom, ...], terms: RuleTerms) -> tuple[BodyAtom, ...]:
         """Return the body, in which what stands in no fact is found by other means.
 
         Such individuals are members of owl:Thing, such values are computed by a built-in. All other
@@ -803,7 +814,7 @@ class Translation:
             for atom in body
         )
 
-    def _heads(self, rule: ax.Rule, body: tuple[BodyAtom, ...], terms: _Terms) -> None:
+    def _heads(self, rule: ax.Rule, body: tuple[BodyAtom, ...], terms: RuleTerms) -> None:
         program = self.program
         bound = {term for atom in body for term in atom.terms if isinstance(term, int)}
 

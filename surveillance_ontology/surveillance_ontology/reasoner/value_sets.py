@@ -284,7 +284,7 @@ class ValueSet:
         """Whether the answers about the set are exact."""
         return not any(one.tests for part in self.parts.values() for one in part)
 
-    @property
+    @cached_property
     def only(self) -> Value | None:
         """The value of a set of one value; None of any other set."""
         return next(self.members()) if self.size == 1 else None

@@ -12,7 +12,7 @@ from surveillance_ontology.documents.writing import ontology_bytes
 from surveillance_ontology.owl import axioms as ax
 from surveillance_ontology.owl import expressions as ex
 from surveillance_ontology.owl.expressions import Literal, Variable
-from surveillance_ontology.owl.vocabulary import RDF, RDFS, THING, XSD
+from surveillance_ontology.owl.vocabulary import OWL, RDF, RDFS, THING, XSD
 
 IRI = 'http://x/'
 FUNCTIONAL = """
@@ -53,6 +53,7 @@ def test_functional_syntax_is_read() -> None:
     )
     assert (document.format, document.iri) == ('functional', IRI)
     assert document.axioms == [
+        ax.AnnotationAssertion(OWL + 'versionIRI', IRI, 'http://x/1'),
         ax.Declaration('class', x + 'A'),
         some,
         ax.AxiomAnnotation(some, ((RDFS + 'comment', note),)),
@@ -171,6 +172,8 @@ def test_an_undeclared_property_is_what_its_values_and_ranges_say() -> None:
     document = read_turtle(
         ':place a rdf:Property ; rdfs:range :Room , xsd:string . :near a rdf:Property .\n'
         ':width a rdf:Property ; rdfs:range xsd:integer .\n'
+        ':deep a rdf:Property ; rdfs:subPropertyOf :depth .\n'
+        ':size a owl:DatatypeProperty . :depth a rdf:Property ; rdfs:subPropertyOf :size .\n'
         ':i :place :hall , "the hall" ; :said "yes" , :j .'
     )
     x = 'http://x/#'
@@ -181,15 +184,36 @@ def test_an_undeclared_property_is_what_its_values_and_ranges_say() -> None:
         (x + 'place', 'object_property'),
         (x + 'near', 'object_property'),
         (x + 'width', 'data_property'),
+        (x + 'size', 'data_property'),
+        (x + 'depth', 'data_property'),
+        (x + 'deep', 'data_property'),
     }
     for axiom in (
         ax.ObjectPropertyRange(x + 'place', x + 'Room'),
         ax.DataPropertyRange(x + 'place', XSD + 'string'),
         ax.ObjectPropertyAssertion(x + 'place', x + 'i', x + 'hall'),
+        ax.SubDataPropertyOf(x + 'depth', x + 'size'),
+        ax.SubDataPropertyOf(x + 'deep', x + 'depth'),
         ax.DataPropertyAssertion(x + 'said', x + 'i', Literal('yes')),
         ax.ObjectPropertyAssertion(x + 'said', x + 'i', x + 'j'),
     ):
         assert axiom in document.axioms
+
+
+def test_an_object_property_is_below_no_data_property_and_stays_what_it_is() -> None:
+    text = (
+        '<http://x/> a owl:Ontology ; :license "free" .\n'
+        ':license a owl:ObjectProperty ; rdfs:subPropertyOf :about .\n'
+        ':about a owl:DatatypeProperty .'
+    )
+    document = read_turtle(text)
+    assert document.unsupported == [
+        'a statement about license is left out: subPropertyOf of an object property and a data'
+        ' property, license and about'
+    ]
+    again = read_ontology(ontology_bytes(document.axioms, 'http://x/'), IRI)
+    assert set(again.axioms) == set(document.axioms)
+    assert again.unsupported == []
 
 
 def test_what_has_no_name_keeps_its_annotations_or_says_so() -> None:

@@ -36,6 +36,7 @@ from surveillance_ontology.owl.expressions import (
     Literal,
     ObjectIntersectionOf,
     ObjectMaxCardinality,
+    ObjectMinCardinality,
     ObjectPropertyAtom,
     ObjectUnionOf,
     SameIndividualAtom,
@@ -320,6 +321,28 @@ def test_many_individuals_become_the_same_at_once(monkeypatch: pytest.MonkeyPatc
     assert kb.reason()
     assert kb.holds(SameIndividual(frozenset((n('x7'), n('y7')))))
     assert len(renamed) <= 20 * len(links)
+
+
+def test_what_a_complex_class_left_open_ends_with_its_last_assertion() -> None:
+    x = Variable('urn:swrl#x')
+    either = ClassAssertion(ObjectUnionOf((n('C'), n('D'))), n('a'))
+    kb = KnowledgeBase(
+        IRI,
+        [
+            Rule((ClassAtom(n('A'), x),), (ClassAtom(n('B'), x),)),
+            EquivalentClasses((n('E'), ObjectMinCardinality(2, n('p')))),
+            link('p', 'x', 'a'),
+            link('p', 'x', 'b'),
+            either,
+        ],
+    )
+    kb.reason()
+    assert kb.unsupported == ()
+    kb.remove(either)
+    kb.reason()
+    fresh = KnowledgeBase(IRI, kb.axioms())
+    fresh.reason()
+    assert kb.unsupported == fresh.unsupported != ()
 
 
 def test_facts_that_support_each_other_go_together() -> None:

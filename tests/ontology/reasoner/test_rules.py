@@ -7,6 +7,8 @@ import pytest
 
 from surveillance_ontology.knowledge_base import KnowledgeBase
 from surveillance_ontology.owl.axioms import (
+    EquivalentClasses,
+    HasKey,
     Rule,
     SubClassOf,
 )
@@ -21,9 +23,11 @@ from surveillance_ontology.owl.expressions import (
     DatatypeRestriction,
     DifferentIndividualsAtom,
     Literal,
+    ObjectHasSelf,
     ObjectIntersectionOf,
     ObjectPropertyAtom,
     ObjectSomeValuesFrom,
+    ObjectUnionOf,
     SameIndividualAtom,
     Variable,
 )
@@ -34,6 +38,7 @@ from .small_ontologies import (
     A,
     B,
     C,
+    D,
     P,
     Q,
     R,
@@ -230,20 +235,22 @@ def test_whom_a_class_of_a_rule_relates_to_needs_no_name(
 
 
 @pytest.mark.parametrize(
-    ('values', 'tests', 'named', 'witness'),
+    ('values', 'tests', 'follows', 'witness'),
     [
-        (DataOneOf((num(1), num(2))), [num(1), num(2)], 2, num(2)),
-        (DataOneOf((num(1), num(2), num(3))), [num(1), num(2)], 0, num(2)),
-        (XSD + 'boolean', [TRUE, FALSE], 2, TRUE),
-        (_NUMBER, [V], 1, num(5)),
-        (_AT_LEAST_18, [('greaterThan', 17)], 1, num(20)),
-        (_NUMBER, [('greaterThan', 17)], 0, num(20)),
+        (DataOneOf((num(1), num(2))), [num(1), num(2)], True, num(2)),
+        (DataOneOf((num(1), num(2), num(3))), [num(1), num(2)], False, num(2)),
+        (XSD + 'boolean', [TRUE, FALSE], True, TRUE),
+        (_NUMBER, [V], True, num(5)),
+        (_AT_LEAST_18, [('greaterThan', 17)], True, num(20)),
+        (_NUMBER, [('greaterThan', 17)], False, num(20)),
+        (_NUMBER, [('greaterThan', 17), ('lessThanOrEqual', 17)], True, num(20)),
+        (XSD + 'double', [('greaterThan', 17), ('lessThanOrEqual', 17)], False, num(20, 'double')),
     ],
 )
-def test_a_rule_that_a_value_which_is_not_known_may_fit_is_named(
+def test_rules_apply_by_a_value_that_is_not_known(
     values: DataRange,
     tests: list[Literal | Variable | tuple[str, int]],
-    named: int,
+    follows: bool,
     witness: Literal,
 ) -> None:
     kb = base(SubClassOf(A, DataSomeValuesFrom(S, values)), is_a(A, i))
@@ -252,10 +259,63 @@ def test_a_rule_that_a_value_which_is_not_known_may_fit_is_named(
         value = V if isinstance(test, tuple) else test
         kb.add(Rule((DataPropertyAtom(S, X, value), *more), (ClassAtom(B, X),)))
     assert kb.reason()
-    assert kb.instances(B) == set()
-    assert len(kb.unsupported) == named
-    assert all('it depends on a value of' in sentence for sentence in kb.unsupported)
+    assert kb.instances(B) == ({i} if follows else set())
+    assert kb.unsupported == ()
+    assert kb.justification(is_a(B, i)) == () or follows
     kb.add(has(S, i, witness))
     assert kb.reason()
     assert kb.instances(B) == {i}
     assert kb.unsupported == ()
+
+
+def test_keys_apply_by_values_that_are_not_known() -> None:
+    few = SubClassOf(A, DataSomeValuesFrom(S, DataOneOf((num(1), num(2)))))
+    key = HasKey(A, (), (S,))
+    apart = differ(i, j, k)
+    kb = base(few, key, apart, is_a(A, i), is_a(A, j), has(S, j, 1))
+    assert kb.data_values(S, i) == {num(2)}
+    kb.add(is_a(A, k))
+    assert not kb.reason()
+    assert set(kb.justification(None)) == {few, key, apart, *(is_a(A, one) for one in (i, j, k))}
+
+
+def test_a_rule_hands_on_a_value_that_is_not_known() -> None:
+    member = is_a(DataSomeValuesFrom(S, _AT_LEAST_18), i)
+    given = Rule((DataPropertyAtom(S, X, V),), (DataPropertyAtom(T, X, V),))
+    asked = EquivalentClasses((B, DataSomeValuesFrom(T, _AT_LEAST_18)))
+    kb = base(member, given, asked)
+    assert kb.instances(B) == {i}
+
+
+def test_a_rule_about_different_individuals_looks_at_both_cases() -> None:
+    body = (ObjectPropertyAtom(P, X, Y), DifferentIndividualsAtom(X, Y))
+    needed = [Rule(body, (ClassAtom(B, X),)), SubClassOf(ObjectHasSelf(P), B), rel(P, i, j)]
+    kb = base(*needed, is_a(ObjectUnionOf((C, D)), i))
+    assert kb.instances(B) == {i}
+    assert set(kb.justification(is_a(B, i))) == set(needed)
+
+
+def test_what_one_value_of_several_implies_is_no_consequence() -> None:
+    def one_of(prop: str, *values: int) -> DataSomeValuesFrom:
+        return DataSomeValuesFrom(prop, DataOneOf(tuple(map(num, values))))
+
+    pass_on = Rule(
+        (DataPropertyAtom(S, X, V), ObjectPropertyAtom(P, X, Y)), (DataPropertyAtom(S, Y, V),)
+    )
+    cases = [
+        Rule((DataPropertyAtom(S, X, num(n)), ObjectPropertyAtom(P, Y, X)), (ClassAtom(A, Y),))
+        for n in (1, 2)
+    ]
+    kb = base(is_a(one_of(S, 1, 2), i), rel(P, i, j), pass_on, cases[0])
+    assert kb.instances(A) == set()
+    assert kb.data_values(S, j) == set()
+    kb.add(cases[1])
+    assert kb.reason()
+    assert kb.instances(A) == {i}
+    assert {pass_on, *cases} <= set(kb.justification(is_a(A, i)))
+
+    less = (DataPropertyAtom(S, X, V), DataPropertyAtom(T, X, W), computed('lessThan', V, W))
+    kb = base(is_a(one_of(S, 1, 5), i), is_a(one_of(T, 2, 3), i), Rule(less, (ClassAtom(A, X),)))
+    assert kb.instances(A) == set()
+    kb = base(is_a(one_of(S, 1, 0), i), is_a(one_of(T, 2, 3), i), Rule(less, (ClassAtom(A, X),)))
+    assert kb.instances(A) == {i}

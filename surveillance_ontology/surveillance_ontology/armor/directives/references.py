@@ -104,23 +104,26 @@ def _load(
     name = request.reference_name
     notes = [f'{name} is loaded already']
     if not _rebuffer(session, request, buffered):
-        with session.loading:
-            if name not in session.references:
-                with memory.uncollected():
-                    web = request.primary.upper() == 'WEB'
-                    ref, notes = _read_document(
-                        name, source, iri, reasoner, session.paths, session.settings, web=web
-                    )
-                    memory.settle(len(ref.kb))
-                ref.buffered_manipulation, ref.buffered_reasoner = buffered, lazy
-                ref.history = History(session.clock(), session.settings.history)
+        with memory.uncollected():
+            web = request.primary.upper() == 'WEB'
+            ref, found = _read_document(
+                name, source, iri, reasoner, session.paths, session.settings, web=web
+            )
+            memory.settle(len(ref.kb))
+        ref.buffered_manipulation, ref.buffered_reasoner = buffered, lazy
+        ref.history = History(session.clock(), session.settings.history)
+        with session.entering:
+            entered = name not in session.references
+            if entered:
                 if session.store:
                     session.store.loaded(ref)
                 session.register(ref)
-                for note in notes:
-                    session.warn(f'{name}: {note}')
-            else:
-                _rebuffer(session, request, buffered)
+        if entered:
+            notes = found
+            for note in notes:
+                session.warn(f'{name}: {note}')
+        else:
+            _rebuffer(session, request, buffered)
     if request.secondary:
         _mount(session, request)
     return DirectiveResponse(error_description='; '.join(notes))
@@ -202,22 +205,32 @@ def _release(session: Session, ref: Reference) -> None:
 )
 @memory.uncollected()
 def _save(session: Session, request: DirectiveRequest, path: str) -> DirectiveResponse:
-    with session.references.locked(request.reference_name) as ref:
-        session.check_free(ref, request.client_name)
-        target = session.paths.to_write(path or _loaded_file(session, ref), ONTOLOGY_ENDINGS)
-        axioms = list(ref.kb.axioms())
-        if request.primary:
-            axioms = list(dict.fromkeys([*axioms, *ref.kb.facts()]))
-        origin = ref.origin
-        replace = session.saves.begin()
     # Late, as what LOAD WEB needs: a server that starts again is to be back at once.
     from surveillance_ontology.documents.writing import write_ontology
 
-    form = 'ntriples' if target.suffix.lower() == '.nt' else origin.format
-    try:
-        write_ontology(axioms, ref.kb.iri, target, form, origin.prefixes, replace)
-    except OntologyFileError as error:
-        raise DirectiveError(f'SAVE: {error}') from None
+    with contextlib.ExitStack() as turn:
+        while True:
+            with session.references.locked(request.reference_name) as ref:
+                session.check_free(ref, request.client_name)
+                target = session.paths.to_write(
+                    path or _loaded_file(session, ref), ONTOLOGY_ENDINGS
+                )
+                saving = session.saving(target)
+                # Whose turn it is waits for no reference: a list may hold it, and wait for a turn.
+                if saving.acquire(blocking=False):
+                    turn.callback(saving.release)
+                    axioms = list(ref.kb.axioms())
+                    if request.primary:
+                        axioms = list(dict.fromkeys([*axioms, *ref.kb.facts()]))
+                    origin = ref.origin
+                    break
+            with saving:
+                pass
+        form = 'ntriples' if target.suffix.lower() == '.nt' else origin.format
+        try:
+            write_ontology(axioms, ref.kb.iri, target, form, origin.prefixes)
+        except OntologyFileError as error:
+            raise DirectiveError(f'SAVE: {error}') from None
     return DirectiveResponse()
 
 

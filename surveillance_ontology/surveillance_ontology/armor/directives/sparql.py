@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import json
+from typing import Any
 
-from surveillance_ontology.armor.directives.table import query, text
+from surveillance_ontology.armor.directives.table import Enter, query, text
 from surveillance_ontology.armor.protocol import DirectiveError, DirectiveResponse, QueryItem
 from surveillance_ontology.armor.reference import Reference
 from surveillance_ontology.armor.rendering import shown
 from surveillance_ontology.armor.session import Session
-from surveillance_ontology.armor.sparql_engine import (
-    Binding,
-)
+from surveillance_ontology.armor.sparql_engine import Binding
 from surveillance_ontology.armor.sparql_graph import GraphUpdate, Version
 from surveillance_ontology.owl.vocabulary import XSD
 
@@ -27,44 +26,37 @@ _DIFFERS = (
 )
 
 
-@query(
-    'QUERY SPARQL',
-    text('query'),
-    rest=1,
-    slow=True,
-    summary=_SUMMARY + 'All rows in one text: `{x=iri, v=5^^datatype}, {...}`.',
-    differs=_DIFFERS,
-)
-def _sparql(session: Session, ref: Reference, *parts: str) -> DirectiveResponse:
+def _sparql(words: str, form: str, **properties: Any) -> Enter:
+    """Enter a SPARQL query; ``form`` says in what form the rows come."""
+    summary = _SUMMARY + form
+    return query(words, text('query'), rest=1, slow=True, summary=summary, **properties)
+
+
+@_sparql('QUERY SPARQL', 'All rows in one text: `{x=iri, v=5^^datatype}, {...}`.', differs=_DIFFERS)
+def _rows_as_text(session: Session, ref: Reference, *parts: str) -> DirectiveResponse:
     rows = _select(session, ref, parts)
     texts = [', '.join(f'{b.variable}={_value(b)}' for b in row) for row in rows]
     return DirectiveResponse(queried_objects=[', '.join(f'{{{text}}}' for text in texts)])
 
 
-@query(
+@_sparql(
     'QUERY SPARQL FORMATTED',
-    text('query'),
-    rest=1,
-    slow=True,
-    summary=_SUMMARY + 'The rows one after the other as pairs of variable and value.',
+    'The rows one after the other as pairs of variable and value.',
     differs=_DIFFERS,
 )
-def _sparql_formatted(session: Session, ref: Reference, *parts: str) -> DirectiveResponse:
+def _rows_as_pairs(session: Session, ref: Reference, *parts: str) -> DirectiveResponse:
     rows = _select(session, ref, parts)
     pairs = [QueryItem(bound.variable, _value(bound)) for row in rows for bound in row]
     return DirectiveResponse(sparql_queried_objects=pairs)
 
 
-@query(
+@_sparql(
     'QUERY SPARQL ROWS',
-    text('query'),
-    rest=1,
-    slow=True,
+    'One JSON object for each row, variable to value; a variable that the row leaves unbound is '
+    'left out, which the other two forms cannot show.',
     native=False,
-    summary=_SUMMARY + 'One JSON object for each row, variable to value; a variable that the row '
-    'leaves unbound is left out, which the other two forms cannot show.',
 )
-def _sparql_rows(session: Session, ref: Reference, *parts: str) -> DirectiveResponse:
+def _rows_as_json(session: Session, ref: Reference, *parts: str) -> DirectiveResponse:
     rows = _select(session, ref, parts)
     objects = [json.dumps({b.variable: _value(b) for b in row}, ensure_ascii=False) for row in rows]
     return DirectiveResponse(queried_objects=objects)
