@@ -27,12 +27,10 @@ from surveillance_fsm.execution import (
     Exit,
     LeftBehindError,
     Node,
-    SpecialStep,
 )
 from surveillance_fsm.frame import Answer, Frame, History, Move, answer_of
 from surveillance_fsm.state import State, this_thread
 from surveillance_fsm.timeouts import LimitOptions, leave_behind, supervise
-from surveillance_fsm.userdata import raw
 
 Outcomes = dict[str, str | None]
 ChildTerminationCallback = Callable[[Outcomes], bool | Iterable[str] | None]
@@ -54,7 +52,6 @@ class ChildFrame(Frame):
     container: Concurrence
     unneeded = False
     served = False
-    carried_over = (*Frame.carried_over, 'unneeded')
 
     def __init__(self, within: ConcurrentFrame, node: Node, thread: ExecutionThread) -> None:
         super().__init__(within.container, thread, within.path, node, None)
@@ -62,10 +59,11 @@ class ChildFrame(Frame):
 
     def successor(self) -> ChildFrame:
         """Return a copy for the thread that takes this execution over."""
+        frame = super().successor()
+        assert isinstance(frame, ChildFrame)
         # Not kept: the two would refer to each other, which is left to no garbage collector.
         within = self.container.fsm_frame
         assert isinstance(within, ConcurrentFrame)
-        frame = self.handed_over(ChildFrame(within, self.node, self.thread))
         within.replace_child(frame)
         return frame
 
@@ -169,9 +167,6 @@ class _AllStates(State):
         if self._frame is not None:
             self._frame.cut_states()
 
-    def fsm_recall_suspend(self) -> None:
-        """Nothing was asked of states that had not begun."""
-
     def fsm_forget(self) -> None:
         """Drop how far they have come."""
         for state in self._concurrence.fsm_states.values():
@@ -186,7 +181,6 @@ class ConcurrentFrame(Frame):
     """
 
     container: Concurrence
-    carried_over = (*Frame.carried_over, 'outcomes')
     _watches = False
 
     def __init__(
@@ -199,11 +193,23 @@ class ConcurrentFrame(Frame):
     ) -> None:
         super().__init__(container, thread, path, current, parent_ud)
         self.outcomes: Outcomes = dict.fromkeys(container.fsm_states)
+        self._begin_anew()
+
+    def successor(self) -> Frame:
+        """Return a copy for the thread that takes this execution over."""
+        frame = super().successor()
+        assert isinstance(frame, ConcurrentFrame)
+        frame._begin_anew()
+        return frame
+
+    def _begin_anew(self) -> None:
+        """Watch no thread yet."""
+        self._watches = False
         self._wakeup = Interrupt()
         # Of all states that were started, by label; most have ended.
         self._children: dict[str, ChildFrame] = {}
         # What an execution that was left behind, or broke off, was asked is not for this one.
-        together = container.fsm_first().state
+        together = self.container.fsm_first().state
         if together.preempt_requested():
             together.recall_preempt()
 
@@ -403,9 +409,7 @@ class ConcurrentFrame(Frame):
         return str(outcome)
 
     def _tell_end(self, label: str, outcome: str) -> None:
-        if self.run.control.trace is not None:
-            step = SpecialStep(self.path, label, '', 'ended')
-            self.note((step, outcome, self.run.now(), raw(self.container.userdata).copy()))
+        self.note(label, outcome, '', 'ended')
         if self.run.chatty:
             log.loginfo(f"'{self.path}': '{label}' ended with '{outcome}'")
         self.container.call_transition_cbs()

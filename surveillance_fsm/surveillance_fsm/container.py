@@ -86,7 +86,6 @@ class Container(State):
         fsm_frame: The execution of the container, while there is one.
         fsm_history: Where the next execution goes on, when the last one was put aside.
         fsm_raised: Interrupts that have been raised and have not begun.
-        fsm_aside: The container was asked to be put aside in the moment before it began.
         fsm_frame_type: How the container is executed.
         fsm_arguments: What else may be said of a state that is added.
         fsm_table: The nodes of states and interrupts by label, as they were last made.
@@ -102,7 +101,6 @@ class Container(State):
     fsm_frame: Frame | None = None
     fsm_history: History | None = None
     fsm_raised: tuple[Branch, ...] = ()
-    fsm_aside = False
     fsm_table: Mapping[str, Node] = {}
     fsm_data: dict[str, Any]
     _table_made_for: tuple[int, int, int, str] | None = None
@@ -112,7 +110,6 @@ class Container(State):
         'fsm_frame',
         'fsm_history',
         'fsm_raised',
-        'fsm_aside',
         'fsm_table',
         'fsm_data',
         '_table_made_for',
@@ -478,8 +475,6 @@ class Container(State):
     def fsm_node(self, label: str, state: State, priority: float = LOWEST) -> Node:
         """Make the node of one state; its targets are left to the container's kind."""
         node = Node(self, label, state, priority)
-        if isinstance(state, Container) and state.fsm_entered_directly():
-            node.enter = node.execute = state.fsm_enter
         clock = self.fsm_clock
         if state.fsm_clock is not clock:
             state.fsm_clock = clock
@@ -553,15 +548,6 @@ class Container(State):
             return self._enter(thread, here.stack, parent_ud)
         return self._execute_as_root(parent_ud)
 
-    def fsm_entered_directly(self) -> bool:
-        """Tell whether nobody has put code of his own around `execute`."""
-        return type(self).execute is Container.execute and 'execute' not in self.__dict__
-
-    def fsm_enter(self, parent_ud: Any) -> Any:
-        """Run as the state that the engine executes next on this thread; see `execute`."""
-        here = this_thread
-        return self._enter(here.thread, here.stack, parent_ud)
-
     def _execute_as_root(self, parent_ud: Any) -> Any:
         """Begin a run of its own, and watch it to its end."""
         control, wakeup = self.control, Interrupt()
@@ -607,25 +593,19 @@ class Container(State):
             if self.fsm_frame is not before:
                 raise InvalidStateError(f"'{self.fsm_path}' is running already")
             self.fsm_frame = frame
+        if stack and stack[-1].cut is stack[-1].current:
+            # It was asked to make way before it was visible that it had begun.
+            frame.suspending = True
         # Whoever takes the thread over gives it another stack, and afterwards looks at this one.
         stack.append(frame)
-        try:
+
+        def run() -> Any:
             if stack is not thread.stack:
                 raise LeftBehindError
             history, self.fsm_history = self.fsm_history, None
-            if self.fsm_aside:
-                with thread.run.condition:
-                    frame.suspending = frame.suspending or self.fsm_aside
-                    self.fsm_aside = False
             return frame.execute(history)
-        except BaseException:
-            if self.fsm_frame is frame:
-                self.fsm_frame = None
-            raise
-        finally:
-            frame.ended = True
-            if stack and stack[-1] is frame:
-                stack.pop()
+
+        return frame.to_its_end(run)
 
     def request_preempt(self) -> None:
         """Ask the container to stop: the request reaches what runs inside at once."""
@@ -633,7 +613,7 @@ class Container(State):
         frame = self.fsm_frame
         if frame is None:
             return
-        with frame.run.lock:
+        with frame.run.condition:
             frame = self.fsm_frame
             if frame is not None:
                 frame.preempt()
@@ -737,16 +717,9 @@ class Container(State):
 
     def fsm_suspend(self) -> None:
         """Have the container put aside with its history; under the run's condition."""
-        # Noted first: an execution that begins in this moment looks after it has become visible.
-        self.fsm_aside = True
         frame = self.fsm_frame
         if frame is not None:
-            self.fsm_aside = False
             frame.suspend()
-
-    def fsm_recall_suspend(self) -> None:
-        """Take that back from a container that had not begun."""
-        self.fsm_aside = False
 
     def fsm_forget(self) -> None:
         """Drop the history of the container and of all inside: it will not be resumed."""

@@ -13,6 +13,7 @@ from surveillance_fsm.exceptions import InvalidStateError, InvalidTransitionErro
 from surveillance_fsm.execution import (
     ExecutionThread,
     Node,
+    Noted,
     RawTransition,
     Run,
     Trace,
@@ -49,16 +50,13 @@ class Control:
 
     Attributes:
         condition: The one condition of the machine.
-        lock: Its lock.
         paused: No further state is entered; see `pause`.
         steps: States that may be entered although paused.
         trace: Where transitions are reported, if anywhere.
     """
 
     def __init__(self, container: Container) -> None:
-        # The condition's lock by itself, too: it is taken sooner.
-        self.lock = threading.RLock()
-        self.condition = threading.Condition(self.lock)
+        self.condition = threading.Condition()
         self.paused = False
         self.steps = 0
         self.trace: Trace | None = None
@@ -71,7 +69,7 @@ class Control:
         """Report every transition to `trace`, in the thread that makes it.
 
         Args:
-            trace: Takes each transition as the loop notes it; `history.unfold` says it in full.
+            trace: Takes each transition as the loop notes it; `execution.unfold` says it in full.
                 What it raises is logged.
 
         Returns:
@@ -203,13 +201,17 @@ class Control:
         Raises:
             InvalidStateError: Another run has not ended.
         """
-        with self.lock:
+        with self.condition:
             if self._run is not None and not self._run.ended:
                 raise InvalidStateError(f"'{self._container.get_name()}' is running already")
             self._run, self.steps = run, 0
 
     def fsm_end(self, run: Run) -> None:
         """Let go of a run that has ended."""
-        with self.lock:
+        with self.condition:
             run.ended = True
             self.condition.notify_all()
+        # Others may end their reports in this moment.
+        trace = self.trace
+        if trace is not None:
+            trace(Noted(self._container.get_name(), '', '', '', run.now(), {}, 'end'))

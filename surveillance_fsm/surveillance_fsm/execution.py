@@ -17,7 +17,7 @@ import threading
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from surveillance_fsm import log
 from surveillance_fsm.clock import WALL_CLOCK, Clock, Interrupt, elapsed_of
@@ -161,11 +161,6 @@ class Node:
     def __str__(self) -> str:
         return self.path
 
-    def step(self, outcome: Any) -> tuple[str, str, str, str]:
-        """Return what `outcome` leads to by the table: (path of the container, from, to, kind)."""
-        target = self.targets[outcome]
-        return self.container.get_name(), self.label, target.label, target.kind
-
     def target(self, outcome: Any) -> Node | Exit:
         """Return where `outcome` leads.
 
@@ -226,34 +221,50 @@ class Branch:
 # What is told to a trace.
 
 
-class SpecialStep:
-    """A step that is not what the table says, told to a trace in place of the node that was left.
+class Noted(NamedTuple):
+    """A transition as it was noted.
 
-    Args:
+    Attributes:
         path: Path of the container.
         source: Label of the state that was left; empty at the start.
-        target: Label of the state or the outcome reached.
-        kind: See `history.Transition`.
+        outcome: What that ended with.
+        target: Label of the state entered, or the container's outcome.
+        time: Seconds on the machine's clock.
+        userdata: Shallow copy of the container's userdata.
+        kind: See `history.Transition`; also ``start``, when a container begins or goes on,
+            ``entered``, when a pause before `target` is over, and ``end``, when a root has ended.
     """
 
-    __slots__ = ('_step',)
+    path: str
+    source: str
+    outcome: str
+    target: str
+    time: float
+    userdata: dict[str, Any]
+    kind: str
 
-    def __init__(self, path: str, source: str, target: str, kind: str) -> None:
-        self._step = path, source, target, kind
-
-    def step(self, _outcome: Any) -> tuple[str, str, str, str]:
-        """As `Node.step`."""
-        return self._step
+    @property
+    def is_transition(self) -> bool:
+        """Whether a state was left, or a child of a concurrence ended."""
+        return self.kind not in ('start', 'entered', 'end')
 
 
-RawTransition = tuple[Node | SpecialStep, Any, float, dict[str, Any]]
-"""(what was left, outcome, time in seconds, shallow copy of the container's userdata)."""
+RawTransition = Noted | tuple[Node, Any, float, dict[str, Any]]
+"""A transition; one that is as the table says may be told as what was left, its outcome, the time
+and a shallow copy of the container's userdata, which costs the loop least."""
+
+
+def unfold(raw: RawTransition) -> Noted:
+    """Say in full what a trace was given."""
+    if isinstance(raw, Noted):
+        return raw
+    left, outcome, time, userdata = raw
+    path, target = left.container.get_name(), left.targets[outcome]
+    return Noted(path, left.label, str(outcome), target.label, time, userdata, target.kind)
+
 
 Trace = Callable[[RawTransition], object]
-"""Takes transitions as the loop notes them, at the least cost to it; see `history.unfold`."""
-
-NO_USERDATA: dict[str, Any] = {}
-"""Stands for a copy of userdata that holds nothing; never written to."""
+"""Takes transitions as the loop notes them; see `unfold`."""
 
 
 # Threads.
@@ -265,7 +276,6 @@ class Run:
     Attributes:
         control: What others want of the machine, over all executions.
         condition: The one condition of the machine; its lock guards everything slow.
-        lock: That lock by itself.
         clock: The machine's clock.
         preempt_timeout: See `DEFAULT_PREEMPT_TIMEOUT`; None waits for ever.
         now: The time of reports and limits.
@@ -279,7 +289,6 @@ class Run:
     def __init__(self, control: Control, clock: Clock, preempt_timeout: float | None) -> None:
         self.control = control
         self.condition = control.condition
-        self.lock = control.lock
         self.clock = clock
         self.preempt_timeout = preempt_timeout
         self.now: Callable[[], float] = time.monotonic if clock is WALL_CLOCK else elapsed_of(clock)
@@ -379,7 +388,7 @@ class ExecutionThread:
 
     def retire(self) -> None:
         """Take it from those that are at work."""
-        with self.run.lock:
+        with self.run.condition:
             if self in self.run.threads:
                 self.run.threads.remove(self)
 
@@ -481,7 +490,7 @@ class Work:
         finally:
             here.thread = here.stack = None
             self._going_on.release()
-        with thread.run.lock:
+        with thread.run.condition:
             if self.stack is not thread.stack:
                 if error is not None:
                     log.logwarn(f"'{thread.path}', left behind, ended with {type(error).__name__}")

@@ -11,7 +11,6 @@ import os
 import secrets
 import stat
 import time
-from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
@@ -64,20 +63,13 @@ ABANDONED = 3600.0
 """Seconds after which a draft that nobody writes to is one of a process that was killed."""
 
 
-def replace_file(
-    path: str | Path,
-    data: bytes,
-    *,
-    durable: bool = False,
-    replace: Callable[[Path, Path], None] | None = None,
-) -> None:
+def replace_file(path: str | Path, data: bytes, *, durable: bool = False) -> None:
     """Write a file so that whoever reads it finds all of the old content or all of the new one.
 
     Args:
         path: The file, or a link to it, which stays; its folder is there.
         data: What it is to hold.
         durable: On return it is on the disk, and outlives a failure of power.
-        replace: Puts a draft, which is beside the file, into its place; ``os.replace`` by default.
 
     Raises:
         OSError: It cannot be written, or is none; the error has its name, and the old one is whole.
@@ -93,7 +85,7 @@ def replace_file(
             file.flush()
             if durable:
                 os.fsync(handle)
-        (replace or os.replace)(draft, target)
+        os.replace(draft, target)
     except OSError as error:
         raise OSError(error.errno, error.strerror, str(path)) from None
     finally:

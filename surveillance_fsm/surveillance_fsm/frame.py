@@ -8,25 +8,24 @@ paused.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import copy
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from surveillance_fsm import control, log
 from surveillance_fsm.exceptions import InvalidStateError, SmachError
 from surveillance_fsm.execution import (
     LOWEST,
-    NO_USERDATA,
     RESUMPTION,
     SUSPENDED,
     ExecutionThread,
     Exit,
     LeftBehindError,
     Node,
-    RawTransition,
-    SpecialStep,
+    Noted,
 )
-from surveillance_fsm.state import State
+from surveillance_fsm.state import State, this_thread
 from surveillance_fsm.timeouts import end_watch, settle, watch_of
 from surveillance_fsm.userdata import raw
 
@@ -72,9 +71,6 @@ class Move(NamedTuple):
     kind: str
 
 
-AnyFrame = TypeVar('AnyFrame', bound='Frame')
-
-
 class Answer(NamedTuple):
     """What the end of a state says of what it was asked.
 
@@ -103,10 +99,8 @@ def answer_of(state: State, outcome: Any, *, preempted: bool, cut: bool, gone: b
     pending = state.preempt_requested() and not gone
     if pending and (preempted or (cut and outcome is not SUSPENDED)):
         state.recall_preempt()
-    if cut and state.fsm_suspends:
-        # One that makes way is suspended; any other outcome is its own.
-        state.fsm_recall_suspend()
-        cut = False
+    # A container that makes way is suspended; any other outcome is its own.
+    cut = cut and not state.fsm_suspends
     if outcome is SUSPENDED:
         made_way = True
     elif pending:
@@ -148,7 +142,6 @@ class Frame:
         items: An iterator's items that are left.
         index: How many items an iterator has begun.
         repeat: An iterator's current item has not ended: it is not followed by the next one.
-        carried_over: The attributes that `successor` takes over.
     """
 
     # Class attributes: most executions of a container need none of them.
@@ -165,16 +158,6 @@ class Frame:
     items: Any = None
     index = 0
     repeat = False
-    carried_over: ClassVar[tuple[str, ...]] = (
-        'preempted',
-        'cut',
-        'suspending',
-        'forced',
-        'saved',
-        'items',
-        'index',
-        'repeat',
-    )
 
     def __init__(
         self,
@@ -222,11 +205,11 @@ class Frame:
             self.tell(Move(None, None, target, 'start'))
         return self._run_from(target)
 
-    def proceed(self, outcome: Any) -> Any:
-        """Go on as if the current state had just returned `outcome`, and run to the end."""
-        stack = self.thread.stack
+    def to_its_end(self, run: Callable[[], Any]) -> Any:
+        """Call what runs the container to its end; the frame leaves this thread's stack then."""
+        stack = this_thread.stack
         try:
-            return self.run_on(outcome)
+            return run()
         except BaseException:
             if self.container.fsm_frame is self:
                 self.container.fsm_frame = None
@@ -237,7 +220,7 @@ class Frame:
                 stack.pop()
 
     def run_on(self, outcome: Any) -> Any:
-        """Take `outcome` for that of the current state, and run to the end; see `proceed`."""
+        """Go on as if the current state had just returned `outcome`, and run to the end."""
         node = self.current
         assert isinstance(node, Node)
         outcome = self.settled(outcome)
@@ -255,13 +238,8 @@ class Frame:
 
     def successor(self) -> Frame:
         """Return a copy for the thread that takes this execution over."""
-        frame = type(self)(self.container, self.thread, self.path, self.current, self.parent_ud)
-        return self.handed_over(frame)
-
-    def handed_over(self, frame: AnyFrame) -> AnyFrame:
-        """Give another frame what is asked of this one, and how far it is; return that."""
-        for name in self.carried_over:
-            setattr(frame, name, getattr(self, name))
+        frame = copy.copy(self)
+        frame.attention, frame.gone = False, None
         return frame
 
     def last_outcomes(self) -> Iterable[str]:
@@ -324,7 +302,7 @@ class Frame:
                     self.current = told = target = SHUTDOWN
                     break
                 if trace is not None:
-                    trace((node, outcome, now(), data.copy() if data else NO_USERDATA))
+                    trace((node, outcome, now(), data.copy()))
                 if chatty:
                     self._log(node, outcome, target)
                 if callbacks and not target.is_exit:
@@ -436,7 +414,8 @@ class Frame:
         """Take the request to make way back from a state that had not begun when it came."""
         cut = self.cut
         if cut is not None and cut is not ended:
-            cut.state.fsm_recall_suspend()
+            if not cut.state.fsm_suspends:
+                cut.state.recall_preempt()
             if self.preempted is cut:
                 self.preempted = None  # It is asked again.
             self.cut = None
@@ -537,14 +516,10 @@ class Frame:
         container, run = self.container, self.run
         left, outcome, target, kind = move
         if left is None:
-            if run.control.trace is not None:
-                step = SpecialStep(self.path, '', target.label, kind or 'start')
-                self.note((step, '', run.now(), NO_USERDATA))
+            self.note('', '', target.label, kind or 'start')
             return
-        if run.control.trace is not None:
-            kind = target.kind if target.is_exit else kind or 'transition'
-            step = SpecialStep(self.path, left.label, target.label, kind)
-            self.note((step, outcome, run.now(), raw(container.userdata).copy()))
+        kind = target.kind if target.is_exit else kind or 'transition'
+        self.note(left.label, outcome, target.label, kind)
         if run.chatty:
             self._log(left, outcome, target)
         if target.is_exit:
@@ -556,11 +531,12 @@ class Frame:
         verb = 'ends' if target.is_exit else 'goes on'
         log.loginfo(f"'{self.path}' {verb}: '{left.label}' : '{outcome}' --> '{target.label}'")
 
-    def note(self, raw: RawTransition) -> None:
-        """Tell the run's trace of a transition."""
+    def note(self, source: str, outcome: Any, target: str, kind: str) -> None:
+        """Tell the run's trace, if there is one, of a transition; see `Noted`."""
         trace = self.run.control.trace
         if trace is not None:
-            trace(raw)
+            now, userdata = self.run.now(), raw(self.container.userdata).copy()
+            trace(Noted(self.path, source, str(outcome), target, now, userdata, kind))
 
     # What others want; under the run's condition.
 

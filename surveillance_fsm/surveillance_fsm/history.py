@@ -21,12 +21,12 @@ from contextlib import suppress
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from queue import Empty, SimpleQueue
-from typing import IO, Any, NamedTuple
+from typing import IO, Any
 
 from surveillance_fsm.clock import elapsed_of
 from surveillance_fsm.container import Container
 from surveillance_fsm.exceptions import MachineFileError, describe, shown
-from surveillance_fsm.execution import RawTransition
+from surveillance_fsm.execution import Noted, RawTransition, unfold
 from surveillance_fsm.files import read_file, replace_file
 from surveillance_fsm.frame import History
 from surveillance_fsm.log import logerr, logwarn
@@ -46,41 +46,6 @@ QUEUE_LENGTH = 100_000
 
 
 # Transitions.
-
-
-class Noted(NamedTuple):
-    """A transition as it was noted.
-
-    Attributes:
-        path: Path of the container.
-        source: Label of the state that was left; empty at the start.
-        outcome: What that ended with.
-        target: Label of the state entered, or the container's outcome.
-        time: Seconds on the machine's clock.
-        userdata: Shallow copy of the container's userdata.
-        kind: See `Transition`; also ``start``, when a container is entered, and ``entered``, when
-            a pause before `target` is over.
-    """
-
-    path: str
-    source: str
-    outcome: str
-    target: str
-    time: float
-    userdata: dict[str, Any]
-    kind: str
-
-    @property
-    def is_transition(self) -> bool:
-        """Whether a state was left, or a child of a concurrence ended."""
-        return self.kind not in ('start', 'entered')
-
-
-def unfold(raw: RawTransition) -> Noted:
-    """Say in full what a trace was given."""
-    left, outcome, time, userdata = raw
-    path, source, target, kind = left.step(outcome)
-    return Noted(path, source, str(outcome), target, time, userdata, kind)
 
 
 @dataclass(frozen=True)
@@ -134,14 +99,18 @@ class TransitionFeed:
     Args:
         machine: The root.
         consume: Takes each `Transition`, in order, on the feed's thread.
+        changed: Told the path of each container that begins or goes on, and of the root when that
+            has ended; in order with the transitions.
     """
 
     def __init__(
         self,
         machine: Container,
         consume: Callable[[Transition], object],
+        changed: Callable[[str], object] = lambda _path: None,
     ) -> None:
         self._consume = consume
+        self._changed = changed
         # An event among the transitions is set by whoever comes to it.
         self._queue: SimpleQueue[RawTransition | threading.Event] = SimpleQueue()
         self._lost: deque[None] = deque()
@@ -162,7 +131,7 @@ class TransitionFeed:
                 oldest = queue.get_nowait()
                 if isinstance(oldest, threading.Event):
                     queue.put(oldest)
-                else:
+                elif unfold(oldest).is_transition:
                     self._lost.append(None)
 
     def flush(self, timeout: float | None = None) -> bool:
@@ -185,42 +154,45 @@ class TransitionFeed:
                 raw.set()
             else:
                 try:
-                    transition = self._transition(raw)
-                    if transition is not None:
-                        self._consume(transition)
+                    self._tell(unfold(raw))
                 except Exception as error:
                     logerr(f'Reporting a transition raised {describe(error)}')
             if self._closing and self._queue.empty():
                 return
 
-    def _transition(self, raw: RawTransition) -> Transition | None:
-        noted = unfold(raw)
+    def _tell(self, noted: Noted) -> None:
         while self._lost:
             # What was lost leaves a gap.
             self._lost.pop()
             self._sequence += 1
         if noted.kind == 'entered':
             self._entered[noted.path] = noted.time
-            return None
+            return
+        if noted.kind == 'end':
+            self._changed(noted.path)
+            return
         place = (noted.path, noted.target)
         visits = self._visits[place] = self._visits.get(place, 0) + 1
         since = self._entered.get(noted.path, noted.time)
         if noted.kind != 'ended':
             self._entered[noted.path] = noted.time
         if noted.kind == 'start':
-            return None
+            self._changed(noted.path)
+            return
         self._sequence += 1
-        return Transition(
-            self._sequence,
-            noted.time,
-            noted.path,
-            noted.source,
-            noted.outcome,
-            noted.target,
-            noted.kind,
-            noted.time - since,
-            visits,
-            presentable(noted.userdata),
+        self._consume(
+            Transition(
+                self._sequence,
+                noted.time,
+                noted.path,
+                noted.source,
+                noted.outcome,
+                noted.target,
+                noted.kind,
+                noted.time - since,
+                visits,
+                presentable(noted.userdata),
+            )
         )
 
 

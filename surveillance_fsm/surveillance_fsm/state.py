@@ -13,10 +13,6 @@ from typing import Any, ClassVar
 from surveillance_fsm.clock import WALL_CLOCK, Clock, Interrupt, elapsed_of
 from surveillance_fsm.exceptions import InvalidStateError, shown
 
-# Guards the preempt flags of all states: it is held for a few instructions, on preempts and waits
-# only, and never while user code runs.
-_preempt_lock = threading.Lock()
-
 _shared_names: dict[frozenset[str], frozenset[str]] = {}
 
 
@@ -148,7 +144,6 @@ class State:
     _outcomes: frozenset[str] = frozenset()
     _input_keys: frozenset[str] = frozenset()
     _output_keys: frozenset[str] = frozenset()
-    _preempt_requested: bool = False
     fsm_clock: Clock = WALL_CLOCK
     fsm_interrupt: Interrupt | None = None
     fsm_progress: dict[str, Any] | None = None
@@ -159,7 +154,6 @@ class State:
     fsm_suspends = False
     fsm_of_execution: ClassVar[frozenset[str]] = frozenset(
         {
-            '_preempt_requested',
             'fsm_clock',
             'fsm_interrupt',
             'fsm_progress',
@@ -248,11 +242,7 @@ class State:
 
     def request_preempt(self) -> None:
         """Ask the state to stop; a `wait` under way, or the next one, ends at once."""
-        with _preempt_lock:
-            self._preempt_requested = True
-            interrupt = self.fsm_interrupt
-        if interrupt is not None:
-            interrupt.set()
+        self.interrupt.set()
 
     def service_preempt(self) -> None:
         """Acknowledge the request: the state stopped because of it."""
@@ -260,14 +250,22 @@ class State:
 
     def recall_preempt(self) -> None:
         """Take the request back."""
-        with _preempt_lock:
-            self._preempt_requested = False
-            if self.fsm_interrupt is not None:
-                self.fsm_interrupt.clear()
+        if self.fsm_interrupt is not None:
+            self.fsm_interrupt.clear()
 
     def preempt_requested(self) -> bool:
         """Tell whether a request to stop is pending."""
-        return self._preempt_requested
+        return self.fsm_interrupt is not None and self.fsm_interrupt.is_set()
+
+    @property
+    def _preempt_requested(self) -> bool:
+        """The flag as states written for SMACH read it, and clear it by assignment."""
+        return self.preempt_requested()
+
+    @_preempt_requested.setter
+    def _preempt_requested(self, requested: bool) -> None:
+        change = State.request_preempt if requested else State.recall_preempt
+        change(self)
 
     def request_shutdown(self) -> None:
         """Ask the state to stop because the program ends."""
@@ -294,7 +292,7 @@ class State:
             interrupt = self.interrupt
             finished = clock.sleep(max(0.0, start + seconds - elapsed()), interrupt)
             # A preempt that was serviced meanwhile may wake a wait it was not meant for.
-            if finished or self._preempt_requested:
+            if finished or self.preempt_requested():
                 break
         if progress is not None:
             self.fsm_waiting = None
@@ -318,17 +316,11 @@ class State:
     @property
     def interrupt(self) -> Interrupt:
         """What a preempt raises: for waits and calls that take an interrupt of their own."""
-        with _preempt_lock:
-            interrupt = self.fsm_interrupt
-            if interrupt is None:
-                interrupt = self.fsm_interrupt = Interrupt()
-            # The flag alone decides: code written for SMACH clears it by assignment.
-            if not self._preempt_requested:
-                interrupt.clear()
-                return interrupt
-        if not interrupt.is_set():
-            interrupt.set()
-        return interrupt
+        if self.fsm_interrupt is None:
+            # In one step: two threads may come here at once.
+            self.__dict__.setdefault('fsm_interrupt', Interrupt())
+        assert self.fsm_interrupt is not None
+        return self.fsm_interrupt
 
     # What a container overrides.
 
@@ -339,10 +331,6 @@ class State:
     def fsm_suspend(self) -> None:
         """Ask the state to make way for an interrupt; under the run's condition."""
         self.request_preempt()
-
-    def fsm_recall_suspend(self) -> None:
-        """Take that back from a state that had not begun."""
-        self.recall_preempt()
 
     def fsm_forget(self) -> None:
         """Drop how far the state has come: it will not be resumed."""

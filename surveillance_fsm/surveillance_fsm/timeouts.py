@@ -10,6 +10,7 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable, Iterable, Sequence
+from functools import partial
 from typing import TYPE_CHECKING, Any, TypedDict
 
 from surveillance_fsm.clock import Interrupt
@@ -206,7 +207,7 @@ def supervise(run: Run, threads: Sequence[ExecutionThread], wakeup: Interrupt) -
         threads: The threads; each raises `wakeup` when it ends or its limits change.
         wakeup: What the wait ends by.
     """
-    with run.lock:
+    with run.condition:
         wakeup.clear()
         quiet = True
         for thread in threads:
@@ -373,7 +374,7 @@ def _go_on(thread: ExecutionThread, frames: list[Frame], outcome: Any) -> Any:
     frame = frames[-1]
     try:
         for frame in reversed(frames):
-            outcome = frame.proceed(outcome)
+            outcome = frame.to_its_end(partial(frame.run_on, outcome))
     finally:
         with thread.run.condition:
             for rest in frames[: frames.index(frame) + 1]:

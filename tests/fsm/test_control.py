@@ -7,6 +7,9 @@ import threading
 import pytest
 
 import surveillance_fsm as fsm
+from surveillance_fsm.clock import WALL_CLOCK
+from surveillance_fsm.control import Control
+from surveillance_fsm.execution import Run
 from surveillance_fsm.history import TransitionFeed
 from surveillance_fsm.testing import FakeClock, watching
 
@@ -276,4 +279,12 @@ def test_a_trace_that_raises_does_not_end_the_machine(others, caplog):
         machine.control.add_trace(seen.append)
     assert machine.execute() == 'done'
     assert 'disk full' in caplog.text
-    assert len(seen) == 3 * others
+    assert len(seen) == 4 * others
+
+
+def test_reports_may_end_in_the_moment_in_which_the_machine_ends(monkeypatch):
+    control = fsm.StateMachine(['done']).control
+    traces = [lambda raw: None]
+    ends_when_it_was_read = property(lambda _: traces.pop() if traces else None)
+    monkeypatch.setattr(Control, 'trace', ends_when_it_was_read, raising=False)
+    control.fsm_end(Run(control, WALL_CLOCK, None))

@@ -149,6 +149,7 @@ def test_calls_take_the_time_that_the_link_needs(graph, server, monkeypatch):
 def test_a_missed_answer_is_noted_and_shown(graph, server):
     never_answers(server)
     caller = ServiceCaller(server, Trigger, 'ask')
+    graph.until(caller.is_ready)
     with pytest.raises(CallTimeoutError):
         caller.call(Trigger.Request(), timeout=0.05)
     assert caller.round_trips.deadline(1.0) == 2.0
@@ -351,7 +352,8 @@ def test_result_deadline_cancels_the_goal(graph, server):
     caller = GoalCaller(graph.node, FollowPath, 'follow_path')
     with pytest.raises(CallTimeoutError):
         caller.run(follow(1), accept_timeout=60.0, result_timeout=0.1)
-    assert runs[0].cancelled
+    # On a busy machine the goal begins after its deadline.
+    graph.until(lambda: runs and runs[0].cancelled)
 
 
 def test_newer_goal_takes_the_place_of_the_running_one(graph, server):

@@ -90,7 +90,7 @@ class IntrospectionServer:
         self._feed: TransitionFeed | None = None
         self._sequence = 0
         self._containers: dict[str, Structure] = {}
-        # Two threads tell of a container that begins: the newer message goes out last.
+        # A command is told of on another thread: the newer message goes out last.
         self._smach_turn = threading.Lock()
 
         def publisher(kind: Any, name: str, depth: int) -> Any:
@@ -128,12 +128,7 @@ class IntrospectionServer:
             self._smach_structure.publish(message)
         self._containers = {each.path: each for each in Structure(self._root).walk()}
         self._publish_smach(self._containers.values(), 'initial state')
-        self._feed = TransitionFeed(self._root, self._publish)
-        self._root.register_start_cb(self._changed)
-        for each in self._containers.values():
-            # The transition to a container is published when that may not have begun.
-            each.container.register_start_cb(self._started, [each])
-        self._root.register_termination_cb(self._changed)
+        self._feed = TransitionFeed(self._root, self._publish, self._changed)
         self._publish_status()
 
     def stop(self) -> None:
@@ -153,11 +148,22 @@ class IntrospectionServer:
         place = self._containers.get(transition.path)
         if place is not None:
             info = f'{transition.from_state}: {transition.outcome} -> {transition.to_state}'
-            entered = place.inner.get(transition.to_state)
-            left = place.inner.get(transition.from_state)
-            self._publish_smach(
-                (place, *(each for each in (left, entered) if each is not None)), info
-            )
+            # All that was inside what was left is idle now, or was put aside.
+            left = [
+                inner
+                for label, state in place.inner.items()
+                if label == transition.from_state or not transition.from_state
+                for inner in state.walk()
+            ]
+            self._publish_smach([place, *left], info)
+
+    def _changed(self, path: str) -> None:
+        """Tell of a container that begins or goes on, and of all when the root has ended."""
+        self._publish_status()
+        running = self._root.is_running()
+        # One that was added after `start` is not known.
+        changed = [each for each in self._containers.values() if each.path == path or not running]
+        self._publish_smach(changed, 'started' if running else 'ended')
 
     def _publish_status(self) -> None:
         self._status.publish(status_message(self._root, self._sequence, self._stamp()))
@@ -166,14 +172,6 @@ class IntrospectionServer:
         with self._smach_turn:
             for message in smach_status_messages(containers, info, self._stamp()):
                 self._smach_status.publish(message)
-
-    def _started(self, _userdata: Any, _labels: Any, place: Structure) -> None:
-        if self._feed is not None:
-            self._publish_smach((place,), 'started')
-
-    def _changed(self, *_: Any) -> None:
-        if self._feed is not None:
-            self._publish_status()
 
     def _on_initial_state(self, message: SmachContainerInitialStatusCmd) -> None:
         path = message.path.strip('/')
