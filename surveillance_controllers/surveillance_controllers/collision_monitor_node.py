@@ -13,13 +13,19 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
 from geometry_msgs.msg import Twist
 from sensor_msgs.msg import LaserScan
 
 from surveillance_controllers import conversions
 from surveillance_controllers.geometry import Points, Scan
 from surveillance_controllers.motion.command_publisher import CommandPublisher
-from surveillance_controllers.motion.path_following import Velocity, room_ahead
+from surveillance_controllers.motion.path_following import (
+    Velocity,
+    as_forwards,
+    room_ahead,
+    speed_to_stop,
+)
 from surveillance_controllers.motion.sensor_age import STANDSTILL
 from surveillance_controllers.motion.transforms import Transforms, lidar_mount
 from surveillance_runtime.node import PatrolNode
@@ -72,18 +78,11 @@ def allowed(wanted: Velocity, seen: Points, settings: MonitorSettings) -> Veloci
     """
     if wanted.speed == 0.0:
         return wanted  # A round robot that turns on the spot touches nothing.
-    ahead = seen if wanted.speed > 0.0 else -seen
-    curvature = wanted.turn / wanted.speed
-    if wanted.speed < 0.0:
-        # Seen from behind the robot drives forwards, and turns to the same side.
-        curvature = -curvature
     way = settings.way_to_stand(wanted.speed)
-    room = room_ahead(ahead, curvature, settings.reach, way)
+    room = room_ahead(*as_forwards(wanted.speed, wanted.turn, seen), settings.reach, way)
     if room >= way:
         return wanted
-    # Braking begins after the latency.
-    a = settings.deceleration
-    speed = math.sqrt((a * LATENCY) ** 2 + 2.0 * a * room) - a * LATENCY
+    speed = speed_to_stop(room, settings.deceleration, LATENCY)
     share = min(1.0, speed / abs(wanted.speed))
     return Velocity(wanted.speed * share, wanted.turn * share)
 
@@ -123,7 +122,7 @@ class CollisionMonitor(PatrolNode):
     def _on_scan(self, message: LaserScan) -> None:
         with conversions.refusing(self, 'scan'):
             mount = self._mount or self._frames.mount_of(message.header.frame_id)
-            self._scan = conversions.scan_from(message, mount)
+            self._scan = conversions.scan_from(message, mount, self._settings.radius)
             self._base.hear('scan')
             allowed_now = self._allowed()
             # Only what cannot wait for the next command.
@@ -134,7 +133,7 @@ class CollisionMonitor(PatrolNode):
         if self._scan is None:
             return self._wanted  # Nothing was seen yet, so the publisher lets nothing through.
         velocity = self._wanted
-        nearest = float(self._scan.ranges.min()) - math.hypot(*self._scan.mount[:2])
+        nearest = float(np.fmin.reduce(self._scan.ranges)) - math.hypot(*self._scan.mount[:2])
         # Most of the time nothing is so near that the arc must be looked at.
         if nearest <= self._settings.reach + self._settings.way_to_stand(velocity.speed):
             velocity = allowed(velocity, self._scan.points, self._settings)

@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from geometry_msgs.msg import (
@@ -14,28 +15,40 @@ from geometry_msgs.msg import (
     Transform,
     Twist,
 )
-from geometry_msgs.msg import Pose as PoseMessage
 from nav_msgs.msg import OccupancyGrid
 from nav_msgs.msg import Path as PathMessage
+from numpy.typing import NDArray
 from rclpy.node import Node
 from sensor_msgs.msg import BatteryState, LaserScan
 
 from surveillance_controllers.battery.model import Battery
-from surveillance_controllers.geometry import Points, Pose, Scan
-from surveillance_runtime.conversions import map_from, point_message, pose_from
+from surveillance_controllers.geometry import Mount, Points, Scan
+from surveillance_runtime.conversions import map_from, point_message
 
 if TYPE_CHECKING:
     from surveillance_controllers.motion.path_following import Velocity
     from surveillance_controllers.planning.grid_map import GridMap
 
 
+_refused: WeakKeyDictionary[Node, dict[str, str]] = WeakKeyDictionary()
+"""Of each node: why the last message of a topic was refused."""
+
+
 @contextmanager
 def refusing(node: Node, topic: str) -> Iterator[None]:
-    """Let a message that is not sound cost one line in the node's log, and nothing else."""
+    """Let messages that are not sound cost one line in the node's log, and nothing else.
+
+    The same fault is told again after a sound message.
+    """
+    refused = _refused.setdefault(node, {})
     try:
         yield
     except ValueError as error:
-        node.get_logger().error(f'{topic}: {error}')
+        if refused.get(topic) != str(error):
+            refused[topic] = str(error)
+            node.get_logger().error(f'{topic}: {error}')
+    else:
+        refused.pop(topic, None)
 
 
 def array_from_points(points: Iterable[Point]) -> Points:
@@ -89,6 +102,9 @@ MOST_RAYS = 100_000
 """Rays of the largest scan that is taken."""
 LONGEST_RANGE = 1000.0
 """No ray of a lidar goes farther, metres."""
+LEAST_TOLD = 0.05
+"""A scan of which a smaller share of the rays tells something is that of a lidar that is covered or
+broken."""
 
 
 def twist_from(velocity: Velocity) -> Twist:
@@ -107,16 +123,24 @@ def grid_from(message: OccupancyGrid) -> GridMap:
     return GridMap(*map_from(message, MOST_CELLS))
 
 
-def scan_from(message: LaserScan, mount: Pose = (0.0, 0.0, 0.0)) -> Scan:
-    """Return a turn of a lidar; rays that are out of its range or not a number met nothing.
+_LEVEL = Mount()
+
+
+def scan_from(message: LaserScan, mount: Mount = _LEVEL, radius: float = 0.0) -> Scan:
+    """Return a turn of a lidar.
+
+    Rays beyond its reach met nothing; those that are 0 or not a number tell nothing; those of minus
+    infinity met something nearer than it can measure (REP 117), perhaps at the robot's edge. What
+    is nearer than that, and within the robot, is the robot's own.
 
     Args:
         message: The scan; of a lidar that turns clockwise, its rays come back the other way round.
-        mount: Where the lidar sits on the robot, robot's frame.
+        mount: Where the lidar sits on the robot.
+        radius: Of the robot, metres.
 
     Raises:
-        ValueError: Angles or reach are no lidar's, there are too many rays, or it was made before
-            time began.
+        ValueError: Angles or reach are no lidar's, there are too many rays, next to none of them
+            tells anything, or it was made before time began.
     """
     count = len(message.ranges)
     first, step, reach = message.angle_min, message.angle_increment, message.range_max
@@ -135,26 +159,50 @@ def scan_from(message: LaserScan, mount: Pose = (0.0, 0.0, 0.0)) -> Scan:
         )
     reach = min(float(reach), LONGEST_RANGE)
     ranges = np.frombuffer(message.ranges, dtype=np.float32).astype(float)
+    ranges[ranges >= reach] = np.inf
+    if mount.upside_down:
+        first, step = -first, -step
     angles = first + step * np.arange(count)
-    # The lidar gives what is nearer than it can measure as its least range, or below it.
-    good = (ranges > 0) & (ranges < reach)
-    ranges = np.where(good, ranges, np.inf)
-    return Scan(*((angles, ranges) if step >= 0 else (angles[::-1], ranges[::-1])), reach, mount)
+    near = ranges <= message.range_min
+    edge = _edge(mount, angles[near], radius)
+    least = np.where(np.isinf(ranges[near]), message.range_min, ranges[near])
+    met = np.where(np.isinf(ranges[near]), edge, ranges[near])
+    ranges[near] = np.where(least > edge, met, np.nan)
+    ranges[~(ranges > 0)] = np.nan
+    if np.isnan(ranges).mean() > 1.0 - LEAST_TOLD:
+        raise ValueError(
+            f'a scan of which less than {LEAST_TOLD:.0%} of the rays tells something: expected '
+            'distances, or infinity where nothing is met; the lidar may be covered or broken'
+        )
+    turns = (angles, ranges) if step >= 0 else (angles[::-1], ranges[::-1])
+    return Scan(*turns, reach, mount.pose)
 
 
-def planar_from(transform: Transform) -> Pose:
-    """Return a transform as a pose in the plane.
+def _edge(mount: Mount, angles: Points, radius: float) -> Points:
+    """Return how far it is from a lidar to its robot's edge along rays, metres, more than 0."""
+    x, y, yaw = mount.pose
+    along = x * np.cos(angles + yaw) + y * np.sin(angles + yaw)
+    within = np.maximum(along**2 + radius**2 - x**2 - y**2, 0.0)
+    return np.maximum(np.sqrt(within) - along, 1e-3)
+
+
+def matrix_from(transform: Transform) -> NDArray[np.float64]:
+    """Return a transform as a matrix of homogeneous coordinates, shape (4, 4).
 
     Raises:
-        ValueError: It is not finite, or leaves the plane by more than 0.1 rad.
+        ValueError: It is not finite, or its rotation is none.
     """
-    message = PoseMessage(orientation=transform.rotation)
-    moved = transform.translation
-    message.position = Point(x=moved.x, y=moved.y, z=moved.z)
-    q = transform.rotation
-    # The z axis of the turned frame, as seen from the other one.
-    upright = 1 - 2 * (q.x * q.x + q.y * q.y)
-    pose = pose_from(message)
-    if upright < math.cos(0.1):
-        raise ValueError('a mount that is tilted: expected one in the plane of the floor')
-    return pose
+    moved, q = transform.translation, transform.rotation
+    size = math.hypot(q.x, q.y, q.z, q.w)
+    values = moved.x, moved.y, moved.z, size
+    if not (all(map(math.isfinite, values)) and size > 0):
+        raise ValueError('a transform that is none: expected finite numbers and a rotation')
+    x, y, z, w = q.x / size, q.y / size, q.z / size, q.w / size
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y), moved.x],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x), moved.y],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y), moved.z],
+            [0.0, 0.0, 0.0, 1.0],
+        ]
+    )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -124,13 +125,21 @@ def points_passed(path: ArrayLike, distance: float) -> int:
     return int(np.searchsorted(distances_along(path), distance + 1e-6, side='right'))
 
 
+class Mount(NamedTuple):
+    """Where a lidar sits on the robot, robot's frame, and whether it hangs upside down."""
+
+    pose: Pose = (0.0, 0.0, 0.0)
+    upside_down: bool = False
+
+
 @dataclass(frozen=True, eq=False)
 class Scan:
     """One turn of a lidar.
 
     Attributes:
         angles: Direction of each ray in the lidar's frame, shape (n,), rad.
-        ranges: How far each ray went, shape (n,), metres; infinite where it met nothing.
+        ranges: How far each ray went, shape (n,), metres; infinite where it met nothing, NaN where
+            that is not known.
         range_max: The lidar's reach, metres.
         mount: Where the lidar sits on the robot, robot's frame.
     """

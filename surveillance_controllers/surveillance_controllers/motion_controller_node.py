@@ -8,6 +8,7 @@ writes it into the ontology.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from typing import Any, TextIO
 
@@ -134,11 +135,27 @@ class MotionController(PatrolNode):
         if self._robot is not None:
             self._robot.look_around(run)
 
+    def _paced(self, report: Callable[[Points], None], run: GoalRun) -> Callable[[Points], None]:
+        """Return what reports a position once a `feedback_period`: Nav2 tells one a hundred times a
+        second.
+        """
+        told = -math.inf
+
+        def paced(position: Points) -> None:
+            nonlocal told
+            if not 0 <= run.now() - told < self._settings.feedback_period:
+                told = run.now()
+                report(position)
+
+        return paced
+
     def _move(
         self, path: Points, run: GoalRun, report: Callable[[Points], None], what: str
     ) -> Points:
         if self._robot is not None:
-            return self._robot.follow(path, run, report)
+            end = self._robot.follow(path, run, self._paced(report, run))
+            report(end)
+            return end
         if self._mode == 'MANUAL':
             answer = self._requests.ask(commands.move_request(what, path), run.interrupt)
             if answer is None:

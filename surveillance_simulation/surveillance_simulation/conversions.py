@@ -11,6 +11,7 @@ from builtin_interfaces.msg import Time
 from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped, TransformStamped
 from nav_msgs.msg import OccupancyGrid, Odometry
 from sensor_msgs.msg import CameraInfo, Image, JointState, LaserScan
+from std_msgs.msg import Header
 
 from surveillance_interfaces.msg import DoorStates
 from surveillance_interfaces.srv import SetMarker
@@ -35,25 +36,20 @@ def time_to_ros(seconds: float) -> Time:
 
 def stamped_pose_to_ros(pose: PlanePose, frame: str, stamp: Time) -> PoseStamped:
     """Convert a pose in the plane to a stamped pose message."""
-    message = PoseStamped(pose=pose_message(pose))
-    message.header.frame_id, message.header.stamp = frame, stamp
-    return message
+    return PoseStamped(header=Header(frame_id=frame, stamp=stamp), pose=pose_message(pose))
 
 
 def uncertain_pose_to_ros(
     pose: PlanePose, frame: str, stamp: Time, deviation: float, turn_deviation: float
 ) -> PoseWithCovarianceStamped:
     """Convert a pose in the plane and its standard deviations (metres, rad) to a message."""
-    message = PoseWithCovarianceStamped()
-    message.header.frame_id, message.header.stamp = frame, stamp
-    message.pose = pose_estimate(pose, deviation, turn_deviation)
-    return message
+    estimate = pose_estimate(pose, deviation, turn_deviation)
+    return PoseWithCovarianceStamped(header=Header(frame_id=frame, stamp=stamp), pose=estimate)
 
 
 def odometry_message(frame: str, child: str) -> Odometry:
     """Return a message of odometry with its frames and covariances; see `set_odometry`."""
-    message = Odometry(child_frame_id=child)
-    message.header.frame_id = frame
+    message = Odometry(header=Header(frame_id=frame), child_frame_id=child)
     message.pose.covariance = message.twist.covariance = planar_covariance(0.02, 0.02)
     return message
 
@@ -70,8 +66,7 @@ def set_odometry(
 
 def transform_to_ros(pose: PlanePose, frame: str, child: str, stamp: Time) -> TransformStamped:
     """Convert the pose of a frame in another one to a transform message."""
-    message = TransformStamped(child_frame_id=child)
-    message.header.frame_id, message.header.stamp = frame, stamp
+    message = TransformStamped(header=Header(frame_id=frame, stamp=stamp), child_frame_id=child)
     message.transform.translation.x, message.transform.translation.y = pose[0], pose[1]
     message.transform.rotation = pose_message(pose).orientation
     return message
@@ -83,21 +78,20 @@ def scan_to_ros(
     """Convert distances (rays,) in metres to a message."""
     increment = 2.0 * math.pi / lidar.rays
     message = LaserScan(
+        header=Header(frame_id=frame, stamp=stamp),
         angle_min=-math.pi,
         angle_max=math.pi - increment,
         angle_increment=increment,
         range_min=lidar.range_min,
         range_max=lidar.range_max,
     )
-    message.header.frame_id, message.header.stamp = frame, stamp
     message.ranges.frombytes(ranges.astype(np.float32).tobytes())
     return message
 
 
 def grid_to_ros(grid: Grid, frame: str, stamp: Time) -> OccupancyGrid:
     """Convert a map to a message."""
-    message = OccupancyGrid()
-    message.header.frame_id, message.header.stamp = frame, stamp
+    message = OccupancyGrid(header=Header(frame_id=frame, stamp=stamp))
     message.info.map_load_time = stamp
     message.info.resolution = float(grid.resolution)
     message.info.height, message.info.width = grid.cells.shape
@@ -110,22 +104,24 @@ def joints_to_ros(
     names: Sequence[str], positions: Iterable[float], velocities: Iterable[float], stamp: Time
 ) -> JointState:
     """Convert joint positions (rad) and velocities (rad/s) to a message."""
-    message = JointState(
+    return JointState(
+        header=Header(stamp=stamp),
         name=list(names),
         position=[float(each) for each in positions],
         velocity=[float(each) for each in velocities],
     )
-    message.header.stamp = stamp
-    return message
 
 
 def image_to_ros(picture: Picture, frame: str, stamp: Time) -> Image:
     """Convert an RGB picture (rows, columns, 3) to a message."""
     rows, columns, channels = picture.shape
     message = Image(
-        height=rows, width=columns, encoding='rgb8', is_bigendian=0, step=columns * channels
+        header=Header(frame_id=frame, stamp=stamp),
+        height=rows,
+        width=columns,
+        encoding='rgb8',
+        step=columns * channels,
     )
-    message.header.frame_id, message.header.stamp = frame, stamp
     message.data.frombytes(np.ascontiguousarray(picture).tobytes())
     return message
 
@@ -133,7 +129,8 @@ def image_to_ros(picture: Picture, frame: str, stamp: Time) -> Image:
 def camera_info_to_ros(camera: Camera, frame: str, stamp: Time) -> CameraInfo:
     """Convert a camera without distortion to a message."""
     matrix = camera.matrix
-    message = CameraInfo(
+    return CameraInfo(
+        header=Header(frame_id=frame, stamp=stamp),
         height=camera.height,
         width=camera.width,
         distortion_model='plumb_bob',
@@ -142,8 +139,6 @@ def camera_info_to_ros(camera: Camera, frame: str, stamp: Time) -> CameraInfo:
         r=np.eye(3).ravel().tolist(),
         p=np.hstack([matrix, np.zeros((3, 1))]).ravel().tolist(),
     )
-    message.header.frame_id, message.header.stamp = frame, stamp
-    return message
 
 
 def doors_to_ros(world: World) -> DoorStates:

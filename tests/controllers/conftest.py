@@ -117,7 +117,7 @@ def seven_rooms() -> dict[str, Any]:
     return flat
 
 
-@pytest.fixture(scope='session')
+@pytest.fixture
 def flat() -> Flat:
     """Two rooms and a lidar in them."""
     return Flat()

@@ -9,11 +9,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from geometry_msgs.msg import PoseWithCovarianceStamped, TransformStamped, Twist
+from builtin_interfaces.msg import Time
+from geometry_msgs.msg import PoseWithCovarianceStamped, Quaternion, TransformStamped, Twist
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import LaserScan
 
-from surveillance_controllers.geometry import Scan, composed
+from surveillance_controllers.geometry import Mount, Scan, composed
 from surveillance_controllers.motion.base_interface import (
     RobotBase,
     Transforms,
@@ -31,12 +32,14 @@ class Steersman:
     def __init__(self) -> None:
         self.task: Drive | Spin | None = None
         self.seen: list[Scan] = []
+        self.times: list[float] = []
         self.pose = self.odometry = self.place = self.missing = None
         self.lost, self.jumps, self.obstacles_changed = False, 0, False
         self.ambiguous = False
 
-    def see(self, scan: Scan, _now: float) -> Velocity:
+    def see(self, scan: Scan, now: float) -> Velocity:
         self.seen.append(scan)
+        self.times.append(now)
         return Velocity(0.6, 0.0)
 
     def move(self, _odometry: Any) -> None:
@@ -160,13 +163,53 @@ def test_a_lidar_s_mount_comes_from_the_static_transforms(graph: Any, capfd: Any
     transforms[-1].header.frame_id = 'a'
     # tf2_msgs is no wheel: its message is a list of transforms.
     frames._on_static(SimpleNamespace(transforms=transforms))
-    assert frames.mount_of('laser') == pytest.approx((0.3, 0.0, 0.0))
-    assert frames.mount_of('robot2/base_link') == (0.0, 0.0, 0.0)
+    assert frames.mount_of('laser').pose == pytest.approx((0.3, 0.0, 0.0))
+    assert frames.mount_of('/laser') == frames.mount_of('laser')
+    assert frames.mount_of('robot2/base_link') == Mount()
     for unknown in ('lidar', 'a', 'lidar'):
-        assert frames.mount_of(unknown) == (0.0, 0.0, 0.0)
+        assert frames.mount_of(unknown) == Mount()
     logged = capfd.readouterr().err
     assert logged.count("its frame 'lidar' is on the robot is not known") == 1
     assert "its frame 'a' is" in logged
+
+
+def test_a_lidar_below_tilted_frames_is_looked_up_in_space(graph: Any, capfd: Any) -> None:
+    frames = Transforms(graph.node)
+    over, forward = Quaternion(x=1.0, w=0.0), Quaternion(y=0.5, w=0.75**0.5)
+    transforms = []
+    for parent, child, x, turn in (
+        ('/base_link', 'plate', 0.3, over),
+        ('plate', 'hanging', 0.1, Quaternion(z=0.5**0.5, w=0.5**0.5)),
+        ('plate', 'upright', 0.1, over),
+        ('base_link', 'nodding', 0.2, forward),
+    ):
+        step = TransformStamped(child_frame_id=child)
+        step.header.frame_id = parent
+        step.transform.translation.x, step.transform.rotation = x, turn
+        transforms.append(step)
+    frames._on_static(SimpleNamespace(transforms=transforms))
+    pose, upside_down = frames.mount_of('hanging')
+    assert pose == pytest.approx((0.4, 0.0, -math.pi / 2))
+    assert upside_down
+    pose, upside_down = frames.mount_of('upright')
+    assert pose == pytest.approx((0.4, 0.0, 0.0))
+    assert not upside_down
+    assert frames.mount_of('nodding').pose == pytest.approx((0.2, 0.0, 0.0))
+    assert "'nodding' is tilted by 60 degrees" in capfd.readouterr().err
+
+
+def test_scans_without_a_stamp_count_from_when_they_came(graph: Any, steersman: Any) -> None:
+    RobotBase(graph.node, steersman, 5.0, lambda _place, _stamp: None)
+    scans = graph.node.create_publisher(LaserScan, 'scan', SENSOR_QOS)
+    unstamped = scan()
+    unstamped.header.stamp = Time()
+
+    def seen() -> bool:
+        scans.publish(unstamped)
+        return len(steersman.times) >= 2
+
+    graph.until(seen)
+    assert 0.0 < steersman.times[0] < steersman.times[1]
 
 
 @pytest.mark.parametrize('mount', [(0.3, -0.2, 0.0), (0.1, 0.0, math.pi), (-0.25, 0.1, 2.0)])

@@ -76,6 +76,9 @@ def test_a_foreign_command_is_stopped_before_a_wall_and_without_a_scan(
     graph.until(lambda: passes(None) == 0.0)
     assert 'nothing on the topic scan' in capfd.readouterr().err
     graph.until(lambda: passes(3.0) == 0.5)
+    graph.until(lambda: passes(-0.24) == 0.0)  # all rays are 0
+    assert capfd.readouterr().err.count('may be covered or broken') == 1
+    graph.until(lambda: passes(3.0) == 0.5)
     graph.until(lambda: told[-1].linear.x == 0.0)
     command.linear.x = math.nan
     graph.until(lambda: passes(3.0) == 0.0)

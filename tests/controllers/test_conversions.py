@@ -16,6 +16,7 @@ from std_msgs.msg import Header
 
 from surveillance_controllers import conversions
 from surveillance_controllers.battery.model import Battery, BatteryParameters
+from surveillance_controllers.geometry import Mount
 from surveillance_controllers.motion.path_following import Velocity
 from surveillance_runtime.conversions import (
     cloud_from_points,
@@ -110,14 +111,34 @@ def test_unsound_maps_are_refused() -> None:
         conversions.grid_from(grid_message(0, 2, 0))
 
 
-def test_a_scan_keeps_what_was_met_and_makes_the_rest_infinite() -> None:
-    message = LaserScan(angle_min=-1.0, angle_increment=0.5, range_min=0.1, range_max=8.0)
-    message.ranges = [0.5, math.inf, math.nan, 8.5, 0.0]
+def test_a_scan_tells_what_was_met_what_was_not_and_what_is_not_known() -> None:
+    message = LaserScan(angle_min=-1.0, angle_increment=0.5, range_min=0.125, range_max=8.0)
+    message.ranges = [0.5, math.inf, 8.5, math.nan, 0.0, -math.inf]
     scan = conversions.scan_from(message)
-    assert scan.angles == pytest.approx([-1, -0.5, 0, 0.5, 1])
-    assert scan.ranges[0] == 0.5
-    assert np.isinf(scan.ranges[1:]).all()
-    assert scan.points == pytest.approx(np.array([[0.5 * math.cos(-1), 0.5 * math.sin(-1)]]))
+    assert scan.angles == pytest.approx([-1, -0.5, 0, 0.5, 1, 1.5])
+    np.testing.assert_array_equal(scan.ranges, [0.5, math.inf, math.inf, math.nan, math.nan, 0.001])
+    near, nearer = (0.5 * math.cos(-1), 0.5 * math.sin(-1)), (0.0, 0.001)
+    assert scan.points == pytest.approx(np.array([near, nearer]), abs=1e-3)
+
+
+@pytest.mark.parametrize('near', [-math.inf, 0.06])
+def test_a_lidar_that_sees_its_own_robot_tells_nothing_of_it(near: float) -> None:
+    message = LaserScan(angle_increment=math.pi / 2, range_min=0.125, range_max=8.0)
+    message.ranges = [near] * 4
+    scan = conversions.scan_from(message, Mount((0.15, 0.0, 0.0)), radius=0.2)
+    assert scan.points == pytest.approx(np.array([[0.2 if near < 0 else 0.21, 0.0]]))
+    assert np.isnan(scan.ranges[1:]).all(), 'beside and behind it there is the robot'
+
+
+@pytest.mark.parametrize('told', [0, 17, 18])
+def test_a_lidar_that_is_covered_or_broken_is_refused(told: int) -> None:
+    message = LaserScan(angle_increment=0.01, range_max=8.0)
+    message.ranges = [math.inf] * told + [0.0, math.nan] * ((360 - told) // 2) + [0.0] * (told % 2)
+    if told >= 18:
+        assert np.isinf(conversions.scan_from(message).ranges).sum() == told
+    else:
+        with pytest.raises(ValueError, match='may be covered or broken'):
+            conversions.scan_from(message)
 
 
 def test_a_lidar_that_turns_clockwise_is_read_the_other_way_round() -> None:
@@ -125,6 +146,14 @@ def test_a_lidar_that_turns_clockwise_is_read_the_other_way_round() -> None:
     scan = conversions.scan_from(message)
     assert scan.angles == pytest.approx([0.0, 0.5, 1.0])
     assert scan.ranges.tolist() == [3.0, 2.0, 1.0]
+
+
+def test_a_lidar_that_hangs_upside_down_is_read_the_other_way_round() -> None:
+    message = LaserScan(angle_min=0.0, angle_increment=0.5, range_max=8.0, ranges=[1.0, 2.0, 3.0])
+    scan = conversions.scan_from(message, Mount((0.2, 0.0, 0.5), upside_down=True))
+    assert scan.angles == pytest.approx([-1.0, -0.5, 0.0])
+    assert scan.ranges.tolist() == [3.0, 2.0, 1.0]
+    assert scan.points[1] == pytest.approx((2.2, 0.0))
 
 
 def test_a_velocity_is_a_twist() -> None:
@@ -202,8 +231,18 @@ def test_a_map_too_large_or_without_size_is_refused() -> None:
         conversions.grid_from(message)
 
 
-def test_a_tilted_mount_is_refused() -> None:
-    level = Transform(translation=Vector3(x=0.2, y=-0.1), rotation=Quaternion(z=1.0, w=0.0))
-    assert conversions.planar_from(level) == pytest.approx((0.2, -0.1, math.pi))
-    with pytest.raises(ValueError, match='tilted'):
-        conversions.planar_from(Transform(rotation=Quaternion(x=1.0, w=0.0)))
+def test_a_transform_is_a_matrix_and_an_unsound_one_is_refused() -> None:
+    turned = Transform(translation=Vector3(x=0.2, y=-0.1), rotation=Quaternion(z=2.0, w=2.0))
+    matrix = conversions.matrix_from(turned)
+    assert matrix @ (1.0, 0.0, 0.0, 1.0) == pytest.approx((0.2, 0.9, 0.0, 1.0))
+    for unsound in (Quaternion(w=0.0), Quaternion(w=math.inf)):
+        with pytest.raises(ValueError, match='a transform that is none'):
+            conversions.matrix_from(Transform(rotation=unsound))
+
+
+@pytest.mark.parametrize('size', [0.0, 0.5, 3.0, 1e200])
+def test_a_turn_of_another_length_is_the_same_turn(size: float) -> None:
+    message = pose_message((1.0, 2.0, 0.7))
+    turn = message.orientation
+    turn.z, turn.w = turn.z * size, turn.w * size
+    assert pose_from(message) == pytest.approx((1.0, 2.0, 0.7 if size else 0.0))

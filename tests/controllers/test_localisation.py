@@ -125,6 +125,44 @@ def test_obstacles_and_a_closed_door_do_not_carry_the_estimate_away(flat: Any) -
     assert not localiser.lost
 
 
+def test_rays_that_tell_nothing_are_no_doubt(flat: Any) -> None:
+    true = (2.0, 1.5, 0.0)
+    localiser = Localiser(flat.grid, true)
+    scan = flat.scan(true)
+    scan.ranges[::3] = math.nan
+    localiser.see(scan, now=0.0)
+    assert localiser.certain
+    assert localiser.agreement == pytest.approx(1.0, abs=0.05)
+    scan.ranges[:] = math.nan
+    assert localiser.explained(true, scan) == 0.0
+
+
+def test_a_lost_robot_looks_on_when_time_begins_anew(flat: Any) -> None:
+    localiser = Localiser(flat.grid, (2.0, 1.5, 0.0))
+    scan = flat.scan((2.0, 1.5, 0.0))
+    nonsense = np.random.default_rng(2).uniform(0.3, 7.0, len(scan.angles))
+    localiser.see(Scan(scan.angles, nonsense, scan.range_max), now=1000.0)
+    assert localiser.lost
+    elsewhere = (3.5, 1.5, 1.0)
+    for step in range(12):
+        localiser.see(flat.scan(elsewhere), now=0.1 * step)
+    assert not localiser.lost
+    assert error(localiser, elsewhere)[0] < 0.06
+
+
+@pytest.mark.parametrize('shape', [(1, 1), (1, 40), (3, 2), (60, 60)])
+@pytest.mark.parametrize('value', [-1, 0, 100])
+def test_a_map_of_any_size_is_searched(shape: tuple[int, int], value: int) -> None:
+    localiser = Localiser(
+        GridMap(np.full(shape, value, np.int8), 0.05, (0.0, 0.0)), (0.02, 0.02, 0.0)
+    )
+    angles = np.linspace(0.0, 6.2, 90)
+    for met, reach in ((0.5, 8.0), (999.0, 1000.0)):
+        scan = Scan(angles, np.full(90, met), reach)
+        localiser.see(scan, now=0.0)
+        assert all(explained <= 1.0 for _, explained in localiser.search(scan))
+
+
 def test_a_robot_that_sees_nothing_of_its_map_is_lost_and_found_again(flat: Any) -> None:
     true = (2.0, 1.5, 0.0)
     localiser = Localiser(flat.grid, true)

@@ -15,11 +15,14 @@ import pytest
 from geometry_msgs.msg import PoseWithCovarianceStamped
 
 from surveillance_controllers.controller_parameters import MotionSettings
+from surveillance_controllers.conversions import points_from_array
 from surveillance_controllers.motion import docking
 from surveillance_controllers.motion import nav2 as nav2_motion
 from surveillance_controllers.motion.arrival import MotionFailedError
+from surveillance_controllers.motion_controller_node import MotionController
 from surveillance_fsm import Interrupt
-from surveillance_fsm.ros import CallInterruptedError, GoalEnd, UnavailableError
+from surveillance_fsm.ros import CallInterruptedError, GoalCaller, GoalEnd, UnavailableError
+from surveillance_interfaces.action import FollowPath
 from surveillance_runtime.parameters import ParameterError
 from surveillance_runtime.qos import STATE_QOS
 
@@ -92,7 +95,7 @@ def at(x: float, y: float) -> Any:
 
 
 def test_nav2_is_led_along_the_path(graph: Any, servers: Servers, run: Any) -> None:
-    servers.feedback = [at(1, 0), at(2.9, 3.9)]
+    servers.feedback = [at(1, 0), at(2.9, 3.9), at(float('nan'), 4.0)]
     seen: list[Any] = []
     end = nav2(graph).follow(PATH, run, seen.append)
     ((name, goal),) = servers.asked
@@ -114,6 +117,25 @@ def test_a_path_around_the_world_is_led_through_a_bounded_number_of_poses(
     poses = servers.asked[-1][1].poses
     assert len(poses) == nav2_motion.MOST_POSES
     assert poses[-1].pose.position.x == 2e7
+
+
+def test_feedback_comes_once_a_period_however_often_nav2_tells_it(
+    graph: Any, servers: Servers, in_background: Any
+) -> None:
+    servers.feedback = [at(0.001 * step, 0) for step in range(500)]
+    parameters = {'execution_mode': 'SIMULATED', 'navigator': 'nav2', 'feedback_period': 60.0}
+    graph.add(MotionController, parameters)
+    seen: list[float] = []
+    caller = GoalCaller(graph.node, FollowPath, 'follow_path')
+    goal = FollowPath.Goal(path=points_from_array(PATH))
+    ended = in_background(
+        lambda: caller.run(
+            goal, accept_timeout=60.0, on_feedback=lambda f: seen.append(f.position.x)
+        )
+    )()
+    assert ended.status == 'succeeded'
+    assert set(seen) <= {0.0, 0.499}
+    assert ended.result.position.x == 0.499
 
 
 def test_a_goal_that_was_cancelled_is_no_failure(graph: Any, servers: Servers, run: Any) -> None:

@@ -205,7 +205,7 @@ def test_a_place_that_joins_is_planned_to_and_visited(world: World) -> None:
     ('node', 'text'),
     [
         (PlannerController, 'no map came on the topic map within 0.2 s'),
-        (MotionController, 'nothing came on the topic map for 0.2 s'),
+        (MotionController, 'nothing of use came on the topic map for 0.2 s'),
     ],
 )
 def test_without_a_robot_the_reason_is_what_does_not_come(

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from surveillance_controllers.geometry import composed
+from surveillance_controllers.geometry import Scan, composed
 from surveillance_controllers.motion.driving import Drive, State
 from surveillance_controllers.motion.navigator import Navigator
 from surveillance_controllers.motion.obstacle_memory import ObstacleMemory
@@ -134,6 +134,9 @@ def test_obstacles_are_forgotten_when_rays_go_through_them(flat: Any) -> None:
     memory.update(pose, behind, 1.0)
     near = np.hypot(*(memory.points - (2.5, 1.2)).T) < 0.3
     assert near.any(), 'what is hidden is not forgotten'
+    blind = np.full(len(behind.angles), np.nan)
+    memory.update(pose, Scan(behind.angles, blind, behind.range_max), 1.5)
+    assert len(memory.points) > 3, 'rays that tell nothing go through nothing'
     memory.update(pose, flat.scan(pose), 2.0)
     assert len(memory.points) == 0
 

@@ -175,3 +175,14 @@ def test_acceleration_and_jerk_keep_their_limits_on_a_free_path() -> None:
     # Where the wanted speed is met, the acceleration may end within one step.
     assert np.diff(accelerations).max() / 0.1 <= robot.jerk + 1e-6
     assert min(speeds) >= 0.0
+
+
+@pytest.mark.parametrize(('y', 'slower'), [(-0.2, True), (0.2, False)])
+def test_a_robot_that_backs_out_in_an_arc_looks_where_the_arc_leads(y: float, slower: bool) -> None:
+    follower = PathFollower([[0.0, 0.0], [3.0, 0.0]], ROBOT)
+    backs = Velocity(-0.3, 1.0)  # its back goes to the right
+    for _ in range(20):
+        guidance = follower.step_with(
+            lambda _way, _last: backs, (0.0, 0.0, 0.0), np.array([[-0.28, y]]), PERIOD
+        )
+    assert (guidance.velocity.speed > -0.28) == slower

@@ -4,9 +4,13 @@ from __future__ import annotations
 
 import math
 import random
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
+from surveillance_controllers.motion.command_publisher import CommandPublisher
+from surveillance_controllers.motion.path_following import Velocity
 from surveillance_controllers.motion.sensor_age import LEAD, REACTION, STANDSTILL, SensorAge
 
 DECELERATION = 2.5
@@ -41,6 +45,51 @@ def test_commands_to_brake_that_come_late_do_not_make_the_way_longer() -> None:
         at += LOOK_PERIOD
         driven = max(commanded, driven - DECELERATION * LOOK_PERIOD)
     assert at + REACTION <= 3.0 + STANDSTILL + LOOK_PERIOD + 1e-9
+
+
+def test_new_commands_do_not_speed_a_robot_up_that_brakes(
+    graph: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    told: list[str] = []
+    base = CommandPublisher(graph.node, 'cmd_vel', ['scan'], DECELERATION, told.append)
+    sent: list[float] = []
+    monkeypatch.setattr(
+        base, '_publisher', SimpleNamespace(publish=lambda twist: sent.append(twist.linear.x))
+    )
+    now = 0.0
+    monkeypatch.setattr(base, '_now', lambda: now)
+    for count in range(30):
+        now = 0.1 * count
+        base.hear('scan')
+    base.command(Velocity(0.6))
+    assert sent == [0.6]
+    while now < 3.4:  # a joystick goes on while the scans have ended
+        now += 0.01
+        base._limit_again()
+        base.command(Velocity(0.6))
+    assert sent == sorted(sent, reverse=True)
+    assert sent[-1] == 0.0
+    assert told == ['scan']
+
+
+@pytest.mark.parametrize('wanted', [0.7, -1.5])
+def test_a_speed_too_high_to_brake_from_is_one_that_can_be_kept(
+    graph: Any, monkeypatch: pytest.MonkeyPatch, wanted: float
+) -> None:
+    base = CommandPublisher(graph.node, 'cmd_vel', ['scan'], DECELERATION, lambda _topic: None)
+    sent: list[Any] = []
+    monkeypatch.setattr(base, '_publisher', SimpleNamespace(publish=sent.append))
+    now = 0.0
+    monkeypatch.setattr(base, '_now', lambda: now)
+    for step in range(100):
+        now = 0.01 * step
+        if step % 10 == 0:
+            base.hear('scan')
+            base.command(Velocity(wanted, 1.0))
+        base._limit_again()
+    speeds = [twist.linear.x for twist in sent]
+    assert speeds == pytest.approx([math.copysign(0.6, wanted)] * len(sent))
+    assert sent[-1].angular.z == pytest.approx(0.6 / abs(wanted)), 'the arc is the same'
 
 
 @pytest.mark.parametrize('rate', [5.0, 7.0, 10.0])

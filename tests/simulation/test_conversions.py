@@ -62,7 +62,7 @@ def test_a_map_comes_back() -> None:
 def test_odometry_carries_pose_and_velocity() -> None:
     message = conversions.odometry_message('odom', 'base_link')
     conversions.set_odometry(message, (1.0, 2.0, 0.5), 0.3, -0.2, STAMP)
-    assert received.pose_from(message.pose.pose) == pytest.approx((1.0, 2.0, 0.5))
+    assert pose_from(message.pose.pose) == pytest.approx((1.0, 2.0, 0.5))
     assert (message.twist.twist.linear.x, message.twist.twist.angular.z) == (0.3, -0.2)
     assert (message.header.frame_id, message.child_frame_id) == ('odom', 'base_link')
 

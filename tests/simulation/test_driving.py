@@ -28,12 +28,13 @@ import navigation
 
 RADIUS = 0.22
 DOORS = ('D1', 'D2', 'D3', 'D4', 'D5', 'D6', 'D7')
+PLAN = read_world(CONFIG / 'seven_rooms.yaml').plan
 points = st.tuples(st.floats(2.0, 18.0), st.floats(2.0, 18.0))
 
 
 @pytest.fixture(scope='module')
 def planner() -> GridPlanner:
-    drawn = occupancy_grid.draw(read_world(CONFIG / 'seven_rooms.yaml').plan)
+    drawn = occupancy_grid.draw(PLAN)
     return GridPlanner(GridMap(drawn.cells, drawn.resolution, drawn.origin))
 
 
@@ -45,7 +46,7 @@ def test_a_path_never_touches_a_wall_or_a_closed_door(
     goal: tuple[float, float],
     closed: set[str],
 ) -> None:
-    world = read_world(CONFIG / 'seven_rooms.yaml')
+    world = World(PLAN)
     for door in closed:
         world.set_door(door, False)
     planner.set_closed(
@@ -94,7 +95,7 @@ def driven(world: World, seed: int, goals: list[str]) -> tuple[Robot, float]:
 
 @pytest.mark.parametrize('seed', [1, 2, 3])
 def test_a_drive_stays_in_the_corridor_around_its_path_and_arrives(seed: int) -> None:
-    world = read_world(CONFIG / 'seven_rooms.yaml')
+    world = World(PLAN)
     goals = [['R1', 'R4', 'E'], ['R3', 'C1', 'R2'], ['C2', 'E', 'R1']][seed - 1]
     robot, furthest = driven(world, seed, goals)
     assert robot.base.collisions == 0

@@ -30,7 +30,7 @@ from surveillance_interfaces.srv import (
     SetMarker,
     SlipOdometry,
 )
-from surveillance_runtime.conversions import seconds_of
+from surveillance_runtime.conversions import pose_from, seconds_of
 from surveillance_runtime.parameters import ParameterError
 from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
 from surveillance_simulation.simulator_node import Simulator
@@ -107,7 +107,7 @@ def test_it_publishes_map_doors_clock_and_odometry(graph: Any) -> None:
     assert list(doors[0].open) == ['D']
     times = [clock.clock.sec + clock.clock.nanosec / 1e9 for clock in clocks]
     assert np.diff(times) == pytest.approx(0.1)
-    assert received.pose_from(odometry[0].pose.pose) == (1.0, 1.0, 0.0)
+    assert pose_from(odometry[0].pose.pose) == (1.0, 1.0, 0.0)
 
 
 def test_it_drives_on_command_and_stops_at_the_wall(graph: Any) -> None:
@@ -293,7 +293,7 @@ def test_it_tells_a_localisation_where_it_starts(graph: Any) -> None:
     poses = graph.listen(PoseWithCovarianceStamped, 'initialpose', 10)
     simulator(graph, announce_pose=True)
     graph.until(lambda: poses)
-    assert received.pose_from(poses[0].pose.pose) == (1.0, 1.0, 0.0)
+    assert pose_from(poses[0].pose.pose) == (1.0, 1.0, 0.0)
 
 
 def test_light_can_be_changed_while_it_runs(graph: Any) -> None:

@@ -17,7 +17,10 @@ class Motion(Protocol):
     """What drives the robot: `NavigationMotion`, `Nav2Motion`, either with docking."""
 
     def follow(self, path: Points, run: GoalRun, report: Callable[[Points], None]) -> Points:
-        """Drive along a path; return where the robot is then, or raise `MotionFailedError`."""
+        """Drive along a path; return where the robot is then, or raise `MotionFailedError`.
+
+        It may report where the robot is as often as it likes.
+        """
 
     def place_reached(self, goal: Points, end: Points, run: GoalRun) -> str:
         """Return the place the robot is in; raises `MotionFailedError` when it is not the

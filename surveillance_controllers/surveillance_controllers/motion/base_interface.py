@@ -11,12 +11,13 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
+from builtin_interfaces.msg import Time
 from geometry_msgs.msg import PoseWithCovarianceStamped
 from nav_msgs.msg import OccupancyGrid, Odometry
 from sensor_msgs.msg import LaserScan, PointCloud2
 
 from surveillance_controllers import conversions
-from surveillance_controllers.geometry import Points, Pose, Scan, point_of
+from surveillance_controllers.geometry import Mount, Points, Pose, Scan, point_of
 from surveillance_controllers.motion.arrival import MotionFailedError
 from surveillance_controllers.motion.command_publisher import CommandPublisher
 from surveillance_controllers.motion.driving import Drive, Spin, State
@@ -29,7 +30,7 @@ from surveillance_interfaces.msg import DoorStates
 from surveillance_runtime.conversions import cloud_from_points, pose_estimate, pose_from, seconds_of
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
-from surveillance_runtime.robot_base import ROBOT_DECELERATION
+from surveillance_runtime.robot_base import ROBOT_DECELERATION, ROBOT_RADIUS
 from surveillance_runtime.serialized import pose_of_serialized
 
 POSE_PERIOD = 0.19
@@ -47,6 +48,7 @@ class RobotBase:
             changed (None: not known any more), and the scan's stamp; must not block.
         mount: Where the lidar sits on the robot; None: as `tf_static` says of the scan's frame.
         deceleration: With which the base brakes when it must, m/s^2.
+        radius: Of the robot, metres.
     """
 
     def __init__(
@@ -55,10 +57,12 @@ class RobotBase:
         navigator: Navigator,
         sensor_timeout: float,
         on_place: Callable[[str | None, Any], None],
-        mount: Pose | None = None,
+        mount: Mount | None = None,
         deceleration: float = ROBOT_DECELERATION,
+        radius: float = ROBOT_RADIUS,
     ) -> None:
         self._node = node
+        self._radius = radius
         self._navigator = navigator
         self._sensor_timeout = sensor_timeout
         self._on_place = on_place
@@ -191,7 +195,7 @@ class RobotBase:
                 if not woken and self._steps == before:
                     topic = self._navigator.missing or 'scan'
                     raise MotionFailedError(
-                        f'nothing came on the topic {topic} for {self._sensor_timeout:g} s',
+                        f'nothing of use came on the topic {topic} for {self._sensor_timeout:g} s',
                         None if self.pose is None else point_of(self.pose),
                     )
 
@@ -226,7 +230,11 @@ class RobotBase:
     def _on_scan(self, message: LaserScan) -> None:
         with conversions.refusing(self._node, 'scan'):
             mount = self._mount or self._tf.mount_of(message.header.frame_id)
-            self._see(conversions.scan_from(message, mount), message.header.stamp)
+            stamp = message.header.stamp
+            if stamp == Time():
+                # A lidar without a clock; a drive needs the time that passes.
+                stamp = self._node.get_clock().now().to_msg()
+            self._see(conversions.scan_from(message, mount, self._radius), stamp)
 
     def _see(self, scan: Scan, stamp: Any) -> None:
         measured = seconds_of(stamp)

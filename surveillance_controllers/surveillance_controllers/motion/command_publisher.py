@@ -32,7 +32,7 @@ class CommandPublisher:
         standstill: The robot stands this long after the first message that did not come, seconds.
 
     Attributes:
-        wanted: The last command, before it was limited.
+        wanted: The last command, before it was limited by the age of what was heard.
     """
 
     def __init__(
@@ -45,6 +45,7 @@ class CommandPublisher:
         standstill: float = STANDSTILL,
     ) -> None:
         self._clock = node.get_clock()
+        self._logger = node.get_logger()
         self._on_silence = on_silence
         self._age = SensorAge(heard, deceleration, standstill)
         self._lock = threading.Lock()
@@ -61,20 +62,35 @@ class CommandPublisher:
     def command(self, velocity: Velocity) -> None:
         """Publish a command as far as the age of what was heard allows it."""
         with self._lock:
-            self.wanted = velocity
+            self.wanted = self._sustained(velocity)
             now = self._now()
             self._publish(now)
             self._watch(now)
+
+    def _sustained(self, velocity: Velocity) -> Velocity:
+        """Return the velocity, or less where the robot would brake before each message."""
+        top, speed = self._age.top_speed, abs(velocity.speed)
+        if speed <= top + 1e-6:
+            return velocity
+        self._logger.warn(
+            f'{speed:.2f} m/s is commanded, driven is {top:.2f} m/s: from there a robot that '
+            'brakes with robot_deceleration stands in time when its sensors fall silent',
+            once=True,
+        )
+        return Velocity(velocity.speed * top / speed, velocity.turn * top / speed)
 
     def _limit_again(self) -> None:
         with self._lock:
             now = self._now()
             if self._age.share(self.wanted.speed, now) < 1.0:
-                self._publish(now + LEAD)
+                self._publish(now)
             self._watch(now)
 
     def _publish(self, now: float) -> None:
         share = self._age.share(self.wanted.speed, now)
+        if share < 1.0:
+            # A new command, too: else it would end what the last one began.
+            share = self._age.share(self.wanted.speed, now + LEAD)
         limited = Velocity(share * self.wanted.speed, share * self.wanted.turn)
         self._publisher.publish(conversions.twist_from(limited))
         silent = self._age.left(now)[1] if share == 0.0 and self.wanted != Velocity() else ''

@@ -25,7 +25,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from surveillance_controllers.geometry import Points, Pose, Scan, composed, relative
+from surveillance_controllers.geometry import (
+    Points,
+    Pose,
+    Scan,
+    angle_between,
+    composed,
+    in_map,
+    relative,
+)
 from surveillance_controllers.planning.grid_map import GridMap, distance_to
 
 
@@ -141,8 +149,11 @@ class Localiser:
         outside = distance_to(occupied, grid.resolution)
         inside = distance_to(~occupied, grid.resolution)
         signed = np.where(occupied, half - inside, outside - half)
-        # Without anything occupied there is nothing to match: one finite value, no slope.
-        self._edges: NDArray[np.float32] = np.minimum(signed, np.float32(10.0))
+        # With nothing or everything occupied nothing is to match: one finite value, no slope.
+        self._edges: NDArray[np.float32] = np.clip(signed, -10.0, 10.0)
+        # A slope needs two cells.
+        short = [(0, max(0, 2 - count)) for count in signed.shape]
+        self._edges = np.pad(self._edges, short, mode='edge')
         self._occupied = occupied
         self._standable = grid.free & (outside - half >= self.parameters.body)
 
@@ -234,8 +245,8 @@ class Localiser:
 
     @staticmethod
     def _same(first: Pose, second: Pose) -> bool:
-        turned = math.remainder(first[2] - second[2], math.tau)
-        return math.dist(first[:2], second[:2]) < 0.5 and abs(turned) < 0.5
+        turned = abs(angle_between(first[2], second[2]))
+        return math.dist(first[:2], second[:2]) < 0.5 and turned < 0.5
 
     def _is_due(self, now: float) -> bool:
         p = self.parameters
@@ -256,8 +267,9 @@ class Localiser:
             self._settle(corrected, agreement)
             return
         self.agreement = agreement
-        if self._look_at is None:
-            self._look_at = now + p.doubt_time
+        # Time may begin anew, as that of a simulation does.
+        latest = now + (p.lost_pause if self.lost else p.doubt_time)
+        self._look_at = latest if self._look_at is None else min(self._look_at, latest)
         if agreement < p.lost_below and not self.lost:
             # Next to nothing fits: that is no passer-by.
             self._look_at = min(self._look_at, now)
@@ -312,9 +324,14 @@ class Localiser:
             shows too little. Of poses that explain as much, one near the last pose comes first.
         """
         p = self.parameters
-        found = self._searched(scan, p.near, 24)
+        points = scan.thinned(40).points
+        if len(points) < 8:
+            return []
+        places, scores = self._scored(points)
+        within = np.hypot(*(places - self.pose[:2]).T) <= p.near
+        found = self._refined(places[within], scores[:, within], 24, scan)
         near = max(found, key=lambda each: self._worth(*each), default=None)
-        found += self._searched(scan, math.inf, p.most_rivals)
+        found += self._refined(places, scores, p.most_rivals, scan)
         found.sort(key=lambda each: -self._worth(*each))
         if near is not None and near[1] >= p.sure_from:
             # That somebody carried the robot far away is unlikely.
@@ -339,9 +356,10 @@ class Localiser:
     def explained(self, pose: Pose, scan: Scan) -> float:
         """Return the part of a scan's rays that go as far as they should from a pose, 0 to 1."""
         expected = self.cast(composed(pose, scan.mount), scan.angles, scan.range_max)
-        measured = np.minimum(scan.ranges, scan.range_max)
+        off = np.abs(expected - np.minimum(scan.ranges, scan.range_max))
+        off = off[~np.isnan(off)]
         slack = self.parameters.hit + self.grid.resolution / 2
-        return float((np.abs(expected - measured) <= slack).mean()) if len(measured) else 0.0
+        return float((off <= slack).mean()) if len(off) else 0.0
 
     def cast(self, pose: Pose, angles: Points, range_max: float) -> Points:
         """Return how far rays go in the map from a pose until they meet something occupied.
@@ -384,7 +402,7 @@ class Localiser:
             jacobian = np.array([slope_x, slope_y, slope_turn])
             weighted = jacobian * weight
             back = estimate - pose
-            back[2] = math.remainder(back[2], math.tau)
+            back[2] = angle_between(pose[2], estimate[2])
             change = np.linalg.solve(
                 weighted @ jacobian.T + np.diag(pull + 1e-9), -(weighted @ error + pull * back)
             )
@@ -410,64 +428,75 @@ class Localiser:
         slope_y = (north - south) / self.grid.resolution
         return south + (north - south) * v, slope_x, slope_y
 
-    def _searched(self, scan: Scan, reach: float, count: int) -> list[tuple[Pose, float]]:
-        """Search within reach of the last pose; refine the best `count` poses of the lattice."""
-        poses = self._lattice(reach)
-        points = scan.thinned(40).points
-        if not len(poses) or len(points) < 8:
-            return []
-        scores = self._scores(poses, points)
-        candidates = _apart(poses, scores, count, 2 * self.parameters.lattice)
-        refined = [self._matched(pose, scan.points, (1.0, 1.0)) for pose in candidates]
-        return [(pose, self.explained(pose, scan)) for pose in refined if self._can_stand(pose)]
-
     def _can_stand(self, pose: Pose) -> bool:
         cell = self.grid.cells_of(pose[:2])
         return bool(self.grid.contains(cell)[0] and self._standable[cell[0, 0], cell[0, 1]])
 
-    def _lattice(self, reach: float) -> Points:
-        """Poses to try, shape (n, 3): free places at equal distances, each with every heading."""
+    @property
+    def _headings(self) -> Points:
+        """The headings that a search tries, shape (n,), rad."""
+        count = self.parameters.headings
+        return np.asarray(self.pose[2] + np.arange(count) * (math.tau / count), np.float64)
+
+    def _scored(self, points: Points) -> tuple[Points, NDArray[np.float32]]:
+        """Return how well points fit the edges from each place of a lattice with each heading.
+
+        The lattice's places are cells, so that for one heading each point adds a shifted image of
+        the map (Olson, "Real-time correlative scan matching", ICRA 2009).
+
+        Args:
+            points: What is seen, robot's frame, shape (n, 2), metres.
+
+        Returns:
+            The places on which the robot can stand, shape (m, 2), metres; the scores, shape
+            (headings, m), the greater the better.
+        """
         step = max(1, round(self.parameters.lattice / self.grid.resolution))
-        cells = np.argwhere(self._standable[::step, ::step]) * step
-        centres = self.grid.centres_of(cells)
-        gaps = np.hypot(centres[:, 0] - self.pose[0], centres[:, 1] - self.pose[1])
-        centres = centres[gaps <= reach]
-        turns = np.arange(self.parameters.headings) * (math.tau / self.parameters.headings)
-        headings = self.pose[2] + turns
-        return np.concatenate(
-            [
-                np.repeat(centres, len(headings), axis=0),
-                np.tile(headings, len(centres))[:, None],
-            ],
-            axis=1,
-        )
+        fit = np.exp(-0.5 * (self._edges / np.float32(0.2)) ** 2)
+        images = [
+            [fit[up::step, right::step].copy() for right in range(step)] for up in range(step)
+        ]
+        can_stand = self._standable[::step, ::step]
+        scores = []
+        for yaw in self._headings.tolist():
+            fits: NDArray[np.float32] = np.zeros(can_stand.shape, np.float32)
+            turned = in_map((0.0, 0.0, yaw), points) / self.grid.resolution
+            for right, up in np.rint(turned).astype(int).tolist():
+                image = images[up % step][right % step]
+                rows, image_rows = _overlap(up // step, len(fits), len(image))
+                columns, image_columns = _overlap(right // step, fits.shape[1], image.shape[1])
+                fits[rows, columns] += image[image_rows, image_columns]
+            scores.append(fits[can_stand])
+        return self.grid.centres_of(step * np.argwhere(can_stand)), np.array(scores)
 
-    def _scores(self, poses: Points, points: Points) -> Points:
-        """Return how well the points fit the edges from each pose; the greater the better."""
-        scores = np.empty(len(poses))
-        flat = np.exp(-0.5 * (self._edges / np.float32(0.2)) ** 2).ravel()
-        rows, columns = self._edges.shape
-        scale = 1 / self.grid.resolution
-        px, py = points[:, 0].astype(np.float32), points[:, 1].astype(np.float32)
-        for begin in range(0, len(poses), 4096):
-            some = poses[begin : begin + 4096].astype(np.float32)
-            cos, sin = np.cos(some[:, 2:]), np.sin(some[:, 2:])
-            x = (some[:, :1] - self.grid.origin[0] + cos * px - sin * py) * scale
-            y = (some[:, 1:2] - self.grid.origin[1] + sin * px + cos * py) * scale
-            column = np.clip(x.astype(np.int32), 0, columns - 1)
-            row = np.clip(y.astype(np.int32), 0, rows - 1)
-            scores[begin : begin + 4096] = flat[row * columns + column].mean(axis=1)
-        return scores
+    def _refined(
+        self, places: Points, scores: NDArray[np.float32], count: int, scan: Scan
+    ) -> list[tuple[Pose, float]]:
+        """Refine a lattice's best poses; return them with the part of the rays each explains."""
+        most = 60 * count
+        # The best poses are at the best places.
+        best = np.argsort(-scores.max(axis=0))[:most]
+        heading, place = np.divmod(np.argsort(-scores[:, best], axis=None)[:most], len(best))
+        poses = np.column_stack([places[best[place]], self._headings[heading]])
+        tried = _apart(poses, count, 2 * self.parameters.lattice)
+        refined = [self._matched(pose, scan.points, (1.0, 1.0)) for pose in tried]
+        return [(pose, self.explained(pose, scan)) for pose in refined if self._can_stand(pose)]
 
 
-def _apart(poses: Points, scores: Points, count: int, distance: float) -> list[Pose]:
-    """Return the best poses that are not all the same: some way or turn lies between any two."""
+def _overlap(shift: int, count: int, image: int) -> tuple[slice, slice]:
+    """Return which of `count` cells lie on an image that is shifted back, and where on it."""
+    first = max(0, -shift)
+    end = max(first, min(count, image - shift))
+    return slice(first, end), slice(first + shift, end + shift)
+
+
+def _apart(poses: Points, count: int, distance: float) -> list[Pose]:
+    """Return the first poses that are not all the same: some way or turn lies between any two."""
     taken: list[Pose] = []
-    for index in np.argsort(-scores)[: 60 * count]:
-        x, y, yaw = (float(value) for value in poses[index])
+    for x, y, yaw in poses.tolist():
         if all(
             math.hypot(x - other[0], y - other[1]) > distance
-            or abs(math.remainder(yaw - other[2], math.tau)) > 0.4
+            or abs(angle_between(other[2], yaw)) > 0.4
             for other in taken
         ):
             taken.append((x, y, yaw))

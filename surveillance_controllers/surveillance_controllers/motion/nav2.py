@@ -94,8 +94,10 @@ class Nav2Motion:
 
         def on_feedback(feedback: Any) -> None:
             nonlocal position
-            position = conversions.array_from_points([feedback.current_pose.pose.position])[0]
-            report(position)
+            point = conversions.array_from_points([feedback.current_pose.pose.position])[0]
+            if np.isfinite(point).all():
+                position = point
+                report(point)
 
         try:
             end = self._navigator.run(

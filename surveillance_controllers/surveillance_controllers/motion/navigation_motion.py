@@ -5,8 +5,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-import numpy as np
-
 from surveillance_controllers import conversions
 from surveillance_controllers.geometry import Points, Pose, point_of
 from surveillance_controllers.map_knowledge import MapKnowledge, keep_up
@@ -55,6 +53,7 @@ class NavigationMotion:
             tell,
             settings.lidar_mount,
             settings.drive.deceleration,
+            settings.drive.radius,
         )
         self._base.set_positions(settings.positions)
         knowledge.assume(settings.positions)
@@ -72,13 +71,9 @@ class NavigationMotion:
         """
         drive = Drive(path[:, :2], self._settings.drive)
         goal = path[-1]
-        told = -np.inf
 
         def on_step(pose: Pose) -> None:
-            nonlocal told
-            if not 0 <= run.now() - told < self._settings.motion.feedback_period:
-                told = run.now()
-                report(point_of(pose))
+            report(point_of(pose))
 
         def another_path(pose: Pose) -> Points:
             return self._ask_planner(point_of(pose), goal, run)
@@ -86,7 +81,6 @@ class NavigationMotion:
         end = point_of(self._base.drive(drive, run.interrupt, on_step, another_path))
         if drive.state is State.FAILED:
             raise MotionFailedError(drive.reason, end)
-        report(end)
         self._recorder.tell(self._base.place_at(end) if self._base.is_sure else None)
         return end
 

@@ -225,9 +225,7 @@ class PathFollower:
         a, t = 0.8 * p.acceleration, p.latency
         horizon = min(way, p.speed * t + p.speed**2 / (2 * a) + 0.1)
         room = room_ahead(seen, curvature, p.radius + p.margin, horizon)
-        if room >= horizon:
-            return p.speed
-        return min(p.speed, max(0.0, math.sqrt((a * t) ** 2 + 2 * a * room) - a * t))
+        return p.speed if room >= horizon else min(p.speed, speed_to_stop(room, a, t))
 
     def _safely(self, speed: float, turn: float, seen: Points, way: float = math.inf) -> float:
         """Return the speed, or less where the robot could not stop on the arc that this turn
@@ -235,10 +233,8 @@ class PathFollower:
         """
         if speed == 0.0:
             return 0.0
-        if speed < 0.0:
-            # Seen from behind the robot drives forwards, and turns to the other side.
-            return -min(-speed, self._safe_speed(-seen, turn / speed, way))
-        return min(speed, self._safe_speed(seen, turn / speed, way))
+        safe = self._safe_speed(*as_forwards(speed, turn, seen), way)
+        return math.copysign(min(abs(speed), safe), speed)
 
     def is_clear(self, obstacles: Points, reach: float, ahead: float) -> bool:
         """Tell whether the next part of the path keeps away from obstacles.
@@ -352,6 +348,32 @@ class PathFollower:
             if (across <= p.deviation * max(math.hypot(*line), 1e-9)).all():
                 return np.asarray(ahead[index])
         return np.asarray(ahead[first])
+
+
+def speed_to_stop(room: float, deceleration: float, latency: float) -> float:
+    """Return the speed from which the robot stops within some room, m/s.
+
+    Args:
+        room: Metres, 0 or more.
+        deceleration: With which it brakes, m/s^2.
+        latency: Seconds until it begins to brake.
+    """
+    lost = deceleration * latency
+    return max(0.0, math.sqrt(lost**2 + 2.0 * deceleration * room) - lost)
+
+
+def as_forwards(speed: float, turn: float, seen: Points) -> tuple[Points, float]:
+    """Return what is seen and the curvature of the arc, as for a robot that drives forwards.
+
+    One that drives backwards does so in a frame that is turned round: what is seen lies on the
+    other side, and it turns to the same one.
+
+    Args:
+        speed: m/s, not 0.
+        turn: rad/s.
+        seen: Points in the robot's frame, shape (n, 2), metres.
+    """
+    return seen if speed > 0.0 else -seen, turn / abs(speed)
 
 
 def _nearest(seen: Points) -> float:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from surveillance_controllers.controller_parameters import MotionSettings
-from surveillance_controllers.geometry import Points, Pose
+from surveillance_controllers.geometry import Mount, Points
 from surveillance_controllers.motion.path_following import DriveParameters
 from surveillance_controllers.motion.place_regions import Segment, door_segment
 from surveillance_controllers.motion.transforms import lidar_mount
@@ -62,7 +62,7 @@ class RobotSettings:
     drive: DriveParameters
     doors: dict[str, Segment]
     positions: dict[str, Points]
-    lidar_mount: Pose | None
+    lidar_mount: Mount | None
     sensor_timeout: float = parameter(
         5.0, 'how long map, odom and scan may be silent, s of real time.', 0.1, 3600.0
     )

@@ -18,6 +18,8 @@ REACTION = 0.05
 LEAD = 0.1
 """A command to brake is for this much later, seconds: a base that waits for a late one loses time
 that it cannot make up, since it brakes as hard as it can."""
+LATE = 0.01
+"""Messages that are late by this slow no robot down, seconds."""
 LONGEST_PERIOD = 0.25
 """A sensor that is slower than this lets the robot drive slowly, or not at all; seconds."""
 _COUNT = 10
@@ -58,6 +60,11 @@ class SensorAge:
         """
         at, topic = min((at, topic) for topic, at in self._stands_at.items())
         return at - now, topic
+
+    @property
+    def top_speed(self) -> float:
+        """The speed that messages allow which come on time, or `LATE` after that, m/s."""
+        return max(0.0, self._deceleration * (self._standstill - REACTION - LATE))
 
     def seconds_to_brake(self, speed: float, now: float) -> float:
         """Return after how long a robot of some speed, m/s, must brake if nothing is heard."""

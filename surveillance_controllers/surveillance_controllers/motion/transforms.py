@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
+import numpy as np
 from geometry_msgs.msg import TransformStamped
+from numpy.typing import NDArray
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
 from surveillance_controllers import conversions
-from surveillance_controllers.geometry import Pose, composed, relative
+from surveillance_controllers.geometry import Mount, Pose, composed, relative
 from surveillance_runtime import parameter_checks
 from surveillance_runtime.conversions import pose_message
 from surveillance_runtime.node import PatrolNode
@@ -20,9 +23,11 @@ except ImportError:
 
 BASE_FRAMES = ('base_link', 'base_footprint', '')
 """Frames at the robot's centre."""
+MOST_TILT = 0.1
+"""A lidar that is tilted by more than this does not look along the floor, rad."""
 
 
-def lidar_mount(node: PatrolNode) -> Pose | None:
+def lidar_mount(node: PatrolNode) -> Mount | None:
     """Declare where the lidar sits on the robot; None: `tf_static` says it.
 
     Raises:
@@ -37,7 +42,7 @@ def lidar_mount(node: PatrolNode) -> Pose | None:
         check=parameter_checks.pose_or_nothing,
         read_only=True,
     )
-    return (given[0], given[1], given[2]) if given else None
+    return Mount((given[0], given[1], given[2])) if given else None
 
 
 class Transforms:
@@ -51,8 +56,9 @@ class Transforms:
 
     def __init__(self, node: PatrolNode) -> None:
         self._node = node
-        self._parents: dict[str, tuple[str, Pose]] = {}
-        self._unknown: set[str] = set()
+        self._parents: dict[str, tuple[str, NDArray[np.float64]]] = {}
+        self._mounts: dict[str, Mount] = {}
+        self._told: set[str] = set()
         self._publisher = None
         if TFMessage is not None:
             self._publisher = node.create_publisher(TFMessage, 'tf', 10)
@@ -75,31 +81,48 @@ class Transforms:
         transform.transform.rotation = pose_message((x, y, yaw)).orientation
         self._publisher.publish(TFMessage(transforms=[transform]))
 
-    def mount_of(self, frame: str) -> Pose:
+    def mount_of(self, frame: str) -> Mount:
         """Return where a sensor's frame is on the robot; at its centre while nobody says."""
-        pose: Pose = (0.0, 0.0, 0.0)
-        at, passed = frame, 0
+        if frame not in self._mounts:
+            self._mounts[frame] = self._looked_up(frame)
+        return self._mounts[frame]
+
+    def _looked_up(self, frame: str) -> Mount:
+        matrix = np.eye(4)
+        at, passed = _plain(frame), 0
         while at.rpartition('/')[2] not in BASE_FRAMES:
             if at not in self._parents or passed > len(self._parents):
-                if frame not in self._unknown:
-                    self._unknown.add(frame)
-                    self._node.get_logger().warn(
-                        f'scan: where its frame {frame!r} is on the robot is not known: expected '
-                        f'it on tf_static below {BASE_FRAMES[0]}, or the parameter lidar_mount; '
-                        "it is taken for the robot's centre"
-                    )
-                return (0.0, 0.0, 0.0)
+                self._tell_once(
+                    f'scan: where its frame {frame!r} is on the robot is not known: expected '
+                    f'it on tf_static below {BASE_FRAMES[0]}, or the parameter lidar_mount; '
+                    "it is taken for the robot's centre"
+                )
+                return Mount()
             at, step = self._parents[at]
-            pose = composed(step, pose)
+            matrix = step @ matrix
             passed += 1
-        return pose
+        tilt = math.acos(min(abs(float(matrix[2, 2])), 1.0))
+        if tilt > MOST_TILT:
+            self._tell_once(
+                f'scan: its frame {frame!r} is tilted by {math.degrees(tilt):.0f} degrees: '
+                'expected a lidar in the plane of the floor; it is taken for one'
+            )
+        x, y, yaw = matrix[0, 3], matrix[1, 3], math.atan2(matrix[1, 0], matrix[0, 0])
+        return Mount((float(x), float(y), yaw), bool(matrix[2, 2] < 0.0))
+
+    def _tell_once(self, text: str) -> None:
+        if text not in self._told:
+            self._told.add(text)
+            self._node.get_logger().warn(text)
 
     def _on_static(self, message: Any) -> None:
         for each in message.transforms:
-            try:
-                pose = conversions.planar_from(each.transform)
-            except ValueError as error:
-                # Cameras and arms are tilted; only the lidar must not be.
-                self._node.get_logger().debug(f'tf_static: {each.child_frame_id}: {error}')
-                continue
-            self._parents[each.child_frame_id] = each.header.frame_id, pose
+            with conversions.refusing(self._node, f'tf_static: {each.child_frame_id}'):
+                matrix = conversions.matrix_from(each.transform)
+                self._parents[_plain(each.child_frame_id)] = _plain(each.header.frame_id), matrix
+        self._mounts.clear()
+
+
+def _plain(frame: str) -> str:
+    """Return a frame's name without the slash that older drivers begin it with, as tf2 does."""
+    return frame.removeprefix('/')

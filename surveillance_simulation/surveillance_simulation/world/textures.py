@@ -18,7 +18,8 @@ Texture = npt.NDArray[np.uint8]
 TILE = 2.0
 """Side of the piece of wall or floor that a repeated texture covers, metres."""
 
-_TEXELS = 384
+_TEXELS, _CELL = 384, 24
+"""Sides of a texture and of a cell of a marker's code, texels."""
 _PAPER, _INK = 228, 22
 
 MARGIN_CELLS = 1.5
@@ -82,14 +83,13 @@ def station() -> Texture:
 
 
 @cache
-def marker_panel(dictionary: str, marker_id: int, state: str, cell: int = 24) -> Texture:
+def marker_panel(dictionary: str, marker_id: int, state: str) -> Texture:
     """Return a marker on its white sheet as it hangs: whole, broken or covered.
 
     Args:
         dictionary: OpenCV's name of the dictionary, e.g. DICT_5X5_100.
         marker_id: Id within the dictionary.
         state: 'whole'; 'broken', a corner torn off; 'covered' by a grey sheet.
-        cell: Texels per cell of the code.
 
     Raises:
         PlaceError: There is no such dictionary, or no such id in it.
@@ -100,10 +100,10 @@ def marker_panel(dictionary: str, marker_id: int, state: str, cell: int = 24) ->
             (), f'marker id {marker_id}: {dictionary} holds ids 0 to {len(known.bytesList) - 1}'
         )
     cells = known.markerSize + 2
-    margin = round(MARGIN_CELLS * cell)
-    sheet = np.full((cells * cell + 2 * margin,) * 2, _PAPER, np.uint8)
-    code = cv2.aruco.generateImageMarker(known, marker_id, cells * cell)
-    inner = slice(margin, margin + cells * cell)
+    margin, width = round(MARGIN_CELLS * _CELL), cells * _CELL
+    sheet = np.full((width + 2 * margin,) * 2, _PAPER, np.uint8)
+    code = cv2.aruco.generateImageMarker(known, marker_id, width)
+    inner = slice(margin, margin + width)
     sheet[inner, inner] = np.where(code > 127, _PAPER, _INK)
     side = len(sheet)
     if state == 'broken':
@@ -111,7 +111,7 @@ def marker_panel(dictionary: str, marker_id: int, state: str, cell: int = 24) ->
         cv2.fillConvexPoly(sheet, torn, 160)
     elif state == 'covered':
         sheet[:] = 176
-        cv2.line(sheet, (0, 0), (side, side), 150, max(1, cell // 6))
+        cv2.line(sheet, (0, 0), (side, side), 150, _CELL // 6)
     return np.repeat(sheet[..., None], 3, axis=2)
 
 

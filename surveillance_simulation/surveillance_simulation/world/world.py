@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from surveillance_runtime.place import PlaceError, boxes
+from surveillance_runtime.place import PlaceError, boxes, read_place_file
 from surveillance_runtime.place.floor_plan import (
     WALL_THICKNESS,
     FloorPlan,
@@ -22,7 +22,6 @@ from surveillance_runtime.place.floor_plan import (
 )
 from surveillance_runtime.place.regions import Regions
 from surveillance_runtime.suggestions import nearest
-from surveillance_runtime.yaml_file import read_parameter_file
 
 MARKER_STATES = ('whole', 'broken', 'covered')
 
@@ -239,8 +238,6 @@ def read_world(path: str | Path) -> World:
     Raises:
         FileError: The file cannot be read, or describes no sound place; one line.
     """
-    file = read_parameter_file(path)
-    try:
-        return World.from_parameters(file.values)
-    except PlaceError as error:
-        raise file.error(error.where, error.problem) from None
+    plan = read_place_file(path, walls=True).plan
+    assert plan is not None, 'walls were asked for'
+    return World(plan)
