@@ -15,7 +15,7 @@ import numpy as np
 
 from surveillance_perception import CameraModel, DetectorSettings, MarkerDetector, pose_of
 from surveillance_perception.detection import dictionary_named
-from surveillance_perception.stream import read_image
+from surveillance_perception.stream.image_files import read_image
 from surveillance_perception.testing.marker_scene import (
     Degradation,
     Panel,

@@ -12,6 +12,7 @@ from surveillance_perception.detection.annotation import annotated
 from surveillance_perception.detection.detector import DetectorSettings, MarkerDetector
 from surveillance_perception.stream.image_files import read_image
 from surveillance_runtime.command_line import CommandParser
+from surveillance_runtime.files import in_one_line
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -36,8 +37,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     known = None if options.known is None else frozenset(options.known)
     try:
         detector = MarkerDetector(DetectorSettings(options.dictionary, known))
-    except ValueError as error:
-        print(f'detect: {error}', file=sys.stderr)
+        if options.out is not None:
+            options.out.mkdir(parents=True, exist_ok=True)
+    except (ValueError, OSError) as error:
+        print(f'detect: {_words(error)}', file=sys.stderr)
         return 2
     failed = 0
     written = {path.resolve() for path in options.images}
@@ -45,7 +48,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         try:
             _detect(detector, path, options.out, written)
         except (ValueError, OSError) as error:
-            print(f'detect: {error}', file=sys.stderr)
+            print(f'detect: {_words(error)}', file=sys.stderr)
             failed += 1
     return 1 if failed else 0
 
@@ -55,7 +58,6 @@ def _detect(detector: MarkerDetector, path: Path, folder: Path | None, written: 
     detections = detector.detect(image)
     said = f'{path}: {len(detections)} marker{"" if len(detections) == 1 else "s"}'
     if folder is not None:
-        folder.mkdir(parents=True, exist_ok=True)
         target = _target(path, folder, written)
         encoded = cv2.imencode('.png', annotated(image, detections))[1]
         target.write_bytes(encoded.tobytes())
@@ -68,6 +70,10 @@ def _detect(detector: MarkerDetector, path: Path, folder: Path | None, written: 
             f'  id {detection.marker_id:4d}  at ({x:.1f}, {y:.1f})'
             f'  confidence {detection.confidence:.2f}{note}'
         )
+
+
+def _words(error: ValueError | OSError) -> str:
+    return in_one_line(error) if isinstance(error, OSError) else str(error)
 
 
 def _target(path: Path, folder: Path, written: set[Path]) -> Path:

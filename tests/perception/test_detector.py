@@ -11,7 +11,7 @@ import pytest
 
 from benchmarks.backdrops import BACKDROPS, backdrop_of
 from surveillance_perception.detection.camera_model import CameraModel
-from surveillance_perception.detection.candidates import distinct
+from surveillance_perception.detection.candidates import distinct, quads_around
 from surveillance_perception.detection.detector import DetectorSettings, MarkerDetector
 from surveillance_perception.detection.dictionaries import DICTIONARY_NAMES, dictionary_named
 from surveillance_perception.testing.marker_scene import (
@@ -337,6 +337,22 @@ def test_drawn_outline_on_bright_paper_is_no_marker_in_a_reflection():
         cv2.polylines(image, [corners], True, 20, 3, cv2.LINE_AA)
         compressed = cv2.imencode('.jpg', image, [cv2.IMWRITE_JPEG_QUALITY, 60])[1]
         assert not detector.detect(cv2.imdecode(compressed, cv2.IMREAD_GRAYSCALE))
+
+
+def test_white_field_of_six_megapixels_in_a_dark_frame_overflows_nothing():
+    image = np.full((2600, 2600), 20, np.uint8)
+    image[20:-20, 20:-20] = 230
+    with np.errstate(all='raise', under='ignore'):
+        assert MarkerDetector().detect(image) == []
+
+
+def test_square_with_two_covered_corners_is_an_outline_in_crowds_too():
+    mask = np.zeros((160, 160), np.uint8)
+    mask[10:50, 100:140] = mask[60:100, 100:140] = mask[100:140, 10:50] = 255
+    cv2.fillPoly(mask, [np.array([[10, 100], [36, 100], [10, 126]])], 0)
+    mask[120:140, 35:50] = 0
+    middles = quads_around([(mask, 1)], limit=1).mean(axis=1)
+    assert (np.linalg.norm(middles - (30.0, 120.0), axis=1) < 5.0).any()
 
 
 def test_outlines_of_one_marker_are_one_in_crowds_too():

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from surveillance_perception.stream import ImageError
 from surveillance_perception.stream.encodings import ENCODING_NAMES, image_of_pixels, printable
+from surveillance_perception.stream.image_files import ImageError
 
 GREY = np.arange(10, 250, 10, dtype=np.uint8).reshape(4, 6)
 COLOUR = np.stack([GREY, GREY[::-1], GREY[:, ::-1]], axis=2)

@@ -229,3 +229,9 @@ def test_wrong_registry_is_refused_in_one_line_that_names_the_file(tmp_path, tex
 def test_registry_that_is_not_there_is_named(tmp_path):
     with pytest.raises(FileError, match='No such file'):
         read_registry(tmp_path / 'none.yaml')
+
+
+def test_a_folder_that_cannot_be_made_costs_one_line_before_any_image_is_read(tmp_path, capsys):
+    (tmp_path / 'taken').touch()
+    assert main([str(tmp_path / 'nothing.png'), '--out', str(tmp_path / 'taken' / 'out')]) == 2
+    assert capsys.readouterr().err == f'detect: {tmp_path}/taken/out: Not a directory\n'

@@ -98,14 +98,6 @@ def test_door_in_three_places_is_not_used():
     assert 'R2' in rooms(report)
 
 
-def test_id_that_stands_for_nothing_is_discarded():
-    survey = survey_of(range(11, 18))
-    survey.discard(99)
-    assert survey.discarded == {99}
-    assert 99 in survey.seen
-    assert survey.report().complete
-
-
 def test_robot_is_in_the_nearest_place_when_it_is_not_told():
     survey = survey_of(range(11, 18), robot_room='')
     assert survey.report().robot_room == ''

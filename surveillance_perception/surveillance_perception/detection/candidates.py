@@ -231,7 +231,8 @@ def _scatter(x: Indices, y: Indices, counts: Indices) -> Array:
     u[starts + counts - 1], v[starts + counts - 1] = x[starts], y[starts]
     # moments of polygons by Green's theorem
     cross = x * v - u * y
-    area = np.maximum(np.add.reduceat(cross, starts) / 2.0, 1.0)
+    # in double precision: what is divided by the 1 of a large hole has squares beyond single
+    area = np.maximum(np.add.reduceat(cross, starts) / 2.0, 1.0).astype(float)
     terms = (x + u, y + v, x * x + (x + u) * u, y * y + (y + v) * v)
     mean_x, mean_y, xx, yy = (np.add.reduceat(cross * term, starts) / area for term in terms)
     xy = np.add.reduceat(cross * (2.0 * (x * y + u * v) + x * v + u * y), starts) / area
@@ -316,7 +317,7 @@ class BorderCheck:
             (m,) 0 to 1; -1 where it can be no marker.
         """
         levels = levels_for(homographies, self._side, _CELL_PIXELS)
-        values = pyramid.sample(homographies, self._grid, levels).astype(float)
+        values = pyramid.sample(homographies, self._grid, levels)
         count = 4 * _PER_SIDE
         near, far, border = (values[:, k * count : (k + 1) * count] for k in range(3))
         deviation = values[:, 3 * count :].std(axis=1)
@@ -368,7 +369,7 @@ class EdgeFit:
         """Return quads (m, 4, 2) with their sides on the edges nearest to them."""
         homographies = homographies_of(quads)
         levels = levels_for(homographies, self._side, _CELL_PIXELS)
-        values = pyramid.sample(homographies, self._grid, levels).astype(float)
+        values = pyramid.sample(homographies, self._grid, levels)
         values = values.reshape(len(quads), 4, _PLACES, _STEPS)
         rise = np.maximum(values[..., 2:] - values[..., :-2], 0.0)
         steepest = rise.max(axis=3)
