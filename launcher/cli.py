@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import errno
 import io
 import os
 import signal
@@ -252,6 +253,11 @@ def _test(argv: list[str]) -> int:
     if argv in (['-h'], ['--help']):
         print(_TEST_HELP)
         return 0
+    for path in (word.partition('::')[0] for word in argv if word.startswith('tests/')):
+        # Spread over processes, pytest does not say which file it lacks.
+        if not (CHECKOUT / path).exists():
+            missing = FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), CHECKOUT / path)
+            raise ValueError(in_one_line(missing))
     _enter(['test', *argv], extras=('test',))
     spread = any(a.startswith(('-n', '--numprocesses', '--pdb')) or 'no:xdist' in a for a in argv)
     # On two cores three are a seventh faster than two: many tests wait for other processes.

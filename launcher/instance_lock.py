@@ -1,32 +1,35 @@
 """Which nodes run on this machine, so that a second launch does not start the same ones again.
 
-Two nodes of one name in one ROS domain answer each other's calls. A claim is a locked file in the
-user's runtime folder, so it ends with the process that holds it, however that ends.
+Two nodes of one name in one ROS domain answer each other's calls. A claim is a name that the kernel
+gives to one socket at a time (unix(7), abstract), so it holds for all users of this machine's
+network and ends with the process that holds it, however that ends.
 """
 
 from __future__ import annotations
 
 import contextlib
-import fcntl
-import os
-import tempfile
+import errno
+import hashlib
+import socket
+import struct
 from collections.abc import Iterable
-from pathlib import Path
 
 from launcher.system import NotNowError
 from surveillance_runtime.node_table import RUN_NODES, Node
 
+_CREDENTIALS = struct.Struct('3i')
+"""struct ucred: process, user, group."""
+_MOST_ASKING = 4096
+"""How many launches may ask who holds a claim: nobody takes their connections."""
 
-def claim(
-    nodes: Iterable[Node], domain: str, namespace: str | None, folder: Path | None = None
-) -> list[int]:
+
+def claim(nodes: Iterable[Node], domain: str, namespace: str | None) -> list[int]:
     """Claims nodes for this process.
 
     Args:
         nodes: what shall run; of a viewer there may be several, so it is not claimed.
         domain: the ROS domain they run in.
         namespace: the namespace they run in, None for none.
-        folder: where the claims lie; default: in the user's runtime folder.
 
     Returns:
         Descriptors that hold the claims as long as they are open.
@@ -34,32 +37,27 @@ def claim(
     Raises:
         NotNowError: some of them are claimed already; then none is claimed.
     """
-    folder = folder or runtime_folder() / 'nodes'
-    held: list[int] = []
-    taken: list[str] = []
-    holder = ''
+    held: list[socket.socket] = []
+    taken: dict[str, str] = {}
     for node in (node.name for node in nodes if node.name in RUN_NODES):
         place = '.'.join([domain, *(namespace or '').strip('/').split('/'), node])
-        descriptor = _open(folder, place)
-        if descriptor is None:
-            continue
+        # A namespace may be longer than a socket's name.
+        name = f'\0surveillance-node-{hashlib.sha256(place.encode()).hexdigest()}'
+        lock = socket.socket(socket.AF_UNIX)
         try:
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
-            taken.append(node)
-            holder = holder or os.read(descriptor, 20).decode('ascii', 'replace').strip()
-            os.close(descriptor)
-            continue
-        held.append(descriptor)
-        # Others may read who holds it; where the disk is full they do not learn it.
-        with contextlib.suppress(OSError):
-            os.ftruncate(descriptor, 0)
-            os.write(descriptor, str(os.getpid()).encode())
+            lock.bind(name)
+            lock.listen(_MOST_ASKING)
+        except OSError as error:
+            lock.close()
+            if error.errno == errno.EADDRINUSE:
+                taken[node] = _holder(name)
+            continue  # where there are no such names, nothing is claimed
+        held.append(lock)
     if not taken:
-        return held
-    for descriptor in held:
-        os.close(descriptor)
-    who = f' (process {holder})' if holder else ''
+        return [lock.detach() for lock in held]
+    for lock in held:
+        lock.close()
+    who = next((f' (process {pid})' for pid in taken.values() if pid), '')
     where = f'ROS domain {domain}' + (f', namespace {namespace}' if namespace else '')
     raise NotNowError(
         f'already running in {where}{who}: {", ".join(taken)}; '
@@ -67,28 +65,11 @@ def claim(
     )
 
 
-def runtime_folder() -> Path:
-    """Return the user's folder for what lives as long as processes do, made when missing.
-
-    It is below XDG_RUNTIME_DIR, or else in the folder for temporary files, the user's own and
-    closed to others: there nobody can plant a link.
-    """
-    given = os.environ.get('XDG_RUNTIME_DIR', '')
-    if given and os.access(given, os.W_OK):
-        return Path(given, 'surveillance')
-    return Path(tempfile.gettempdir(), f'surveillance-{os.getuid()}')
-
-
-def _open(folder: Path, name: str) -> int | None:
-    """Return the file of a claim; None where it cannot be had, and nothing is claimed then."""
-    try:
-        for each in (folder.parent, folder):
-            with contextlib.suppress(FileExistsError):
-                each.mkdir(mode=0o700)
-        if folder.is_symlink() or folder.parent.is_symlink():
-            return None
-        if folder.parent.stat().st_uid != os.getuid() or folder.stat().st_uid != os.getuid():
-            return None
-        return os.open(folder / name, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o600)
-    except OSError:
-        return None
+def _holder(name: str) -> str:
+    """Return the process that holds a claim; empty where it cannot be told."""
+    with socket.socket(socket.AF_UNIX) as asking, contextlib.suppress(OSError):
+        asking.setblocking(False)
+        asking.connect(name)
+        given = asking.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, _CREDENTIALS.size)
+        return str(_CREDENTIALS.unpack(given)[0] or '')
+    return ''

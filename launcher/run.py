@@ -16,10 +16,8 @@ from launcher import run_folder
 from launcher.options import DEFAULT_KEEP, DEFAULT_MEMORY
 from launcher.system import LaunchError
 from surveillance_runtime import node_table
-from surveillance_runtime.configuration import Configuration, file_layer
 from surveillance_runtime.discovery import LAST_DOMAIN
 from surveillance_runtime.files import FileError
-from surveillance_runtime.parameters import ParameterError
 from surveillance_runtime.place import read_place_file
 
 NOT_RECORDED = 'off'
@@ -92,11 +90,6 @@ class Run:
                 read_place_file(self.place)
             except FileError as error:
                 raise LaunchError(f'--map {error}') from None
-        if self.parameters is not None:
-            try:
-                Configuration((file_layer(self.parameters),)).check()
-            except (FileError, ParameterError) as error:
-                raise LaunchError(f'--params {error}') from None
         if self.web_address is not None:
             page_address(self.web_address)
         try:

@@ -138,6 +138,27 @@ def check_assignments(merged: Configuration, nodes: Sequence[node_table.Node]) -
             raise LaunchError(f'{entry.origin}: no node that is started takes it: {names}')
 
 
+def check_clocks(merged: Configuration, run: Run, nodes: Sequence[node_table.Node]) -> None:
+    """Make sure that all nodes live by the clock of a simulation that is slower or faster.
+
+    Raises:
+        LaunchError: One would live by the machine's.
+    """
+    given = {
+        each.name: merged.resolve(each.name, full_name(run.namespace, each.name)) for each in nodes
+    }
+    speed = given.get('simulator', {}).get('speed')
+    if speed is None or speed.value == 1.0:
+        return
+    for name, settings in given.items():
+        follows = settings.get('use_sim_time')
+        if follows is None or not follows.value:
+            raise LaunchError(
+                f'{speed.origin}: at speed {speed.value:g} {name} needs use_sim_time:=true, '
+                'expected for all nodes as in config/fast.yaml'
+            )
+
+
 def with_mode_of(run: Run, merged: Configuration) -> Run:
     """Return the run, where none was asked for with the mode that all controllers are given."""
     if run.mode:

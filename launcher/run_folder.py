@@ -152,10 +152,11 @@ def find(runs: Path, name: str) -> Found:
     return found
 
 
-def prune(runs: Path, most: float) -> list[Path]:
+def prune(runs: Path, most: float, chosen: Path) -> list[Path]:
     """Delete the oldest runs until the rest takes at most so many bytes.
 
-    The last one, those that still go on, and folders that are not of this form stay.
+    The last one, that which was chosen to go on, those that still go on, and folders that are not
+    of this form stay.
 
     Returns:
         The deleted folders.
@@ -167,7 +168,7 @@ def prune(runs: Path, most: float) -> list[Path]:
         if total <= most:
             break
         found = look_into(folder)
-        if found is None or found.running:
+        if found is None or found.running or folder.resolve() == chosen.resolve():
             continue
         shutil.rmtree(folder, ignore_errors=True)
         deleted.append(folder)

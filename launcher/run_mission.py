@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import os
 import shlex
 import shutil
@@ -14,11 +13,12 @@ from launcher import run_folder
 from launcher.instance_lock import claim
 from launcher.log_merge import MergedLog
 from launcher.run import NOT_RECORDED, Run, options_of
-from launcher.run_configuration import check_assignments, configuration, with_mode_of
+from launcher.run_configuration import check_assignments, check_clocks, configuration, with_mode_of
 from launcher.run_processes import COMPOSED, node_environ, programs_of, ros_domain
 from launcher.service import is_service
 from launcher.supervisor import Supervisor
 from surveillance_behaviour.mission import mission_log
+from surveillance_behaviour.mission.recovery import WAITING_FOR_HELP
 from surveillance_runtime import node_table
 from surveillance_runtime.files import PLACE, RECORD, TIMELINE, FileError
 from surveillance_runtime.run_parameters import BEHAVIOUR_NODE, place_file, write_parameters
@@ -26,8 +26,6 @@ from surveillance_runtime.run_parameters import BEHAVIOUR_NODE, place_file, writ
 NOTHING_RECORDED = 'Mission: nothing was recorded.'
 EXIT_NOTHING_DONE = 1
 """The exit code of a run that had all its time and in which the mission did not begin."""
-HELP = 'waiting for help: '
-"""What the behaviour says when it needs somebody."""
 
 
 def run_mission(run: Run, config: Path, runs: Path, resume: Path | None = None) -> int:
@@ -38,11 +36,12 @@ def run_mission(run: Run, config: Path, runs: Path, resume: Path | None = None) 
     nodes = run.nodes()
     observers = run.observers()
     check_assignments(merged, (*nodes, *observers))
+    check_clocks(merged, run, (*nodes, *observers))
     claims = claim(nodes, ros_domain(run), run.namespace)
     if run.record not in (None, NOT_RECORDED):
         runs = Path(run.record)
     folder, how = _chosen_folder(run, runs, resume)
-    deleted = run_folder.prune(runs, run.keep * 1e9)
+    deleted = run_folder.prune(runs, run.keep * 1e9, folder)
     state = run_folder.RunState(folder, options_of(run))
     merged = configuration(config, run, folder)
     everyone = (*nodes, *observers)
@@ -65,7 +64,11 @@ def run_mission(run: Run, config: Path, runs: Path, resume: Path | None = None) 
         log.say('nodes of other machines are heard: see docs/security.md')
     log.say(f'watch it in a second terminal: {watch_command(run)}')
     call = alarm_caller(run.alarm, log)
-    log.listen(lambda name, text: call(text) if name == BEHAVIOUR_NODE and HELP in text else None)
+    log.listen(
+        lambda name, text: (
+            call(text) if name == BEHAVIOUR_NODE and f'{WAITING_FOR_HELP}: ' in text else None
+        )
+    )
     supervisor = Supervisor(programs, log, on_trouble=call)
     code = _supervised(run, nodes, supervisor, folder, log)
     for line in what_to_look_at(folder):
@@ -144,10 +147,13 @@ def what_to_look_at(folder: Path) -> list[str]:
     from surveillance_operator.report import write_report
 
     lines = []
-    with contextlib.suppress(FileError):  # nothing was visited: the summary says so
-        lines.append(f'report: {_short(write_report(folder))}')
+    if summary(folder / RECORD) != NOTHING_RECORDED:
+        try:
+            lines.append(f'report: {_short(write_report(folder))}')
+        except FileError as error:
+            lines.append(f'report: {error}')
     if (folder / TIMELINE).exists():
-        lines.append(f'replay: python3 launch.py replay {_short(folder)}')
+        lines.append(f'replay: python3 launch.py replay {shlex.quote(_short(folder))}')
     return lines
 
 

@@ -28,7 +28,7 @@ from surveillance_runtime.files import FileError
 from surveillance_runtime.node_table import LOG_LEVELS
 from surveillance_runtime.parameters import Check, ParameterError, ParameterSpec
 from surveillance_runtime.place import Place, PlaceError, checked_place
-from surveillance_runtime.place.rooms import GEOMETRY_KEYS, PLACE_KEYS
+from surveillance_runtime.place.rooms import GEOMETRY_KEYS, PLACE_KEYS, tables_of
 from surveillance_runtime.robot_base import ROBOT_RADIUS
 from surveillance_runtime.suggestions import nearest
 from surveillance_runtime.yaml_file import (
@@ -40,7 +40,6 @@ from surveillance_runtime.yaml_file import (
 )
 
 SCHEMA = Path(__file__).with_name('parameter_schema.json')
-PLACE_TABLES = ('map', 'room_positions', 'walls', 'doors', 'markers')
 _PLACE = frozenset((*PLACE_KEYS, *GEOMETRY_KEYS))
 _TYPES = {'bool': bool, 'int': int, 'float': float, 'str': str}
 _OWN = {  # every rclpy node has these; a clock that changes makes all times that were taken wrong
@@ -147,9 +146,9 @@ class NodeSchema:
 
 
 @cache
-def read_schema(path: Path = SCHEMA) -> Mapping[str, NodeSchema]:
+def read_schema() -> Mapping[str, NodeSchema]:
     """Return what each node declares, by the node's name."""
-    stored = json.loads(path.read_text(encoding='utf-8'))
+    stored = json.loads(SCHEMA.read_text(encoding='utf-8'))
     return {node: _node_schema(body) for node, body in stored.items()}
 
 
@@ -268,25 +267,20 @@ class Configuration:
     layers: tuple[Layer, ...]
     schema: Mapping[str, NodeSchema] = field(default_factory=read_schema)
 
-    def check(self, nodes: Iterable[str] | None = None) -> None:
+    def check(self) -> None:
         """Make sure that every entry is one that some node takes.
-
-        Args:
-            nodes: Names of the nodes that there are; None for those of the schema.
 
         Raises:
             ParameterError: The first entry that is wrong.
         """
         for layer in self.layers:
             for entry in layer.entries:
-                self._check_entry(entry, tuple(self.schema if nodes is None else nodes))
+                self._check_entry(entry)
 
-    def _check_entry(self, entry: Entry, nodes: Sequence[str]) -> None:
+    def _check_entry(self, entry: Entry) -> None:
         last = entry.pattern.rsplit('/', 1)[-1]
         everyone = last in ('*', '**')
-        if not everyone and last not in nodes:
-            if self.schema.keys() & {last}:
-                return  # a node that this run does not start
+        if not everyone and last not in self.schema:
             raise ParameterError(
                 f"{entry.origin}: no node is called '{entry.pattern}', "
                 f'expected /** or {nearest(last, self.schema)}'
@@ -294,8 +288,6 @@ class Configuration:
         addressed = list(self.schema) if everyone else [last]
         takers = [node for node in addressed if self._schema_of(node).takes(entry.name)]
         if not takers:
-            if not everyone and last not in self.schema:
-                return  # a node of somebody else's, which checks its own parameters
             known = {name for node in addressed for name in self._names(node)}
             whose = '' if everyone else f' of {last}'
             owners = [node for node in self.schema if self._schema_of(node).takes(entry.name)]
@@ -339,18 +331,17 @@ class Configuration:
         if 'map' not in self._schema_of(node).prefixes:
             return None  # it knows no rooms
         settings = self.resolve(node, full_name)
-        parameters: dict[str, Any] = {}
-        for name, setting in settings.items():
-            table, _, key = name.partition('.')
-            if table in PLACE_TABLES and key:
-                parameters.setdefault(table, {})[key] = setting.value
-            elif table in _PLACE:
-                parameters[table] = setting.value
-        if not parameters.keys() & {'map', 'room_positions'}:
-            return None
+        described = {
+            name: setting.value
+            for name, setting in settings.items()
+            if name.partition('.')[0] in _PLACE
+        }
         radius = settings.get('robot_radius', Setting(ROBOT_RADIUS, '')).value
-        walls = bool(parameters.keys() & {'walls', 'doors'})
         try:
+            parameters = tables_of(described.items())
+            if not parameters.keys() & {'map', 'room_positions'}:
+                return None
+            walls = bool(parameters.keys() & {'walls', 'doors'})
             return checked_place(parameters, walls=walls, radius=float(radius))[0]
         except PlaceError as error:
             raise ParameterError(f'{self._origin(settings, error)}: {error}') from None
@@ -358,9 +349,9 @@ class Configuration:
     def _origin(self, settings: Mapping[str, Setting], error: PlaceError) -> str:
         for depth in range(len(error.where), 0, -1):
             name = '.'.join(error.where[:depth])
-            for known, setting in settings.items():
-                if known == name or known.startswith(name + '.'):
-                    return setting.origin
+            below = (known for known in settings if known.startswith(name + '.'))
+            if known := name if name in settings else next(below, ''):
+                return settings[known].origin
         first = next((settings[name] for name in settings if name.startswith('map.')), None)
         return first.origin.rpartition(':')[0] if first else 'the place'
 

@@ -89,8 +89,9 @@ def planar_pose(x: float, y: float, turn: Sequence[float]) -> PlanarPose:
         raise ValueError(
             f'a pose at ({x:g}, {y:g}) m: expected at most {FARTHEST:g} m from the origin'
         )
+    size = math.hypot(*turn) or 1.0  # Who leaves the turn out means none.
+    qx, qy, qz, qw = (each / size for each in turn)
     # Yaw of a quaternion in Z-Y-X order; exact for any tilt that is not straight up.
-    qx, qy, qz, qw = turn
     return x, y, math.atan2(2 * (qw * qz + qx * qy), 1 - 2 * (qy * qy + qz * qz))
 
 

@@ -183,13 +183,15 @@ class PatrolExecutor(SingleThreadedExecutor):  # type: ignore[misc]  # rclpy has
 
     def add_node(self, node: Node) -> bool:
         """Spin a node, too."""
-        self._changed = True
-        return bool(super().add_node(node))
+        added = bool(super().add_node(node))
+        self.wake()
+        return added
 
     def remove_node(self, node: Node) -> None:
         """Spin a node no more."""
-        self._changed = True
         super().remove_node(node)
+        # Afterwards: whoever spins meanwhile has gathered it once more.
+        self.wake()
 
     def _spin_once_impl(
         self, timeout_sec: Any = None, wait_condition: Callable[[], bool] = lambda: False

@@ -2,7 +2,7 @@
 
 YAML's own readers take the last of two equal keys in silence, expand aliases without bound, and
 know no line once a value is read. Here the first two are errors, and every error names file and
-line. `read_yaml_file` reads any mapping, `read_parameter_file` the form of ROS parameter files.
+line. `read_yaml_file` reads any mapping, `parameters_of` the form of ROS parameter files.
 """
 
 from __future__ import annotations
@@ -236,36 +236,3 @@ def _flattened(
             yield from _flattened(value, (*where, key), f'{prefix}{key}.')
         else:
             yield (*where, key), prefix + key, value
-
-
-def read_parameter_file(path: str | Path) -> YamlFile:
-    """Read the parameters that a file gives to every node, below `/**`.
-
-    Returns:
-        The parameters below ``ros__parameters``; dots in keys are resolved into nesting.
-
-    Raises:
-        FileError: The file cannot be read, is not of a parameter file's form, or gives a
-            parameter twice.
-    """
-    file = read_yaml_file(path)
-    if '/**' not in file.values:
-        found = ', '.join(file.values) or 'nothing'
-        raise file.error((), f"expected the top-level key '/**', got {found}")
-    values: dict[str, Any] = {}
-    for where, name, value in parameters_of(file, '/**'):
-        *above, last = name.split('.')
-        inner = values
-        for part in above:
-            inner = inner.setdefault(part, {})
-            if not isinstance(inner, dict):
-                raise file.error_at(where, f"'{name}': '{part}' has a value already")
-        if last in inner:
-            raise file.error_at(where, f"'{name}' has parameters below it already")
-        inner[last] = value
-    lines = {
-        tuple('.'.join(where[2:]).split('.')) if where[2:] else (): line
-        for where, line in file.lines.items()
-        if where[:2] == ('/**', 'ros__parameters')
-    }
-    return YamlFile(file.path, values, lines)

@@ -2,45 +2,84 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import signal
+import subprocess
+import sys
 
 import pytest
 
-from launcher.instance_lock import claim, runtime_folder
+from launcher.instance_lock import claim
 from launcher.run import Run
 from launcher.run_processes import ros_domain
 from launcher.system import LaunchError
 from surveillance_runtime.node_table import select
+from tests.launcher.conftest import ROOT
 
 RANDOM = select('RANDOM')
+HERE = f'{os.getpid()}'
+"""In place of a domain: claims hold for the whole machine, other test runs among them."""
 
 
-def test_the_same_nodes_are_claimed_once_and_again_after_that(tmp_path):
-    held = claim(RANDOM, '7', None, tmp_path)
+@pytest.fixture
+def held():
+    """Claim nodes; the claims end with the test."""
+    with contextlib.ExitStack() as claims:
+
+        def hold(*asked):
+            descriptors = claim(*asked)
+            for descriptor in descriptors:
+                claims.callback(os.close, descriptor)
+            return descriptors
+
+        yield hold
+
+
+def test_the_same_nodes_are_claimed_once_and_again_after_that(held):
+    first = claim(RANDOM, HERE, None)
     with pytest.raises(LaunchError) as caught:
-        claim(select('RANDOM', only=['armor_server', 'simulator']), '7', None, tmp_path)
+        claim(select('RANDOM', only=['armor_server', 'simulator']), HERE, None)
     message = str(caught.value)
-    assert message.startswith(f'already running in ROS domain 7 (process {os.getpid()}): armor_')
+    assert message.startswith(
+        f'already running in ROS domain {HERE} (process {os.getpid()}): armor_'
+    )
     assert 'simulator' not in message
     assert '\n' not in message
-    claim(select('RANDOM', only=['simulator']), '7', None, tmp_path)
-    for descriptor in held:
+    held(select('RANDOM', only=['simulator']), HERE, None)
+    for descriptor in first:
         os.close(descriptor)
-    assert claim(RANDOM, '7', None, tmp_path)
+    assert held(RANDOM, HERE, None)
 
 
-def test_other_domains_and_namespaces_are_free(tmp_path):
-    assert claim(RANDOM, '7', None, tmp_path)
-    assert claim(RANDOM, '8', None, tmp_path)
-    assert claim(RANDOM, '7', '/robot2', tmp_path)
+def test_other_domains_and_namespaces_are_free(held):
+    assert held(RANDOM, HERE, None)
+    assert held(RANDOM, f'{HERE}.2', None)
+    assert held(RANDOM, HERE, '/robot2')
     with pytest.raises(LaunchError, match='namespace robot2'):
-        claim(RANDOM, '7', 'robot2', tmp_path)
+        claim(RANDOM, HERE, 'robot2')
 
 
-def test_where_nothing_can_be_written_nothing_is_claimed(tmp_path):
-    (tmp_path / 'file').write_text('')
-    assert claim(RANDOM, '7', None, tmp_path / 'file') == []
+def test_a_namespace_of_any_length_is_claimed(held):
+    assert held(RANDOM, HERE, 'robot' * 100)
+    with pytest.raises(LaunchError, match='already running'):
+        claim(RANDOM, HERE, 'robot' * 100)
+
+
+@pytest.mark.skipif(os.getuid() != 0, reason='needs root, to become somebody else')
+def test_what_another_user_runs_is_claimed_too():
+    script = (
+        'import os, sys; from launcher.instance_lock import claim; '
+        'from surveillance_runtime.node_table import NODES; os.setuid(65534); '
+        'held = claim(NODES, sys.argv[1], None); print("held", flush=True); input()'
+    )
+    words = [sys.executable, '-c', script, HERE]
+    pipe = subprocess.PIPE
+    with subprocess.Popen(words, cwd=ROOT, stdin=pipe, stdout=pipe, text=True) as other:
+        assert other.stdout.readline() == 'held\n'
+        with pytest.raises(LaunchError, match=f'process {other.pid}'):
+            claim(RANDOM, HERE, None)
+        other.stdin.write('\n')
 
 
 @pytest.mark.parametrize('given', ['x', '-1', '102', '1.5'])
@@ -65,29 +104,3 @@ def test_a_second_launch_says_that_the_first_is_there(start, tmp_path, ros_domai
     (complaint,) = second.lines
     assert f'already running in ROS domain {ros_domain} (process {first.process.pid})' in complaint
     assert first.end(signal.SIGINT)[0] == 0
-
-
-def test_planted_links_are_not_followed(tmp_path):
-    target = tmp_path / 'precious'
-    target.write_text('precious')
-    folder = tmp_path / 'nodes'
-    folder.mkdir()
-    for node in RANDOM:
-        (folder / f'7..{node.name}').symlink_to(target)
-        (folder / f'7.{node.name}').symlink_to(target)
-    claim(RANDOM, '7', None, folder)
-    assert target.read_text() == 'precious'
-    (tmp_path / 'linked').symlink_to(folder)
-    assert claim(RANDOM, '8', None, tmp_path / 'linked') == []
-
-
-def test_the_claims_lie_in_the_users_own_folder(tmp_path, monkeypatch):
-    monkeypatch.setenv('XDG_RUNTIME_DIR', str(tmp_path))
-    assert runtime_folder() == tmp_path / 'surveillance'
-    held = claim(RANDOM, '7', None)
-    assert held
-    assert (tmp_path / 'surveillance').stat().st_mode & 0o077 == 0
-    monkeypatch.delenv('XDG_RUNTIME_DIR')
-    assert str(os.getuid()) in runtime_folder().name
-    for descriptor in held:
-        os.close(descriptor)

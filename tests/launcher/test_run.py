@@ -3,6 +3,7 @@ from __future__ import annotations
 import io
 import json
 import os
+import shlex
 import subprocess
 import sys
 import threading
@@ -16,20 +17,27 @@ from launcher.cli import CONFIG, wanted_run
 from launcher.log_merge import MergedLog
 from launcher.options import make_parser
 from launcher.run import MARKERS, PAGE, RECORDER, Run, options_of, page_address, resumed, run_from
-from launcher.run_configuration import check_assignments, configuration, with_mode_of
+from launcher.run_configuration import check_assignments, check_clocks, configuration, with_mode_of
 from launcher.run_folder import RunState, make_folder
-from launcher.run_mission import alarm_caller, summary, watch_command
+from launcher.run_mission import alarm_caller, summary, watch_command, what_to_look_at
 from launcher.run_processes import command, node_environ, ros_arguments
 from launcher.system import LaunchError
 from surveillance_behaviour.mission.mission_log import MissionRecord
 from surveillance_runtime import discovery
+from surveillance_runtime.files import RECORD, TIMELINE
 from surveillance_runtime.node_table import DEFAULT_MODE
 from surveillance_runtime.run_parameters import place_file, run_layers, write_parameters
 
 
+def look_over(run: Run) -> None:
+    """Look at a run as a launch does before it starts anything."""
+    run.check()
+    configuration(CONFIG, run)
+
+
 def error_of(run: Run) -> str:
     with pytest.raises(LaunchError) as caught:
-        run.check()
+        look_over(run)
     message = str(caught.value)
     assert '\n' not in message
     return message
@@ -87,7 +95,7 @@ def test_a_place_that_is_none_is_named_with_file_and_line(tmp_path):
 def test_a_wrong_parameter_file_is_named(content, wrong, tmp_path):
     file = tmp_path / 'own.yaml'
     file.write_text(content)
-    assert f'--params {file}' in error_of(Run(parameters=file))
+    assert str(file) in error_of(Run(parameters=file))
     assert wrong in error_of(Run(parameters=file))
 
 
@@ -102,7 +110,7 @@ def test_every_place_and_parameter_file_of_the_project_can_be_run():
         run = Run(behaviour=behaviour)
         configuration(CONFIG, run)
         Run(place=place_file(CONFIG, behaviour)).check()
-    Run(parameters=CONFIG / 'parameters.yaml').check()
+    configuration(CONFIG, Run(parameters=CONFIG / 'parameters.yaml'))
 
 
 def test_the_users_file_comes_after_the_projects_and_the_launchers_own_last(tmp_path):
@@ -147,6 +155,19 @@ def test_an_assignment_that_no_started_node_takes_is_refused():
     run = Run(mode='RANDOM', assignments=('lidar.rays:=90',))
     with pytest.raises(LaunchError, match=r'-p lidar.rays:=90: no node that is started takes it'):
         check_assignments(configuration(CONFIG, run), run.nodes())
+
+
+def test_a_fast_simulation_beside_nodes_on_the_machines_clock_is_refused():
+    for words, name in (
+        (('simulator:speed:=0',), 'armor_server'),
+        (('speed:=2', 'use_sim_time:=true', 'mission_page:use_sim_time:=false'), 'mission_page'),
+    ):
+        run = Run(assignments=words, web=True)
+        with pytest.raises(LaunchError, match=rf'speed [02] {name} needs use_sim_time:=true'):
+            check_clocks(configuration(CONFIG, run), run, (*run.nodes(), *run.observers()))
+    run = Run(assignments=('speed:=0', 'use_sim_time:=true'))
+    check_clocks(configuration(CONFIG, run), run, (*run.nodes(), *run.observers()))
+    check_clocks(configuration(CONFIG, Run()), Run(), Run().nodes())
 
 
 def test_the_default_mode_stands_in_the_first_file_and_for_all_nodes():
@@ -215,6 +236,19 @@ def test_a_resumed_run_keeps_what_is_not_given_anew(tmp_path):
     RunState(folder, options_of(Run(mode='RANDOM', namespace='robot1'))).end()
     run, found = resumed(Run(namespace='robot2'), Run(), tmp_path, '')
     assert (run.mode, run.namespace, found) == ('RANDOM', 'robot2', folder)
+
+
+def test_the_last_lines_of_a_run_can_be_typed_and_tell_what_could_not_be_written(tmp_path):
+    folder = tmp_path / 'ein Lauf é'
+    (folder / 'report.html').mkdir(parents=True)
+    (folder / TIMELINE).touch()
+    with MissionRecord(folder / RECORD) as record:
+        record.write('start', 0.0, machine='surveillance', place='E', places=['E'])
+        record.write('visit', 9.0, place='E', distance=1.0)
+    report, replay = what_to_look_at(folder)
+    assert report == f'report: {folder}/report.html: Is a directory'
+    assert shlex.split(replay)[1:] == ['python3', 'launch.py', 'replay', str(folder)]
+    assert what_to_look_at(tmp_path) == []
 
 
 def test_an_alarm_gets_one_line_as_its_last_argument(tmp_path):

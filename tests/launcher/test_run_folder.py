@@ -5,7 +5,6 @@ from __future__ import annotations
 import errno
 import os
 import signal
-import sys
 
 import pytest
 
@@ -118,10 +117,16 @@ def test_the_oldest_runs_go_first_and_the_last_and_the_running_stay(tmp_path):
         begun(tmp_path, name, 100_000, ended=number != 1) for number, name in enumerate(names)
     ]
     (tmp_path / 'notes').mkdir()
-    assert prune(tmp_path, 10**9) == []
-    deleted = prune(tmp_path, 350_000)
+    assert prune(tmp_path, 10**9, folders[4]) == []
+    deleted = prune(tmp_path, 350_000, folders[4])
     assert deleted == [folders[0], folders[2]]
-    assert prune(tmp_path, 0) == [folders[3]]
+    assert prune(tmp_path, 0, folders[4]) == [folders[3]]
     assert folders[4].exists()
     assert (tmp_path / 'notes').exists()
-    assert sys.executable
+
+
+def test_the_run_that_is_gone_on_with_stays_though_it_is_the_oldest(tmp_path, monkeypatch):
+    folders = [begun(tmp_path, f'2026010{number}-000000', 100_000) for number in range(1, 4)]
+    monkeypatch.chdir(tmp_path)
+    chosen = find(tmp_path, folders[0].name).folder
+    assert prune(tmp_path, 0, chosen) == [folders[1]]

@@ -180,6 +180,17 @@ def test_a_resolved_file_reads_back_as_what_it_holds_with_its_sources(tmp_path):
         assert again.resolve(node) == found
 
 
+def test_a_table_of_the_place_that_is_a_value_is_named_where_it_was_given(tmp_path):
+    place = file_layer(CONFIG / 'seven_rooms.yaml')
+    own = written(tmp_path, '/**: {ros__parameters: {doors: 3}}')
+    later = argument_layer(['doors.D1:=[10.0, 6.5, 0.0, 1.2]'])
+    for layers in ((place, file_layer(own)), (place, file_layer(own), later)):
+        with pytest.raises(ParameterError) as refusal:
+            merged(*layers).place('simulator')
+        expected = f'{own}:1: doors: got 3, expected NAME: [...] for each'
+        assert str(refusal.value) == expected
+
+
 def test_places_that_a_robot_cannot_use_are_refused_with_file_and_line(tmp_path):
     text = (CONFIG / 'seven_rooms.yaml').read_text()
     narrow = text.replace('D1: [10.0, 6.5, 0.0, 1.2]', 'D1: [10.0, 6.5, 0.0, 0.4]')

@@ -14,7 +14,7 @@ from rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallb
 from rclpy.clock import JumpThreshold
 from rclpy.duration import Duration
 from rclpy.event_handler import PublisherEventCallbacks
-from rclpy.executors import ExternalShutdownException
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.task import Future
@@ -86,6 +86,29 @@ def test_what_comes_and_goes_while_it_spins_is_heard(spun: Spun) -> None:
     told.publish(Int32(data=7))
     spun.until(lambda: others == [7])
     spun.nodes.append(third)
+
+
+def test_a_node_that_is_removed_while_it_spins_is_heard_no_more(
+    spun: Spun, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    teller, listener = spun.nodes
+    ticks: list[str] = []
+    listener.create_timer(0.001, lambda: ticks.append('removed'))
+    spun.until(lambda: ticks)
+    remove = SingleThreadedExecutor.remove_node
+
+    def late(self: PatrolExecutor, node: Node) -> None:
+        # As when the spinning thread comes first.
+        self.spin_once(timeout_sec=0.1)
+        remove(self, node)
+
+    monkeypatch.setattr(SingleThreadedExecutor, 'remove_node', late)
+    teller.create_timer(0.001, lambda: ticks.append('kept'))
+    spun.executor.remove_node(listener)
+    spun.until(lambda: 'kept' in ticks)
+    ticks.clear()
+    spun.until(lambda: ticks.count('kept') >= 10)
+    assert 'removed' not in ticks
 
 
 def test_a_coroutine_waits_while_others_are_served_and_keeps_its_group(spun: Spun) -> None:

@@ -15,10 +15,11 @@ from surveillance_runtime.place.rooms import (
     Place,
     PlaceError,
     place_from,
+    tables_of,
 )
 from surveillance_runtime.robot_base import ROBOT_RADIUS
 from surveillance_runtime.suggestions import nearest
-from surveillance_runtime.yaml_file import YamlFile, read_parameter_file
+from surveillance_runtime.yaml_file import YamlFile, parameters_of, read_yaml_file
 
 
 @dataclass(frozen=True)
@@ -26,12 +27,10 @@ class PlaceFile:
     """What a place's file describes.
 
     Attributes:
-        file: The parameters with their lines.
         place: The rooms, which doors join them, a point in each.
         plan: Walls, doors and markers; None where the file has rooms only.
     """
 
-    file: YamlFile
     place: Place
     plan: FloorPlan | None
 
@@ -47,21 +46,31 @@ def read_place_file(path: str | Path, *, walls: bool = False) -> PlaceFile:
         FileError: The file cannot be read, or what it describes is no sound place; one line
             with file and line number.
     """
-    file = read_parameter_file(path)
-    known = (*PLACE_KEYS, *GEOMETRY_KEYS)
-    for key in file.values:
-        if key not in known:
-            raise file.error((key,), f'unknown parameter, expected {nearest(key, known)}')
-    for key in PLACE_KEYS[:3]:
-        if key not in file.values:
-            raise file.error((), f"parameter '{key}' is missing")
+    file = read_yaml_file(path)
+    if '/**' not in file.values:
+        found = ', '.join(file.values) or 'nothing'
+        raise file.error((), f"expected the top-level key '/**', got {found}")
+    given = {name: value for _, name, value in parameters_of(file, '/**')}
+    lines = {
+        tuple('.'.join(where[2:]).split('.')) if where[2:] else (): line
+        for where, line in file.lines.items()
+        if where[:2] == ('/**', 'ros__parameters')
+    }
+    file = YamlFile(file.path, given, lines)
     try:
-        place, plan = checked_place(
-            file.values, walls=walls or any(key in file.values for key in GEOMETRY_KEYS)
-        )
+        described = tables_of(given.items())
+        known = (*PLACE_KEYS, *GEOMETRY_KEYS)
+        for key in described:
+            if key not in known:
+                raise PlaceError((key,), f'unknown parameter, expected {nearest(key, known)}')
+        for key in PLACE_KEYS[:3]:
+            if key not in described:
+                raise PlaceError((), f"parameter '{key}' is missing")
+        geometry = any(key in described for key in GEOMETRY_KEYS)
+        place, plan = checked_place(described, walls=walls or geometry)
     except PlaceError as error:
         raise file.error(error.where, error.problem) from None
-    return PlaceFile(file, place, plan)
+    return PlaceFile(place, plan)
 
 
 def checked_place(

@@ -18,6 +18,8 @@ from surveillance_runtime.yaml_file import KeyPath
 
 PLACE_KEYS = ('map', 'room_positions', 'robot_room', 'recharge_rooms')
 GEOMETRY_KEYS = ('walls', 'doors', 'markers', 'marker_size', 'marker_dictionary', 'station')
+PLACE_TABLES = ('map', 'room_positions', 'walls', 'doors', 'markers')
+"""Those that hold an entry for each room, wall, door or marker: `map.R1`, `map.R2`, ..."""
 _NAME = re.compile(r'[A-Za-z_][A-Za-z0-9_-]*\Z')
 
 Position = tuple[float, float, float]
@@ -179,6 +181,24 @@ def place_from(parameters: Mapping[str, Any]) -> Place:
         parameters.get('robot_room'),
         parameters.get('recharge_rooms', ()),
     )
+
+
+def tables_of(parameters: Iterable[tuple[str, Any]]) -> dict[str, Any]:
+    """Return the parameters that describe a place with the entries of each table together.
+
+    Raises:
+        PlaceError: A table is given as a single value.
+    """
+    described: dict[str, Any] = {}
+    for name, value in parameters:
+        table, _, entry = name.partition('.')
+        if table not in PLACE_TABLES:
+            described[name] = value
+        elif entry:
+            described.setdefault(table, {})[entry] = value
+        else:
+            raise PlaceError((table,), f'got {_shown(value)}, expected NAME: [...] for each')
+    return described
 
 
 def _rooms(rooms: Any) -> dict[str, tuple[str, ...]]:
