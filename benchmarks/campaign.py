@@ -339,14 +339,25 @@ def visits(folder: Path) -> list[tuple[float, str]]:
 
 
 def _last_visits(folder: Path) -> dict[str, float]:
-    """Return when each place was visited last, on the clock as it is at the record's end."""
+    """Return when each place was visited last, on the clock as it is at the record's end.
+
+    The ontology is told of a visit with the next decision: one after which nothing was decided any
+    more does not count.
+    """
     last: dict[str, float] = {}
+    arrived: dict[str, float] = {}
     before = 0.0
     for event in events_of(folder):
         back = max(0.0, before - event['time'])
-        last, before = {place: at - back for place, at in last.items()}, event['time']
+        last, arrived = (
+            {place: at - back for place, at in known.items()} for known in (last, arrived)
+        )
+        before = event['time']
         if event.get('event') == 'visit':
-            last[event['place']] = before
+            arrived[event['place']] = before
+        elif event.get('event') == 'decision':
+            last.update(arrived)
+            arrived.clear()
     return last
 
 

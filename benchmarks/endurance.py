@@ -49,6 +49,8 @@ from surveillance_simulation.world.world import read_world
 
 USUAL_SPEED = 0.45
 """Of a drive, m/s: acceleration, bends and doors included."""
+SAY_EVERY = 600.0
+"""Simulated seconds between two lines that say how far the run is."""
 NEVER = 1e12
 """Seconds that no run lasts."""
 LONGEST_WRONG = 2.0
@@ -359,8 +361,17 @@ def _patrol(
         watch.until(watch.now + 1.0)
     end = watch.now + seconds
     next_trouble = watch.now + pause()
+    begun, next_said = time.monotonic(), watch.now
     while watch.now < end:
-        watch.until(min(next_trouble, trouble.next_mend, end))
+        if watch.now >= next_said:
+            next_said += SAY_EVERY
+            print(
+                f'{watch.now / 3600:.2f} simulated hours after {time.monotonic() - begun:.0f} s: '
+                f'{watch.visits.total()} places entered, {watch.collisions} collisions, '
+                f'least charge {watch.least_charge:.0f} %',
+                flush=True,
+            )
+        watch.until(min(next_trouble, trouble.next_mend, next_said, end))
         trouble.mend()
         if watch.now >= next_trouble:
             tell(f'{watch.now:8.1f} s  {trouble.make()}')

@@ -15,7 +15,7 @@ from surveillance_behaviour.charging import BatteryMonitor
 from surveillance_behaviour.decision import (
     RECHARGE,
     DecisionSettings,
-    NowhereToGoError,
+    RequestError,
     WhyNot,
     check_place,
     decide,
@@ -235,9 +235,12 @@ class Decider:
             self.send_to_charge(why or 'charging was begun')
         try:
             decision = decide(world, self.battery(), self.settings)
-        except NowhereToGoError:
-            self.experience.requested = ''
-            raise
+        except RequestError as error:
+            # What a person asked for in vain is no failure of the patrol.
+            if self.experience.requested == world.requested:
+                self.experience.requested = ''
+            self._warn(f'{error}: it goes on without that')
+            decision = decide(replace(world, requested=''), self.battery(), self.settings)
         self.model.target = decision.target
         if decision.rule == RECHARGE and not self.experience.sent_to_charge:
             self.experience.sent_to_charge = decision.reason.rpartition(': ')[0]
@@ -299,10 +302,6 @@ class Decider:
             return self.model.graph.without_leg(start, goal).route(start, goal)
         except (GraphError, KeyError):
             return ()
-
-    def expected(self, start: str, goal: str) -> float:
-        """Return the seconds that the leg between two neighbours is expected to take."""
-        return self.model.graph.legs.get(start, {}).get(goal, float('nan'))
 
     def request(self, place: str) -> str:
         """Send the robot to a place before the policy decides again; empty: home, to charge.

@@ -36,6 +36,10 @@ class NowhereToGoError(RuntimeError):
     """No place can be reached from where the robot is."""
 
 
+class RequestError(NowhereToGoError):
+    """The place that an operator asked for cannot be reached."""
+
+
 @dataclass(frozen=True)
 class Rules:
     """Classes of places by falling priority.
@@ -193,7 +197,7 @@ def _as_requested(world: World) -> Decision:
     """Send the robot where an operator wants it."""
     place = world.requested
     if place not in world.graph.index:
-        raise NowhereToGoError(f'{place}, as requested, cannot be reached from {world.place}')
+        raise RequestError(f'{place}, as requested, cannot be reached from {world.place}')
     seconds = world.graph.seconds(world.place, place)
     reason = f'an operator has sent the robot to {place}, {seconds:.1f} s away'
     return _straight_to(world, place, REQUEST, 'request', reason, {place: seconds})

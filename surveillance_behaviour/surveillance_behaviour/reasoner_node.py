@@ -2,7 +2,8 @@
 
 It takes one snapshot of the ontology, and decides by the same function as the behaviour
 `surveillance`: charging first, then an operator's request, then the rules and the policy. The
-decision is published with its reason. It also offers `why_not` and `go_to`.
+decision is published with its reason. It also offers `why_not` and `go_to`. A setting of decisions
+that is changed in `robot_behavior` is changed here, too.
 """
 
 from __future__ import annotations
@@ -11,7 +12,9 @@ import threading
 from collections.abc import Sequence
 from typing import Any
 
+from rcl_interfaces.msg import ParameterEvent
 from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.parameter import Parameter
 from rclpy.task import Future
 
 from surveillance_behaviour.charging import BatteryMonitor
@@ -28,6 +31,7 @@ from surveillance_runtime.conversions import seconds_of
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.process import run_node
 from surveillance_runtime.qos import STATE_QOS
+from surveillance_runtime.run_parameters import BEHAVIOUR_NODE
 from surveillance_runtime.waiting import AwaitedWork
 
 
@@ -61,6 +65,8 @@ class Reasoner(PatrolNode):
         self._sharing = threading.Lock()
         hear_battery(self, battery)
         self.create_subscription(MissionStatus, 'mission_status', self._on_status, STATE_QOS)
+        self._owner = f'{self.get_namespace().rstrip("/")}/{BEHAVIOUR_NODE}'
+        self.create_subscription(ParameterEvent, '/parameter_events', self._on_parameters, 1000)
         self.create_service(
             Reason, 'reason', self._on_reason, callback_group=ReentrantCallbackGroup()
         )
@@ -75,6 +81,15 @@ class Reasoner(PatrolNode):
         if status.place and status.place != self._place:
             self._place = status.place
             self._decider.arrived(status.place, seconds_of(status.stamp))
+
+    def _on_parameters(self, event: ParameterEvent) -> None:
+        """Take over what is set in the node that owns the settings of decisions."""
+        if event.node == self._owner:
+            changed = [each for each in event.changed_parameters if each.name in self.declared]
+            # In one step, as there: alone, one of two levels may be refused.
+            taken = self.set_parameters_atomically([*map(Parameter.from_parameter_msg, changed)])
+            if not taken.successful:
+                self.get_logger().warn(f'not taken over from {BEHAVIOUR_NODE}: {taken.reason}')
 
     async def _on_reason(self, _request: Any, response: Any) -> Any:
         # Who asks before a choice is begun shares it: one client that gave up and asks again must

@@ -23,7 +23,7 @@ from surveillance_controllers.manual.commands import (
     Grammar,
     number,
 )
-from surveillance_fsm.exceptions import CallError
+from surveillance_fsm.exceptions import CallError, UnavailableError
 from surveillance_runtime.configuration import declared, read_schema
 from surveillance_runtime.parameters import ParameterSpec, shown
 
@@ -166,7 +166,7 @@ _COMMANDS = (
         'threshold',
         'Set after how long a place is URGENT.',
         lambda a, seconds: a.set_threshold(seconds),
-        number('SECONDS', 0.0, 1e9, 'seconds'),
+        _word('SECONDS', 'seconds'),
     ),
     _command('go', 'Send the robot there next.', lambda a, place: a.go_to(place), _PLACE),
     _command('home', 'Call the robot home.', lambda a: a.go_to('')),
@@ -294,6 +294,8 @@ def _exit(name: str, actions: MissionActions) -> Answer:
 def _told(actions: MissionActions, controller: str, line: str) -> Answer:
     try:
         return Answer(actions.command(controller, line), controller)
+    except UnavailableError as error:
+        return Answer(str(error))
     except CallError as error:
         return Answer(f'{controller} does not answer: {error}')
     except ValueError as error:

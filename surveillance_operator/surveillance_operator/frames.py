@@ -70,10 +70,7 @@ def _decision(snapshot: Snapshot) -> Any:
 
 def _status(snapshot: Snapshot) -> Any:
     status = snapshot.status
-    if status is None:
-        return None
-    more = {'whereabouts': status.whereabouts, 'help': status.waiting_for_help}
-    return {**vars(status), **more}
+    return status and {**vars(status), 'whereabouts': status.whereabouts}
 
 
 def _places(snapshot: Snapshot) -> Any:

@@ -161,6 +161,8 @@ def _draw(options: argparse.Namespace) -> list[str]:
     output: Path = options.output or Path(options.place.stem + '.png')
     if output.suffix.lower() not in _SUFFIXES:
         raise ValueError(f'{output}: expected a picture, one of *{", *".join(_SUFFIXES)}')
+    if not output.parent.is_dir():
+        raise ValueError(f'{output}: there is no folder {output.parent}')
     run = None
     lines = [f'{options.place}: {facts(plan)}']
     if options.record:

@@ -6,7 +6,6 @@ raises one line that says why: `ValueError` where it was refused, `CallError` wh
 
 from __future__ import annotations
 
-import contextlib
 import math
 import re
 import time
@@ -46,10 +45,17 @@ from surveillance_runtime.parameters import shown
 
 _DISCOVERY = 2.0
 """Seconds in which a node that has just started finds the services that there are."""
-REASONER = 'reasoner'
-"""The node that decides in the behaviour patrol, with settings of its own."""
-_OPTIONAL = ('simulation/', 'move_arm', f'{REASONER}/')
+_OPTIONAL = ('simulation/', 'move_arm')
 """How the names of services begin that a mission need not have."""
+_OFFERED_BY = {
+    'simulation': ('simulator',),
+    'ontology_map': ('ontology_map_builder',),
+    'move_arm': ('arm_controller',),
+    'go_to': (BEHAVIOUR, 'reasoner'),
+    'why_not': (BEHAVIOUR, 'reasoner'),
+    'armor_interface_srv': ('armor_server',),
+}
+"""The nodes that a service needs, by the first word of its name; else that word is the node."""
 ARM_SECONDS = 60.0
 """Deadline of a movement of the arm, whose answer comes when it has arrived."""
 _NAME = re.compile(r'[A-Za-z]\w{0,63}\Z', re.ASCII)
@@ -82,7 +88,6 @@ class MissionActions:
             (GoTo, 'go_to'),
             (WhyNot, 'why_not'),
             (SetParameters, f'{BEHAVIOUR}/set_parameters'),
-            (SetParameters, f'{REASONER}/set_parameters'),
             *((Trigger, f'{BEHAVIOUR}/fsm/{word}') for word in ('pause', 'step', 'resume')),
             *((ConsoleCommand, f'{name}/command') for name in CONTROLLERS),
         ):
@@ -146,16 +151,13 @@ class MissionActions:
         done = {'pause': 'paused', 'step': 'one step made', 'resume': 'going on'}
         return str(answer.message) or f'state machine: {done[word]}'
 
-    def set_threshold(self, seconds: float) -> str:
+    def set_threshold(self, seconds: str) -> str:
         """Set after how long a place is URGENT, seconds."""
-        number = _number('threshold', seconds)
-        if number != int(number):
-            raise ValueError(f'{number:g} s: expected whole seconds')
-        return self._decide_by('urgency_threshold', int(number)) + ' s'
+        return self.set_parameter(BEHAVIOUR, 'urgency_threshold', str(seconds))
 
     def set_policy(self, policy: str) -> str:
         """Set how a place is chosen among those that the rules allow."""
-        return self._decide_by('policy', str(policy))
+        return self.set_parameter(BEHAVIOUR, 'policy', str(policy))
 
     def parameters(self, node: str) -> dict[str, Any]:
         """Return the values that a node's parameters have now, by name."""
@@ -179,7 +181,11 @@ class MissionActions:
         if isinstance(spec.default, str) and not isinstance(value, str):
             value = text
         value = spec.accept(value)
-        self._set(node, name, value)
+        parameter = Parameter(name, value=value).to_parameter_msg()
+        request = SetParameters.Request(parameters=[parameter])
+        (result,) = self._call_node(node, SetParameters, request).results
+        if not result.successful:
+            raise ValueError(result.reason or f'{name} was refused')
         return f'{name} of {node} is {shown(value)}'
 
     def move_arm(self, pose: str) -> str:
@@ -230,21 +236,10 @@ class MissionActions:
                     interrupt=self._node.stopping,
                 )
             return question(self._armor)
-        except (ArmorServiceCallError, ArmorServiceInternalError) as error:
+        except ArmorServiceCallError as error:
+            raise ValueError(self._away('armor_interface_srv') or str(error)) from None
+        except ArmorServiceInternalError as error:
             raise ValueError(str(error)) from None
-
-    def _decide_by(self, name: str, value: Any) -> str:
-        self._set(BEHAVIOUR, name, value)
-        with contextlib.suppress(UnavailableError):
-            self._set(REASONER, name, value)
-        return f'{name} is {value}'
-
-    def _set(self, node: str, name: str, value: Any) -> None:
-        parameter = Parameter(name, value=value).to_parameter_msg()
-        request = SetParameters.Request(parameters=[parameter])
-        (result,) = self._call_node(node, SetParameters, request).results
-        if not result.successful:
-            raise ValueError(result.reason or f'{name} was refused')
 
     def _call_node(self, node: str, kind: Any, request: Any) -> Any:
         words = {GetParameters: 'get', ListParameters: 'list', SetParameters: 'set'}
@@ -265,9 +260,21 @@ class MissionActions:
         if service.startswith(_OPTIONAL):
             # Nobody waits for a service that this kind of mission does not have.
             discovery = max(min(0.5, self._timeout), self._found_by - time.monotonic())
-        return caller.call(
-            request, timeout or self._timeout, self._node.stopping, discovery=discovery
-        )
+        try:
+            return caller.call(
+                request, timeout or self._timeout, self._node.stopping, discovery=discovery
+            )
+        except UnavailableError as error:
+            raise UnavailableError(self._away(service) or str(error)) from None
+
+    def _away(self, service: str) -> str:
+        """Say which node a service lacks; empty when all that it needs are there."""
+        first = service.partition('/')[0]
+        there = self._node.get_node_names_and_namespaces()
+        for name in _OFFERED_BY.get(first, (first,)):
+            if (name, self._node.get_namespace()) not in there:
+                return f'{name} is not running'
+        return ''
 
 
 def _name(text: str) -> str:

@@ -16,9 +16,8 @@ from surveillance_behaviour.mission.mission_log import Event
 from surveillance_operator.map_command import facts, graph_over_doors, in_words, run_of
 from surveillance_operator.recording import bag
 from surveillance_operator.recording.runs import find_run, run_parser
-from surveillance_operator.recording.timeline import Timeline
 from surveillance_runtime.command_line import EXIT_BAD_INPUT
-from surveillance_runtime.files import PLACE, RECORD, RECORDING, TIMELINE, FileError
+from surveillance_runtime.files import PLACE, RECORD, RECORDING, FileError
 from surveillance_runtime.place import read_place_file
 from surveillance_runtime.place.drawing import Run, draw_place
 from surveillance_runtime.place.floor_plan import FloorPlan
@@ -84,7 +83,7 @@ def _one_line(folder: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        raise FileError(f'{folder}: {error.strerror or error}') from None
+        raise FileError(f'{error.filename or folder}: {error.strerror or error}') from None
 
 
 def _material(folder: Path) -> tuple[Sequence[Event], FloorPlan | None, Run | None]:
@@ -148,20 +147,9 @@ def _fastest(events: Sequence[Event]) -> float:
     return fastest
 
 
-def _threshold(folder: Path) -> float | None:
-    try:
-        line = Timeline(folder / TIMELINE)
-    except FileError:
-        return None
-    _, _, parts = line.at(math.inf)
-    line.close()
-    value = (parts.get('mission') or {}).get('threshold')
-    return float(value) if value else None
-
-
 def _page(folder: Path, events: Sequence[Event], drawn: str, bound: float | None) -> str:
     summary = mission_log.summarize(events)
-    threshold = _threshold(folder)
+    threshold = summary.threshold
     begin, end = events[0].time, max(event.time for event in events)
     is_whole = events[0].name != 'snapshot'
     start = begin if is_whole else end - summary.seconds
@@ -290,8 +278,11 @@ def main(argv: Sequence[str] | None = None) -> int:
     options = parser.parse_args(argv)
     try:
         folder = find_run(options.run, options.runs)
-        for line in bag.repair(folder / RECORDING):
-            print(line)
+        try:
+            for line in bag.repair(folder / RECORDING):
+                print(line)
+        except OSError as error:  # the report can do without
+            print(f'report: {folder / RECORDING}: cannot be repaired: {error.strerror}')
         print(write_report(folder))
         if (picture := draw_picture(folder)) is not None:
             print(picture)

@@ -24,6 +24,7 @@ TRAIL_STEP = 0.1
 BATTERY_STEP = 10
 """Percent between two lines about the battery."""
 KEPT_EVENTS = 50
+WAITS_FOR_HELP = 'the robot waits for help'
 STALE = 3
 """The level of health of what no longer reports."""
 HISTORY_SECONDS = 3600.0
@@ -344,7 +345,7 @@ def why(snapshot: Snapshot) -> tuple[str, str] | None:
     """Return what the robot is about and the reason: the decision, or what it waits for."""
     status, decision = snapshot.status, snapshot.decision
     if status is not None and status.waiting_for_help:
-        return 'the robot waits for help', status.text.removeprefix('waiting for help: ')
+        return WAITS_FOR_HELP, status.text
     return None if decision is None else (_decision_line(snapshot), decision.reason)
 
 
@@ -368,7 +369,7 @@ def _status_changes(old: Status | None, new: Status) -> Iterator[Change]:
         state = new.state or 'not started'
         yield Change(f'{new.machine} {state}: {new.whereabouts}', routine=True)
     if new.text and (old is None or new.text != old.text):
-        yield Change(new.text)
+        yield Change(f'{WAITS_FOR_HELP}: {new.text}' if new.waiting_for_help else new.text)
 
 
 def _history(old: Snapshot, new: Snapshot) -> History:

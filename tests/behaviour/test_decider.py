@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from surveillance_behaviour.decider import Decider
-from surveillance_behaviour.decision import REQUEST, DecisionSettings
+from surveillance_behaviour.decision import REQUEST, DecisionSettings, NowhereToGoError
 from surveillance_behaviour.mission.mission_log import MissionRecord
 from surveillance_behaviour.world_model import Experience
 from surveillance_fsm import Interrupt
@@ -50,6 +50,32 @@ def test_a_request_ends_when_the_robot_has_been_there_or_cannot_go(
         world.is_in = 'R4'
     assert first.decide(2.0, NOBODY, avoided).rule != REQUEST
     assert decider(world, record).decide(3.0, NOBODY).rule != REQUEST
+
+
+def test_a_request_behind_a_door_that_closed_is_said_and_the_patrol_goes_on() -> None:
+    world, said = World(), list[str]()
+    told = Decider(DecisionSettings(), world, world, world.battery, warn=said.append)
+    told.begin(1.0, NOBODY)
+    told.request('R4')
+    world.closed.update(world.rooms['R4'])
+    assert told.decide(2.0, NOBODY).rule != REQUEST
+    assert told.decide(3.0, NOBODY).rule != REQUEST
+    words = 'R4, as requested, cannot be reached from E: it goes on without that'
+    assert [each for each in said if 'R4' in each] == [words]
+
+
+def test_a_request_waits_while_no_charging_place_can_be_reached() -> None:
+    world, said = World(start_place='C1'), list[str]()
+    told = Decider(DecisionSettings(), world, world, world.battery, warn=said.append)
+    told.begin(1.0, NOBODY)
+    told.request('R1')
+    world.battery.set_level(1.0)
+    world.closed.update(world.rooms['E'])
+    with pytest.raises(NowhereToGoError, match='no charging place'):
+        told.decide(2.0, NOBODY)
+    assert not [each for each in said if 'goes on' in each]
+    world.battery.set_level(100.0)
+    assert told.decide(3.0, NOBODY).place == 'R1'
 
 
 def test_the_ontology_knows_until_when_the_robot_was_in_a_place() -> None:

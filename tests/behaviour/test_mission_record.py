@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import math
 import os
 import subprocess
@@ -12,6 +13,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from surveillance_behaviour.mission import mission_log
 from surveillance_behaviour.mission.mission_log import (
     CutOff,
     MissionRecord,
@@ -21,7 +23,7 @@ from surveillance_behaviour.mission.mission_log import (
     read_all,
     summarize,
 )
-from surveillance_runtime.files import FileError
+from surveillance_runtime.files import FileError, LineFile
 
 
 @pytest.fixture
@@ -160,6 +162,34 @@ def test_a_record_tells_where_its_mission_was_cut_off(
         for time, (name, fields) in enumerate(events):
             record.write(name, float(time), **fields)
     assert cut_off(read(path)) == expected
+
+
+def test_what_a_full_disk_did_not_take_is_written_when_it_does(
+    path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(mission_log, 'MOST_WAITING', 200)
+    append, full = LineFile.append, [False]
+
+    def append_unless_full(self: LineFile, line: bytes) -> int:
+        if full[0]:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path))
+        return append(self, line)
+
+    monkeypatch.setattr(LineFile, 'append', append_unless_full)
+    with MissionRecord(path) as record:
+        record.write('start', 0.0, machine='surveillance', place='E', places=['E', 'C1'])
+        for seconds in (10, 20):  # one, then more than may wait
+            full[0] = True
+            for each in range(1 if seconds == 10 else 9):
+                lost = '; the oldest .* are lost' if each > 2 else ''
+                with pytest.raises(FileError, match=f'No space left on device{lost}$'):
+                    record.write('visit', float(seconds + each), place='C1', distance=5.0)
+            full[0] = False
+            record.write('visit', seconds + 9.5, place='E', distance=5.0)
+    *first, last = [(event.time, event.text('place')) for event in read(path)]
+    assert first[:3] == [(0.0, 'E'), (10.0, 'C1'), (19.5, 'E')]
+    assert first[3:] == [(26.0, 'C1'), (27.0, 'C1'), (28.0, 'C1')]
+    assert last == (29.5, 'E')
 
 
 def test_what_another_simulation_wrote_says_nothing(path: Path) -> None:

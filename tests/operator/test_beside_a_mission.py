@@ -238,7 +238,7 @@ def test_hands_change_the_mission_and_say_what_came_of_it(viewer: Viewer) -> Non
 
     viewer.js("document.querySelector('input[name=seconds]').value = '90'")
     viewer.click('[data-act=threshold]')
-    done(viewer, 'urgency_threshold is 90 s')
+    done(viewer, 'urgency_threshold of robot_behavior is 90')
     viewer.until(lambda: viewer.js('return mission.state.mission.threshold') == 90)
     viewer.js("document.querySelector('select[name=place]').value = 'R2'")
     viewer.click('[data-act=go]')

@@ -143,7 +143,7 @@ def test_ways_and_failures_come_from_the_record(record: Path) -> None:
         ([], 'the following arguments are required: FILE'),
         (['nowhere.yaml'], 'nowhere.yaml: No such file'),
         (['{config}/seven_rooms.yaml', '-o', 'picture.txt'], 'picture.txt: expected a picture'),
-        (['{config}/seven_rooms.yaml', '-o', '{tmp}/no/such.png'], 'such.png: No such file'),
+        (['{config}/seven_rooms.yaml', '-o', '{tmp}/no/such.png'], 'such.png: there is no folder'),
         (['{config}/seven_rooms.yaml', '--record', '{tmp}/none'], 'none: No such file'),
         (['{config}/office.yaml', '--record', '{record}'], "visits 'R1', which the place does not"),
         (['{broken}'], "broken.yaml:1: expected the top-level key '/**', got nothing"),

@@ -9,8 +9,10 @@ from typing import Any
 import pytest
 from rcl_interfaces.msg import SetParametersResult
 from rcl_interfaces.srv import SetParameters
+from rclpy.parameter import Parameter
 from std_srvs.srv import Trigger
 
+from surveillance_behaviour.decision import DecisionSettings
 from surveillance_behaviour.reasoner_node import Reasoner
 from surveillance_fsm.exceptions import CallError
 from surveillance_interfaces.srv import GoTo, MarkerRoutine, PlaceObstacle, SetDoor, WhyNot
@@ -106,11 +108,11 @@ def test_a_refusal_is_said_in_the_words_of_the_node(graph: Any, actions: Mission
 def test_a_parameter_is_set_or_the_reason_told(graph: Any, actions: MissionActions) -> None:
     results = [SetParametersResult(successful=True)]
     asked = serve(graph, SetParameters, 'robot_behavior/set_parameters', results=results)
-    assert actions.set_threshold(90) == 'urgency_threshold is 90 s'
+    assert actions.set_threshold(90) == 'urgency_threshold of robot_behavior is 90'
     assert asked[0].parameters[0].value.integer_value == 90
-    results[0] = SetParametersResult(successful=False, reason='expected one of tour')
-    with pytest.raises(ValueError, match='expected one of tour'):
-        actions.set_policy('fast')
+    results[0] = SetParametersResult(successful=False, reason='not now')
+    with pytest.raises(ValueError, match='not now'):
+        actions.set_policy('tour')
 
 
 def test_any_parameter_of_a_running_node_is_looked_at_and_set(
@@ -152,14 +154,22 @@ def test_any_parameter_of_a_running_node_is_looked_at_and_set(
 def test_what_a_person_sets_reaches_the_node_that_decides(
     graph: Any, actions: MissionActions
 ) -> None:
-    results = [SetParametersResult(successful=True)]
-    asked = serve(graph, SetParameters, 'robot_behavior/set_parameters', results=results)
-    reasoner = graph.add(Reasoner)
-    actions.set_threshold(90)
-    actions.set_policy('oldest')
-    assert [each.parameters[0].name for each in asked] == ['urgency_threshold', 'policy']
-    assert reasoner.get_parameter('urgency_threshold').value == 90
-    assert reasoner.get_parameter('policy').value == 'oldest'
+    behaviour = graph.add(PatrolNode, name='robot_behavior')
+    owned = behaviour.declare_live(DecisionSettings())
+    reasoner = graph.add(Reasoner, parameters={'robot_speed': 2.0})
+    follows = reasoner._decider.settings
+    graph.until(lambda: behaviour.count_subscribers('/parameter_events'))
+    assert actions.set_threshold('90') == 'urgency_threshold of robot_behavior is 90'
+    assert actions.set_policy('oldest') == "policy of robot_behavior is 'oldest'"
+    graph.until(lambda: (follows.urgency_threshold, follows.policy) == (90, 'oldest'))
+    actions.set_parameter('robot_behavior', 'rooms_priority', '[ROOM]')
+    graph.until(lambda: follows.rules.classes == ('ROOM',))
+    levels = {'battery_require_recharge': 92, 'battery_stop_recharge': 95}
+    together = [Parameter(name, value=value) for name, value in levels.items()]
+    assert behaviour.set_parameters_atomically(together).successful
+    graph.until(lambda: follows.battery == owned.battery)
+    assert (owned.urgency_threshold, owned.policy) == (90, 'oldest')
+    assert follows.speed == 2.0, 'what nobody changed stays as it was given'
 
 
 @pytest.mark.parametrize(
@@ -168,7 +178,12 @@ def test_what_a_person_sets_reaches_the_node_that_decides(
         (lambda a: a.set_door('D 1', True), "name 'D 1': expected letters"),
         (lambda a: a.place_obstacle('box', 'x', 0, 1), "'x': expected a finite number"),
         (lambda a: a.place_obstacle('box', float('nan'), 0, 1), 'expected a finite number'),
-        (lambda a: a.set_threshold(1.5), 'expected whole seconds'),
+        (
+            lambda a: a.set_threshold('1.5'),
+            'threshold: got 1.5, expected an integer from 0',
+        ),
+        (lambda a: a.set_threshold('-5'), 'got -5, expected an integer from 0 to 1000000000'),
+        (lambda a: a.set_policy('fast'), "got 'fast', expected one of 'tour'"),
         (lambda a: a.machine('stop'), 'expected pause, step or resume'),
         (lambda a: a.move_arm('up'), 'expected left, home, right, back or stop'),
         (lambda a: a.command('simulator', 'x'), 'expected one of battery_controller'),
@@ -183,8 +198,25 @@ def test_what_cannot_be_asked_for_is_refused_before_it_is_asked(
 
 
 def test_a_service_that_is_not_there_is_said_at_once(actions: MissionActions) -> None:
-    with pytest.raises(CallError, match='simulation/remove_obstacle: no server'):
+    with pytest.raises(CallError, match=r'^simulator is not running$'):
         actions.remove_obstacle('box')
+
+
+def test_a_node_that_is_away_is_named(graph: Any) -> None:
+    actions = MissionActions(graph.add(PatrolNode, name='hands'), timeout=0.1)
+    for call, node in (
+        (lambda: actions.set_policy('tour'), 'robot_behavior'),
+        (lambda: actions.parameters('armor_server'), 'armor_server'),
+        (lambda: actions.facts('R1'), 'ontology_map_builder'),
+        (lambda: actions.command('motion_controller', 'move 1 1'), 'motion_controller'),
+        (lambda: actions.go_to('R1'), 'robot_behavior'),
+    ):
+        with pytest.raises(CallError, match=rf'^{node} is not running$'):
+            call()
+    graph.add(PatrolNode, name='robot_behavior')
+    graph.until(lambda: 'robot_behavior' in actions._node.get_node_names())
+    with pytest.raises(CallError, match=r'^reasoner is not running$'):
+        actions.go_to('R1')
 
 
 def test_a_service_that_each_mission_has_is_waited_for(graph: Any) -> None:

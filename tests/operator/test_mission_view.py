@@ -64,7 +64,7 @@ def shown(snapshot: Snapshot, width: int = 100, height: int = 30, colours: bool 
 
 @pytest.mark.parametrize('page', ['map', 'decision'])
 def test_a_robot_that_waits_for_help_says_for_what_in_the_place_of_its_decision(page: str) -> None:
-    status = replace(STATUS, waiting_for_help=True, text='waiting for help: D is shut; open it')
+    status = replace(STATUS, waiting_for_help=True, text='D is shut; open it')
     console = Console(width=100, height=30, color_system=None)
     with console.capture() as capture:
         console.print(MissionView(replace(whole(), status=status), page=page), end='')

@@ -83,9 +83,7 @@ STATES = {
     'large': mission(ROOMS),
     'help': replace(
         mission(('A', 'B')),
-        status=Status(
-            5000.0, 'm', 'WAIT_FOR_HELP', 'A', 'B', True, 'waiting for help: shut in', ()
-        ),
+        status=Status(5000.0, 'm', 'WAIT_FOR_HELP', 'A', 'B', True, 'shut in', ()),
     ),
     'ended': replace(mission(('A', 'B')), nodes={}, ended=frozenset({'A', 'B'})),
 }
@@ -244,4 +242,7 @@ def test_a_jump_that_leads_nowhere_says_so(viewer: Viewer) -> None:
     viewer.until(lambda: viewer.text('#connection') == 'replay')
     viewer.click('[data-jump=failure]')
     viewer.until(lambda: viewer.text('#jumped') == 'no failure after this moment')
+    logged = [entry['message'] for entry in viewer.driver.get_log('browser')]
+    assert all('status of 422' in line for line in logged), logged
+    viewer.driver.get(viewer.address)  # as the other tests expect it
     page.stop()

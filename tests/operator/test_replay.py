@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import errno
 import http.client
 import json
+import os
 import re
 import subprocess
 import sys
@@ -172,6 +174,19 @@ def test_the_commands_find_runs_and_say_what_is_wrong(
         assert error.startswith(f'{name}: nowhere: expected the folder of a run')
         assert '20260101-000000' in error
         assert error.count('\n') == 1
+
+
+def test_a_recording_that_cannot_be_repaired_keeps_no_report_back(
+    run: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def read_only(folder: Path) -> list[str]:
+        raise OSError(errno.EROFS, os.strerror(errno.EROFS), str(folder / 'recording_0.mcap'))
+
+    monkeypatch.setattr(report.bag, 'repair', read_only)
+    assert report.main([str(run)]) == 0
+    first, *written = capsys.readouterr().out.splitlines()
+    assert first == f'report: {run}/recording: cannot be repaired: Read-only file system'
+    assert written == [str(run / 'report.html'), str(run / 'report.png')]
 
 
 def test_a_run_is_found_by_what_it_holds_and_not_by_a_wrong_name(

@@ -87,27 +87,10 @@ class Survey:
         self.robot_room = robot_room
         self.robot_position = robot_position
         self._notes: dict[int, PlaceNote] = {}
-        self._discarded: set[int] = set()
-
-    @property
-    def seen(self) -> frozenset[int]:
-        """Ids that were noted or discarded."""
-        return frozenset(self._notes) | self._discarded
-
-    @property
-    def discarded(self) -> frozenset[int]:
-        """Ids that stand for nothing."""
-        return frozenset(self._discarded)
 
     def note(self, marker_id: int, note: PlaceNote) -> None:
         """Take what a marker stands for; a later note for the same marker replaces it."""
-        self._discarded.discard(marker_id)
         self._notes[marker_id] = note
-
-    def discard(self, marker_id: int) -> None:
-        """Take note that a marker stands for nothing."""
-        if marker_id not in self._notes:
-            self._discarded.add(marker_id)
 
     def to_json(self) -> dict[str, Any]:
         """Return what was noted, to be kept in a file."""
@@ -115,7 +98,7 @@ class Survey:
             str(marker_id): [note.room, list(note.position), dict(note.connections)]
             for marker_id, note in self._notes.items()
         }
-        return {'notes': notes, 'discarded': sorted(self._discarded)}
+        return {'notes': notes}
 
     def restore(self, kept: Mapping[str, Any]) -> None:
         """Take what `to_json` gave.
@@ -126,8 +109,6 @@ class Survey:
         for marker_id, (room, (x, y), doors) in kept['notes'].items():
             connections = {str(door): str(behind) for door, behind in doors.items()}
             self.note(int(marker_id), PlaceNote(str(room), (float(x), float(y)), connections))
-        for marker_id in kept['discarded']:
-            self.discard(int(marker_id))
 
     def report(self) -> SurveyReport:
         """Judge all notes together."""

@@ -184,7 +184,6 @@ class MarkerInquiry:
             return
         note = place_note_from(answer)
         if note is None:
-            self._survey.discard(marker_id)
             log.info(f'marker {marker_id} is discarded: {answer.room}')
         else:
             self._survey.note(marker_id, note)

@@ -307,6 +307,8 @@ class Mission:
             if str(error) != self._record_complaint:
                 self._record_complaint = str(error)
                 self.say(str(error), warning=True)
+        else:
+            self._record_complaint = ''
 
 
 def _rounded(points: Sequence[Point]) -> list[list[float]]:

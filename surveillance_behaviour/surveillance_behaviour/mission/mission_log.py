@@ -65,6 +65,8 @@ A_DATE = 1e9
 """From here on, in seconds, a time is a date of a machine's clock; a simulation counts from 0."""
 SEGMENT_BYTES = 4_000_000
 """Size from which on a record's file is packed away and a new one begun."""
+MOST_WAITING = 4_000_000
+"""Bytes of events that wait until the disk takes more; of more than these the newest."""
 LARGEST = 1_000_000_000
 """Bytes of a record's file that are read at most."""
 
@@ -112,6 +114,7 @@ class MissionRecord:
         self.path = Path(path)
         self._segment_bytes = segment_bytes
         self._account = Account()
+        self._waiting, self._lost = b'', ''
         self._next = self.path.with_name(self.path.name + '.next')
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
@@ -127,7 +130,7 @@ class MissionRecord:
             self._account = account_of(_events(content, f'{self.path}'))
 
     def write(self, name: str, time: float, **fields: object) -> None:
-        """Append one event.
+        """Append one event, after those that the disk did not take before.
 
         Args:
             name: One of :data:`EVENTS`.
@@ -135,17 +138,23 @@ class MissionRecord:
             fields: The event's own fields; those of :data:`EVENTS` are required.
 
         Raises:
-            FileError: Unknown event, a required field is missing, or the file takes no more.
+            FileError: Unknown event, a required field is missing, or the file takes no more: then
+                the event waits for the next one.
         """
         _check(name, fields, f'{self.path}')
         line = json.dumps({'event': name, 'time': round(time, 3), **fields}) + '\n'
-        try:
-            size = self._file.append(line.encode())
-        except OSError as error:
-            raise FileError(
-                f'cannot write the mission record {self.path}: {error.strerror}'
-            ) from None
         self._account.take(Event(name, round(time, 3), json.loads(line)))
+        self._waiting += line.encode()
+        try:
+            size = self._file.append(self._waiting)
+        except OSError as error:
+            if len(self._waiting) > MOST_WAITING:
+                self._waiting = self._waiting[-MOST_WAITING:].partition(b'\n')[2]
+                self._lost = '; the oldest events that waited for it are lost'
+            raise FileError(
+                f'cannot write the mission record {self.path}: {error.strerror}{self._lost}'
+            ) from None
+        self._waiting, self._lost = b'', ''
         if size >= self._segment_bytes:
             self._begin_segment(time)
 

@@ -17,6 +17,8 @@ from enum import StrEnum
 
 from surveillance_runtime.parameters import parameter
 
+WAITING_FOR_HELP = 'waiting for help'
+"""How the line of the log begins by which the robot asks for somebody."""
 DOUBLINGS = 30
 """More doublings of a time than this are not worth counting."""
 

@@ -11,6 +11,7 @@ from builtin_interfaces.msg import Time
 import surveillance_fsm as fsm
 from surveillance_behaviour import conversions
 from surveillance_behaviour.mission.mission import Mission
+from surveillance_behaviour.mission.recovery import WAITING_FOR_HELP
 from surveillance_behaviour.policy.world import Decision
 from surveillance_fsm.ros import ClockWait
 from surveillance_fsm.structure import Structure
@@ -136,10 +137,11 @@ class RosAnnouncer:
     def waiting_for_help(self, reason: str) -> None:
         """Say that the robot waits, or that it goes on."""
         self._waiting = bool(reason)
-        self._text = f'waiting for help: {reason}' if reason else 'trying again'
+        self._text = reason or 'trying again'
         if reason:
-            self._node.get_logger().error(self._text)
-            self._node.health.error('help', self._text)
+            said = f'{WAITING_FOR_HELP}: {reason}'
+            self._node.get_logger().error(said)
+            self._node.health.error('help', said)
         else:
             self._node.health.clear('help')
         self._publish()

@@ -125,10 +125,6 @@ class DrawEstimate:
             self._rates.append(fallen / (time - self._mark[0]))
             self._mark = (time, level)
 
-    def forget(self) -> None:
-        """Note that the level was set from outside: what it did since then says nothing."""
-        self._mark = None
-
     @property
     def draw(self) -> Draw:
         """The mean and the spread of the last rates; the mean is 0 while nothing is known."""

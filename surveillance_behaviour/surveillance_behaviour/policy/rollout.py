@@ -64,8 +64,8 @@ class RuleMap:
 
     def _seconds_away(self) -> list[list[float]]:
         shortest, legs = self.graph.distances, self.graph.direct
-        away: list[list[float]] = shortest.tolist()
         longer = np.isfinite(legs) & (legs > shortest + HALF_OPEN)
+        away = [row.copy() for row in self._shortest]
         for target in np.flatnonzero(longer.any(axis=0)).tolist():
             for place in np.argsort(shortest[:, target], kind='stable').tolist():
                 if place != target and math.isfinite(shortest[place, target]):

@@ -194,7 +194,7 @@ class RoundSearch:
 
     def _take(self, found: Round) -> None:
         """Make a round the one that is changed."""
-        self._round, self._cost = found, self.cost(found)
+        self._cost = self.cost(found)
         self._changes = RoundChanges(self._rules, found, self._draw)
 
 

@@ -148,7 +148,10 @@ def _exact_order(distances: Matrix) -> tuple[int, ...]:
 
 def _good_order(distances: Matrix) -> tuple[int, ...]:
     """Return the better of two first tours, each improved until no single change shortens it."""
-    ranked = np.argsort(distances, axis=1, kind='stable')[:, 1 : NEIGHBOURS + 1].tolist()
+    # The place itself, which is the nearest one, is left out.
+    near = np.argpartition(distances, NEIGHBOURS, axis=1)[:, : NEIGHBOURS + 1]
+    order = np.argsort(np.take_along_axis(distances, near, axis=1), axis=1, kind='stable')
+    ranked = np.take_along_axis(near, order, axis=1)[:, 1:].tolist()
     rows = distances.tolist()
     tours = [_Improvement(rows, ranked, start(distances)) for start in (_preorder, _nearest)]
     for tour in tours:

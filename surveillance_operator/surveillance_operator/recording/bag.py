@@ -193,7 +193,7 @@ def repair(folder: Path) -> list[str]:
     """
     done: list[str] = []
     for path in segments(folder):
-        with open(path, 'rb+') as file:
+        with open(path, 'rb') as file:
             try:
                 fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except OSError:

@@ -35,9 +35,9 @@ function header() {
   const ended = mission && !mission.running && status;
   set('title', status ? `${status.machine}${mission?.mode ? ' · ' + mission.mode : ''}` : mission?.running ? 'a mission begins' : 'no mission yet');
   document.title = status ? `${status.place || '?'} · ${status.machine}` : 'Mission';
-  const words = status ? [ended && 'the mission has ended', status.state, status.whereabouts, status.help ? 'waiting for help' : status.text] : [`waiting on ${mission?.where ?? ''}`];
+  const words = status ? [ended && 'the mission has ended', status.state, status.whereabouts, status.waiting_for_help ? 'waiting for help' : status.text] : [`waiting on ${mission?.where ?? ''}`];
   set('state', words.filter(Boolean).join(' · '));
-  $('state').classList.toggle('warn', Boolean(status?.help || ended));
+  $('state').classList.toggle('warn', Boolean(status?.waiting_for_help || ended));
   set('battery', battery ? `battery ${Math.round(battery.level)} %${battery.low ? ' (low)' : ''}` : 'battery –');
   $('battery').classList.toggle('warn', Boolean(battery?.low));
 }

@@ -19,10 +19,10 @@ export class Why {
 
   show() {
     const {decision, places, status} = this.state;
-    $('decision-line').classList.toggle('warn', Boolean(status?.help));
-    if (status?.help) {
+    $('decision-line').classList.toggle('warn', Boolean(status?.waiting_for_help));
+    if (status?.waiting_for_help) {
       $('decision-line').textContent = 'the robot waits for help';
-      $('reason').textContent = status.text.replace(/^waiting for help: /, '');
+      $('reason').textContent = status.text;
       $('scores').replaceChildren();
     } else if (!decision) {
       $('decision-line').textContent = 'no decision yet';
