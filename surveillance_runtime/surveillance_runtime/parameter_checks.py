@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
+
+MOST_TILT = 0.1
+"""A lidar that is tilted by more than this does not look along the floor, rad."""
 
 
 def not_empty(values: Sequence[str]) -> str | None:
@@ -15,9 +19,12 @@ def pose(values: Sequence[float]) -> str | None:
     return None if len(values) == 3 else 'three numbers: x, y, yaw'
 
 
-def pose_or_nothing(values: Sequence[float]) -> str | None:
-    """Ask for a place and a direction, if for anything."""
-    return pose(values) if values else None
+def lidar_mount(values: Sequence[float]) -> str | None:
+    """Ask for where a lidar sits on the robot, if for anything; it stands or hangs."""
+    good = len(values) in (0, 3) or (
+        len(values) == 4 and abs(math.sin(values[3])) <= MOST_TILT and abs(values[3]) <= 3.3
+    )
+    return None if good else 'x, y, yaw, and roll: 0, or 3.1416 for a lidar that hangs upside down'
 
 
 def times(values: Sequence[float]) -> str | None:

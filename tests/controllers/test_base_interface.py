@@ -22,7 +22,10 @@ from surveillance_controllers.motion.base_interface import (
 from surveillance_controllers.motion.driving import Drive, Spin
 from surveillance_controllers.motion.localisation import Localiser
 from surveillance_controllers.motion.path_following import Velocity
+from surveillance_controllers.motion.transforms import lidar_mount
 from surveillance_fsm import Interrupt
+from surveillance_runtime.node import PatrolNode
+from surveillance_runtime.parameters import ParameterError
 from surveillance_runtime.qos import SENSOR_QOS
 
 
@@ -196,6 +199,27 @@ def test_a_lidar_below_tilted_frames_is_looked_up_in_space(graph: Any, capfd: An
     assert not upside_down
     assert frames.mount_of('nodding').pose == pytest.approx((0.2, 0.0, 0.0))
     assert "'nodding' is tilted by 60 degrees" in capfd.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ('given', 'mount'),
+    [
+        ([0.1, 0.0, 1.0], Mount((0.1, 0.0, 1.0))),
+        ([0.1, 0.0, 1.0, 0.0], Mount((0.1, 0.0, 1.0))),
+        ([0.1, 0.0, 1.0, 3.1416], Mount((0.1, 0.0, 1.0), True)),
+        ([0.1, 0.0, 1.0, -math.pi], Mount((0.1, 0.0, 1.0), True)),
+        ([0.1, 0.0], ParameterError),
+        ([0.1, 0.0, 1.0, 1.57], ParameterError),
+        ([0.1, 0.0, 1.0, 180.0], ParameterError),
+    ],
+)
+def test_a_lidar_s_mount_may_be_given_upside_down_too(graph: Any, given: Any, mount: Any) -> None:
+    node = graph.add(PatrolNode, {'lidar_mount': given}, name='mounted')
+    if mount is ParameterError:
+        with pytest.raises(ParameterError, match=r'lidar_mount.*hangs upside down'):
+            lidar_mount(node)
+    else:
+        assert lidar_mount(node) == mount
 
 
 def test_scans_without_a_stamp_count_from_when_they_came(graph: Any, steersman: Any) -> None:

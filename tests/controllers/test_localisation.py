@@ -137,19 +137,6 @@ def test_rays_that_tell_nothing_are_no_doubt(flat: Any) -> None:
     assert localiser.explained(true, scan) == 0.0
 
 
-def test_a_lost_robot_looks_on_when_time_begins_anew(flat: Any) -> None:
-    localiser = Localiser(flat.grid, (2.0, 1.5, 0.0))
-    scan = flat.scan((2.0, 1.5, 0.0))
-    nonsense = np.random.default_rng(2).uniform(0.3, 7.0, len(scan.angles))
-    localiser.see(Scan(scan.angles, nonsense, scan.range_max), now=1000.0)
-    assert localiser.lost
-    elsewhere = (3.5, 1.5, 1.0)
-    for step in range(12):
-        localiser.see(flat.scan(elsewhere), now=0.1 * step)
-    assert not localiser.lost
-    assert error(localiser, elsewhere)[0] < 0.06
-
-
 @pytest.mark.parametrize('shape', [(1, 1), (1, 40), (3, 2), (60, 60)])
 @pytest.mark.parametrize('value', [-1, 0, 100])
 def test_a_map_of_any_size_is_searched(shape: tuple[int, int], value: int) -> None:

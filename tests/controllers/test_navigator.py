@@ -107,6 +107,53 @@ def test_who_walks_by_is_no_obstacle_until_they_stand(flat: Any, navigator: Navi
     assert np.abs(gaps - 0.25).max() < 0.1
 
 
+@pytest.mark.parametrize('stamp', [1e6, -1e6], ids=['far ahead', 'far back'])
+def test_one_wrong_stamp_of_a_scan_costs_nothing_that_is_known(
+    flat: Any, navigator: Navigator, stamp: float
+) -> None:
+    true, box = (1.0, 1.5, 0.0), [(2.6, 1.5, 0.15)]
+    navigator.move(true)
+    for step in range(400):
+        navigator.see(flat.scan(true, box), 0.1 * step)
+    before = navigator.obstacles_stay.sum()
+    assert before > 3
+    navigator.see(flat.scan(true, box), stamp)
+    for step in range(400, 420):
+        navigator.see(flat.scan(true, box), 0.1 * step)
+    assert navigator.obstacles_stay.sum() >= before
+
+
+def test_a_clock_that_begins_anew_lets_obstacles_come_to_stay_and_drives_go_on(
+    flat: Any, navigator: Navigator
+) -> None:
+    true, box = (1.0, 1.5, 0.0), [(2.6, 1.5, 0.15)]
+    navigator.move(true)
+    navigator.task = Drive([[1.0, 1.5], [3.5, 1.5]])
+    for step in range(50):
+        navigator.see(flat.scan(true, box), 1000.0 + 0.1 * step)
+    assert len(navigator.obstacles) > 3
+    assert not navigator.obstacles_stay.any()
+    navigator.task.no_path('a box')
+    assert navigator.task.state is State.WAITING
+    for step in range(320):
+        navigator.see(flat.scan(true, box), 0.1 * step)
+    assert navigator.obstacles_stay.sum() > 3
+    assert navigator.task.state is not State.WAITING
+
+
+def test_a_lost_robot_looks_on_when_time_begins_anew(flat: Any, navigator: Navigator) -> None:
+    navigator.move((2.0, 1.5, 0.0))
+    scan = flat.scan((2.0, 1.5, 0.0))
+    nonsense = np.random.default_rng(2).uniform(0.3, 7.0, len(scan.angles))
+    navigator.see(Scan(scan.angles, nonsense, scan.range_max), 1000.0)
+    assert navigator.lost
+    elsewhere = (3.5, 1.5, 1.0)
+    for step in range(15):
+        navigator.see(flat.scan(elsewhere), 0.1 * step)
+    assert not navigator.lost
+    assert navigator.pose == pytest.approx(elsewhere, abs=0.06)
+
+
 def test_a_closed_door_is_no_obstacle_once_it_is_known(flat: Any, navigator: Navigator) -> None:
     true = (2.5, 1.5, 0.0)
     navigator.move(true)

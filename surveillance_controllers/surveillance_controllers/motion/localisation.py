@@ -199,7 +199,7 @@ class Localiser:
 
         Args:
             scan: The scan.
-            now: Its time, seconds.
+            now: Its time, seconds; never less than that of the scan before.
 
         Returns:
             Whether the scan was used; one that would tell little new is not.
@@ -256,7 +256,7 @@ class Localiser:
             or self._look_at is not None
             or self._moved[0] >= p.update_distance
             or self._moved[1] >= p.update_turn
-            or not 0 <= now - self._used_at < p.update_period
+            or now - self._used_at >= p.update_period
         )
 
     def _judge(self, corrected: Pose, agreement: float, thin: Scan, now: float) -> None:
@@ -267,9 +267,8 @@ class Localiser:
             self._settle(corrected, agreement)
             return
         self.agreement = agreement
-        # Time may begin anew, as that of a simulation does.
-        latest = now + (p.lost_pause if self.lost else p.doubt_time)
-        self._look_at = latest if self._look_at is None else min(self._look_at, latest)
+        if self._look_at is None:
+            self._look_at = now + p.doubt_time
         if agreement < p.lost_below and not self.lost:
             # Next to nothing fits: that is no passer-by.
             self._look_at = min(self._look_at, now)

@@ -26,6 +26,9 @@ SETTLE_SECONDS = 0.2
 """A place counts once the robot has been in it for this long, so that a doorway does not
 flicker."""
 
+LONGEST_STEP = 6.0
+"""More than this between two scans counts as this, seconds: longer than what was not seen is still
+taken for the same thing, and short enough that nothing is forgotten for one wrong stamp."""
 MOVER_REACH = 3.5
 """Who moves within this distance is driven around, metres."""
 MOVER_GAP = 0.15
@@ -65,6 +68,7 @@ class Navigator:
         self._odometry: Pose | None = None
         self._believed: Pose | None = None
         self._candidate: tuple[str | None, float] | None = None
+        self._stamp, self._now = -math.inf, 0.0
         self.task: Drive | Spin | None = None
         self.obstacles_changed = False
         self.place: str | None = None
@@ -143,18 +147,19 @@ class Navigator:
         if self._localiser is not None:
             self._localiser.move(odometry)
 
-    def see(self, scan: Scan, now: float) -> Velocity | None:
+    def see(self, scan: Scan, stamp: float) -> Velocity | None:
         """Take a scan and decide what to do.
 
         Args:
             scan: What the lidar sees from where the robot is.
-            now: The time, seconds.
+            stamp: Its time by a clock that may jump or begin anew, seconds.
 
         Returns:
             The velocity to command; None when there is no task, or something is missing yet.
         """
         if self._grid is None or self._odometry is None:
             return None
+        now = self._passed(stamp)
         if self._localiser is None:
             self._localiser = self._first_localiser(scan, self._odometry)
         used = self._localiser.see(scan, now)
@@ -176,6 +181,12 @@ class Navigator:
         if isinstance(self.task, Spin):
             return self.task.step(pose[2])
         return None
+
+    def _passed(self, stamp: float) -> float:
+        """Return the time that passed up to a scan, seconds; it never goes back."""
+        step, self._stamp = stamp - self._stamp, stamp
+        self._now += min(max(step, 0.0), LONGEST_STEP)
+        return self._now
 
     def _first_localiser(self, scan: Scan, odometry: Pose) -> Localiser:
         """Begin where the robot is said to be, or else where its first scan fits best."""

@@ -128,7 +128,7 @@ class Tracker:
             now: The scan's time, seconds.
         """
         dt, self._now = now - self._now, now
-        if not 0.0 <= dt <= self._parameters.keep:
+        if dt > self._parameters.keep:
             self._bodies.clear()
             dt = 0.0
         for body in self._bodies:

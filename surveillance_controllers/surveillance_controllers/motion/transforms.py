@@ -23,8 +23,6 @@ except ImportError:
 
 BASE_FRAMES = ('base_link', 'base_footprint', '')
 """Frames at the robot's centre."""
-MOST_TILT = 0.1
-"""A lidar that is tilted by more than this does not look along the floor, rad."""
 
 
 def lidar_mount(node: PatrolNode) -> Mount | None:
@@ -36,13 +34,16 @@ def lidar_mount(node: PatrolNode) -> Mount | None:
     given: list[float] = node.parameter(
         'lidar_mount',
         [],
-        'Where the lidar sits on the robot: x, y in metres, yaw in radians; empty: as '
-        "tf_static says of the scan's frame.",
+        'Where the lidar sits on the robot: x, y in metres, yaw in radians, and roll: 0, or 3.1416 '
+        "for one that hangs upside down; empty: as tf_static says of the scan's frame.",
         of=float,
-        check=parameter_checks.pose_or_nothing,
+        check=parameter_checks.lidar_mount,
         read_only=True,
     )
-    return Mount((given[0], given[1], given[2])) if given else None
+    if not given:
+        return None
+    x, y, yaw, *roll = given
+    return Mount((x, y, yaw), bool(roll) and math.cos(roll[0]) < 0.0)
 
 
 class Transforms:
@@ -102,7 +103,7 @@ class Transforms:
             matrix = step @ matrix
             passed += 1
         tilt = math.acos(min(abs(float(matrix[2, 2])), 1.0))
-        if tilt > MOST_TILT:
+        if tilt > parameter_checks.MOST_TILT:
             self._tell_once(
                 f'scan: its frame {frame!r} is tilted by {math.degrees(tilt):.0f} degrees: '
                 'expected a lidar in the plane of the floor; it is taken for one'
