@@ -51,9 +51,7 @@ def test_a_sleep_that_begins_while_time_moves_ends_in_time(
     assert driver.error is None
 
 
-def test_time_waits_for_a_sleeper_that_was_interrupted(
-    graph: Any, driver: SimulatedTime
-) -> None:
+def test_time_waits_for_a_sleeper_that_was_interrupted(graph: Any, driver: SimulatedTime) -> None:
     node = graph.add(PatrolNode, {'use_sim_time': True}, name='sleeper')
     wait = ClockWait(node)
     looks = itertools.count()
