@@ -28,6 +28,7 @@ from surveillance_runtime.launch_protocol import (
     HEARTBEAT,
     MEMORY,
     RESTARTS,
+    SAY_WHERE,
     SLEPT,
     UP,
 )
@@ -41,6 +42,8 @@ STOP_WITHIN, STOP_AT_MOST = 2.5, 12.0
 STOP_AGAIN_AFTER = 0.5
 """Seconds from a stop signal on which another one kills all that is left; one Ctrl-C may come as
 two signals."""
+LAST_WORDS = 0.5
+"""Seconds that a process which does not end has to say where it is, before it is killed."""
 TICK = 0.1
 """Seconds that a round of the loop takes at most."""
 LOOK_PERIOD = 0.5
@@ -84,6 +87,7 @@ class Child:
     restart_at: float | None = None
     told_to_stop: bool = False
     killed: bool = False
+    kill_at: float | None = None
     coming_up: bool = False
     finished: bool = False
     heartbeats: Heartbeats | None = None
@@ -298,7 +302,7 @@ class Supervisor:
             _kill_group(process.pid)
             code = process.wait()
             self._close(child, process)
-            child.process = None
+            child.process = child.kill_at = None
             self._after_death(child, code)
             child.heartbeats = None
 
@@ -355,18 +359,28 @@ class Supervisor:
                 continue
             look = look_at(child.process.pid)
             problem = child.heartbeats.problem(now, look)
+            can_tell = bool(problem) and look is not None and look.state != 'T'
             most = child.program.memory
             if look is not None and most and look.memory > most:
                 held, allowed = look.memory >> 20, most >> 20
                 problem = f'holds {held} MB of memory, at most {allowed} MB are allowed'
             if problem:
-                self._end(child, problem)
+                self._end(child, problem, can_tell=can_tell)
 
-    def _end(self, child: Child, problem: str) -> None:
+    def _end(self, child: Child, problem: str, *, can_tell: bool = False) -> None:
         """End a process, to be started again as after a death."""
         if child.process is not None and not child.ended_for and self._stopping_since is None:
             child.ended_for = problem
             self._log.warn(f'{child.program.name} {problem}: ending it')
+            self._kill(child, can_tell=can_tell)
+
+    def _kill(self, child: Child, *, can_tell: bool) -> None:
+        """Kill a process and what it started, at once or after it has told where it hangs."""
+        assert child.process is not None
+        if can_tell:
+            _send(child.process, SAY_WHERE)
+            child.kill_at = time.monotonic() + LAST_WORDS
+        else:
             _kill_group(child.process.pid)
 
     def _tell_to_stop(self, *, leaders_only: bool) -> None:
@@ -374,7 +388,7 @@ class Supervisor:
             wanted = child.program.leads or not leaders_only
             if child.process is not None and wanted and not child.told_to_stop:
                 child.told_to_stop = True
-                child.process.terminate()
+                _send(child.process, signal.SIGTERM)
 
     def _keep_stopping(self, now: float) -> None:
         """Go on with a stop: leaders first, then the rest, at last by force.
@@ -396,7 +410,7 @@ class Supervisor:
             if self._stop_at_once or now >= since + allowed:
                 self._log.warn(f'{child.program.name} did not end in time: killed')
                 child.killed = True
-                _kill_group(child.process.pid)
+                self._kill(child, can_tell=not self._stop_at_once)
 
     def _keep_time(self, end: float | None) -> None:
         now = time.monotonic()
@@ -407,6 +421,8 @@ class Supervisor:
             self.time_is_over = True
             self.stop()
         for child in self.children.values():
+            if child.process is not None and child.kill_at is not None and now >= child.kill_at:
+                _kill_group(child.process.pid)
             if child.restart_at is not None and now >= child.restart_at:
                 child.restart_at = None
                 self._to_start.append(child)
@@ -469,6 +485,12 @@ def _has_ended(process: subprocess.Popen[bytes]) -> bool:
     """Tell whether a child is dead; it is not reaped, so that its group's number stays taken."""
     options = os.WEXITED | os.WNOHANG | os.WNOWAIT
     return os.waitid(os.P_PID, process.pid, options) is not None
+
+
+def _send(process: subprocess.Popen[bytes], number: int) -> None:
+    """Send a signal to a process that is not reaped: `Popen.send_signal` would reap a dead one."""
+    with contextlib.suppress(PermissionError):
+        os.kill(process.pid, number)
 
 
 def _kill_group(group: int) -> None:

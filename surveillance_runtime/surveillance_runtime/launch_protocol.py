@@ -6,6 +6,7 @@ A process gets descriptors of pipes and its limits in environment variables, and
 from __future__ import annotations
 
 import os
+import signal
 
 UP = 'LAUNCH_UP'
 """A descriptor that a process closes to say that the bulk of its start is done."""
@@ -26,6 +27,9 @@ SLEPT = b'S'
 """It did not run for so long that its peers may have forgotten it."""
 FINISHED = b'F'
 """It ends on purpose."""
+
+SAY_WHERE = signal.SIGQUIT
+"""Has a process say on stderr where each of its threads is, and end at once, whatever hangs."""
 
 EXIT_CANNOT_START = 2
 """The exit code of a process whose configuration does not let it start."""

@@ -31,7 +31,12 @@ from surveillance_runtime.configuration import RosArguments, argument_layer, spl
 from surveillance_runtime.diagnostics import DiagnosticsThread, Heartbeat
 from surveillance_runtime.discovery import prefer_quick_discovery
 from surveillance_runtime.executor import PatrolExecutor
-from surveillance_runtime.launch_protocol import EXIT_CANNOT_START, EXIT_NOT_NOW, ONE_THREAD
+from surveillance_runtime.launch_protocol import (
+    EXIT_CANNOT_START,
+    EXIT_NOT_NOW,
+    ONE_THREAD,
+    SAY_WHERE,
+)
 from surveillance_runtime.node import (
     JOIN_SECONDS,
     PatrolNode,
@@ -85,6 +90,7 @@ def _run_nodes(factories: Sequence[Callable[[], PatrolNode]], args: Sequence[str
     # A client that was killed, or is not fully discovered, gets no answer and asks again.
     warnings.filterwarnings('ignore', 'failed to send response', RuntimeWarning)
     ending = _Ending()
+    faulthandler.register(SAY_WHERE, file=2, chain=True)
     argv = [sys.argv[0], *(sys.argv[1:] if args is None else args)]
     try:
         arguments = split_arguments(argv[1:])

@@ -49,9 +49,29 @@ def test_a_child_that_heeds_no_signal_and_does_nothing_is_killed(start):
     code, seconds = launch.end(signal.SIGINT)
     assert code == 0
     assert 2 < seconds < STOP_AT_MOST
-    assert gone([deaf, grandchild], 1)
+    assert gone([deaf, grandchild])
     assert 'deaf did not end in time: killed' in '\n'.join(launch.lines)
     assert 'Traceback' not in '\n'.join(launch.lines)
+
+
+HANGING = (
+    'import threading\n'
+    'from surveillance_runtime.node import PatrolNode\n'
+    'from surveillance_runtime.process import run_node\n'
+    'class Hanging(PatrolNode):\n'
+    '    def __init__(self): super().__init__("hanging")\n'
+    '    def on_stop(self): threading.Event().wait()\n'
+    'run_node(Hanging, [])'
+)
+
+
+def test_a_node_that_hangs_says_where_before_it_is_killed(start, ros_domain):
+    environ = {**USER_ENVIRON, 'ROS_DOMAIN_ID': str(ros_domain)}
+    launch = start(DRIVER, f'node={HANGING}', environ=environ)
+    launch.until(r'node +\| .*ready')
+    assert launch.end(signal.SIGINT)[0] == 0
+    assert 'node did not end in time: killed' in '\n'.join(launch.lines)
+    assert any(re.search(r'node +\| .* in on_stop', line) for line in launch.lines)
 
 
 WORKING = STUBBORN.replace('signal.pause()', 'pass')
@@ -202,6 +222,29 @@ def test_the_time_to_run_ends_the_launch(start):
     assert 'the time is over' in '\n'.join(launch.lines)
 
 
+DIES_AS_A_STOP_BEGINS = """
+import os, sys
+from launcher.log_merge import MergedLog
+from launcher.supervisor import Program, Supervisor
+
+class Log(MergedLog):
+    def line(self, name, text):
+        # Between a child's death and the next look at it.
+        os.waitid(os.P_PID, supervisor.children[name].process.pid, os.WEXITED | os.WNOWAIT)
+        supervisor.stop()
+
+program = Program('one', [sys.executable, '-c', 'print("bye")'], os.environ)
+supervisor = Supervisor([program], Log(None, ['one'], colour=False))
+sys.exit(supervisor.run())
+"""
+
+
+def test_a_child_that_dies_as_a_stop_begins_is_no_trouble(start):
+    launch = start('-c', DIES_AS_A_STOP_BEGINS)
+    assert launch.end()[0] == 0
+    assert 'every process has ended' in launch.lines[-1]
+
+
 def test_a_reader_that_goes_away_ends_the_launch():
     chatty = 'while True: print("x" * 1000, flush=True)'
     with subprocess.Popen(
@@ -232,7 +275,7 @@ def test_children_end_with_a_launcher_that_is_killed(start):
     pids = [int(pid) for pid in children.read_text().split()]
     assert len(pids) == 1
     launch.end(signal.SIGKILL)
-    assert gone(pids, 5)
+    assert gone(pids)
 
 
 def test_a_child_whose_launcher_is_gone_already_does_not_start():
