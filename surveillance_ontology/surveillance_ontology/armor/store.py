@@ -27,7 +27,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import fields, is_dataclass
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 from surveillance_ontology.armor.history import History, PastChange
 from surveillance_ontology.armor.reference import (
@@ -113,9 +113,7 @@ class Journal:
         self.snapshot_size = self._path('snapshot', start).stat().st_size if start else 0
         sizes = [path.stat().st_size for path in parts if path.exists()]
         self.size = sum(sizes) - self.snapshot_size
-        self._number = segments[-1]
-        self._file = self._segment(self._number)
-        self._end = self._file.tell()
+        self._begin(segments[-1])
         self._remove_before(start)
 
     def records(self) -> list[Any]:
@@ -130,11 +128,12 @@ class Journal:
             FileError: They could not be written; none of them is there.
         """
         self.check_open()
-        self._check_place()
+        size = self._size_in_place()
         *first, last = records
         lines = b''.join([*(_line(record, more=True) for record in first), _line(last)])
         try:
-            self._cut()
+            if size != self._end:
+                self._cut()
             rest = memoryview(lines)
             while rest:
                 # A disk that is almost full takes a part without an error.
@@ -154,15 +153,15 @@ class Journal:
             What `finish_snapshot` is to be called with.
         """
         self.check_open()
-        self._check_place()
-        number = self._number + 1
+        self._size_in_place()
+        before = self._file
         try:
-            file = self._segment(number)
+            self._begin(self._number + 1)
         except OSError as error:
             raise FileError(f'{self._directory}: {error.strerror}') from None
-        self._file.close()
-        self._file, self._number, self.size, self._end = file, number, 0, 0
-        return number
+        before.close()
+        self.size = 0
+        return self._number
 
     def finish_snapshot(self, number: int, records: Iterable[Any]) -> None:
         """Write the snapshot and remove what it stands for; records may be appended meanwhile.
@@ -174,7 +173,7 @@ class Journal:
         try:
             temporary = _written(path, records)
             # Another store in this place would lose what is removed below.
-            self._check_place()
+            self._size_in_place()
             self.snapshot_size = temporary.stat().st_size
             temporary.rename(path)
             self._sync_directory()
@@ -202,18 +201,21 @@ class Journal:
         if self._file.closed:
             raise FileError(f'{self._directory}: closed')
 
-    def _check_place(self) -> None:
-        """Check that what is written is found again: a file that was removed takes all in silence.
+    def _size_in_place(self) -> int:
+        """Return how large the segment is that is found where it belongs.
+
+        A file that was removed takes all that is written, in silence.
 
         Raises:
-            FileError: Its folder was removed or renamed, or its disk is no longer there.
+            FileError: The folder was removed or renamed, or its disk is no longer there.
         """
-        path = self._path('journal', self._number)
-        there = False
-        with suppress(OSError):
-            there = os.path.samestat(path.stat(), os.fstat(self._file.fileno()))
-        if not there:
-            raise FileError(f'{path}: is no longer there')
+        try:
+            found = os.stat(self._place)
+        except OSError:
+            found = None
+        if found is None or (found.st_dev, found.st_ino) != self._file_id:
+            raise FileError(f'{self._place}: is no longer there')
+        return found.st_size
 
     def _cut(self) -> None:
         """Remove what a write that failed may have left behind the records."""
@@ -222,10 +224,14 @@ class Journal:
     def _path(self, kind: str, number: int) -> Path:
         return self._directory / f'{kind}-{number}.log'
 
-    def _segment(self, number: int) -> BinaryIO:
-        file = self._path('journal', number).open('ab', buffering=0)
+    def _begin(self, number: int) -> None:
+        """Append to a segment from now on; raises OSError, and nothing has changed."""
+        path = self._path('journal', number)
+        file = path.open('ab', buffering=0)
         self._sync_directory()
-        return file
+        found = os.fstat(file.fileno())
+        self._file, self._number, self._place = file, number, str(path)
+        self._file_id, self._end = (found.st_dev, found.st_ino), found.st_size
 
     def _sync_directory(self) -> None:
         descriptor = os.open(self._directory, os.O_RDONLY)
@@ -313,12 +319,13 @@ class _Contents:
             self.records += batch
 
 
+_TO_JSON = json.JSONEncoder(separators=(',', ':'))
 _HEAD = re.compile(rb'([0-9a-f]{8}) (\d{1,10})(\+?) ')
 _CUT_OFF = re.compile(rb'[0-9a-f]{1,8}|[0-9a-f]{8} (\d{0,10}\+?|\d+\+? [ -~]*|\[[ -~]*)')
 
 
 def _line(record: Any, *, more: bool = False) -> bytes:
-    text = json.dumps(record, separators=(',', ':')).encode()
+    text = _TO_JSON.encode(record).encode()
     body = b'%d%s %s' % (len(text), b'+' if more else b'', text)
     return b'%08x %s\n' % (zlib.crc32(body), body)
 
