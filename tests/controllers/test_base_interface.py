@@ -21,6 +21,7 @@ from surveillance_controllers.motion.base_interface import (
 )
 from surveillance_controllers.motion.driving import Drive, Spin
 from surveillance_controllers.motion.localisation import Localiser
+from surveillance_controllers.motion.navigator import Navigator
 from surveillance_controllers.motion.path_following import Velocity
 from surveillance_controllers.motion.transforms import lidar_mount
 from surveillance_fsm import Interrupt
@@ -234,6 +235,28 @@ def test_scans_without_a_stamp_count_from_when_they_came(graph: Any, steersman: 
 
     graph.until(seen)
     assert 0.0 < steersman.times[0] < steersman.times[1]
+
+
+def test_a_robot_that_drives_stands_while_it_looks_for_itself(
+    graph: Any, flat: Any, monkeypatch: Any
+) -> None:
+    navigator = Navigator()
+    navigator.set_map(flat.grid)
+    base = RobotBase(graph.node, navigator, 5.0, lambda _place, _stamp: None)
+    true = (2.0, 1.5, 0.0)
+    navigator.move(true)
+    navigator.task = Drive([[2.0, 1.5], [5.5, 1.5]])
+    for step in range(10):
+        base._see(flat.scan(true), Time(sec=1, nanosec=step * 10**8))
+    assert base._base.wanted.speed > 0.2
+    during = []
+    monkeypatch.setattr(
+        Localiser, 'search', lambda _self, _scan: during.append(base._base.wanted) or []
+    )
+    nonsense = np.random.default_rng(2).uniform(0.3, 7.0, len(flat.scan(true).angles))
+    base._see(Scan(flat.scan(true).angles, nonsense, 8.0), Time(sec=3))
+    assert during == [Velocity()]
+    assert base._base.wanted == Velocity()
 
 
 @pytest.mark.parametrize('mount', [(0.3, -0.2, 0.0), (0.1, 0.0, math.pi), (-0.25, 0.1, 2.0)])

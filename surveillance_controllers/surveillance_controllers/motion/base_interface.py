@@ -64,6 +64,8 @@ class RobotBase:
         self._node = node
         self._radius = radius
         self._navigator = navigator
+        navigator.before_search = self._stand_for_search
+        self._stands_for_search = False
         self._sensor_timeout = sensor_timeout
         self._on_place = on_place
         self._lock = threading.RLock()
@@ -241,9 +243,11 @@ class RobotBase:
         with self._stepped:
             before = self.place
             self._base.hear('scan')
+            self._stands_for_search = False
             velocity = self._navigator.see(scan, measured)
             if velocity is not None and self._navigator.task is not None:
-                self._base.command(velocity)
+                if not self._stands_for_search:
+                    self._base.command(velocity)
                 if self._navigator.pose is not None:
                     self._on_step(self._navigator.pose)
             self._publish_pose(measured, stamp)
@@ -253,6 +257,12 @@ class RobotBase:
             if self._navigator.task is not None and self._awaited():
                 self._stepped.notify_all()
         self._tell(stamp)
+
+    def _stand_for_search(self) -> None:
+        """Brake for as long as a search takes: until the next scan is seen."""
+        if self._base.wanted.speed != 0.0:
+            self._base.command(Velocity())
+            self._stands_for_search = True
 
     def _warn_of_silence(self, topic: str) -> None:
         self._node.get_logger().warn(f'nothing on the topic {topic}: the robot stands')

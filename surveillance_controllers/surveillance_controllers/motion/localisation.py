@@ -20,6 +20,7 @@ wins.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -115,6 +116,7 @@ class Localiser:
         grid: The map.
         pose: Where the robot is believed to be at first.
         parameters: How the localiser works.
+        before_search: Called before a search everywhere, which takes up to a second.
 
     Attributes:
         pose: The estimate: x, y in metres, yaw in rad, map frame.
@@ -124,9 +126,14 @@ class Localiser:
     """
 
     def __init__(
-        self, grid: GridMap, pose: Pose, parameters: LocalisationParameters | None = None
+        self,
+        grid: GridMap,
+        pose: Pose,
+        parameters: LocalisationParameters | None = None,
+        before_search: Callable[[], None] = lambda: None,
     ) -> None:
         self.parameters = parameters or LocalisationParameters()
+        self._before_search = before_search
         self.pose = pose
         self.agreement = 1.0
         self.lost = False
@@ -274,6 +281,7 @@ class Localiser:
             self._look_at = min(self._look_at, now)
         if now < self._look_at - 1e-9:
             return
+        self._before_search()
         candidates = self.search(thin)
         found = candidates[0] if candidates else None
         if found is not None and self._is_convincing(found, agreement):

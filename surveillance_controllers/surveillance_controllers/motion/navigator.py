@@ -8,7 +8,7 @@ ROS; who feeds it takes care that calls do not overlap.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -45,6 +45,8 @@ class Navigator:
 
     Attributes:
         task: What is carried out at the moment.
+        before_search: Called before the robot looks for its pose everywhere, which takes a while in
+            which it sees nothing else.
         obstacles_changed: Set when the obstacles changed; the reader clears it.
         place: The place the robot is in; None while that is not known.
     """
@@ -70,6 +72,7 @@ class Navigator:
         self._candidate: tuple[str | None, float] | None = None
         self._stamp, self._now = -math.inf, 0.0
         self.task: Drive | Spin | None = None
+        self.before_search: Callable[[], None] = lambda: None
         self.obstacles_changed = False
         self.place: str | None = None
 
@@ -190,7 +193,9 @@ class Navigator:
 
     def _first_localiser(self, scan: Scan, odometry: Pose) -> Localiser:
         """Begin where the robot is said to be, or else where its first scan fits best."""
-        localiser = Localiser(self._seen_map, odometry, self._localisation)
+        localiser = Localiser(
+            self._seen_map, odometry, self._localisation, lambda: self.before_search()
+        )
         if self._believed is not None:
             localiser.believe(self._believed)
         else:
