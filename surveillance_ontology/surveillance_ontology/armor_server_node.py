@@ -46,11 +46,10 @@ SLICE = 0.005
 MOST_WAITING = 5000
 """Requests that are taken and wait; further ones wait in the middleware."""
 WORKERS = 4
-"""Threads for directives that may take long, as many for `LONG_QUERIES`, as many for documents."""
+"""Threads for directives that may take long, as many for `LONG_QUERIES`, for LOAD and for SAVE."""
 QUERIES = 2
 """Long queries of one ontology at a time."""
 LONG_QUERIES = ('SPARQL', 'AT', 'EXPLAIN')
-DOCUMENTS = ('LOAD', 'SAVE')
 
 
 class _Backlog:
@@ -152,8 +151,9 @@ class ArmorServer(PatrolNode):
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._pause = self.create_timer(PUBLISH_DELAY, self._on_pause, clock=steady)
         self._pause.cancel()
-        self._work, self._documents = _Workers(self), _Workers(self)
-        self._queries = _Workers(self, QUERIES)
+        self._work, self._queries = _Workers(self), _Workers(self, QUERIES)
+        # Apart from each other and from the rest: a disk may not answer.
+        self._documents = {'LOAD': _Workers(self), 'SAVE': _Workers(self)}
         group = ReentrantCallbackGroup()
         self._backlog = _Backlog()
         self._single = self.create_service(
@@ -168,9 +168,8 @@ class ArmorServer(PatrolNode):
 
     def on_stop(self) -> None:
         """End the workers and queries that run."""
-        self._work.stop()
-        self._queries.stop()
-        self._documents.stop()
+        for workers in (self._work, self._queries, *self._documents.values()):
+            workers.stop()
         self._service.session.sparql.close()
 
     def destroy_node(self) -> None:
@@ -234,9 +233,9 @@ class ArmorServer(PatrolNode):
 
     def _workers(self, directive: DirectiveRequest) -> _Workers:
         """Return whose turn it is: what takes long must not keep changes and REASON waiting."""
-        if directive.command.upper() in DOCUMENTS:
-            return self._documents
-        return self._queries if directive.primary.upper() in LONG_QUERIES else self._work
+        if directive.primary.upper() in LONG_QUERIES:
+            return self._queries
+        return self._documents.get(directive.command.upper(), self._work)
 
     async def _on_list(self, request: Any, response: Any) -> Any:
         directives = [request_from_ros(msg) for msg in request.armor_requests]

@@ -21,24 +21,45 @@ PAUSE = 0.0002
 _lock = threading.Lock()
 _inside = 0
 _was_on = False
+_thread = threading.local()
 
 
 @contextmanager
 def uncollected() -> Iterator[None]:
     """Switch the garbage collector off, where it is on, until the last thread inside is done."""
+    with _thread_inside(True):
+        yield
+
+
+@contextmanager
+def collected() -> Iterator[None]:
+    """Take this thread out of `uncollected` while it waits for a disk, which may never answer."""
+    with _thread_inside(False):
+        yield
+
+
+@contextmanager
+def _thread_inside(inside: bool) -> Iterator[None]:
+    before = getattr(_thread, 'inside', False)
+    _switch(inside)
+    try:
+        yield
+    finally:
+        _switch(before)
+
+
+def _switch(inside: bool) -> None:
+    """Count this thread among those inside, or no more."""
     global _inside, _was_on
     with _lock:
         if not _inside:
             _was_on = gc.isenabled()
-        _inside += 1
-        gc.disable()
-    try:
-        yield
-    finally:
-        with _lock:
-            _inside -= 1
-            if not _inside and _was_on:
-                gc.enable()
+        _inside += inside - getattr(_thread, 'inside', False)
+        _thread.inside = inside
+        if _inside:
+            gc.disable()
+        elif _was_on:
+            gc.enable()
 
 
 def settle(axioms: int) -> None:

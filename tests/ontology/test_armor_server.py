@@ -157,13 +157,13 @@ def test_an_ontology_that_is_used_for_long_keeps_nobody_waiting_for_another(
 
     other = ArmorClient(graph.node, 'test', 'other', timeout=60.0)
     other.utils.get_all_refs()
-    server_waits = (server._work, server._documents, server._queries)
+    server_waits = (server._work, server._queries, *server._documents.values())
     with server._service.references.find('map').lock:
         for _ in range(5):
             graph.node.executor.create_task(ask_all)
             for request in asked:
                 graph.node.executor.create_task(ask, request)
-        graph.until(lambda: [len(w._waiting.get('map', ())) for w in server_waits] == [9, 9, 3])
+        graph.until(lambda: [len(w._waiting.get('map', ())) for w in server_waits] == [9, 3, 4, 4])
         other.utils.load_ref_from_file(ONTOLOGY, IRI)
         assert other.manipulation.add_class('NEW')
         assert other.batch([other.request('REASON')]).success

@@ -55,6 +55,16 @@ def test_the_collector_stays_off_until_the_last_thread_is_done() -> None:
     assert gc.isenabled()
 
 
+def test_whoever_waits_for_a_disk_leaves_the_collector_on() -> None:
+    with memory.collected():
+        assert gc.isenabled()
+    with memory.uncollected(), memory.uncollected():
+        with memory.collected():
+            assert gc.isenabled()
+        assert not gc.isenabled()
+    assert gc.isenabled()
+
+
 def test_what_was_made_and_dropped_meanwhile_is_looked_at_soon() -> None:
     with memory.uncollected():
         rings = [Ring() for _ in range(memory.LARGE + 1)]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import gc
 import queue
 import threading
 from collections.abc import Callable
@@ -15,7 +17,7 @@ import pytest
 from surveillance_ontology.armor.access import DATA, Settings
 from surveillance_ontology.armor.protocol import DirectiveRequest
 from surveillance_ontology.armor.service import ArmorService
-from surveillance_ontology.documents import writing
+from surveillance_ontology.documents import reading, writing
 from surveillance_ontology.owl.axioms import Axiom
 
 from .seven_rooms import IRI, ONTOLOGY, Ask, asker, names
@@ -227,6 +229,50 @@ def test_a_list_that_saves_waits_for_no_save_that_waits_for_it(
             assert waiting.acquire(timeout=30)
     for _ in range(2):
         assert answers.get(timeout=30).success
+
+
+@pytest.mark.parametrize('step', ['looked for', 'written', 'read'])
+def test_a_disk_that_does_not_answer_keeps_neither_readers_nor_the_collector(
+    ask: Ask, step: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    waiting, goes_on = threading.Semaphore(0), threading.Event()
+
+    def hanging(*_: Any, **__: Any) -> Any:
+        waiting.release()
+        assert goes_on.wait(30)
+        raise OSError(errno.EIO, 'it broke')
+
+    def looked_for(path: Path) -> Any:
+        return hanging() if path.name == 'map.owl' else exists(path)
+
+    exists = Path.exists
+    words = ('SAVE', 'map.owl')
+    if step == 'looked for':
+        monkeypatch.setattr(Path, 'exists', looked_for)
+    elif step == 'written':
+        monkeypatch.setattr(writing, 'replace_file', hanging)
+    else:
+        monkeypatch.setattr(reading, 'open', hanging, raising=False)
+        words = ('LOAD FILE', ONTOLOGY, IRI, 'false', '', 'false')
+    answers = queue.SimpleQueue[Any]()
+    reference = 'other' if step == 'read' else 'map'
+    hung = [
+        threading.Thread(target=lambda: answers.put(ask(*words, reference=reference)))
+        for _ in range(2)
+    ]
+    for save in hung:
+        save.start()
+    for _ in range(1 if step == 'written' else 2):
+        assert waiting.acquire(timeout=30)
+    reader = threading.Thread(target=lambda: answers.put(ask('QUERY IND CLASS', 'ROOM')))
+    reader.start()
+    assert answers.get(timeout=30).success
+    assert gc.isenabled()
+    goes_on.set()
+    for save in hung:
+        assert 'it broke' in answers.get(timeout=30).error_description
+        save.join()
+    assert gc.isenabled()
 
 
 def test_names_that_rdf_xml_cannot_hold_are_saved_as_ntriples(ask: Ask) -> None:

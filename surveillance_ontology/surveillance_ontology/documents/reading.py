@@ -19,7 +19,7 @@ from surveillance_ontology.documents.owl_xml import is_owl_xml, parse_owl_xml
 from surveillance_ontology.documents.rdf_xml import Graph, Node, parse_rdf_xml
 from surveillance_ontology.documents.structural import Axioms
 from surveillance_ontology.documents.xml_reading import OntologyFileError, is_absolute, legal
-from surveillance_ontology.memory import uncollected
+from surveillance_ontology.memory import collected, uncollected
 from surveillance_ontology.owl.axioms import Axiom, Import
 from surveillance_ontology.owl.entities import entities_of, renamed
 from surveillance_ontology.owl.expressions import Literal, language_tag
@@ -150,7 +150,7 @@ def _read(source: str | Path | bytes, iri: str, size_limit: int) -> tuple[str, M
     else:
         name = str(source)
         try:
-            with open(source, 'rb') as file:
+            with collected(), open(source, 'rb') as file:
                 data = file.read(size_limit + 1)
         except OSError as error:
             raise OntologyFileError(error.strerror or str(error), path=name) from None

@@ -13,6 +13,7 @@ from surveillance_fsm.files import replace_file
 from surveillance_ontology.documents.rdf_xml import Node, Triple
 from surveillance_ontology.documents.triples import triples_of
 from surveillance_ontology.documents.xml_reading import FORBIDDEN, OntologyFileError
+from surveillance_ontology.memory import collected
 from surveillance_ontology.owl.axioms import (
     Axiom,
     ClassAssertion,
@@ -53,7 +54,8 @@ def write_ontology(
     """
     data = ontology_bytes(axioms, iri, format, prefixes)
     try:
-        replace_file(path, data, durable=True)
+        with collected():
+            replace_file(path, data, durable=True)
     except OSError as error:
         raise OntologyFileError(error.strerror or str(error), path=str(path)) from None
 

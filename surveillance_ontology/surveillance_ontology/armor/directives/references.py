@@ -158,6 +158,7 @@ def _if_loaded(session: Session, name: str) -> Iterator[Reference | None]:
     'DROP',
     summary='Forgets the reference; success also when there is none.',
     differs='Refused with 102 while another client is mounted.',
+    slow=True,
 )
 def _drop(session: Session, request: DirectiveRequest) -> DirectiveResponse:
     with _if_loaded(session, request.reference_name) as ref:
@@ -203,22 +204,24 @@ def _release(session: Session, ref: Reference) -> None:
     'that ends in .nt gets N-Triples, which hold names that RDF/XML cannot.',
     slow=True,
 )
-@memory.uncollected()
 def _save(session: Session, request: DirectiveRequest, path: str) -> DirectiveResponse:
     # Late, as what LOAD WEB needs: a server that starts again is to be back at once.
     from surveillance_ontology.documents.writing import write_ontology
 
+    with session.references.locked(request.reference_name) as ref:
+        session.check_free(ref, request.client_name)
+        path = path or _loaded_file(session, ref)
+    # While nobody waits for the reference: the disk may not answer.
+    target = session.paths.to_write(path, ONTOLOGY_ENDINGS)
+    saving = session.saving(target)
     with contextlib.ExitStack() as turn:
         while True:
             with session.references.locked(request.reference_name) as ref:
                 session.check_free(ref, request.client_name)
-                target = session.paths.to_write(
-                    path or _loaded_file(session, ref), ONTOLOGY_ENDINGS
-                )
-                saving = session.saving(target)
                 # Whose turn it is waits for no reference: a list may hold it, and wait for a turn.
                 if saving.acquire(blocking=False):
                     turn.callback(saving.release)
+                    turn.enter_context(memory.uncollected())
                     axioms = list(ref.kb.axioms())
                     if request.primary:
                         axioms = list(dict.fromkeys([*axioms, *ref.kb.facts()]))
@@ -251,6 +254,7 @@ def _loaded_file(session: Session, ref: Reference) -> str:
     'the reference is unknown.',
     differs='Enforced, unless the parameter enforce_mount is off; ARMOR reports 102 and carries '
     'the manipulation out.',
+    slow=True,
 )
 def _mount(session: Session, request: DirectiveRequest) -> DirectiveResponse:
     client, name = request.client_name, request.reference_name
@@ -268,7 +272,11 @@ def _mount(session: Session, request: DirectiveRequest) -> DirectiveResponse:
     return DirectiveResponse(error_description=note)
 
 
-@utility('UNMOUNT', summary='Ends MOUNT; a client that is not mounted changes nothing by it.')
+@utility(
+    'UNMOUNT',
+    summary='Ends MOUNT; a client that is not mounted changes nothing by it.',
+    slow=True,
+)
 def _unmount(session: Session, request: DirectiveRequest) -> DirectiveResponse:
     with session.references.locked(request.reference_name) as ref:
         if ref.mounted != request.client_name:
@@ -300,13 +308,14 @@ def _get_client(session: Session, _: DirectiveRequest, name: str) -> DirectiveRe
     text('path'),
     summary='Appends each directive with its answer to a file.',
     differs='Only to .log and .txt files below the ontologies folder; closed at 64 MiB.',
+    slow=True,
 )
 def _log_file_on(session: Session, _: DirectiveRequest, path: str) -> DirectiveResponse:
     session.log.open(session.paths.to_write(path, LOG_ENDINGS))
     return DirectiveResponse()
 
 
-@utility('LOG FILE OFF', summary='Ends LOG FILE ON.')
+@utility('LOG FILE OFF', summary='Ends LOG FILE ON.', slow=True)
 def _log_file_off(session: Session, _: DirectiveRequest) -> DirectiveResponse:
     session.log.close()
     return DirectiveResponse()
@@ -384,7 +393,8 @@ def _read_document(
             )
             path = source
         else:
-            file = paths.to_read(source)
+            with memory.collected():
+                file = paths.to_read(source)
             path = str(file)
             document = read_ontology(file, base, size_limit=settings.max_file_bytes)
     except OntologyFileError as error:
@@ -429,7 +439,7 @@ def _fetch(url: str, settings: Settings) -> bytes:
     if not url.lower().startswith(('http://', 'https://')):
         raise DirectiveError(f'LOAD WEB: {shown(url)} is not an http address')
     try:
-        with urllib.request.urlopen(url, timeout=WEB_TIMEOUT) as answer:
+        with memory.collected(), urllib.request.urlopen(url, timeout=WEB_TIMEOUT) as answer:
             data: bytes = answer.read(settings.max_file_bytes + 1)
     except (OSError, ValueError) as error:
         reason = error.reason if isinstance(error, urllib.error.URLError) else error
