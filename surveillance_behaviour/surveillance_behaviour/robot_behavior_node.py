@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from typing import Any, cast
+from typing import Any
 
 from sensor_msgs.msg import BatteryState
 
@@ -67,7 +67,7 @@ class RobotBehavior(PatrolNode):
         self._work: AwaitedWork | None = None
         battery = BatteryMonitor()
         ports = self._ports(choice, deadlines, battery, memory)
-        clock = cast(fsm.Clock, self._mission_clock)
+        clock = self._mission_clock
         self.mission = Mission(
             self._behaviour, settings, ports, battery, clock, self._record, left_at
         )

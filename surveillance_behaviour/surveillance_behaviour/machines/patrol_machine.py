@@ -21,9 +21,8 @@ from surveillance_behaviour.machines.shared_states import (
     Recover,
     WaitForHelp,
     add,
-    check_arrival,
     check_path,
-    path_length,
+    follow,
 )
 from surveillance_behaviour.mission.mission import Mission
 from surveillance_behaviour.mission.recovery import Step
@@ -151,11 +150,8 @@ def drive(
         CallError: It does not.
     """
     check_path(via_points, None, 0.0, 'motion/planner')
-    mission.departs()
-    end = routine_of(mission).control(via_points, interrupt)
-    check_arrival(end, via_points[-1], mission.settings.arrival_tolerance, 'motion/controller')
-    mission.make_sure_of(target, interrupt)
-    return path_length(via_points)
+    control = routine_of(mission).control
+    return follow(mission, target, via_points, control, 'motion/controller', interrupt)
 
 
 class Recharge(MissionState):

@@ -173,11 +173,6 @@ def add(label: str, state: fsm.State, **transitions: str) -> None:
     fsm.StateMachine.add(label, state, {PREEMPTED: PREEMPTED, **transitions})
 
 
-def path_length(path: list[Point]) -> float:
-    """Return the length of a path, metres."""
-    return sum(math.dist(start, end) for start, end in itertools.pairwise(path))
-
-
 def check_path(path: list[Point], goal: Point | None, tolerance: float, peer: str) -> None:
     """Refuse a path that leads nowhere, or elsewhere.
 
@@ -195,14 +190,33 @@ def check_path(path: list[Point], goal: Point | None, tolerance: float, peer: st
         )
 
 
-def check_arrival(end: Point, goal: Point, tolerance: float, peer: str) -> None:
-    """Refuse an arrival that is none.
+def follow(
+    mission: Mission,
+    place: str,
+    path: list[Point],
+    drive: Callable[[Sequence[Point], fsm.Interrupt], Point],
+    peer: str,
+    interrupt: fsm.Interrupt,
+) -> float:
+    """Drive along a path and make sure that it ends in ``place``; metres driven.
+
+    Args:
+        mission: The mission's memory and ports.
+        place: Where the path leads.
+        path: The path; not empty.
+        drive: Drives along it and returns where the robot is at the end.
+        peer: Names who drives, in errors.
+        interrupt: Ends it.
 
     Raises:
-        CallError: The robot stopped too far from ``goal``.
+        CallError: The robot stopped too far from the path's end, or is in another place.
     """
-    away = math.dist(end[:2], goal[:2])
+    mission.departs()
+    away = math.dist(drive(path, interrupt)[:2], path[-1][:2])
+    tolerance = mission.settings.arrival_tolerance
     if not away <= tolerance:
         raise CallError(
             f'{peer}: the robot stopped {away:.2f} m short, expected at most {tolerance:g} m'
         )
+    mission.make_sure_of(place, interrupt)
+    return sum(math.dist(start, end) for start, end in itertools.pairwise(path))

@@ -17,9 +17,8 @@ from surveillance_behaviour.machines.shared_states import (
     Recover,
     WaitForHelp,
     add,
-    check_arrival,
     check_path,
-    path_length,
+    follow,
 )
 from surveillance_behaviour.mission.mission import Mission
 from surveillance_behaviour.mission.recovery import Step
@@ -122,8 +121,8 @@ class MoveToNextRoom(MissionState):
     reads = ('next_room',)
 
     def work(self, ud: Any, interrupt: fsm.Interrupt) -> str:
-        path = drive(self.mission, ud.next_room, interrupt)
-        self.mission.arrived(ud.next_room, path_length(path), path)
+        path, metres = drive(self.mission, ud.next_room, interrupt)
+        self.mission.arrived(ud.next_room, metres, path)
         return 'moved'
 
     def goal(self, ud: Any) -> str | None:
@@ -137,13 +136,13 @@ class ReturnToLastPlace(MissionState):
     ends = ('returned', FAILED)
 
     def work(self, ud: Any, interrupt: fsm.Interrupt) -> str:
-        mission = self.mission
-        mission.came_back(path_length(drive(mission, mission.place, interrupt)))
+        _, metres = drive(self.mission, self.mission.place, interrupt)
+        self.mission.came_back(metres)
         return 'returned'
 
 
-def drive(mission: Mission, place: str, interrupt: fsm.Interrupt) -> list[Point]:
-    """Plan a path to a place and follow it; return the path.
+def drive(mission: Mission, place: str, interrupt: fsm.Interrupt) -> tuple[list[Point], float]:
+    """Plan a path to a place and follow it; return the path and its length, metres.
 
     Raises:
         CallError: The robot did not get there.
@@ -157,11 +156,7 @@ def drive(mission: Mission, place: str, interrupt: fsm.Interrupt) -> list[Point]
         leg = motion.plan(path[-1] if path else start, stop, interrupt)
         check_path(leg, stop, mission.settings.goal_tolerance, 'compute_path')
         path.extend(leg if not path else leg[1:])
-    mission.departs()
-    end = motion.follow(path, interrupt)
-    check_arrival(end, path[-1], mission.settings.arrival_tolerance, 'follow_path')
-    mission.make_sure_of(place, interrupt)
-    return path
+    return path, follow(mission, place, path, motion.follow, 'follow_path', interrupt)
 
 
 def _stops(mission: Mission, place: str, goal: Point, interrupt: fsm.Interrupt) -> list[Point]:

@@ -24,7 +24,7 @@ MARGIN = 1e-6
 """By how much a wait is announced longer than it is, seconds: more than stamps are rounded by."""
 
 
-class MissionClock:
+class MissionClock(ClockWait):
     """The mission's clock, in seconds of ROS time.
 
     Under `use_sim_time` it says on `mission_waits_until` until when the mission waits, zero for an
@@ -32,24 +32,16 @@ class MissionClock:
     """
 
     def __init__(self, node: PatrolNode) -> None:
-        self._wait = ClockWait(node)
+        super().__init__(node)
         self._topic = None
         if node.get_parameter('use_sim_time').value:
             self._topic = node.create_publisher(Time, 'mission_waits_until', STATE_QOS)
 
-    def now(self) -> float:
-        """Return the seconds of ROS time."""
-        return self._wait.now()
-
-    def elapsed(self) -> float:
-        """Return the seconds that have passed since some moment, however the clock is set."""
-        return self._wait.elapsed()
-
-    def sleep(self, seconds: float, interrupt: fsm.Interrupt) -> bool:
+    def sleep(self, seconds: float, interrupt: fsm.Interrupt | None = None) -> bool:
         """Wait; return False when the interrupt ended it early."""
         # A little later than it waits: time that stops a nanosecond early would wake nobody.
         self._announce(self.now() + seconds + MARGIN)
-        return self._wait.sleep(seconds, interrupt)
+        return super().sleep(seconds, interrupt)
 
     def wait_for_event(self) -> None:
         """Say that what comes next ends by an event, whenever that is."""
