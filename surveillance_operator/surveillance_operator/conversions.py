@@ -29,14 +29,7 @@ from surveillance_interfaces.msg import (
     MarkerDetectionArray,
     MissionStatus,
 )
-from surveillance_operator.snapshot import (
-    Container,
-    Detection,
-    Grid,
-    Health,
-    Status,
-    Transition,
-)
+from surveillance_operator.snapshot import Container, Grid, Health, Status, Transition
 from surveillance_runtime.conversions import map_from, points_from_cloud, seconds_of
 
 MOST_CELLS = 16_000_000
@@ -174,15 +167,14 @@ def transition_from(message: FsmTransition) -> Transition:
         message.from_state,
         message.outcome,
         message.to_state,
-        message.kind,
         duration if math.isfinite(duration) else 0.0,
     )
 
 
-def detections_from(message: MarkerDetectionArray) -> tuple[Detection, ...]:
-    """Return the markers of one image."""
+def detections_from(message: MarkerDetectionArray) -> tuple[tuple[int, bool, bool, float], ...]:
+    """Return the markers of one image: id, known, confirmed, confidence."""
     return tuple(
-        Detection(each.id, each.known, each.confirmed, float(each.confidence))
+        (each.id, each.known, each.confirmed, round(float(each.confidence), 2))
         for each in message.detections[:MOST_NAMES]
     )
 

@@ -196,10 +196,7 @@ PARTS: Mapping[str, tuple[tuple[str, ...], Callable[[Snapshot], Any]]] = {
     'markers': (
         ('detections', 'scan_progress', 'markers'),
         lambda s: {
-            'seen': [
-                [each.id, each.known, each.confirmed, round(each.confidence, 2)]
-                for each in s.detections
-            ],
+            'seen': [list(each) for each in s.detections],
             'progress': s.scan_progress,
             'at': {str(number): list(point) for number, point in sorted(s.markers.items())},
         },

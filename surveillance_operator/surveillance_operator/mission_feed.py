@@ -8,7 +8,6 @@ lines of doors, parameters; again when another mission has begun.
 from __future__ import annotations
 
 import contextlib
-import math
 import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -41,6 +40,7 @@ from surveillance_operator.topics import (
 from surveillance_runtime.conversions import clean_texts, pose_from, seconds_of
 from surveillance_runtime.diagnostics import STALE_AFTER
 from surveillance_runtime.node import PatrolNode
+from surveillance_runtime.place.floor_plan import Door
 from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
 
 LOOK_PERIOD = 0.5
@@ -425,5 +425,5 @@ def _with_position(place: str, point: tuple[float, float]) -> Callable[[Snapshot
 
 
 def _door_line(x: float, y: float, yaw: float, width: float) -> tuple[float, float, float, float]:
-    dx, dy = width / 2 * math.cos(yaw), width / 2 * math.sin(yaw)
-    return x - dx, y - dy, x + dx, y + dy
+    (x1, y1), (x2, y2) = Door('', x, y, yaw, width).ends
+    return x1, y1, x2, y2

@@ -58,7 +58,7 @@ class MissionPage(PatrolNode):
             self.page = Page(
                 self._hub,
                 questions=self._questions(),
-                actions=self._hands() if control else {},
+                actions=self._offered_actions() if control else {},
                 picture=self._camera.jpeg,
                 host=host,
                 port=port,
@@ -99,7 +99,7 @@ class MissionPage(PatrolNode):
             'why_not': why_not,
         }
 
-    def _hands(self) -> dict[str, Action]:
+    def _offered_actions(self) -> dict[str, Action]:
         actions = self._actions
         return {
             'door': actions.set_door,

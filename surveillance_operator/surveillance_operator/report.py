@@ -99,29 +99,25 @@ def _material(folder: Path) -> tuple[Sequence[Event], FloorPlan | None, Run | No
 
 def _map(plan: FloorPlan, run: Run) -> str:
     """Return the place with the ways driven, as SVG; y points up in it."""
-    walls = ''.join(
-        f'M{wall.start[0]:.2f} {-wall.start[1]:.2f}L{wall.end[0]:.2f} {-wall.end[1]:.2f}'
-        for wall in plan.walls.values()
-    )
-    doors = ''
-    for door in plan.doors.values():
-        dx, dy = door.width / 2 * math.cos(door.yaw), door.width / 2 * math.sin(door.yaw)
-        doors += f'M{door.x - dx:.2f} {dy - door.y:.2f}L{door.x + dx:.2f} {-dy - door.y:.2f}'
-    ways = ''.join(
-        'M' + 'L'.join(f'{x:.2f} {-y:.2f}' for x, y, *_ in way) for way in run.driven if way
-    )
+    lines = [(wall.start, wall.end) for wall in plan.walls.values()]
+    walls, ways = _drawn(lines), _drawn(run.driven)
+    doors = _drawn(door.ends for door in plan.doors.values())
     names = ''.join(
         f'<text x="{x:.2f}" y="{-y:.2f}">{escape(name)}</text>'
         for name, (x, y) in _labels(plan.place.positions).items()
     )
-    ends = [end for wall in plan.walls.values() for end in (wall.start, wall.end)]
-    xs, ys = [end[0] for end in ends], [-end[1] for end in ends]
-    box = (min(xs) - 0.5, min(ys) - 0.5, max(xs) - min(xs) + 1.0, max(ys) - min(ys) + 1.0)
+    west, south, east, north = plan.bounds
+    box = west - 0.5, -north - 0.5, east - west + 1.0, north - south + 1.0
     return (
         f'<svg class="map" role="img" aria-label="The place with the way driven" '
         f'viewBox="{" ".join(f"{each:.2f}" for each in box)}"><path class="wall" d="{walls}"/>'
         f'<path class="door" d="{doors}"/><path class="way" d="{ways}"/>{names}</svg>'
     )
+
+
+def _drawn(lines: Iterable[Sequence[Sequence[float]]]) -> str:
+    """Return lines through points as the data of an SVG path."""
+    return ''.join('M' + 'L'.join(f'{x:.2f} {-y:.2f}' for x, y, *_ in line) for line in lines)
 
 
 def _labels(points: Mapping[str, Sequence[float]]) -> dict[str, tuple[float, float]]:

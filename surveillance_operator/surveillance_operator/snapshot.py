@@ -115,18 +115,7 @@ class Transition:
     from_state: str
     outcome: str
     to_state: str
-    kind: str
     duration: float
-
-
-@dataclass(frozen=True)
-class Detection:
-    """A marker in the camera's image."""
-
-    id: int
-    known: bool
-    confirmed: bool
-    confidence: float
 
 
 @dataclass(frozen=True)
@@ -215,7 +204,8 @@ class Snapshot:
         active: Paths of the states that are active, outermost first.
         paused: Whether the machine enters no further state.
         transitions: The latest transitions.
-        detections: The markers of the latest image.
+        detections: The markers of the latest image: id, whether the list of markers has it, whether
+            it is confirmed, confidence.
         markers: Where confirmed markers stand by their ids, metres.
         camera: While the arm stands still: its stamp, and the transform (4, 4) from the camera's
             optical frame to the robot.
@@ -262,7 +252,7 @@ class Snapshot:
     active: tuple[str, ...] = ()
     paused: bool = False
     transitions: tuple[Transition, ...] = ()
-    detections: tuple[Detection, ...] = ()
+    detections: tuple[tuple[int, bool, bool, float], ...] = ()
     markers: Mapping[int, tuple[float, float]] = field(default_factory=dict)
     camera: tuple[float, NDArray[np.float64]] | None = None
     stands: bool = False

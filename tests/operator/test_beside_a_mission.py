@@ -220,7 +220,7 @@ def test_the_camera_shows_images(viewer: Viewer) -> None:
     viewer.js('scrollTo(0, 0)')
 
 
-def test_hands_change_the_mission_and_say_what_came_of_it(viewer: Viewer) -> None:
+def test_control_changes_the_mission_and_say_what_came_of_it(viewer: Viewer) -> None:
     viewer.js("document.querySelector('select[name=door]').value = 'D4'")
     viewer.js("[...document.querySelectorAll('[data-act=door]')].at(1).click()")
     done(viewer, 'D4')
@@ -275,7 +275,7 @@ def test_without_the_token_nobody_can_act(viewer: Viewer) -> None:
     viewer.driver.delete_all_cookies()
     viewer.driver.get(viewer.address.partition('?')[0])
     viewer.until(lambda: viewer.count('[data-place]') == 7)
-    assert viewer.js("return document.querySelector('#hands').hidden")
+    assert viewer.js("return document.querySelector('#control').hidden")
     script = """
         const [done] = arguments;
         fetch('/act/door', {method: 'POST', body: '{"door": "D1", "open": false}'})
@@ -284,7 +284,7 @@ def test_without_the_token_nobody_can_act(viewer: Viewer) -> None:
     assert viewer.driver.execute_async_script(script) == 403
     viewer.driver.get(viewer.address)
     viewer.until(lambda: viewer.count('[data-place]') == 7)
-    assert not viewer.js("return document.querySelector('#hands').hidden")
+    assert not viewer.js("return document.querySelector('#control').hidden")
 
 
 @pytest.mark.parametrize('size', [PHONE, DESK], ids=['phone', 'desk'])

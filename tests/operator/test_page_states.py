@@ -66,7 +66,7 @@ def mission(names: tuple[str, ...]) -> Snapshot:
         obstacles=np.array([(1.0, 1.2)]),
         containers=(Container('m', 'StateMachine', names, names[:1], names, ()),),
         active=(f'm/{first}',),
-        transitions=(Transition(1, 4999.0, 'm', first, last, last, 'x', 1.0),),
+        transitions=(Transition(1, 4999.0, 'm', first, last, last, 1.0),),
         markers={11: (0.5, 0.5)},
         health={name: Health(2, first, (('memory_mb', '5'),)) for name in names},
         silent={first: last},
@@ -158,7 +158,13 @@ def test_every_state_is_readable_everywhere(name: str, hub: Hub, viewer: Viewer)
 def test_what_is_empty_says_so(hub: Hub, viewer: Viewer) -> None:
     show(hub, viewer, 'nothing')
     assert viewer.text('#title') == 'no mission yet'
-    for each in ('#map-section', '#machine-section', '#health-section', '#hands', '#time-section'):
+    for each in (
+        '#map-section',
+        '#machine-section',
+        '#health-section',
+        '#control',
+        '#time-section',
+    ):
         assert visible(viewer, f'{each} [data-without]'), each
     assert not visible(viewer, '[data-machine=pause]')
     show(hub, viewer, 'hostile')
@@ -188,7 +194,7 @@ def test_a_leap_of_the_clock_makes_nothing_wait_longer(hub: Hub, viewer: Viewer)
 def test_an_ended_mission_is_not_taken_for_a_running_one(hub: Hub, viewer: Viewer) -> None:
     show(hub, viewer, 'ended')
     assert viewer.text('#state').startswith('the mission has ended')
-    assert not visible(viewer, '#hands-body')
+    assert not visible(viewer, '#control-body')
 
 
 def test_the_next_mission_starts_on_a_clean_page(hub: Hub, viewer: Viewer) -> None:
@@ -212,7 +218,7 @@ def test_no_link_leads_below_the_header(hub: Hub, viewer: Viewer) -> None:
     hub.show(replace(STATES['large'], status=long))
     viewer.until(lambda: 'reasons' in viewer.text('#state'))
     viewer.size(*PHONE)
-    for section in ('why', 'camera-section', 'hands', 'machine-section'):
+    for section in ('why', 'camera-section', 'control', 'machine-section'):
         viewer.click(f'nav [href="#{section}"]')
         bottom = viewer.js('return document.querySelector("header").getBoundingClientRect().bottom')
         top = viewer.js(f'return document.getElementById("{section}").getBoundingClientRect().top')

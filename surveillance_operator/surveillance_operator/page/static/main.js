@@ -5,7 +5,7 @@ import {drawMachine, lightMachine} from './machine.js';
 import {drawStrips} from './time.js';
 import {Why} from './why.js';
 import {showHealth} from './health.js';
-import {Hands} from './hands.js';
+import {Control} from './control.js';
 import {Replay} from './replay.js';
 
 const root = document.documentElement;
@@ -15,8 +15,8 @@ const may = root.dataset.control === '1';
 const replaying = root.dataset.kind === 'replay';
 
 const why = new Why(state);
-const hands = new Hands(state, may && !replaying);
-const map = new MapView($('map'), (place) => { why.choose(place); hands.choose(place); }, (point) => hands.pick(point));
+const control = new Control(state, may && !replaying);
+const map = new MapView($('map'), (place) => { why.choose(place); control.choose(place); }, (point) => control.pick(point));
 const replay = replaying ? new Replay() : null;
 window.mission = {state, now, received: 0};
 
@@ -80,7 +80,7 @@ const SHOW = {
     lightMachine($('machine'), state.active?.paths ?? [], state.transitions ?? []);
     $('paused').hidden = !state.active?.paused;
   }],
-  hands: [['places', 'doors', 'mission', 'requests', 'health'], () => hands.show()],
+  control: [['places', 'doors', 'mission', 'requests', 'health'], () => control.show()],
   strips: [['history', 'places', 'mission'], () => drawStrips($('strips'), state, now())],
   map: [MAP_PARTS, (parts) => map.show(state, parts, now())],
 };
@@ -155,7 +155,7 @@ function camera() {
 
 document.body.classList.toggle('replay', replaying);
 $('replay').hidden = !replaying;
-for (const each of document.querySelectorAll('.hands')) each.hidden = !may || replaying;
+for (const each of document.querySelectorAll('.control')) each.hidden = !may || replaying;
 present();
 connect();
 setInterval(() => { listen(); map.tick(state, now()); drawStrips($('strips'), state, now()); }, 1000);

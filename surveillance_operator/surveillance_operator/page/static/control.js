@@ -27,7 +27,7 @@ function follow(field, value) {
   field.dataset.known = field.value = value;
 }
 
-export class Hands {
+export class Control {
   constructor(state, may) {
     this.state = state;
     this.may = may;
@@ -51,7 +51,7 @@ export class Hands {
     this.obstacle = this.form('Obstacle', [input('name', 'name', 'box', {class: 'short'}), number('radius', 'radius [m]', '0.3')],
       [['Place', 'obstacle', (g) => ({...g, ...this.at()}), this.point],
         ['Take away', 'remove_obstacle', (g) => ({name: g.name})]]);
-    $('hands-body').append(
+    $('control-body').append(
       this.form('Robot', [this.place], [['Go there', 'go', (g) => g], ['Call it home', 'go', () => ({place: ''})]]),
       this.form('Door', [this.door], [['Open', 'door', (g) => ({...g, is_open: true})], ['Close', 'door', (g) => ({...g, is_open: false})]]),
       this.form('Threshold', [this.seconds, h('span', {}, 's')], [['Set', 'threshold', (g) => g]]),
@@ -109,7 +109,7 @@ export class Hands {
     }
     follow(this.policy, mission?.policy || null);
     follow(this.seconds, mission?.threshold);
-    if (mission?.mode === 'MANUAL' && this.answer.previousSibling) $('hands-body').prepend(this.answer);
+    if (mission?.mode === 'MANUAL' && this.answer.previousSibling) $('control-body').prepend(this.answer);
     this.arm.hidden = !health?.nodes?.arm_controller;
     this.obstacle.hidden = !health?.nodes?.simulator;
     const waiting = Object.entries(requests ?? {}).filter(([, text]) => text);
