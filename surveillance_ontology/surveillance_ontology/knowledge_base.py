@@ -345,16 +345,15 @@ class KnowledgeBase:
         """One sentence for each asserted axiom (or part) that the reasoner does not fully use.
 
         As of the last `reason`: what is outside its fragment, and what depends on whether
-        individuals are the same that are neither known to be the same nor to be different.
+        individuals are the same that are neither known to be the same nor to be different. None
+        after a contradiction, from which everything follows.
         """
-        if self._classification is None or self._engine is None:
+        if self._classification is None or self._engine is None or not self._consistent:
             return ()
         if self._completion is not None and self._completion.unsupported is not None:
             return self._completion.unsupported
-        found = dict.fromkeys(self._classification.program.unsupported)
-        if self._consistent:
-            found.update(dict.fromkeys(self._engine.open_cases()))
-        return tuple(found)
+        native = self._classification.program.unsupported
+        return tuple(dict.fromkeys([*native, *self._engine.open_cases()]))
 
     # --- queries ---
 

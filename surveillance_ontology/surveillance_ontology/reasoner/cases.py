@@ -62,7 +62,6 @@ class CaseReasoner:
         # What makes concepts comes before the search.
         self._assertions = [(axiom, self._concept_of(axiom)) for axiom in assertions]
         self._search = CaseSearch(self._rules, most_steps)
-        self._possible = self._search.attempt(self._begin)
         self._base = self._search.mark()
         self._consistent: bool | None = None
         # The steps from each state of what accepts a property's chains.
@@ -123,7 +122,7 @@ class CaseReasoner:
         """Tell whether there is a model; True where that was not found out."""
         if self._consistent is None:
             try:
-                found = self._possible and self._search.settle()
+                found = self._search.attempt(self._begin) and self._search.settle()
             except StoppedError:
                 self.stopped = self._consistent = True
                 return True

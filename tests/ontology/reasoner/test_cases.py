@@ -271,6 +271,26 @@ def test_what_stops_is_named() -> None:
     assert reasoner.stopped
 
 
+def test_too_many_assertions_for_a_search_are_given_up() -> None:
+    members = [ClassAssertion(A, f'x:n{n}') for n in range(50)]
+    links = [ax.ObjectPropertyAssertion(P, f'x:n{n}', f'x:n{n + 1}') for n in range(50)]
+    reasoner = CaseReasoner([*members, *links], most_steps=30)
+    assert reasoner.consistent()
+    assert reasoner.stopped
+    assert list(reasoner.facts(lambda _: False)) == []
+
+
+def test_a_contradiction_leaves_nothing_out() -> None:
+    either = ClassAssertion(B_OR_C, i)
+    clash = ClassAssertion(ex.ObjectComplementOf(A), i)
+    kb = KnowledgeBase('x:', [either, SubClassOf(A, B_OR_C), ClassAssertion(A, i), clash])
+    assert not kb.reason()
+    assert kb.unsupported == ()
+    kb.remove(clash)
+    assert kb.reason()
+    assert kb.unsupported == ()
+
+
 def test_a_join_that_takes_too_long_is_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
     few_steps = partial(CaseReasoner, most_steps=200)
     monkeypatch.setattr('surveillance_ontology.reasoner.completion.CaseReasoner', few_steps)
