@@ -75,7 +75,7 @@ class FakeClock:
             self._now += seconds
             self._changed.notify_all()
 
-    def until_sleeping(self, sleepers: int = 1, timeout: float = 5.0) -> None:
+    def until_sleeping(self, sleepers: int = 1, timeout: float = 60.0) -> None:
         """Block (in real time) until so many threads sleep on the clock.
 
         Raises:

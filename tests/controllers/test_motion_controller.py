@@ -63,12 +63,12 @@ def test_a_move_can_be_cancelled_on_its_way(graph: Any, in_background: Any) -> N
     )
     graph.until(lambda: told)
     caller = ServiceCaller(graph.node, ConsoleCommand, 'motion_controller/command')
-    assert caller.call(ConsoleCommand.Request(line='move 60 0'), 5.0).accepted
+    assert caller.call(ConsoleCommand.Request(line='move 60 0'), 60.0).accepted
     graph.until(lambda: len(seen) > 2)
     cancel.set()
     with pytest.raises(CallInterruptedError):
         end()
-    assert caller.call(ConsoleCommand.Request(line='status'), 5.0).answer.startswith('No request')
+    assert caller.call(ConsoleCommand.Request(line='status'), 60.0).answer.startswith('No request')
 
 
 @pytest.mark.parametrize('path', [[], [Point(x=float('inf'))]])

@@ -40,7 +40,7 @@ class World:
         self.motion = graph.add(MotionController, timed)
         self.truth = graph.listen(PoseStamped, 'ground_truth', SENSOR_QOS)
         self.collisions = graph.listen(UInt32, 'collisions', STATE_QOS)
-        self.armor = ArmorClient(graph.node, 'test', 'surveillance')
+        self.armor = ArmorClient(graph.node, 'test', 'surveillance', timeout=60.0)
         node = graph.node
         self._compute = GoalCaller(node, ComputePath, 'compute_path')
         self._follow = GoalCaller(node, FollowPath, 'follow_path')

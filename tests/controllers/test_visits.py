@@ -27,9 +27,9 @@ def armor(graph: Any, seven_rooms: dict[str, Any]) -> ArmorClient:
     graph.add(ArmorServer)
     graph.add(OntologyMapBuilder, seven_rooms)
     ServiceCaller(graph.node, ReferenceName, 'ontology_map/reference_name').call(
-        ReferenceName.Request(), 10.0
+        ReferenceName.Request(), 60.0
     )
-    armor = ArmorClient(graph.node, 'test', 'surveillance')
+    armor = ArmorClient(graph.node, 'test', 'surveillance', timeout=60.0)
     PatrolOntology(armor).record_place('E', 1)
     return armor
 
@@ -82,7 +82,7 @@ def control(graph: Any, in_background: Any, point: Point, command: str) -> Any:
     )
     graph.until(lambda: told)
     console = ServiceCaller(graph.node, ConsoleCommand, 'motion_controller/command')
-    assert console.call(ConsoleCommand.Request(line=command), 5.0).accepted
+    assert console.call(ConsoleCommand.Request(line=command), 60.0).accepted
     return end(), seen
 
 

@@ -257,7 +257,7 @@ def test_an_alarm_gets_one_line_as_its_last_argument(tmp_path):
     script.write_text(f'printf "%s|" "$@" > {out}.new; mv {out}.new {out}\n')
     log = MergedLog(io.StringIO(), ['a'])
     alarm_caller(f'sh {script} first', log)('waiting for help: a door is closed')
-    for _ in range(200):
+    for _ in range(1200):
         if out.exists():
             break
         threading.Event().wait(0.05)

@@ -83,7 +83,8 @@ def test_a_person_answers_a_mission_and_ctrl_c_gives_the_terminal_back(terminal,
         return ends
 
     terminal.until(rb'patrol>')
-    terminal.until(rb'battery_controller.*MANUAL mode')
+    # Its last line: later ones of its name would be taken for the word that is completed.
+    terminal.until(rb'battery_controller.*ready')
     terminal.type('bat\t')
     terminal.until(rb'tery')
     terminal.type(' set 15\r')

@@ -85,7 +85,7 @@ def test_a_server_that_comes_back_empty_is_told_what_was_and_nothing_else(
     ends = [*(time for time, _ in visits[1:]), math.inf]
     # The robot was in a place from its arrival there to the next arrival at most.
     stays = {place: (time, end) for (time, place), end in zip(visits, ends, strict=True)}
-    armor = ArmorClient(graph.node, 'test', 'surveillance')
+    armor = ArmorClient(graph.node, 'test', 'surveillance', timeout=60.0)
     told = {
         room: float(value_in(armor.query.dataprop_b2_ind('visitedAt', room)[0]))
         for room in armor.query.ind_b2_class('LOCATION')
@@ -108,7 +108,7 @@ def test_a_server_that_comes_back_empty_is_told_what_was_and_nothing_else(
 def test_a_mission_outlives_an_ontology_that_contradicts_itself(
     robot: Robot, graph: Any, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    armor = ArmorClient(graph.node, 'stranger', 'surveillance')
+    armor = ArmorClient(graph.node, 'stranger', 'surveillance', timeout=60.0)
 
     def clash() -> None:
         armor.manipulation.add_ind_to_class('R4', 'DOOR')

@@ -61,7 +61,7 @@ class Caller:
 @pytest.fixture
 def armor(graph: Any) -> ArmorClient:
     """Provide a client of the map builder's ontology."""
-    return ArmorClient(graph.node, 'test', 'surveillance')
+    return ArmorClient(graph.node, 'test', 'surveillance', timeout=60.0)
 
 
 @pytest.fixture
@@ -76,7 +76,8 @@ def built(graph: Any, call: Caller) -> OntologyMapBuilder:
     graph.add(ArmorServer)
     builder: OntologyMapBuilder = graph.add(OntologyMapBuilder, PLACE)
     assert call('reference_name').name == 'surveillance'
-    PatrolOntology(ArmorClient(graph.node, 'test', 'surveillance')).record_place('E', 1)
+    armor = ArmorClient(graph.node, 'test', 'surveillance', timeout=60.0)
+    PatrolOntology(armor).record_place('E', 1)
     return builder
 
 
@@ -98,7 +99,7 @@ def test_the_builder_waits_for_the_server_and_its_clients_for_the_builder(
     async def ask() -> None:
         caller = ServiceCaller(graph.node, ReferenceName, 'ontology_map/reference_name')
         graph_ready.append(caller)
-        answers.append((await caller.call_async(ReferenceName.Request(), 10.0)).name)
+        answers.append((await caller.call_async(ReferenceName.Request(), 60.0)).name)
 
     graph_ready: list[Any] = []
     graph.node.executor.create_task(ask)
