@@ -63,12 +63,20 @@ class RuleMap:
         self.away = self._seconds_away()
 
     def _seconds_away(self) -> list[list[float]]:
-        shortest, legs = self.graph.distances, self.graph.direct
-        longer = np.isfinite(legs) & (legs > shortest + HALF_OPEN)
-        away = [row.copy() for row in self._shortest]
-        for target in np.flatnonzero(longer.any(axis=0)).tolist():
-            for place in np.argsort(shortest[:, target], kind='stable').tolist():
-                if place != target and math.isfinite(shortest[place, target]):
+        shortest = self._shortest
+        longer = {
+            other
+            for place, ways in enumerate(self.legs)
+            for other, seconds in ways.items()
+            if seconds > shortest[place][other] + HALF_OPEN
+        }
+        if not longer:
+            return shortest
+        away = [row.copy() for row in shortest]
+        for target in sorted(longer):
+            to_target = self.graph.distances[:, target]
+            for place in np.argsort(to_target, kind='stable').tolist():
+                if place != target and math.isfinite(to_target[place]):
                     hop = self.hop(place, target)
                     away[place][target] = self.legs[place][hop] + away[hop][target]
         return away
