@@ -46,24 +46,24 @@ ROOT = Path(__file__).resolve().parents[1]
 if str(ROOT) not in sys.path:
     sys.path.insert(0, str(ROOT))
 
-import rclpy  # noqa: E402
-from geometry_msgs.msg import PoseStamped  # noqa: E402
-from rcl_interfaces.srv import ListParameters  # noqa: E402
-from rclpy.executors import SingleThreadedExecutor  # noqa: E402
-from rclpy.node import Node  # noqa: E402
-from rclpy.qos import qos_profile_sensor_data  # noqa: E402
-from std_msgs.msg import UInt32  # noqa: E402
+import rclpy
+from geometry_msgs.msg import PoseStamped
+from rcl_interfaces.srv import ListParameters
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.qos import qos_profile_sensor_data
+from std_msgs.msg import UInt32
 
-from benchmarks.hosts import Host, Network, may_be_made  # noqa: E402
-from benchmarks.machine_faults import SmallDisk, SteppedClock  # noqa: E402
-from surveillance_fsm.ros import ServiceCaller  # noqa: E402
-from surveillance_interfaces.srv import ArmorDirective  # noqa: E402
-from surveillance_runtime.discovery import prefer_quick_discovery  # noqa: E402
-from surveillance_runtime.place import read_place_file  # noqa: E402
-from surveillance_runtime.place.regions import Regions  # noqa: E402
-from surveillance_runtime.qos import STATE_QOS  # noqa: E402
-from surveillance_runtime.run_parameters import PLACES  # noqa: E402
-from surveillance_runtime.testing import claim_domain  # noqa: E402
+from benchmarks.hosts import Host, Network, may_be_made
+from benchmarks.machine_faults import SmallDisk, SteppedClock
+from surveillance_fsm.ros import ServiceCaller
+from surveillance_interfaces.srv import ArmorDirective
+from surveillance_runtime.discovery import prefer_quick_discovery
+from surveillance_runtime.place import read_place_file
+from surveillance_runtime.place.regions import Regions
+from surveillance_runtime.qos import STATE_QOS
+from surveillance_runtime.run_parameters import PLACES
+from surveillance_runtime.testing import claim_domain
 
 ENVIRON = dict(os.environ)
 """Of whoever began the campaign: the watcher chooses its own way of discovery later."""

@@ -30,22 +30,22 @@ from typing import Any
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
-from benchmarks.java_reasoner import KINDS, JavaReasoner, JavaReasonerError, absent  # noqa: E402
-from surveillance_ontology import (  # noqa: E402
+from benchmarks.java_reasoner import KINDS, JavaReasoner, JavaReasonerError, absent
+from surveillance_ontology import (
     KnowledgeBase,
     OntologyFileError,
     read_ontology,
     write_ontology,
 )
-from surveillance_ontology.owl.axioms import (  # noqa: E402
+from surveillance_ontology.owl.axioms import (
     Annotation,
     Axiom,
     Declaration,
     Import,
 )
-from surveillance_ontology.owl.entities import entities_of  # noqa: E402
-from surveillance_ontology.owl.vocabulary import NOTHING, THING  # noqa: E402
-from surveillance_ontology.reasoner.cases import UnsupportedError  # noqa: E402
+from surveillance_ontology.owl.entities import entities_of
+from surveillance_ontology.owl.vocabulary import NOTHING, THING
+from surveillance_ontology.reasoner.cases import UnsupportedError
 
 BASE = 'http://example.org/'
 ENDINGS = ('.owl', '.rdf', '.ttl', '.ofn', '.owx', '.nt')

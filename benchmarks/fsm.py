@@ -31,9 +31,9 @@ from typing import Any
 CHECKOUT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(CHECKOUT / 'surveillance_fsm'))
 
-import surveillance_fsm as fsm  # noqa: E402
-from surveillance_fsm import history  # noqa: E402
-from surveillance_fsm.verify import verify  # noqa: E402
+import surveillance_fsm as fsm
+from surveillance_fsm import history
+from surveillance_fsm.verify import verify
 
 RING = 3
 LEVELS = 3

@@ -44,19 +44,19 @@ ROOT = Path(__file__).resolve().parents[1]
 if str(ROOT) not in sys.path:
     sys.path.insert(0, str(ROOT))
 
-import rclpy  # noqa: E402
-from rcl_interfaces.srv import ListParameters  # noqa: E402
-from rclpy.action import (  # noqa: E402
+import rclpy
+from rcl_interfaces.srv import ListParameters
+from rclpy.action import (
     ActionClient,
     get_action_server_names_and_types_by_node,
 )
-from rclpy.executors import SingleThreadedExecutor  # noqa: E402
-from rclpy.node import Node  # noqa: E402
-from rclpy.qos import DurabilityPolicy, QoSProfile  # noqa: E402
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile
 
-from benchmarks.whole_stack import ros_arguments  # noqa: E402
-from surveillance_runtime import node_table  # noqa: E402
-from surveillance_runtime.testing import claim_domain  # noqa: E402
+from benchmarks.whole_stack import ros_arguments
+from surveillance_runtime import node_table
+from surveillance_runtime.testing import claim_domain
 
 STRANGE_FLOATS = (
     math.nan, math.inf, -math.inf, 1e308, -1e308, 5e-324, -0.0, 1e9, -1e9, 0.0, 1.0, -1.0,

@@ -21,19 +21,19 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
-from benchmarks.java_reasoner import JavaReasoner, JavaReasonerError, absent  # noqa: E402
-from benchmarks.random_agreement import IRI, drawn_axioms, spelt_out, words_for  # noqa: E402
-from surveillance_ontology import KnowledgeBase, read_ontology, write_ontology  # noqa: E402
-from surveillance_ontology.owl.axiom_text import axiom_text  # noqa: E402
-from surveillance_ontology.owl.axioms import (  # noqa: E402
+from benchmarks.java_reasoner import JavaReasoner, JavaReasonerError, absent
+from benchmarks.random_agreement import IRI, drawn_axioms, spelt_out, words_for
+from surveillance_ontology import KnowledgeBase, read_ontology, write_ontology
+from surveillance_ontology.owl.axiom_text import axiom_text
+from surveillance_ontology.owl.axioms import (
     Axiom,
     Declaration,
     Import,
     SameIndividual,
     SubClassOf,
 )
-from surveillance_ontology.owl.entities import entities_of  # noqa: E402
-from surveillance_ontology.owl.vocabulary import THING  # noqa: E402
+from surveillance_ontology.owl.entities import entities_of
+from surveillance_ontology.owl.vocabulary import THING
 
 COLUMNS = ('facts', 'sufficient', 'minimal', 'not judged')
 

@@ -23,19 +23,19 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
-from benchmarks.java_reasoner import KINDS, JavaReasoner, JavaReasonerError, absent  # noqa: E402
-from surveillance_ontology import (  # noqa: E402
+from benchmarks.java_reasoner import KINDS, JavaReasoner, JavaReasonerError, absent
+from surveillance_ontology import (
     KnowledgeBase,
     read_ontology,
     write_ontology,
 )
-from surveillance_ontology.owl.axioms import (  # noqa: E402
+from surveillance_ontology.owl.axioms import (
     Axiom,
     ClassAssertion,
     DataPropertyAssertion,
     ObjectPropertyAssertion,
 )
-from surveillance_ontology.owl.expressions import Literal  # noqa: E402
+from surveillance_ontology.owl.expressions import Literal
 
 UB = 'http://swat.cse.lehigh.edu/onto/univ-bench.owl#'
 STAFF = (('FullProfessor', 7, 10), ('AssociateProfessor', 10, 14), ('AssistantProfessor', 8, 11))

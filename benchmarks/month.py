@@ -30,13 +30,13 @@ ROOT = Path(__file__).resolve().parents[1]
 if str(ROOT) not in sys.path:
     sys.path.insert(0, str(ROOT))
 
-from surveillance_behaviour.mission import mission_log  # noqa: E402
-from surveillance_ontology.armor.access import DATA, Settings  # noqa: E402
-from surveillance_ontology.armor.client import ArmorClient, InProcessTransport  # noqa: E402
-from surveillance_ontology.armor.service import ArmorService  # noqa: E402
-from surveillance_ontology.armor.store import Store  # noqa: E402
-from surveillance_ontology.patrol_ontology import PatrolOntology  # noqa: E402
-from surveillance_runtime.place import read_place_file  # noqa: E402
+from surveillance_behaviour.mission import mission_log
+from surveillance_ontology.armor.access import DATA, Settings
+from surveillance_ontology.armor.client import ArmorClient, InProcessTransport
+from surveillance_ontology.armor.service import ArmorService
+from surveillance_ontology.armor.store import Store
+from surveillance_ontology.patrol_ontology import PatrolOntology
+from surveillance_runtime.place import read_place_file
 
 DAY = 86400.0
 LEG = 13.3

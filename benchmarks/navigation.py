@@ -39,6 +39,7 @@ from geometry_msgs.msg import Twist
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import dijkstra
 from skimage.graph import MCP_Geometric
+from tables import table
 from whole_stack import ROOT, Stack, ros_arguments
 
 from launcher.run import Run
@@ -66,12 +67,9 @@ from surveillance_simulation.world.world import World, read_world
 Mask = npt.NDArray[np.bool_]
 
 
-def table(title: str, head: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-    """Print an aligned table."""
-    widths = [max(len(row[column]) for row in [head, *rows]) for column in range(len(head))]
-    print(f'\n{title}')
-    for row in [head, *rows]:
-        print('  '.join(cell.rjust(width) for cell, width in zip(row, widths, strict=True)))
+def print_table(title: str, head: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
+    """Print a title and a table below it."""
+    print(f'\n{title}\n{table([head, *rows])}')
 
 
 def median_ms(work: Callable[[], Any], budget: float) -> float:
@@ -146,7 +144,7 @@ def planning(*, quick: bool) -> None:
                 reference,
             )
         )
-    table(
+    print_table(
         'Planning from corner to corner, median CPU time; obstacle: with one that is new.\n'
         'Length in metres: ours, which keeps away '
         'from walls;\nwith `aversion` 0; of the bare search on the same costs; the optimum over 32 '
@@ -260,7 +258,7 @@ def control(*, quick: bool) -> None:
         )
         for part, times in spent.items()
     ]
-    table(
+    print_table(
         f'One step of a drive of {robot.base.travelled:.0f} m in {robot.time:.0f} s, '
         f'{robot.base.collisions} collisions; a step is due every 100 ms.',
         ('part', 'median CPU ms', '99 % CPU ms', 'of the step'),
@@ -376,7 +374,7 @@ def people(*, quick: bool) -> None:
         )
         for reason, count in did.failed.items():
             print(f'{name}: failed {count}: {reason}')
-    table(
+    print_table(
         'Drives among people at 1.2 m/s, simulated hours on the cores alone; a contact is one '
         "by the robot's own motion.",
         ('who', 'hours', 'drives', 'arrived', 'contacts', 'recoveries', 'm', 'step ms', '99 %'),
@@ -408,7 +406,7 @@ def kidnaps(*, quick: bool) -> None:
                 f'{sum(longest > 60.0 for longest in wrong)}',
             )
         )
-    table(
+    print_table(
         'A driving robot is carried to another pose and watched for 90 s; wrong is an estimate '
         'more than 0.5 m off\nof a robot that does not say it is lost or unsure (covariance of '
         'amcl_pose).',
@@ -504,7 +502,7 @@ def silence(*, quick: bool) -> None:
 
         patrol.observer.create_timer(0.05, command)
         rows += stops_after_silence(patrol, 'a foreign cmd_vel, scan', speeds, rounds)
-    table(
+    print_table(
         'A sensor of 10 Hz falls silent at a speed, real time, worst of '
         f'{rounds}; times from the first message that did not come.',
         ('who, what', 'm/s', 'until it brakes, s', 'until it stands, s', 'way, m'),
@@ -576,7 +574,7 @@ def stack(*, quick: bool) -> None:
     ):
         rate, cpu, distance = measure()
         rows.append((name, f'{rate:.1f}', f'{cpu:.1f}', f'{distance:.0f}'))
-    table(
+    print_table(
         f'The whole stack patrolling the seven rooms for {seconds:.0f} real seconds each.',
         ('how', 'simulated s / real s', 'simulated s / CPU s', 'metres driven'),
         rows,
@@ -759,7 +757,7 @@ def pace(*, quick: bool) -> None:
                 f'{min(ratios):.3f} to {max(ratios):.3f}',
             )
         )
-    table(
+    print_table(
         'The legs that two missions share, as fast as it goes and on the clock of the machine: '
         'seconds, medians.',
         ('what', 'legs', 'fast, s', 'real time, s', 'ratio', 'from to'),
@@ -801,7 +799,7 @@ def times(*, quick: bool) -> None:
                     f'{longest / promised:.2f}',
                 )
             )
-    table(
+    print_table(
         f'{seconds:.0f} simulated seconds of patrol: how wrong the expected time of each leg is '
         'before it is driven,\nhow many keep to the time that 99 of 100 should keep to, and the '
         'longest wait from visit to visit in the second half.',

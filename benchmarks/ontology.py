@@ -31,18 +31,19 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
-from benchmarks.java_reasoner import KINDS, JavaReasoner, JavaReasonerError, absent  # noqa: E402
-from surveillance_ontology.documents.reading import read_ontology  # noqa: E402
-from surveillance_ontology.documents.writing import write_ontology  # noqa: E402
-from surveillance_ontology.knowledge_base import KnowledgeBase  # noqa: E402
-from surveillance_ontology.owl.axioms import (  # noqa: E402
+from benchmarks.java_reasoner import KINDS, JavaReasoner, JavaReasonerError, absent
+from benchmarks.tables import table
+from surveillance_ontology.documents.reading import read_ontology
+from surveillance_ontology.documents.writing import write_ontology
+from surveillance_ontology.knowledge_base import KnowledgeBase
+from surveillance_ontology.owl.axioms import (
     Axiom,
     DataPropertyAssertion,
     DifferentIndividuals,
     ObjectPropertyAssertion,
 )
-from surveillance_ontology.owl.expressions import Literal  # noqa: E402
-from surveillance_ontology.owl.vocabulary import XSD  # noqa: E402
+from surveillance_ontology.owl.expressions import Literal
+from surveillance_ontology.owl.vocabulary import XSD
 
 IRI = 'http://bnc/exp-rob-lab/2022-23'
 SCHEMA = ROOT / 'surveillance_ontology' / 'surveillance_ontology' / 'data' / 'surveillance.owl'
@@ -248,17 +249,6 @@ def duration(value: float) -> str:
         if value >= scale or unit == 'us':
             return f'{value / scale:.3g} {unit}'
     raise AssertionError
-
-
-def table(rows: list[list[str]]) -> str:
-    widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
-    lines = []
-    for row in rows:
-        first = row[0].ljust(widths[0])
-        rest = [cell.rjust(width) for cell, width in zip(row[1:], widths[1:], strict=True)]
-        lines.append('  '.join([first, *rest]).rstrip())
-    lines.insert(1, '  '.join('-' * width for width in widths))
-    return '\n'.join(lines)
 
 
 def java_rows(figures: list[Figures], quick: bool) -> list[list[str]]:

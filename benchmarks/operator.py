@@ -35,13 +35,14 @@ from sensor_msgs.msg import CompressedImage, LaserScan
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
-from surveillance_operator.page.hub import Hub  # noqa: E402
-from surveillance_operator.recording.bag import METADATA, BagWriter, TopicType  # noqa: E402
-from surveillance_operator.recording.runs import find_recording  # noqa: E402
-from surveillance_operator.recording.schemas import definition  # noqa: E402
-from surveillance_operator.replay import open_player  # noqa: E402
-from surveillance_runtime.testing import claim_domain  # noqa: E402
-from tests.operator.browser import CHROMIUM, DRIVER, Viewer  # noqa: E402
+from benchmarks.tables import table
+from surveillance_operator.page.hub import Hub
+from surveillance_operator.recording.bag import METADATA, BagWriter, TopicType
+from surveillance_operator.recording.runs import find_recording
+from surveillance_operator.recording.schemas import definition
+from surveillance_operator.replay import open_player
+from surveillance_runtime.testing import claim_domain
+from tests.operator.browser import CHROMIUM, DRIVER, Viewer
 
 START = 1e9
 """Of the recordings that are made up here, seconds since 1970."""
@@ -356,10 +357,7 @@ def main() -> None:
         rows += mission_rows(Path(folder), options.quick)
         if not options.quick:
             rows += memory_rows(Path(folder), options.minutes)
-    width = max(len(name) for name, _, _ in rows)
-    print(f'{"figure":<{width}}  {"measured":>20}  {"limit":>8}')
-    for name, measured, limit in rows:
-        print(f'{name:<{width}}  {measured:>20}  {limit:>8}')
+    print(table([('figure', 'measured', 'limit'), *rows]))
 
 
 if __name__ == '__main__':

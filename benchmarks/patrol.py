@@ -36,22 +36,23 @@ ROOT = Path(__file__).resolve().parents[1]
 for package in ('behaviour', 'fsm', 'ontology', 'runtime'):
     sys.path.insert(0, str(ROOT / f'surveillance_{package}'))
 
-from patrolling_sim import read_patrolling_sim  # noqa: E402
-from rule_bound import rule_bound  # noqa: E402
+from patrolling_sim import read_patrolling_sim
+from rule_bound import rule_bound
+from tables import table
 
-from surveillance_behaviour.decision import Rules  # noqa: E402
-from surveillance_behaviour.policy.graph import (  # noqa: E402
+from surveillance_behaviour.decision import Rules
+from surveillance_behaviour.policy.graph import (
     GraphError,
     PatrolGraph,
     graph_of_places,
 )
-from surveillance_behaviour.policy.policies import DEFAULT_POLICY  # noqa: E402
-from surveillance_behaviour.policy.simulation import (  # noqa: E402
+from surveillance_behaviour.policy.policies import DEFAULT_POLICY
+from surveillance_behaviour.policy.simulation import (
     Patrol,
     PatrolRun,
     SimulatedBattery,
 )
-from surveillance_runtime.place import read_place_file  # noqa: E402
+from surveillance_runtime.place import read_place_file
 
 DAY = 86400.0
 SPEED, DWELL = 0.6, 2.0
@@ -162,18 +163,6 @@ def patrol(
     for _ in run.until(hours * 3600.0):
         pass
     return run.run
-
-
-def table(rows: Sequence[Sequence[str]]) -> str:
-    """Aligned columns, the first to the left and the rest to the right."""
-    widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
-    return '\n'.join(
-        '  '.join(
-            cell.ljust(width) if column == 0 else cell.rjust(width)
-            for column, (cell, width) in enumerate(zip(row, widths, strict=True))
-        )
-        for row in rows
-    )
 
 
 def compare(place: Map, hours: float) -> dict[str, PatrolRun]:

@@ -14,7 +14,6 @@ times its answers.
 `--picture` draws recall over distance and angle.
 """
 
-# ruff: noqa: E402 - the number of threads must be set before numpy is imported, and where benchmarks lie
 from __future__ import annotations
 
 import argparse
@@ -31,6 +30,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+# Read when numpy is imported.
 for variable in ('OPENBLAS_NUM_THREADS', 'OMP_NUM_THREADS'):
     os.environ.setdefault(variable, '1')
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
@@ -41,6 +41,7 @@ import numpy.typing as npt
 
 from benchmarks.backdrops import BACKDROPS, backdrop_of
 from benchmarks.photographs import AS_TAKEN, VARIATIONS, Photograph, photographs_in
+from benchmarks.tables import table
 from surveillance_perception.detection.camera_model import CameraModel
 from surveillance_perception.detection.detector import DetectorSettings, MarkerDetector
 from surveillance_perception.detection.dictionaries import dictionary_named
@@ -561,13 +562,8 @@ def summed(tallies: Sequence[Tally]) -> Tally:
 
 
 def print_table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-    """Print an aligned table, the first column to the left."""
-    widths = [max(len(row[column]) for row in [head, *rows]) for column in range(len(head))]
-    for row in [head, ['-' * width for width in widths], *rows]:
-        cells = [row[0].ljust(widths[0])]
-        cells += [cell.rjust(width) for cell, width in zip(row[1:], widths[1:], strict=True)]
-        print('  '.join(cells))
-    print()
+    """Print a table and an empty line."""
+    print(table([head, *rows]) + '\n')
 
 
 def ratio(ours: float, theirs: float) -> str:

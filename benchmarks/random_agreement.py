@@ -27,9 +27,9 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
-from benchmarks.java_reasoner import KINDS, JavaReasoner, JavaReasonerError, absent  # noqa: E402
-from surveillance_ontology import KnowledgeBase, write_ontology  # noqa: E402
-from surveillance_ontology.owl.axioms import (  # noqa: E402
+from benchmarks.java_reasoner import KINDS, JavaReasoner, JavaReasonerError, absent
+from surveillance_ontology import KnowledgeBase, write_ontology
+from surveillance_ontology.owl.axioms import (
     Axiom,
     ClassAssertion,
     DataPropertyAssertion,
@@ -42,9 +42,9 @@ from surveillance_ontology.owl.axioms import (  # noqa: E402
     SameIndividual,
     SubClassOf,
 )
-from surveillance_ontology.owl.expressions import ObjectUnionOf  # noqa: E402
-from surveillance_ontology.owl.vocabulary import NOTHING  # noqa: E402
-from tests.ontology.reasoner.wide_ontologies import DenseOntology, WideOntology  # noqa: E402
+from surveillance_ontology.owl.expressions import ObjectUnionOf
+from surveillance_ontology.owl.vocabulary import NOTHING
+from tests.ontology.reasoner.wide_ontologies import DenseOntology, WideOntology
 
 IRI = 'http://example.org/wide'
 COLUMNS = ('ontologies', 'refused', 'no answer', 'inconsistent', 'questions', 'right', 'settled')

@@ -30,8 +30,8 @@ CHECKOUT = Path(__file__).resolve().parent.parent
 if str(CHECKOUT) not in sys.path:
     sys.path.insert(0, str(CHECKOUT))
 
-from launcher.process_watch import look_at  # noqa: E402
-from surveillance_runtime.testing import claim_domain  # noqa: E402
+from launcher.process_watch import look_at
+from surveillance_runtime.testing import claim_domain
 
 BASE_PYTHON = str(getattr(sys, '_base_executable', sys.executable))
 NO_EXPLORING = '/**/robot_behavior:\n  ros__parameters:\n    exploration_seconds: 0.0\n'

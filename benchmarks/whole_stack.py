@@ -18,14 +18,14 @@ ROOT = Path(__file__).resolve().parents[1]
 if str(ROOT) not in sys.path:
     sys.path.insert(0, str(ROOT))
 
-import rclpy  # noqa: E402
+import rclpy
 
-from surveillance_runtime import node_table  # noqa: E402
-from surveillance_runtime.node import PatrolNode  # noqa: E402
-from surveillance_runtime.process import ExecutorThread, share_clock  # noqa: E402
-from surveillance_runtime.testing import claim_domain  # noqa: E402
-from surveillance_simulation.robot.robot import Robot  # noqa: E402
-from surveillance_simulation.simulator_node import Simulator  # noqa: E402
+from surveillance_runtime import node_table
+from surveillance_runtime.node import PatrolNode
+from surveillance_runtime.process import ExecutorThread, share_clock
+from surveillance_runtime.testing import claim_domain
+from surveillance_simulation.robot.robot import Robot
+from surveillance_simulation.simulator_node import Simulator
 
 
 class Stack:

@@ -19,23 +19,23 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / 'benchmarks'))
 
-from builtin_interfaces.msg import Duration  # noqa: E402
-from PIL import Image as Picture  # noqa: E402
-from PIL import ImageDraw, ImageFont  # noqa: E402
-from rich.console import Console  # noqa: E402
-from rich.style import Style  # noqa: E402
-from rich.terminal_theme import MONOKAI  # noqa: E402
-from sensor_msgs.msg import Image, JointState  # noqa: E402
-from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint  # noqa: E402
-from whole_stack import Stack  # noqa: E402
+from builtin_interfaces.msg import Duration
+from PIL import Image as Picture
+from PIL import ImageDraw, ImageFont
+from rich.console import Console
+from rich.style import Style
+from rich.terminal_theme import MONOKAI
+from sensor_msgs.msg import Image, JointState
+from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+from whole_stack import Stack
 
-from surveillance_fsm.ros import ServiceCaller  # noqa: E402
-from surveillance_interfaces.srv import PlaceObstacle, SetDoor, SetMarker  # noqa: E402
-from surveillance_operator import map_command  # noqa: E402
-from surveillance_operator.watch.view import KEY_NOTE, MissionView  # noqa: E402
-from surveillance_runtime import node_table  # noqa: E402
-from surveillance_runtime.qos import SENSOR_QOS  # noqa: E402
-from surveillance_runtime.robot_arm import ARM  # noqa: E402
+from surveillance_fsm.ros import ServiceCaller
+from surveillance_interfaces.srv import PlaceObstacle, SetDoor, SetMarker
+from surveillance_operator import map_command
+from surveillance_operator.watch.view import KEY_NOTE, MissionView
+from surveillance_runtime import node_table
+from surveillance_runtime.qos import SENSOR_QOS
+from surveillance_runtime.robot_arm import ARM
 
 IMAGES = ROOT / 'docs' / 'images'
 PATROL_SECONDS = 1500.0

@@ -17,9 +17,9 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
-from surveillance_runtime.testing import claim_domain  # noqa: E402
-from tests.launcher.conftest import Started  # noqa: E402
-from tests.operator.browser import DESK, PHONE, Viewer  # noqa: E402
+from surveillance_runtime.testing import claim_domain
+from tests.launcher.conftest import Started
+from tests.operator.browser import DESK, PHONE, Viewer
 
 WAIT = 600.0
 """Longest wait for anything to be seen, on a busy machine, seconds."""
