@@ -59,6 +59,35 @@ def test_print_of_another_code_is_not_taken_for_the_nearest_one():
     assert np.isinf(DIFFERENCES.read(cells).error).all()
 
 
+@pytest.mark.parametrize(
+    ('dictionary', 'dirty', 'read'),
+    [
+        ('DICT_APRILTAG_36h11', 3, True),
+        ('DICT_6X6_250', 3, True),
+        ('DICT_7X7_250', 4, True),
+        ('DICT_5X5_100', 1, False),
+        ('DICT_4X4_50', 1, False),
+        # so many cells lie between prints of DICT_APRILTAG_36h11 and codes of DICT_6X6_1000
+        ('DICT_6X6_1000', 4, False),
+    ],
+)
+def test_code_with_wrong_cells_is_read_where_hardly_any_print_is_so_near(dictionary, dirty, read):
+    codes = MarkerCodes.of(dictionary_named(dictionary))
+    generator = np.random.default_rng(2)
+    entries = generator.choice(len(codes.ids), 50)
+    white = codes.cells[entries, 1:-1, 1:-1] > 0
+    for each in white:
+        row, column = np.divmod(generator.choice(codes.bits**2, dirty, replace=False), codes.bits)
+        each[1 + row, 1 + column] ^= True
+    cells = np.where(white, 225.0, 25.0).astype(np.float32)
+    seen = CellDifferences(codes).read(cells)
+    if read:
+        assert seen.entries.tolist() == entries.tolist()
+        assert seen.error.max() < 1e-4
+    else:
+        assert seen.error.min() > 1e-4
+
+
 def test_cells_of_the_other_colour_are_counted():
     entries = np.array([40])
     cells = levels(40)[None]
