@@ -22,6 +22,7 @@ from launcher.process_watch import IDLE_AFTER, Activity, Heartbeats, look_at
 from launcher.restarts import PAUSES, Restarts
 from launcher.service import notify
 from surveillance_runtime.launch_protocol import (
+    DONE,
     EXIT_CANNOT_START,
     EXIT_NOT_NOW,
     FINISHED,
@@ -38,7 +39,8 @@ START_WITHIN = 1.5
 STOP_LEADERS_WITHIN = 1.2
 """Seconds that the processes which use the others have before those are told to stop as well."""
 STOP_WITHIN, STOP_AT_MOST = 2.5, 12.0
-"""Seconds until whatever is left and does nothing is killed, and until all that is left is."""
+"""Seconds until whatever is left and does nothing, or has done its work, is killed, and until all
+that is left is."""
 STOP_AGAIN_AFTER = 0.5
 """Seconds from a stop signal on which another one kills all that is left; one Ctrl-C may come as
 two signals."""
@@ -90,6 +92,7 @@ class Child:
     kill_at: float | None = None
     coming_up: bool = False
     finished: bool = False
+    done: bool = False
     heartbeats: Heartbeats | None = None
     activity: Activity = field(default_factory=Activity)
     ended_for: str = ''
@@ -220,7 +223,7 @@ class Supervisor:
             self._start(self._to_start.pop(0))
 
     def _start(self, child: Child) -> None:
-        child.finished, child.ended_for = False, ''
+        child.finished, child.done, child.ended_for = False, False, ''
         with self._pipe(self._when_up(child)) as up, self._pipe(self._when_it_beats(child)) as beat:
             process = self._spawn(child, {UP: up, HEARTBEAT: beat})
         child.process = process
@@ -271,6 +274,7 @@ class Supervisor:
             if chunk and child.heartbeats is heartbeats:
                 heartbeats.beat(time.monotonic())
                 child.finished = child.finished or FINISHED in chunk
+                child.done = child.done or DONE in chunk
                 # Who is alone has nobody who could have forgotten it.
                 if SLEPT in chunk and len(self.children) > 1:
                     self._end(child, 'slept so long that its peers may have forgotten it')
@@ -406,11 +410,15 @@ class Supervisor:
                 continue
             look = look_at(child.process.pid)
             works = look is not None and child.activity.idle(now, look) < IDLE_AFTER
-            allowed = STOP_AT_MOST if works else STOP_WITHIN
-            if self._stop_at_once or now >= since + allowed:
+            allowed = STOP_AT_MOST if works and not child.done else STOP_WITHIN
+            if not self._stop_at_once and now < since + allowed:
+                continue
+            child.killed = True
+            if child.done:
+                self._log.say(f'{child.program.name} has done its work, ROS does not let it end')
+            else:
                 self._log.warn(f'{child.program.name} did not end in time: killed')
-                child.killed = True
-                self._kill(child, can_tell=not self._stop_at_once)
+            self._kill(child, can_tell=not (self._stop_at_once or child.done))
 
     def _keep_time(self, end: float | None) -> None:
         now = time.monotonic()

@@ -18,7 +18,7 @@ from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.clock import Clock, ClockType
 
 from surveillance_runtime.health import ERROR, OK, RECENT, WARN, Finding
-from surveillance_runtime.launch_protocol import BEAT, FINISHED, HEARTBEAT, RESTARTS, SLEPT
+from surveillance_runtime.launch_protocol import BEAT, DONE, FINISHED, HEARTBEAT, RESTARTS, SLEPT
 from surveillance_runtime.node import PatrolNode
 
 TOPIC = '/diagnostics'
@@ -85,6 +85,10 @@ class Heartbeat:
     def say_finished(self) -> None:
         """Say that the process ends on purpose, and is not to be started again."""
         self._write(FINISHED)
+
+    def say_done(self) -> None:
+        """Say that the nodes' work has ended: what follows may be cut off."""
+        self._write(DONE)
 
     def _write(self, word: bytes) -> None:
         if self._pipe is not None:

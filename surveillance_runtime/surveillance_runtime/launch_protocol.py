@@ -11,7 +11,7 @@ import signal
 UP = 'LAUNCH_UP'
 """A descriptor that a process closes to say that the bulk of its start is done."""
 HEARTBEAT = 'LAUNCH_HEARTBEAT'
-"""A descriptor that a process writes `BEAT`, `SLEPT` or `FINISHED` to."""
+"""A descriptor that a process writes `BEAT`, `SLEPT`, `FINISHED` or `DONE` to."""
 RESTARTS = 'LAUNCH_RESTARTS'
 """How often the process has been started again."""
 MEMORY = 'LAUNCH_MEMORY'
@@ -27,6 +27,9 @@ SLEPT = b'S'
 """It did not run for so long that its peers may have forgotten it."""
 FINISHED = b'F'
 """It ends on purpose."""
+DONE = b'D'
+"""Its nodes' work has ended: it has only to leave ROS. Fast DDS 2.14 was seen to block there for
+ever, 18 s after a peer was killed; its issue 6502 tells of such a deadlock."""
 
 SAY_WHERE = signal.SIGQUIT
 """Has a process say on stderr where each of its threads is, and end at once, whatever hangs."""

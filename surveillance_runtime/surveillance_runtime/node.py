@@ -395,10 +395,14 @@ class PatrolNode(Node):  # type: ignore[misc]
     def on_stop(self) -> None:
         """Do what is to be done once when the node stops, while messages still flow."""
 
-    def stop(self) -> None:
-        """End the node's work; call it from outside the executor while that still spins."""
+    def stop(self) -> bool:
+        """End the node's work; call it from outside the executor while that still spins.
+
+        Returns:
+            Whether all its threads have ended, or were told to before.
+        """
         if self.stopping.is_set():
-            return
+            return True
         self.stopping.set()
         self.on_stop()
         with self._spawning:
@@ -410,6 +414,7 @@ class PatrolNode(Node):  # type: ignore[misc]
         late = ', '.join(thread.name for thread in others if thread.is_alive())
         if late:
             self.get_logger().warn(f'{late} did not end in {JOIN_SECONDS} s')
+        return not late
 
     def _check_parameters(self, parameters: list[Parameter]) -> SetParametersResult:
         try:

@@ -103,7 +103,7 @@ def _run_nodes(factories: Sequence[Callable[[], PatrolNode]], args: Sequence[str
     give_arguments(arguments)
     nodes: list[PatrolNode] = []
     spinner = ExecutorThread()
-    diagnostics = None
+    heartbeat = diagnostics = None
     code = 0
     try:
         for factory in factories:
@@ -127,14 +127,15 @@ def _run_nodes(factories: Sequence[Callable[[], PatrolNode]], args: Sequence[str
     finally:
         ending.ignore_signals()
         give_arguments(None)
-        for node in reversed(nodes):
-            node.stop()
+        late = [node for node in reversed(nodes) if not node.stop()]
         # Its watchdog needs neither the interpreter nor a lock; it tells where each thread hangs.
         faulthandler.dump_traceback_later(END_SECONDS, exit=True, file=2)
         if diagnostics is not None:
             diagnostics.stop()
         # What a callback that has not ended uses is not taken away from under it.
         if spinner.stop():
+            if heartbeat is not None and not late:
+                heartbeat.say_done()
             for node in reversed(nodes):
                 node.destroy_node()
             rclpy.try_shutdown()

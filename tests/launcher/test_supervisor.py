@@ -54,24 +54,35 @@ def test_a_child_that_heeds_no_signal_and_does_nothing_is_killed(start):
     assert 'Traceback' not in '\n'.join(launch.lines)
 
 
-HANGING = (
-    'import threading\n'
-    'from surveillance_runtime.node import PatrolNode\n'
-    'from surveillance_runtime.process import run_node\n'
-    'class Hanging(PatrolNode):\n'
-    '    def __init__(self): super().__init__("hanging")\n'
-    '    def on_stop(self): threading.Event().wait()\n'
-    'run_node(Hanging, [])'
-)
+HANGING = """
+import threading
+from surveillance_runtime.node import PatrolNode
+from surveillance_runtime.process import run_node
+
+class Hanging(PatrolNode):
+    def __init__(self):
+        super().__init__('hanging')
+
+    def METHOD(self):
+        threading.Event().wait()
+
+run_node(Hanging, [])
+"""
 
 
-def test_a_node_that_hangs_says_where_before_it_is_killed(start, ros_domain):
+def test_a_node_that_hangs_says_where_unless_its_work_is_done(start, ros_domain):
     environ = {**USER_ENVIRON, 'ROS_DOMAIN_ID': str(ros_domain)}
-    launch = start(DRIVER, f'node={HANGING}', environ=environ)
-    launch.until(r'node +\| .*ready')
+    scripts = (('works', 'on_stop'), ('leaves', 'destroy_node'))
+    programs = [f'{name}={HANGING.replace("METHOD", method)}' for name, method in scripts]
+    launch = start(DRIVER, *programs, environ=environ)
+    for name, _ in scripts:
+        launch.until(rf'{name} +\| .*ready')
     assert launch.end(signal.SIGINT)[0] == 0
-    assert 'node did not end in time: killed' in '\n'.join(launch.lines)
-    assert any(re.search(r'node +\| .* in on_stop', line) for line in launch.lines)
+    output = '\n'.join(launch.lines)
+    assert 'works did not end in time: killed' in output
+    assert re.search(r'works +\| .* in on_stop', output)
+    assert 'leaves has done its work' in output
+    assert not re.search(r'leaves +\| .* in destroy_node', output)
 
 
 WORKING = STUBBORN.replace('signal.pause()', 'pass')
