@@ -322,10 +322,13 @@ def under_load(seconds: float, axioms: int) -> list[Row]:
             peer.wait_for_service()
         start = time.perf_counter()
         futures = [peer.call_async(request) for _ in range(20) for peer in peers]
-        while not all(f.done() for f in futures) and time.perf_counter() - start < 20:
+        lost, last = len(futures), start
+        # On a busy machine an answer may be late; one that does not come is lost.
+        while lost and time.perf_counter() - last < 20:
             time.sleep(0.01)
-        lost = sum(not future.done() for future in futures)
-        taken = (time.perf_counter() - start) * 1e3
+            if (left := sum(not future.done() for future in futures)) < lost:
+                lost, last = left, time.perf_counter()
+        taken = (last - start) * 1e3
         found.append(('1,000 requests of 50 clients at once, ROS', taken, f'{lost} lost'))
         # Each client is told of every answer to any of them, and drops those of others.
         for peer in peers:

@@ -120,7 +120,9 @@ class _Parser:
         if depth > DEEPEST:
             raise self._fail(f'constructs nest deeper than {DEEPEST}', place)
         if kind == 'iri':
-            return self._iri(value, place)
+            # The OWL API writes <_:a> as the value of an annotation.
+            unnamed = value.startswith('_:')
+            return self._named(value, place) if unnamed else self._iri(value, place)
         if kind == 'text':
             return self._literal(re.sub(r'\\(.)', r'\1', value, flags=re.DOTALL))
         if (kind, value) == ('mark', '('):

@@ -111,12 +111,13 @@ class _Reader(XmlReader):
         if name == 'Literal':
             return self._literal(element)
         text = ''.join(element.text).strip()
-        if name == 'IRI':
+        if name == 'IRI' and not text.startswith('_:'):
             return self.named(element.base, text)
         if name == 'AbbreviatedIRI':
             return self._named(text)
-        if name == 'AnonymousIndividual':
-            label = '_:' + self._attribute(element, 'nodeID').removeprefix('_:')
+        if name in ('IRI', 'AnonymousIndividual'):
+            # The OWL API writes an annotation's value without a name as an IRI.
+            label = text or '_:' + self._attribute(element, 'nodeID').removeprefix('_:')
             try:
                 return blank_label(label)
             except OntologyFileError as error:

@@ -105,6 +105,11 @@ class _Reader(XmlReader):
             raise self.fail(f'rdf:nodeID {name!r} is no name')
         return '_:n' + name
 
+    def referred(self, base: str, reference: str) -> str:
+        """Return what an IRI reference names; `_:a`, which is none, is a nodeID to the OWL API."""
+        unnamed = reference.startswith('_:')
+        return self.blank_named(reference[2:]) if unnamed else self.resolve(base, reference)
+
     def start(self, name: str, attributes: dict[str, str]) -> None:
         parent = self.stack[-1]
         if parent.kind == 'xml':
@@ -149,7 +154,7 @@ class _Reader(XmlReader):
         if [about, ident, node_id].count(None) < 2:
             raise self.fail('expected one of rdf:about, rdf:ID and rdf:nodeID')
         if about is not None:
-            subject = self.resolve(base, about)
+            subject = self.referred(base, about)
         elif ident is not None:
             subject = self.named(base, ident)
         elif node_id is not None:
@@ -208,7 +213,7 @@ class _Reader(XmlReader):
             tag = _TAG.match(self.data, self.parser.CurrentByteIndex)
             frame.counter = tag.end() if tag else self.parser.CurrentByteIndex
         elif resource is not None:
-            frame.kind, frame.object = 'empty', self.resolve(base, resource)
+            frame.kind, frame.object = 'empty', self.referred(base, resource)
         elif node_id is not None:
             frame.kind, frame.object = 'empty', self.blank_named(node_id)
         elif attributes:

@@ -42,6 +42,7 @@ _TRIPLE = re.compile(
     rb'(?:<[^\s<>]*>|_:[^\s<]+)\s*<[^\s<>]*>[^\n]*\.[ \t\r]*(?:#.*)?$', re.MULTILINE
 )
 _TURTLE = re.compile(rb'@(?:prefix|base)\b|(?:prefix|base)\s|<|_:|\[|\(', re.IGNORECASE)
+_MANCHESTER = re.compile(rb'(?:Prefix|Namespace|Ontology|Import|Class|Individual|\w+Property):\s')
 _PARSER_PLACE = re.compile(r'Parser error (?:at|between) line [\w ]*: ')
 _NAMES = {'turtle': 'Turtle', 'ntriples': 'N-Triples', 'jsonld': 'JSON-LD'}
 FORMATS = 'RDF/XML, OWL/XML, Turtle, N-Triples, JSON-LD or OWL functional syntax'
@@ -205,8 +206,11 @@ def _parsed(data: bytes, iri: str) -> tuple[str, Mapping | Axioms]:
     if _TURTLE.match(data, place):
         return 'turtle', Mapping(_rdf_text(data, iri, 'turtle'))
     shown = data[place : place + 40].decode('latin-1')
+    kind = 'Manchester syntax, which is not read: ' if _MANCHESTER.match(data, place) else ''
     raise OntologyFileError(
-        f'expected {FORMATS}, got {shown!r}', data.count(b'\n', 0, place) + 1, 1
+        f'expected {FORMATS}, got {kind}{shown!r}',
+        data.count(b'\n', 0, place) + 1,
+        1,
     )
 
 

@@ -153,6 +153,24 @@ ON_P = '<owl:onProperty rdf:resource="#p"/>'
             ax.NegativeObjectPropertyAssertion(f'{IRI}#p', f'{IRI}#i', '_:j'),
         ),
         (
+            f'Ontology(<{IRI}> Annotation(<{IRI}#n> <_:genid7>))',
+            ax.AnnotationAssertion(f'{IRI}#n', IRI, '_:genid7'),
+        ),
+        (
+            owl_xml(
+                '<AnnotationAssertion><AnnotationProperty IRI="#n"/>'
+                '<IRI>#i</IRI><IRI>_:genid7</IRI></AnnotationAssertion>'
+            ),
+            ax.AnnotationAssertion(f'{IRI}#n', f'{IRI}#i', '_:genid7'),
+        ),
+        (
+            rdf(
+                f'<owl:AnnotationProperty rdf:about="{IRI}#n"/>'
+                '<rdf:Description rdf:about="#i"><n rdf:resource="_:genid7"/></rdf:Description>'
+            ),
+            ax.AnnotationAssertion(f'{IRI}#n', f'{IRI}#i', '_:ngenid7'),
+        ),
+        (
             owl_xml(
                 '<DLSafeRule><Body><ClassAtom><Class IRI="#A"/>'
                 '<Variable IRI="#x"/></ClassAtom></Body>'
@@ -258,7 +276,11 @@ def test_what_says_nothing_is_left_out_and_reported(text, report):
 @pytest.mark.parametrize(
     ('text', 'complaint'),
     [
-        ('Prefix: : <http://x/>\nOntology: <http://x>\n', f"expected {FORMATS}, got 'Prefix: :"),
+        (
+            'Prefix: : <http://x/>\nOntology: <http://x>\n',
+            f"expected {FORMATS}, got Manchester syntax, which is not read: 'Prefix: :",
+        ),
+        ('Prefixes: none', f"expected {FORMATS}, got 'Prefixes: none'"),
         (b'\x1f\x8b\x08\x00', f'expected {FORMATS}'),
         ('{"a": 1}', 'not JSON-LD: it states nothing'),
         (
