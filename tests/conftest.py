@@ -209,6 +209,22 @@ class Graph:
         self.node.create_subscription(msg_type, topic, arrived, kept)
         return messages
 
+    def said(self) -> list[str]:
+        """Return the list to which each line that a node logs from now on is appended.
+
+        Waiting for a line of `capfd` may last for ever: what is printed while that reads is lost.
+        """
+        from rcl_interfaces.msg import Log
+
+        lines: list[str] = []
+
+        def arrived(line: Log) -> None:
+            lines.append(line.msg)
+            self.touch()
+
+        self.node.create_subscription(Log, '/rosout', arrived, 1000)
+        return lines
+
     def close(self) -> None:
         """Stop all nodes while messages flow, then the executor, then ROS."""
         import rclpy

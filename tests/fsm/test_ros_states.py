@@ -64,7 +64,7 @@ def test_a_preempt_ends_waiting_for_a_service_and_for_its_answer(graph):
 
 def test_a_service_server_that_dies_before_it_answers(graph):
     server = graph.add(SilentServer)
-    machine = machine_of(service(graph.node, timeout=1.0))
+    machine = machine_of(service(graph.node))
     run = Background(machine)
     assert server.asked.wait(60.0)
     graph.remove(server)
@@ -172,7 +172,7 @@ def test_a_goal_that_is_rejected_aborts(graph, caplog):
 
 def test_an_action_server_that_dies_in_the_middle_aborts(graph):
     server = graph.add(ScriptedActionServer)
-    run = Background(machine_of(action(graph.node, server_wait_timeout=3.0)))
+    run = Background(machine_of(action(graph.node)))
     assert server.began.wait(60.0)
     graph.remove(server)
     assert run.result() == 'aborted'
