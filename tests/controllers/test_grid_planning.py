@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from skimage.graph import MCP_Geometric
 
 from surveillance_controllers import geometry
-from surveillance_controllers.planning.grid_map import GridMap, distance_to, drawn_lines
+from surveillance_controllers.planning.grid_map import GridMap, distance_to, drawn_lines, with_walls
 from surveillance_controllers.planning.grid_planning import (
     GridPlanner,
     NoPathError,
@@ -86,8 +86,26 @@ def test_what_blocks_is_named_and_gone_when_it_is_taken_away() -> None:
 
 
 def test_an_opening_that_is_too_narrow_is_a_wall() -> None:
-    with pytest.raises(NoPathError, match='walls lie between them, with no opening wide enough'):
+    with pytest.raises(NoPathError, match=r'wide enough: expected one of 0\.64 m,'):
         GridPlanner(two_rooms((2.0, 2.4)), ROBOT).plan((1, 1), (7, 1))
+
+
+@pytest.mark.parametrize('radius', [0.22, 0.25])
+@pytest.mark.parametrize('degrees', [0, 5, 15, 22.5, 30, 40, 45, 61, 75])
+def test_an_opening_as_wide_as_is_asked_for_is_passed_at_any_angle(
+    radius: float, degrees: float
+) -> None:
+    robot = PlanningParameters(radius=radius)
+    width = 2.0 * (radius + robot.margin + math.sqrt(2.0) * RESOLUTION) + 1e-6
+    along = np.array([math.cos(math.radians(degrees)), math.sin(math.radians(degrees))])
+    across = np.array([-along[1], along[0]])
+    empty = GridMap(np.zeros((120, 120), np.int8), RESOLUTION, (-3.0, -3.0))
+    for shift in (0.0, 0.01, 0.024, 0.04):
+        middle = shift * (along + across)
+        ends = [(middle + side * along * width / 2, side * along * 5.0) for side in (-1, 1)]
+        grid = with_walls(empty, [(*inner, *outer) for inner, outer in ends])
+        path = GridPlanner(grid, robot).plan(middle - across, middle + across)
+        assert true_clearance(grid, path) >= radius - RESOLUTION / 2
 
 
 def test_an_obstacle_on_the_way_is_driven_around() -> None:

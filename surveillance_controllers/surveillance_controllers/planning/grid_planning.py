@@ -333,7 +333,12 @@ class GridPlanner:
             search.find_costs([start], [goal])
             cells = np.asarray(search.traceback(goal))
         except ValueError:
-            return 'walls lie between them, with no opening wide enough'
+            # The grid takes up to a cell's diagonal on either side of an opening at an angle.
+            wide = 2.0 * (needed + math.sqrt(2.0) * self.grid.resolution)
+            return (
+                'walls lie between them, with no opening wide enough: expected one of '
+                f'{wide:.2f} m, or a smaller planning.margin'
+            )
         path = self.grid.centres_of(cells)
         blocked = path[self._cost[cells[:, 0], cells[:, 1]] < 0]
         return self._nearest_extra(blocked[len(blocked) // 2]) + ' is in the way'
