@@ -7,11 +7,8 @@ into view, and by a scan every `look_again` seconds. What was found is kept in
 
 from __future__ import annotations
 
-import contextlib
-import json
 import queue
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 from nav_msgs.msg import Odometry
@@ -27,10 +24,10 @@ from surveillance_behaviour.map_from_markers.assembly import (
 )
 from surveillance_behaviour.map_from_markers.initial_scan import InitialScan, Progress
 from surveillance_behaviour.map_from_markers.scan_peers import CameraScanner, MarkerInquiry
+from surveillance_behaviour.mission.kept_file import KeptFile
 from surveillance_fsm.ros import CallError, ServiceCaller
 from surveillance_interfaces.msg import OntologyMap
 from surveillance_interfaces.srv import ReferenceName
-from surveillance_runtime.files import read_file, replace_text
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.place.parameters import described_place
 from surveillance_runtime.process import run_node
@@ -38,8 +35,6 @@ from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
 from surveillance_runtime.waiting import AwaitedEvent
 
 _BUILD_SECONDS = 20.0
-_LARGEST = 10_000_000
-"""Bytes of what was found before that are read at most."""
 
 
 class InitialState(PatrolNode):
@@ -71,10 +66,10 @@ class InitialState(PatrolNode):
         )
         self._survey = Survey(self.get_parameter('robot_room').value, (0.0, 0.0))
         self._progress = Progress()
-        self._file = Path(record + '.survey.json') if record else None
-        self._kept = ''
+        self._file = KeptFile(record, '.survey.json')
         self._missing: list[str] = []
-        self._take_kept()
+        if problem := self._file.read(self._take_kept):
+            self.get_logger().warn(problem)
         self._sent: tuple[PlaceNote, ...] = ()
         self._finished = False
         self._found = AwaitedEvent(self)
@@ -125,23 +120,13 @@ class InitialState(PatrolNode):
 
     def _keep(self) -> None:
         """Write what was found, if that has changed."""
-        kept = json.dumps({**self._survey.to_json(), **vars(self._progress)})
-        if self._file is None or kept == self._kept:
-            return
-        self._kept = kept
-        with contextlib.suppress(OSError):
-            replace_text(self._file, kept)
+        self._file.write({**self._survey.to_json(), **vars(self._progress)})
 
-    def _take_kept(self) -> None:
-        if self._file is None or not self._file.exists():
-            return
-        try:
-            kept = json.loads(read_file(self._file, _LARGEST))
-            self._survey.restore(kept)
-            poses = [int(number) for number in kept['poses']]
-            self._progress = Progress(poses, float(kept['seconds']))
-        except (ValueError, KeyError, TypeError, RecursionError) as error:
-            self.get_logger().warn(f'{self._file}: what was found before is not used: {error}')
+    def _take_kept(self, kept: dict[str, Any]) -> None:
+        poses = [int(number) for number in kept['poses']]
+        progress = Progress(poses, float(kept['seconds']))
+        self._survey.restore(kept)
+        self._progress = progress
 
     def _start(self) -> bool:
         """Find out and send the map; False when the node stops first."""

@@ -7,8 +7,6 @@ was where, and how long each leg takes. What it learned outlives its process in 
 
 from __future__ import annotations
 
-import contextlib
-import json
 import math
 import random
 from dataclasses import dataclass, field
@@ -16,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from surveillance_behaviour.decision import DecisionSettings
+from surveillance_behaviour.mission.kept_file import KeptFile
 from surveillance_behaviour.mission.mission_log import account_of, on_present_clock, read
 from surveillance_behaviour.peers.ports import Ontology, Places, Point, UnknownPlaceError
 from surveillance_behaviour.policy.battery_reserve import DrawEstimate
@@ -25,12 +24,10 @@ from surveillance_behaviour.policy.world import PolicyMemory, World
 from surveillance_fsm import Interrupt
 from surveillance_fsm.exceptions import CallError
 from surveillance_ontology.patrol_ontology import Snapshot
-from surveillance_runtime.files import FileError, read_file, replace_text
+from surveillance_runtime.files import FileError
 
 SIMULTANEOUS = 1.0
 """Seconds by which what several threads take for the present may differ."""
-_LARGEST = 100_000_000
-"""Bytes of what was learned that are read at most."""
 
 
 @dataclass
@@ -44,7 +41,7 @@ class Experience:
     the record.
 
     Attributes:
-        path: The file; None: nothing is kept.
+        file: Where it is kept.
         visits: When the robot was in each place last, seconds on the mission's clock.
         leg_times: How long the legs take.
         draw: How fast the battery falls.
@@ -53,7 +50,7 @@ class Experience:
         now: The last time that was told, seconds on the clock of the visits.
     """
 
-    path: Path | None = None
+    file: KeptFile = field(default_factory=KeptFile)
     visits: dict[str, float] = field(default_factory=dict)
     leg_times: LegTimes = field(default_factory=LegTimes)
     draw: DrawEstimate = field(default_factory=DrawEstimate)
@@ -69,8 +66,8 @@ class Experience:
         The visits in the record itself count: they are on the clock of its end. A file that cannot
         be read counts as none; `problem` says what is wrong with it.
         """
-        experience = cls(Path(record + '.experience.json') if record else None)
-        experience.problem = experience._read()
+        experience = cls(KeptFile(record, '.experience.json'))
+        experience.problem = experience.file.read(experience._take)
         if record and Path(record).is_file():
             try:
                 account = account_of(read(record))
@@ -81,37 +78,26 @@ class Experience:
             experience.now = account.now or 0.0
         return experience
 
-    def _read(self) -> str:
-        if self.path is None or not self.path.exists():
-            return ''
-        try:
-            kept: dict[str, Any] = json.loads(
-                read_file(self.path, _LARGEST), parse_float=_finite, parse_constant=_finite
-            )
-            self.visits = {str(place): float(at) for place, at in kept['visits'].items()}
-            self.leg_times.restore(kept['leg_times'])
-            self.draw.restore(kept['draw'])
-            self.sent_to_charge = str(kept['sent_to_charge'])
-            self.requested = str(kept.get('requested', ''))
-        except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
-            self.visits, self.leg_times, self.draw = {}, LegTimes(), DrawEstimate()
-            return f'{self.path}: what was learned before is not used: {error}'
-        return ''
+    def _take(self, kept: dict[str, Any]) -> None:
+        leg_times, draw = LegTimes(), DrawEstimate()
+        visits = {str(place): float(at) for place, at in kept['visits'].items()}
+        leg_times.restore(kept['leg_times'])
+        draw.restore(kept['draw'])
+        sent_to_charge = str(kept['sent_to_charge'])
+        self.visits, self.leg_times, self.draw = visits, leg_times, draw
+        self.sent_to_charge, self.requested = sent_to_charge, str(kept.get('requested', ''))
 
     def save(self) -> None:
-        """Write the file in one piece; a disk that takes no more does not stop the mission."""
-        if self.path is None:
-            return
-        kept = {
-            'visits': {place: round(at, 3) for place, at in self.visits.copy().items()},
-            'leg_times': self.leg_times.to_json(),
-            'draw': self.draw.to_json(),
-            'sent_to_charge': self.sent_to_charge,
-            'requested': self.requested,
-        }
-        with contextlib.suppress(OSError):
-            self.path.parent.mkdir(parents=True, exist_ok=True)
-            replace_text(self.path, json.dumps(kept))
+        """Write the file, if anything has changed."""
+        self.file.write(
+            {
+                'visits': {place: round(at, 3) for place, at in self.visits.copy().items()},
+                'leg_times': self.leg_times.to_json(),
+                'draw': self.draw.to_json(),
+                'sent_to_charge': self.sent_to_charge,
+                'requested': self.requested,
+            }
+        )
 
     def saw(self, place: str, now: float) -> None:
         """Note that the robot was in ``place``."""
@@ -272,14 +258,6 @@ class WorldModel:
             self.target = None
         if place == self.experience.requested:
             self.experience.requested = ''
-
-
-def _finite(text: str) -> float:
-    """Return a number of a file; one that is none would make every comparison false in silence."""
-    number = float(text)
-    if not math.isfinite(number):
-        raise ValueError(f'got {text}, expected a finite number')
-    return number
 
 
 def _distance(start: Point, goal: Point) -> float:

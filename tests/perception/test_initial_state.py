@@ -167,6 +167,23 @@ def test_a_scan_whose_node_was_killed_goes_on_where_it_was(graph: Any, tmp_path:
     assert 1 not in robot.poses[done:]
 
 
+@pytest.mark.parametrize(
+    'damage',
+    [
+        '{"notes": {}, "poses": [1], "seconds": NaN}',
+        '{"notes": {"12": ["C1", [1e999, 2], {}]}, "poses": [1], "seconds": 1.0}',
+        '{"notes": {"12": ["C1", [1, 2], {}], "13": "R1"}, "poses": [1], "seconds": 1.0}',
+    ],
+)
+def test_what_was_found_and_is_damaged_counts_for_nothing(
+    graph: Any, tmp_path: Path, damage: str
+) -> None:
+    (tmp_path / 'mission.jsonl.survey.json').write_text(damage)
+    node = graph.add(InitialState, parameters={'record': str(tmp_path / 'mission.jsonl')})
+    assert node._survey.to_json() == {'notes': {}}
+    assert node._progress.poses == []
+
+
 def test_without_its_room_the_robot_is_in_the_nearest_place(graph: Any) -> None:
     robot = Robot(graph, {1: [11, 12, 13, 14, 15, 16, 17]})
     graph.add(MarkerServer)

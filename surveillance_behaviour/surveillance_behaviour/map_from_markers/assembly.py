@@ -106,9 +106,11 @@ class Survey:
         Raises:
             KeyError, TypeError, ValueError: It is something else.
         """
+        notes = {}
         for marker_id, (room, (x, y), doors) in kept['notes'].items():
             connections = {str(door): str(behind) for door, behind in doors.items()}
-            self.note(int(marker_id), PlaceNote(str(room), (float(x), float(y)), connections))
+            notes[int(marker_id)] = PlaceNote(str(room), (float(x), float(y)), connections)
+        self._notes.update(notes)
 
     def report(self) -> SurveyReport:
         """Judge all notes together."""

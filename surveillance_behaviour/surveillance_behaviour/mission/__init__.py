@@ -2,5 +2,6 @@
 
 - `mission`: where the robot is, what it heads for and what failed (`Mission`, `MissionSettings`);
 - `recovery`: what to try after a failure, and which places to leave alone for a while;
-- `mission_log`: the record on disk (`MissionRecord`, `read`, `summarize`).
+- `mission_log`: the record on disk (`MissionRecord`, `read`, `summarize`);
+- `kept_file`: a file beside it, for what a node has found out (`KeptFile`).
 """
