@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import math
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -77,10 +78,20 @@ def test_a_torn_last_line_is_skipped_and_then_cut_off(path: Path, kept: int) -> 
     assert [(event.name, event.time) for event in read(path)] == [('start', 0.0), ('visit', 2.0)]
 
 
-def test_a_broken_line_is_named(path: Path) -> None:
+@pytest.mark.parametrize(
+    'line',
+    [
+        'not json',
+        '[' * 100_000,
+        '{"event": "end", "time": NaN}',
+        f'{{"time": {"9" * 400}, "event": ""}}',
+    ],
+)
+def test_a_broken_line_is_named(path: Path, line: str) -> None:
     path.parent.mkdir()
-    path.write_text('{"event": "end", "time": 1}\nnot json\n')
-    with pytest.raises(FileError, match=r'mission\.jsonl:2: expected a JSON object .*not json'):
+    path.write_text(f'{{"event": "end", "time": 1}}\n{line}\n')
+    shown = re.escape(line[:60])
+    with pytest.raises(FileError, match=rf'mission\.jsonl:2: expected a JSON object .*{shown}'):
         read(path)
     path.write_text('{"event": "visit", "time": 1, "place": "E"}\n')
     with pytest.raises(FileError, match=r"jsonl:1: event 'visit' lacks distance"):

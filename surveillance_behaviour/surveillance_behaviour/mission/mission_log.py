@@ -236,7 +236,9 @@ def _event(line: bytes, where: str) -> Event:
     try:
         values = json.loads(line)
         name, time = str(values.pop('event')), float(values.pop('time'))
-    except (ValueError, KeyError, TypeError, AttributeError):
+        if not math.isfinite(time):
+            raise ValueError
+    except (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError):
         shown = line.decode(errors='replace')[:60]
         raise FileError(
             f'{where}: expected a JSON object with event and time, got {shown!r}'

@@ -198,7 +198,7 @@ class Page:
                 return JSONResponse({'ok': False, 'text': 'the request is too long'}, 413)
         try:
             given = json.loads(body or b'{}')
-        except ValueError:
+        except (ValueError, RecursionError):
             given = None
         if not isinstance(given, dict):
             return JSONResponse({'ok': False, 'text': 'expected a JSON object'}, 400)
