@@ -90,6 +90,10 @@ class ScriptedActionServer(PatrolNode):
         )
         self.own(self.server)
 
+    def let_go(self):
+        """Have the goals end; by the executor, which nothing else might wake."""
+        self.executor.create_task(self.hold.set_result, None)
+
     def _cancel(self, _handle):
         self.cancelled.set()
         return self.cancel

@@ -403,7 +403,7 @@ def test_a_result_that_is_lost_is_asked_for_again(graph, monkeypatch):
     caller = GoalCaller(graph.node, FollowPath, 'follow_path')
     end = in_thread(lambda: caller.run(follow(1), accept_timeout=60.0))
     graph.until(lambda: 'result' in server.server.asked)
-    server.hold.set_result(None)
+    server.let_go()
     assert end().status == 'succeeded'
 
 
@@ -454,7 +454,7 @@ def test_a_cancel_that_is_lost_is_sent_again(graph, monkeypatch):
     graph.until(lambda: 'result' in server.server.asked)
     interrupt.set()
     assert server.cancelled.wait(60.0)
-    server.hold.set_result(None)
+    server.let_go()
     with pytest.raises(CallInterruptedError):
         end()
 
