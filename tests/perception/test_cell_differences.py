@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import cv2
 import numpy as np
 import pytest
 
@@ -86,6 +87,16 @@ def test_code_with_wrong_cells_is_read_where_hardly_any_print_is_so_near(diction
         assert seen.error.max() < 1e-4
     else:
         assert seen.error.min() > 1e-4
+
+
+def test_cells_of_blurred_print_are_not_taken_for_another_code():
+    codes = MarkerCodes.of(dictionary_named('DICT_APRILTAG_36h11'))
+    entries = np.random.default_rng(1).choice(len(codes.ids), 300)
+    printed = [np.where(codes.cells[each] > 0, 225.0, 25.0) for each in entries]
+    blurred = [cv2.GaussianBlur(each, (0, 0), 0.65)[1:-1, 1:-1] for each in printed]
+    seen = CellDifferences(codes).read(np.array(blurred, np.float32))
+    assert seen.entries.tolist() == entries.tolist()
+    assert np.isfinite(seen.error).all()
 
 
 def test_cells_of_the_other_colour_are_counted():

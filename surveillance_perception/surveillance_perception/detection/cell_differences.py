@@ -38,7 +38,10 @@ _SATURATED = 252.0
 _LEAST_STEP = 20.0
 _STEP_QUANTILE = 0.85
 _DARK_LEVEL = 12.0
-_OTHER_CODE = 1.4
+# how many times less a code with one cell, or all that agree better, of the other colour leaves
+# unexplained where print shows it: in print without noise single ones of several explain little,
+# and where cells are a pixel wide many explain little together
+_OTHER_CELL, _OTHER_CODE = 1.4, 4.0
 # error from which a code is not looked at again
 _LIKELY = 1e-3
 # share of all print that may lie as near a code as what is taken for it
@@ -137,7 +140,7 @@ class CellDifferences:
         scale *= np.linalg.norm(seen, axis=1)[:, None]
         correlation = (seen * room) @ self._codes.T / np.maximum(scale, 1e-6)
         two = np.partition(correlation, -2, axis=1)[:, -2:]
-        second, best = 1.0 - np.square(np.maximum(two.T, 0.0)) + 1e-6
+        second, best = _unexplained(two.T)
         freedom = self._freedom * room.mean(axis=1, dtype=float)
         by_chance = betainc((freedom - 1.0) / 2.0, 0.5, np.minimum(best, 1.0)) / 2.0
         # each code is tried with levels and with logarithms
@@ -161,8 +164,13 @@ class CellDifferences:
         expected = room * _differences(white)
         scale = np.linalg.norm(seen, axis=1) * np.linalg.norm(expected, axis=1)
         nearer = (seen * expected).sum(axis=1) / np.maximum(scale, 1e-6)
-        explained = unexplained > _OTHER_CODE * (1.0 - np.square(np.maximum(nearer, 0.0)) + 1e-6)
+        explained = unexplained > _OTHER_CELL * _unexplained(flipped.max(axis=1))
+        explained |= unexplained > _OTHER_CODE * _unexplained(nearer)
         return np.asarray(explained & (self._share[better.sum(axis=1)] > _LARGEST_SHARE))
+
+
+def _unexplained(correlation: Reals) -> Reals:
+    return 1.0 - np.square(np.maximum(correlation, 0.0)) + 1e-6
 
 
 def _differences(cells: Patches) -> Patches:
