@@ -11,7 +11,15 @@ from surveillance_ontology.owl.assertions import is_assertion
 from surveillance_ontology.owl.axioms import Axiom, ClassAssertion, Rule
 from surveillance_ontology.reasoner.cases import CaseReasoner, entails
 from surveillance_ontology.reasoner.classification import Classification
-from surveillance_ontology.reasoner.clauses import BodyAtom, Constant, Program
+from surveillance_ontology.reasoner.clauses import (
+    BodyAtom,
+    Clause,
+    Constant,
+    Predicate,
+    PredicateAtom,
+    Program,
+    closure,
+)
 from surveillance_ontology.reasoner.engine import Engine
 from surveillance_ontology.reasoner.normal_form import is_positive
 from surveillance_ontology.reasoner.open_cases import values_may_split
@@ -96,14 +104,15 @@ class Completion:
         """Tell whether the clauses may leave something out without saying so.
 
         They do not where nothing unnamed must exist and no class requires something of a certain
-        individual, nor where each class that requires somebody says all by itself, no chain comes
-        back from somebody unnamed, and nothing is counted or excluded. Nor where there are rules,
-        and no value that must exist is one of several that matter.
+        individual that matters, nor where each class that requires somebody says all by itself, no
+        chain comes back from somebody unnamed, and nothing is counted or excluded. Nor where there
+        are rules, and no value that must exist is one of several that matter.
         """
         if program.unsupported or program.interacting:
             return True
         clauses = [clause for clause in program.clauses if not clause.named_only]
-        if any(_names(clause.head) for clause in clauses if clause.body):
+        named = [clause.head for clause in clauses if clause.body and _names(clause.head)]
+        if named and not _change_nothing(named, program, clauses):
             return True  # Whether the class can have members depends on the individual.
         if not program.existentials:
             return False
@@ -143,6 +152,32 @@ class Completion:
             found.append('the ontology: reasoning by cases took too many steps')
         found += self._program.unsupported[len(self._native) :]
         self.unsupported = tuple(dict.fromkeys(found))
+
+
+def _change_nothing(heads: Iterable[BodyAtom], program: Program, clauses: list[Clause]) -> bool:
+    """Tell whether nothing follows from these heads but that one is related: no clause, count or
+    key asks for the properties.
+    """
+    start: dict[Predicate, None] = {}
+    for head in heads:
+        if not isinstance(head, PredicateAtom) or head.predicate.kind != 'object':
+            return False
+        start[head.predicate] = None
+    above: dict[Predicate, list[Predicate]] = {}
+    asked = {least.prop for least in program.at_least}
+    asked.update(most.prop for most in program.at_most)
+    asked.update(prop for key in program.keys for prop, _ in key.props)
+    for clause in clauses:
+        asking = [atom.predicate for atom in clause.body if isinstance(atom, PredicateAtom)]
+        sup = clause.head.predicate if isinstance(clause.head, PredicateAtom) else None
+        alone = len(clause.body) == len(asking) == 1 and asking[0].kind == 'object'
+        if alone and sup is not None and sup.kind == 'object':
+            above.setdefault(asking[0], []).append(sup)
+        else:
+            asked.update(asking)
+    return asked.isdisjoint(
+        prop for one in start for prop in closure(one, lambda sub: above.get(sub, ()))
+    )
 
 
 def _names(atom: BodyAtom) -> bool:

@@ -291,6 +291,29 @@ def test_a_contradiction_leaves_nothing_out() -> None:
     assert kb.unsupported == ()
 
 
+def test_a_value_that_nobody_asks_for_needs_no_cases(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[object] = []
+
+    class Counted(CaseReasoner):
+        def __init__(self, axioms: list[Axiom]) -> None:
+            asked.append(axioms)
+            super().__init__(axioms)
+
+    monkeypatch.setattr('surveillance_ontology.reasoner.completion.CaseReasoner', Counted)
+    value = [SubClassOf(A, ex.ObjectHasValue(P, k)), ax.SubObjectPropertyOf(P, Q)]
+    facts = [SubClassOf(B, A), ClassAssertion(B, i), ClassAssertion(C, k)]
+    kb = reasoned(*value, *facts)
+    assert kb.object_values(Q, i) == {k}
+    assert asked == []
+    # What is asked for may depend on the individual.
+    kb.add(SubClassOf(ex.ObjectSomeValuesFrom(Q, C), D))
+    assert kb.reason()
+    assert asked != []
+    assert kb.superclasses(B) == {A, D}
+    kb = reasoned(*value, ax.ObjectPropertyRange(Q, D), ax.DisjointClasses((C, D)), facts[2])
+    assert kb.holds(SubClassOf(A, NOTHING))
+
+
 def test_a_join_that_takes_too_long_is_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
     few_steps = partial(CaseReasoner, most_steps=200)
     monkeypatch.setattr('surveillance_ontology.reasoner.completion.CaseReasoner', few_steps)
