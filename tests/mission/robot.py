@@ -162,11 +162,16 @@ class Robot:
         return read(self.record)
 
     def battery_is_heard(self) -> bool:
-        """Whether all in the behaviour were told what the battery said last, or one is away."""
-        battery, behavior = map(self.nodes.get, ('battery_controller', 'robot_behavior'))
-        if battery is None or behavior is None:
-            return True
-        return self.heard_of_battery.get(behavior.mission.battery) == battery._said
+        """Whether all who decide by the battery were told what it said last, or it is away."""
+        battery, behavior, reasoner = map(
+            self.nodes.get, ('battery_controller', 'robot_behavior', 'reasoner')
+        )
+        monitors = [] if behavior is None else [behavior.mission.battery]
+        if reasoner is not None:
+            monitors.append(reasoner._decider._battery)
+        return battery is None or all(
+            self.heard_of_battery.get(each) == battery._said for each in monitors
+        )
 
     def set_parameter(self, node: Any, name: str, value: Any) -> str:
         """Set a parameter at run time; why that was refused, empty: it was not."""
