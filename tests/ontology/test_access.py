@@ -81,6 +81,31 @@ def test_no_link_leads_out_of_the_folder(ask: Ask, folder: Path, tmp_path: Path)
     assert not (tmp_path / 'new.owl').exists()
 
 
+@pytest.mark.parametrize('leads', ['by its file IRI', 'by a link'])
+def test_no_import_leads_out_of_the_folders(
+    ask: Ask, folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, leads: str
+) -> None:
+    away = tmp_path / 'run' / 'away'
+    away.mkdir(parents=True)
+    secret = away / 'secret.ofn'
+    secret.write_text('Ontology(<http://x/secret> ClassAssertion(<http://x#S> <http://x#hidden>))')
+    folder.mkdir(parents=True)
+    (folder / 'secret.ofn').symlink_to(secret)
+    monkeypatch.chdir(away)
+    service = ArmorService(
+        Settings(folder, (str(folder),)), screen=lambda _: None, warn=lambda _: None
+    )
+    send = asker(service)
+    name = secret.as_uri() if leads == 'by its file IRI' else 'http://x/secret'
+    text = f'Ontology(<http://x> Import(<{name}>) ClassAssertion(<http://x#C> <http://x#i>))'
+    (folder / 'main.ofn').write_text(text)
+    answer = send('LOAD FILE', 'main.ofn', 'http://x', 'false', 'PELLET', 'false')
+    assert answer.success
+    assert f'owl:imports <{name}> is not followed' in answer.error_description
+    assert 'secret.ofn may not be read' in answer.error_description
+    assert send('QUERY IND', 'hidden').queried_objects == []
+
+
 def test_a_line_of_the_log_is_one_line_whatever_the_client_sends(ask: Ask, folder: Path) -> None:
     assert ask('LOG FILE ON', 'armor.log').success
     for words, args in (

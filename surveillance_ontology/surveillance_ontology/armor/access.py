@@ -139,6 +139,10 @@ class SafePaths:
             raise DirectiveError(f'{_named(text)} {what}')
         return path
 
+    def may_read(self, path: Path) -> bool:
+        """Tell whether a file lies, links resolved, in the allowed directories."""
+        return _is_inside(path.resolve(), (self._writable, *self._readable))
+
     def to_write(self, text: str, endings: tuple[str, ...]) -> Path:
         """Resolve the path of a file to write; its directory must exist.
 
@@ -178,8 +182,12 @@ def _named(text: str) -> str:
     return f'path {shown(text, limit=1000)}'
 
 
+def _is_inside(path: Path, allowed: tuple[Path, ...]) -> bool:
+    return any(path.is_relative_to(directory) for directory in allowed)
+
+
 def _check_inside(path: Path, allowed: tuple[Path, ...], problem: str) -> None:
-    if not any(path.is_relative_to(directory) for directory in allowed):
+    if not _is_inside(path, allowed):
         raise DirectiveError(f'{problem}; allowed is {", ".join(map(str, allowed))}')
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import codecs
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
@@ -70,7 +70,11 @@ class OntologyDocument:
 
 
 def read_ontology(
-    source: str | Path | bytes, iri: str, *, size_limit: int = DEFAULT_SIZE_LIMIT
+    source: str | Path | bytes,
+    iri: str,
+    *,
+    size_limit: int = DEFAULT_SIZE_LIMIT,
+    may_read: Callable[[Path], bool] = Path.exists,
 ) -> OntologyDocument:
     """Read a document and the documents beside it that it imports.
 
@@ -83,6 +87,7 @@ def read_ontology(
         source: A path, or the document itself as bytes.
         iri: Base for relative IRIs where the document gives none.
         size_limit: Largest document accepted, bytes.
+        may_read: Whether a document may import a file that is there; all may be unless given.
 
     Raises:
         OntologyFileError: Not readable, too large, or not an ontology; nothing is half-read.
@@ -91,12 +96,14 @@ def read_ontology(
     seen = set() if isinstance(source, bytes) else {Path(source).resolve()}
     form, main = _read(source, iri, size_limit)
     documents: list[tuple[str, Mapping | Axioms, Path | None]] = [('', main, folder)]
-    missing: dict[str, None] = {}
+    missing: dict[str, str] = {}
     for _, document, place in documents:
         for name in document.imports:
             path = _imported(name, place)
             if path is None:
-                missing[name] = None
+                missing[name] = 'no file beside it'
+            elif not may_read(path):
+                missing[name] = f'{path} may not be read'
             elif path.resolve() not in seen:
                 seen.add(path.resolve())
                 _, other = _read(path, name, size_limit)
@@ -114,7 +121,7 @@ def read_ontology(
             if not isinstance(axiom, Import) or axiom.iri in missing:
                 axioms[axiom] = None
         unsupported += (prefix + text for text in document.unsupported)
-    unsupported += (f'owl:imports <{name}> is not followed: no file beside it' for name in missing)
+    unsupported += (f'owl:imports <{name}> is not followed: {why}' for name, why in missing.items())
     return OntologyDocument(list(axioms), unsupported, form, main.iri, main.prefixes)
 
 

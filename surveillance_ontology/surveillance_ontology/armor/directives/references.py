@@ -6,6 +6,7 @@ import contextlib
 import threading
 import time
 from collections.abc import Iterator
+from pathlib import Path
 
 from surveillance_ontology import memory
 from surveillance_ontology.armor.access import (
@@ -386,17 +387,17 @@ def _read_document(
     except ValueError as error:
         raise DirectiveError(f'LOAD: argument iri {error}') from None
     notes: list[str] = []
+    found: Path | bytes
     try:
         if web:
-            document = read_ontology(
-                _fetch(source, settings), base, size_limit=settings.max_file_bytes
-            )
-            path = source
+            path, found = source, _fetch(source, settings)
         else:
             with memory.collected():
-                file = paths.to_read(source)
-            path = str(file)
-            document = read_ontology(file, base, size_limit=settings.max_file_bytes)
+                found = paths.to_read(source)
+            path = str(found)
+        document = read_ontology(
+            found, base, size_limit=settings.max_file_bytes, may_read=paths.may_read
+        )
     except OntologyFileError as error:
         raise DirectiveError(f'LOAD: {error}') from None
     if document.iri and document.iri.rstrip('#') != base:
