@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterable, Mapping
 from typing import Any
 
+import cv2
 import numpy as np
 import numpy.typing as npt
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
@@ -57,10 +58,14 @@ def image_from_ros(message: Image, max_pixels: int) -> ImageArray:
 def image_from_compressed(message: CompressedImage, max_pixels: int) -> ImageArray:
     """Return a BGR image (height, width, 3) from a CompressedImage.
 
+    As the sensor has it, whatever EXIF says: its CameraInfo describes that one (cv_bridge does the
+    same).
+
     Raises:
         ImageError: The data is no image, or the image is larger than `max_pixels`.
     """
-    return decode_image(bytes(message.data), 'compressed image', max_pixels)
+    flags = cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION
+    return decode_image(bytes(message.data), 'compressed image', max_pixels, flags)
 
 
 def image_from_any(message: Image | CompressedImage, max_pixels: int) -> ImageArray:

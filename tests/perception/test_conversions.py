@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import math
 import resource
 import struct
@@ -9,6 +10,7 @@ import zlib
 
 import cv2
 import numpy as np
+import PIL.Image
 import pytest
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticStatus
@@ -24,7 +26,7 @@ from surveillance_perception.arm.trajectory import ArmState, motion_to
 from surveillance_perception.detection.camera_model import CameraModel
 from surveillance_perception.detection.marker_stream import Statistics
 from surveillance_perception.detection.pose import pose_of
-from surveillance_perception.stream.image_files import ImageError
+from surveillance_perception.stream.image_files import ImageError, decode_image
 from surveillance_perception.testing.marker_scene import (
     Panel,
     corners_in_camera,
@@ -143,6 +145,21 @@ def test_camera_info_of_a_binned_region_describes_the_image_that_comes():
     assert (camera.width, camera.height) == (200, 240)
     assert camera.matrix[0, 0] == pytest.approx(CAMERA.matrix[0, 0] / 2)
     assert camera.matrix[0, 2] == pytest.approx((CAMERA.matrix[0, 2] - 100) / 2)
+
+
+def test_a_compressed_image_is_as_the_sensor_has_it_whatever_its_orientation_says():
+    taken = np.zeros((40, 60, 3), np.uint8)
+    taken[:10, :10] = 255
+    image, exif = PIL.Image.fromarray(taken), PIL.Image.Exif()
+    exif[0x0112] = 6  # to be turned a quarter
+    file = io.BytesIO()
+    image.save(file, 'JPEG', exif=exif, quality=95)
+    message = CompressedImage(data=file.getvalue())
+    read = conversions.image_from_compressed(message, LIMIT)
+    assert read.shape == taken.shape
+    assert read[5, 5].min() > 200
+    upright = decode_image(file.getvalue(), 'photograph')
+    assert upright.shape == (60, 40, 3)
 
 
 def test_compressed_image_that_says_it_is_huge_is_refused_before_it_is_decoded():

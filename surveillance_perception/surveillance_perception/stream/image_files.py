@@ -35,7 +35,9 @@ class ImageError(ValueError):
     """An image cannot be read; the message is one line."""
 
 
-def decode_image(data: bytes, what: str, max_pixels: int = MAX_PIXELS) -> ImageArray:
+def decode_image(
+    data: bytes, what: str, max_pixels: int = MAX_PIXELS, flags: int = cv2.IMREAD_COLOR
+) -> ImageArray:
     """Return a BGR image (height, width, 3) from an encoded one, such as a JPEG.
 
     The size in the header is looked at first: a small file may say that it is huge.
@@ -44,6 +46,7 @@ def decode_image(data: bytes, what: str, max_pixels: int = MAX_PIXELS) -> ImageA
         data: The encoded image.
         what: Names it in an error.
         max_pixels: The largest image that is taken.
+        flags: How OpenCV decodes it; unless given, turned upright by its EXIF orientation.
 
     Raises:
         ImageError: `data` is empty, no image, or a larger one.
@@ -53,7 +56,7 @@ def decode_image(data: bytes, what: str, max_pixels: int = MAX_PIXELS) -> ImageA
     _check_size(_size_in_header(data, what, max_pixels), what, max_pixels)
     _check_chunks(data, what)
     try:
-        image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR)
+        image = cv2.imdecode(np.frombuffer(data, np.uint8), flags)
     except cv2.error as error:
         raise ImageError(f'{what} cannot be decoded: {_reason(error)}') from error
     if image is None:
