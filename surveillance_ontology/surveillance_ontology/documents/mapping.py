@@ -442,11 +442,10 @@ class Mapping:
 
     def _attempt(self, subject: str, read: Callable[..., None], *arguments: object) -> None:
         """Read one statement; what is ill-formed in it costs the statement alone."""
-        left_out = f'a statement about {local_name(subject)} is left out'
         try:
             read(*arguments)
         except IllFormedError as error:
-            text = f'{left_out}: {error.message}'
+            text = f'a statement about {local_name(subject)} is left out: {error.message}'
             self.unsupported.append(f'line {error.line}: {text}' if error.line else text)
 
     def _triple(self, subject: str, predicate: str, value: Node) -> None:

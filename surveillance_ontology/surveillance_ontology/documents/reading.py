@@ -250,18 +250,25 @@ def _rdf_text(data: bytes, iri: str, form: str) -> Graph:
     }[form]
     graph = Graph()
     known: dict[str, str] = {}
+    names: dict[str, str] = {}
+    default = pyoxigraph.DefaultGraph()
 
     def name(node: object) -> str:
         text = str(node)
-        return text if text.startswith('_:') else legal(text[1:-1], known, graph.unsupported)
+        found = names.get(text)
+        if found is None:
+            is_blank = text.startswith('_:')
+            found = text if is_blank else legal(text[1:-1], known, graph.unsupported)
+            names[text] = found
+        return found
 
     try:
         base = None if form == 'ntriples' else iri
         # Lenient: names that are no IRIs, which JSON-LD would drop in silence, come as they are.
         for quad in pyoxigraph.parse(data, format=source, base_iri=base, lenient=True):
-            if quad.graph_name != pyoxigraph.DefaultGraph():
+            subject, predicate, node, of_graph = quad
+            if of_graph != default:
                 raise OntologyFileError('named graphs are not read')
-            node = quad.object
             if isinstance(node, pyoxigraph.Triple):
                 raise OntologyFileError('triples about triples (RDF 1.2) are not read')
             value: Node
@@ -275,12 +282,12 @@ def _rdf_text(data: bytes, iri: str, form: str) -> Graph:
                     value = Literal(node.value)
             else:
                 value = Literal(node.value, name(node.datatype))
-            subject, predicate = name(quad.subject), name(quad.predicate)
-            if is_absolute(predicate):
-                graph.triples.append((subject, predicate, value))
+            about, says = name(subject), name(predicate)
+            if is_absolute(says):
+                graph.triples.append((about, says, value))
             else:
-                what = f'a statement about {local_name(subject)} is left out'
-                graph.unsupported.append(f'{what}: its property {predicate!r} is no IRI')
+                what = f'a statement about {local_name(about)} is left out'
+                graph.unsupported.append(f'{what}: its property {says!r} is no IRI')
     except SyntaxError as error:
         message = _PARSER_PLACE.sub('', str(error.msg), count=1)
         place = error.lineno or 0, error.offset or 0
