@@ -15,7 +15,7 @@ from surveillance_ontology.armor.client import (
     ArmorServiceInternalError,
 )
 from surveillance_ontology.map_building import RoomNote, extended
-from surveillance_ontology.patrol_ontology import NEVER, PatrolOntology, is_gone
+from surveillance_ontology.patrol_ontology import NEVER, PatrolOntology, checked_names, is_gone
 from surveillance_runtime.parameters import parameter
 from surveillance_runtime.place import Place, PlaceError
 
@@ -169,7 +169,7 @@ class MapKeeper:
     def extend(self, notes: Sequence[RoomNote], robot_room: str) -> None:
         """Take in rooms that were described by a message."""
         try:
-            place = extended(self.place, notes, robot_room)
+            place = checked_names(extended(self.place, notes, robot_room))
         except PlaceError as error:
             self._reports.refused(f'the map that was sent is not used: {error}')
             return
@@ -195,7 +195,7 @@ class MapKeeper:
         before = self.place
         try:
             # First, as in `extend`: who learns of a new room from the ontology asks for its point.
-            self.place = change(before)
+            self.place = checked_names(change(before))
             self._ontology.change(before, self.place, self._first_visit())
         except PlaceError as error:
             self.place = before

@@ -20,10 +20,11 @@ from surveillance_interfaces.srv import AddRoom, ReferenceName, RemoveRoom, Room
 from surveillance_ontology.armor_client import CHANGES_QOS, CHANGES_TOPIC, ArmorClient
 from surveillance_ontology.conversions import position_from_ros, room_note_from_ros
 from surveillance_ontology.map_keeper import MapKeeper, Reports, Source
-from surveillance_ontology.patrol_ontology import PatrolOntology
+from surveillance_ontology.patrol_ontology import PatrolOntology, checked_names
 from surveillance_runtime.conversions import point_message
 from surveillance_runtime.node import PatrolNode
-from surveillance_runtime.place import Place
+from surveillance_runtime.parameters import ParameterError
+from surveillance_runtime.place import Place, PlaceError
 from surveillance_runtime.place.parameters import described_place
 from surveillance_runtime.process import run_node
 from surveillance_runtime.qos import STATE_QOS
@@ -56,6 +57,11 @@ class OntologyMapBuilder(PatrolNode):
         )
         source = self.declare_fields(Source())
         place = described_place(self)
+        if place is not None:
+            try:
+                checked_names(place)
+            except PlaceError as error:
+                raise ParameterError(f'{self.get_name()}: parameter {error}') from None
         # The first reasoning over thousands of places takes its time.
         timeout = max(timeout, SECONDS_PER_ROOM * len(place.rooms if place else ()))
         armor = ArmorClient(
@@ -128,9 +134,15 @@ class OntologyMapBuilder(PatrolNode):
     async def _on_add_room(self, request: Any, response: Any) -> Any:
         name, position = request.room_name, position_from_ros(request.position)
         done = f'{name} has {", ".join(request.doors)}'
-        return await self._edit(
+        response = await self._edit(
             lambda place: place.with_room(name, position, request.doors), done, response
         )
+        place = self._keeper.place
+        if response.success and place is not None:
+            loose = [door for door in request.doors if len(place.doors.get(door, ())) == 1]
+            if loose:
+                response.message += f'; no other place has {", ".join(loose)} yet'
+        return response
 
     async def _on_remove_room(self, request: Any, response: Any) -> Any:
         name = request.room_name

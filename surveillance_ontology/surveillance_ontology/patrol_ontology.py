@@ -34,7 +34,7 @@ from surveillance_ontology.armor.protocol import (
     value_in,
 )
 from surveillance_ontology.map_building import closed_doors, shown_doors
-from surveillance_runtime.place import Place
+from surveillance_runtime.place import Place, PlaceError
 
 ROBOT = 'Robot1'
 """The robot's name where nobody gives another one."""
@@ -60,6 +60,18 @@ class OntologyNotReadyError(Exception):
     """The ontology, or the map in it, does not answer, does not know (yet) what was asked for, or
     contradicts itself; the text is one line.
     """
+
+
+def checked_names(place: Place, robot: str = ROBOT) -> Place:
+    """Return the place, whose names the ontology has for nothing else.
+
+    Raises:
+        PlaceError: A room or a door has the robot's name, which would make the robot a place.
+    """
+    for room, doors in place.rooms.items():
+        if robot in (room, *doors):
+            raise PlaceError(('map', room), f"'{robot}' is the robot's name: expected another one")
+    return place
 
 
 class Waiting(Protocol):

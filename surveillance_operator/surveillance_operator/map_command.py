@@ -11,9 +11,10 @@ from pathlib import Path
 
 from surveillance_behaviour.mission import mission_log
 from surveillance_behaviour.policy.graph import PatrolGraph
+from surveillance_ontology.patrol_ontology import checked_names
 from surveillance_runtime.command_line import EXIT_BAD_INPUT, CommandParser
 from surveillance_runtime.files import RECORD, FileError
-from surveillance_runtime.place import Place, read_place_file
+from surveillance_runtime.place import Place, PlaceError, read_place_file
 from surveillance_runtime.place.drawing import Run, draw_place
 from surveillance_runtime.place.floor_plan import FloorPlan
 from surveillance_simulation.world.textures import marker_panel
@@ -57,17 +58,11 @@ def run_of(events: Sequence[mission_log.Event], place: Place, source: str) -> Ru
     """Return what a mission's record adds to the picture of its place.
 
     Raises:
-        FileError: The record is of another place, or empty.
+        FileError: The record is empty.
     """
     summary = mission_log.summarize(events)
     if not summary.visits:
         raise FileError(f'{source}: nothing was recorded')
-    unknown = sorted(set(summary.visits) - set(place.rooms))
-    if unknown:
-        raise FileError(
-            f"{source}: visits '{unknown[0]}', which the place does not have; "
-            f'expected the record of a run through {", ".join(place.rooms)}'
-        )
     line = in_words(summary)
     if events[0].name == 'snapshot':
         listed = max(event.time for event in events) - events[0].time
@@ -108,12 +103,18 @@ def _way(event: mission_log.Event, field: str) -> Way:
     return [(float(x), float(y)) for x, y in points] if isinstance(points, list) else []
 
 
+def _position(place: Place, name: str) -> Spot | None:
+    position = place.positions.get(name)
+    return None if position is None else position[:2]
+
+
 def _drives(
     events: Sequence[mission_log.Event], place: Place
 ) -> tuple[list[Way], list[Way], list[Spot]]:
     """Return the ways driven, those planned, and where something failed.
 
-    A way that the record does not have is the straight line.
+    A way that the record does not have is the straight line. A room that was added during the run
+    is where the way to it ended.
     """
     driven: list[Way] = []
     planned: list[Way] = []
@@ -121,12 +122,13 @@ def _drives(
     here: Spot | None = None
     for event in events:
         if event.name == 'start':
-            here = place.positions[event.text('place')][:2]
+            here = _position(place, event.text('place'))
         elif event.name == 'visit':
-            there = place.positions[event.text('place')][:2]
-            straight = [here, there] if here is not None and here != there else []
-            planned.append(_way(event, 'path') or straight)
+            planned.append(_way(event, 'path'))
             driven.append(_way(event, 'driven'))
+            there = _position(place, event.text('place')) or next(iter(planned[-1][-1:]), None)
+            if not planned[-1] and here is not None and there is not None and here != there:
+                planned[-1] = [here, there]
             here = there
         elif event.name == 'failure':
             way = _way(event, 'driven')
@@ -156,6 +158,10 @@ def _parse(argv: Sequence[str] | None) -> argparse.Namespace:
 def _draw(options: argparse.Namespace) -> list[str]:
     plan = read_place_file(options.place, walls=True).plan
     assert plan is not None  # as walls were asked for
+    try:
+        checked_names(plan.place)
+    except PlaceError as error:
+        raise FileError(f'{options.place}: {error}') from None
     for marker in plan.markers.values():
         marker_panel(plan.marker_dictionary, marker.id, 'whole')
     output: Path = options.output or Path(options.place.stem + '.png')
@@ -168,6 +174,13 @@ def _draw(options: argparse.Namespace) -> list[str]:
     if options.record:
         record = options.record / RECORD if options.record.is_dir() else options.record
         run = run_of(mission_log.read(record), plan.place, str(record))
+        unknown = sorted(set(run.visits) - set(plan.place.rooms))
+        # A run whose map a room was added to knows all of the place's rooms, too.
+        if unknown and not set(plan.place.rooms) <= set(run.visits):
+            raise FileError(
+                f"{record}: visits '{unknown[0]}', which the place does not have; "
+                f'expected the record of a run through {", ".join(plan.place.rooms)}'
+            )
         lines.append(f'{options.record}: {run.summary}')
     title = options.place.stem.replace('_', ' ')
     picture = draw_place(plan, title[:1].upper() + title[1:], facts(plan), run)

@@ -7,7 +7,6 @@ raises one line that says why: `ValueError` where it was refused, `CallError` wh
 from __future__ import annotations
 
 import math
-import re
 import time
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -42,6 +41,7 @@ from surveillance_operator.topics import BEHAVIOUR, CONTROLLERS
 from surveillance_runtime.configuration import argument_value, declared
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.parameters import shown
+from surveillance_runtime.place import problem_in_name
 
 _DISCOVERY = 2.0
 """Seconds in which a node that has just started finds the services that there are."""
@@ -58,7 +58,6 @@ _OFFERED_BY = {
 """The nodes that a service needs, by the first word of its name; else that word is the node."""
 ARM_SECONDS = 60.0
 """Deadline of a movement of the arm, whose answer comes when it has arrived."""
-_NAME = re.compile(r'[A-Za-z]\w{0,63}\Z', re.ASCII)
 
 
 class MissionActions:
@@ -278,8 +277,8 @@ class MissionActions:
 
 
 def _name(text: str) -> str:
-    if not isinstance(text, str) or not _NAME.match(text):
-        raise ValueError(f'name {str(text)[:80]!r}: expected letters, digits and _ like R3')
+    if problem := problem_in_name('given', text):
+        raise ValueError(problem)
     return text
 
 

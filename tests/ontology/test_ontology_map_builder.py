@@ -190,9 +190,10 @@ def test_doors_close_and_open(armor: ArmorClient, call: Caller, built: OntologyM
 
 def test_rooms_join_and_leave(armor: ArmorClient, call: Caller, built: OntologyMapBuilder) -> None:
     here = point_message((1.0, 2.0, 0.0))
-    assert call('add_room', room_name='R5', position=here, doors=['D8']).success
+    added = call('add_room', room_name='R5', position=here, doors=['D8'])
+    assert (added.success, added.message) == (True, 'R5 has D8; no other place has D8 yet')
     assert armor.query.objectprop_b2_ind('connectedTo', 'R5') == []
-    assert call('add_room', room_name='E', position=here, doors=['D8']).success
+    assert call('add_room', room_name='E', position=here, doors=['D8']).message == 'E has D8'
     assert reach(armor) == ['C1', 'C2', 'R5']
     assert call('room_position', room_name='R5').position.y == 2.0
     assert 'R5' in armor.query.ind_b2_class('ROOM')
@@ -207,6 +208,10 @@ def test_rooms_join_and_leave(armor: ArmorClient, call: Caller, built: OntologyM
     armor.manipulation.replace_objectprop_b2_ind('isIn', 'Robot1', 'R1', 'E')
     assert 'the robot is in it' in call('remove_room', room_name='R1').message
     assert 'at least one' in call('add_room', room_name='R6', position=here, doors=[]).message
+    for name, door in (('Robot1', 'D9'), ('R6', 'Robot1')):
+        refused = call('add_room', room_name=name, position=here, doors=[door])
+        assert not refused.success
+        assert "'Robot1' is the robot's name" in refused.message
 
 
 def room(name: str, *connections: tuple[str, str]) -> OntologyPlace:
@@ -234,6 +239,10 @@ def test_a_map_comes_over_the_topic_in_parts(graph: Any, armor: ArmorClient, cal
     assert armor.query.ind_b2_class('CORRIDOR') == ['A', 'B', 'E']
     assert call('room_position', room_name='B').valid
     assert not call('room_position', room_name='X').valid, 'a room connected to itself is refused'
+    publisher.publish(OntologyMap(places=[room('Robot1', ('A', 'D8'))]))
+    publisher.publish(OntologyMap(places=[room('Z', ('A', 'D9'))]))
+    graph.until(lambda: call('room_position', room_name='Z').valid)
+    assert not call('room_position', room_name='Robot1').valid
 
 
 @pytest.mark.parametrize(
@@ -244,6 +253,10 @@ def test_a_map_comes_over_the_topic_in_parts(graph: Any, armor: ArmorClient, cal
         ({'map.R1': ['D1', 'D1']}, "parameter map.R1: duplicate door 'D1'"),
         ({'room_positions.X': [1.0, 2.0]}, 'parameter room_positions.X: no such room'),
         ({'recharge_rooms': ['X']}, "parameter recharge_rooms: no room 'X'"),
+        (
+            {'map.Robot1': ['D8'], 'map.R1': ['D1', 'D8'], 'room_positions.Robot1': [1.0, 2.0]},
+            "parameter map.Robot1: 'Robot1' is the robot's name: expected another one",
+        ),
     ],
 )
 def test_a_wrong_map_ends_the_builder_with_one_line(

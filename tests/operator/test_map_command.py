@@ -137,9 +137,31 @@ def test_ways_and_failures_come_from_the_record(record: Path) -> None:
     assert map_command.run_of(mission_log.read(record), place, 'run').threshold == 90.0
 
 
+def test_a_room_that_was_added_during_the_run_keeps_nothing_from_being_drawn(
+    record: Path, tmp_path: Path
+) -> None:
+    from surveillance_behaviour.mission import mission_log
+
+    place = read_world(CONFIG / 'seven_rooms.yaml').plan.place
+    with MissionRecord(record) as mission:
+        mission.write('map', 61.0, places=[*place.rooms, 'New'])
+        way = [[5, 10], [4, 10], [3, 10]]
+        mission.write('visit', 62.0, place='New', distance=2.0, path=way)
+        mission.write('visit', 64.0, place='E', distance=2.0)
+        mission.write('end', 70.0)
+    run = map_command.run_of(mission_log.read(record), place, 'run')
+    assert run.visits['New'] == 1
+    assert run.planned[-2:] == [[(5, 10), (4, 10), (3, 10)], [(3, 10), (5, 10)]]
+    picture = tmp_path / 'run.png'
+    arguments = [f'{CONFIG}/seven_rooms.yaml', '--record', str(record), '-o', str(picture)]
+    assert map_command.main(arguments) == 0
+    assert picture.exists()
+
+
 @pytest.mark.parametrize(
     ('arguments', 'message'),
     [
+        (['{named}'], "named.yaml: map.Robot1: 'Robot1' is the robot's name"),
         ([], 'the following arguments are required: FILE'),
         (['nowhere.yaml'], 'nowhere.yaml: No such file'),
         (['{config}/seven_rooms.yaml', '-o', 'picture.txt'], 'picture.txt: expected a picture'),
@@ -161,7 +183,11 @@ def test_bad_input_is_one_line_and_exit_code_2(
     broken.write_text('{}\n')
     text = (CONFIG / 'patrol_world.yaml').read_text()
     marker.write_text(text.replace('m11: [11.0', 'm11: [400.0'))
+    named = tmp_path / 'named.yaml'
+    text = (CONFIG / 'seven_rooms.yaml').read_text()
+    named.write_text(text.replace('R1:', 'Robot1:'))
     names = {
+        'named': named,
         'config': CONFIG,
         'tmp': tmp_path,
         'record': record,

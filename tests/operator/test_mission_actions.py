@@ -21,6 +21,7 @@ from surveillance_ontology.ontology_map_builder_node import OntologyMapBuilder
 from surveillance_operator.console_commands import answer
 from surveillance_operator.mission_actions import MissionActions
 from surveillance_runtime.node import PatrolNode
+from surveillance_runtime.place import make_place
 from surveillance_runtime.waiting import AwaitedEvent
 
 PLACE = {
@@ -243,6 +244,16 @@ def test_facts_and_their_proofs_come_from_the_ontology(graph: Any, actions: Miss
     assert {depth for depth, _ in premises} >= {1}
     with pytest.raises(ValueError, match='does not hold'):
         actions.explain('connectedTo(A, A)')
+
+
+@pytest.mark.parametrize('name', ['R-1', '_1', 'r' * 80])
+def test_every_name_that_a_place_may_have_can_be_used(
+    graph: Any, actions: MissionActions, name: str
+) -> None:
+    told = serve(graph, GoTo, 'go_to', success=True, message='it goes there')
+    make_place({name: ['D'], 'B': ['D']}, {name: [0.0, 0.0], 'B': [1.0, 0.0]}, name, [])
+    assert actions.go_to(name) == 'it goes there'
+    assert told[0].place == name
 
 
 def test_several_people_may_act_at_once(graph: Any, actions: MissionActions) -> None:
