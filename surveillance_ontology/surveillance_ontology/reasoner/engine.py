@@ -663,6 +663,11 @@ class Engine:
         if not gone and not come:
             return
         difference, equality = self.difference, self.equality
+        if not gone and self._is_blank():
+            # The facts come after: who is different is known when they do.
+            for axiom in come:
+                difference.state(axiom)
+            return
         touched: dict[str, None] = {}
         for axiom in gone:
             # A set that comes back a little larger or smaller changes only for those who joined
@@ -683,6 +688,11 @@ class Engine:
         if equality.members:
             for axiom in (*gone, *come):
                 splitting.update(self._classes_of(axiom))
+
+    def _is_blank(self) -> bool:
+        """Tell whether nothing holds yet, and nothing follows from differences alone."""
+        held = (one.members or one.succ for one in self.program.predicates())
+        return not (self.equality.members or self._network.initial or any(held))
 
     # --- removal ---
 
