@@ -141,6 +141,18 @@ def test_a_clock_that_begins_anew_lets_obstacles_come_to_stay_and_drives_go_on(
     assert navigator.task.state is not State.WAITING
 
 
+def test_scans_of_a_second_lidar_that_come_late_do_not_hurry_time(
+    flat: Any, navigator: Navigator
+) -> None:
+    true, box = (1.0, 1.5, 0.0), [(2.6, 1.5, 0.15)]
+    navigator.move(true)
+    for step in range(250):
+        navigator.see(flat.scan(true, box), 0.1 * step)
+        navigator.see(flat.scan(true, box), 0.1 * step - 0.06)
+    assert len(navigator.obstacles) > 3
+    assert not navigator.obstacles_stay.any(), 'it has stood for 25 s'
+
+
 def test_a_lost_robot_looks_on_when_time_begins_anew(flat: Any, navigator: Navigator) -> None:
     navigator.move((2.0, 1.5, 0.0))
     scan = flat.scan((2.0, 1.5, 0.0))

@@ -29,6 +29,9 @@ flicker."""
 LONGEST_STEP = 6.0
 """More than this between two scans counts as this, seconds: longer than what was not seen is still
 taken for the same thing, and short enough that nothing is forgotten for one wrong stamp."""
+MOST_LATE = 1.0
+"""A scan that is older than the one before by this much, seconds, or less came late, as those of
+a second lidar do; by more, the clock began anew."""
 MOVER_REACH = 3.5
 """Who moves within this distance is driven around, metres."""
 MOVER_GAP = 0.15
@@ -187,8 +190,10 @@ class Navigator:
 
     def _passed(self, stamp: float) -> float:
         """Return the time that passed up to a scan, seconds; it never goes back."""
-        step, self._stamp = stamp - self._stamp, stamp
-        self._now += min(max(step, 0.0), LONGEST_STEP)
+        step = stamp - self._stamp
+        if not -MOST_LATE <= step < 0.0:
+            self._stamp = stamp
+            self._now += min(max(step, 0.0), LONGEST_STEP)
         return self._now
 
     def _first_localiser(self, scan: Scan, odometry: Pose) -> Localiser:
