@@ -51,7 +51,6 @@ from surveillance_controllers.geometry import Scan
 from surveillance_controllers.motion.driving import Drive, State
 from surveillance_controllers.motion.navigator import Navigator
 from surveillance_controllers.motion.path_following import Velocity
-from surveillance_controllers.planning.grid_map import GridMap
 from surveillance_controllers.planning.grid_planning import (
     GridPlanner,
     NoPathError,
@@ -60,6 +59,7 @@ from surveillance_controllers.planning.grid_planning import (
 from surveillance_runtime import node_table
 from surveillance_runtime.place import generation as place_generation
 from surveillance_runtime.place import occupancy_grid
+from surveillance_runtime.place.occupancy_grid import Grid
 from surveillance_simulation.robot.robot import Robot
 from surveillance_simulation.world.people import People, PeopleModel
 from surveillance_simulation.world.world import World, read_world
@@ -83,7 +83,7 @@ def median_ms(work: Callable[[], Any], budget: float) -> float:
     return statistics.median(times)
 
 
-def grid_of(side: int) -> tuple[GridMap, npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+def grid_of(side: int) -> tuple[Grid, npt.NDArray[np.float64], npt.NDArray[np.float64]]:
     """Return a map of about side x side cells full of rooms, and two of its opposite corners."""
     rooms = max(2, round(side / 90))
     world = World.from_parameters(place_generation.grid(rooms, rooms))
@@ -91,7 +91,7 @@ def grid_of(side: int) -> tuple[GridMap, npt.NDArray[np.float64], npt.NDArray[np
     drawn = occupancy_grid.draw(world.plan, cell, margin=0.0)
     half = place_generation.ROOM / 2
     first = np.array([half, half])
-    return GridMap(drawn.cells, drawn.resolution, drawn.origin), first, rooms * 2 * half - first
+    return drawn, first, rooms * 2 * half - first
 
 
 def planning(*, quick: bool) -> None:
@@ -224,7 +224,7 @@ def control(*, quick: bool) -> None:
     world = read_world(ROOT / 'config' / 'seven_rooms.yaml')
     robot = Robot(world, rng=np.random.default_rng(1))
     drawn = occupancy_grid.draw(world.plan)
-    grid = GridMap(drawn.cells, drawn.resolution, drawn.origin)
+    grid = drawn
     planner = GridPlanner(grid)
     navigator = Navigator()
     navigator.set_map(grid)
@@ -287,7 +287,7 @@ def among_people(model: PeopleModel, seconds: float, seed: int, place: str) -> D
     people = People(world.plan, model, np.random.default_rng(seed + 1)) if model.count else None
     robot = Robot(world, rng=rng, people=people)
     drawn = occupancy_grid.draw(world.plan)
-    grid = GridMap(drawn.cells, drawn.resolution, drawn.origin)
+    grid = drawn
     doors = {door.name: door.ends[0] + door.ends[1] for door in world.plan.doors.values()}
     planner, navigator = GridPlanner(grid, doors=doors), Navigator()
     navigator.set_map(grid)
@@ -420,7 +420,7 @@ def kidnapped(world: World, seed: int) -> tuple[float | None, float]:
     rng = np.random.default_rng(seed)
     robot = Robot(world, rng=np.random.default_rng(seed))
     drawn = occupancy_grid.draw(world.plan)
-    grid = GridMap(drawn.cells, drawn.resolution, drawn.origin)
+    grid = drawn
     planner, navigator = GridPlanner(grid), Navigator()
     navigator.set_map(grid)
     free = grid.centres_of(np.argwhere(planner.cost > 0))

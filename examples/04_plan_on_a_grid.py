@@ -10,8 +10,8 @@ import itertools
 import numpy as np
 
 from surveillance_controllers.geometry import Points, length
-from surveillance_controllers.planning.grid_map import OCCUPIED, GridMap
 from surveillance_controllers.planning.grid_planning import GridPlanner, NoPathError
+from surveillance_runtime.place.occupancy_grid import OCCUPIED, Grid
 
 PLAN = """
 ############################################################
@@ -35,14 +35,14 @@ START, GOAL = (1.0, 2.2), (11.0, 0.6)
 DOOR = {'D1': (5.9, 0.9, 5.9, 2.1)}  # the segment that a closed door fills: x, y, x, y
 
 
-def grid_of(text: str) -> GridMap:
+def grid_of(text: str) -> Grid:
     """Return the map of a drawing: # is a wall; the first line lies in the north."""
     rows = text.strip().splitlines()[::-1]
     cells = [[OCCUPIED if sign == '#' else 0 for sign in row] for row in rows]
-    return GridMap(np.array(cells, dtype=np.int8), RESOLUTION, (0.0, 0.0))
+    return Grid(np.array(cells, dtype=np.int8), RESOLUTION, (0.0, 0.0))
 
 
-def show(grid: GridMap, path: Points) -> None:
+def show(grid: Grid, path: Points) -> None:
     """Print the map with the path as dots."""
     signs = np.where(grid.occupied, '#', ' ')
     fine = [np.linspace(first, last, 20) for first, last in itertools.pairwise(path)]

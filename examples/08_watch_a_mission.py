@@ -13,8 +13,9 @@ from rich.console import Console
 
 from surveillance_behaviour.policy.world import Decision
 from surveillance_operator.frames import Framer
-from surveillance_operator.snapshot import Grid, Snapshot, Status, follow
+from surveillance_operator.snapshot import Snapshot, Status, follow
 from surveillance_operator.watch.view import MissionView
+from surveillance_runtime.place.occupancy_grid import Grid
 
 
 def two_rooms() -> Grid:

@@ -27,7 +27,7 @@ from surveillance_runtime.conversions import map_from, point_message
 
 if TYPE_CHECKING:
     from surveillance_controllers.motion.path_following import Velocity
-    from surveillance_controllers.planning.grid_map import GridMap
+    from surveillance_runtime.place.occupancy_grid import Grid
 
 
 _refused: WeakKeyDictionary[Node, dict[str, str]] = WeakKeyDictionary()
@@ -115,12 +115,9 @@ def twist_from(velocity: Velocity) -> Twist:
     return message
 
 
-def grid_from(message: OccupancyGrid) -> GridMap:
+def grid_from(message: OccupancyGrid) -> Grid:
     """Return a map; see `map_from`."""
-    # Only here: a node without a map starts without OpenCV.
-    from surveillance_controllers.planning.grid_map import GridMap
-
-    return GridMap(*map_from(message, MOST_CELLS))
+    return map_from(message, MOST_CELLS)
 
 
 _LEVEL = Mount()

@@ -12,6 +12,7 @@ With ROS:
 """
 
 from surveillance_operator.frames import Framer
-from surveillance_operator.snapshot import Change, Grid, Snapshot, Status, changes, follow
+from surveillance_operator.snapshot import Change, Snapshot, Status, changes, follow
+from surveillance_runtime.place.occupancy_grid import Grid
 
 __all__ = ['Change', 'Framer', 'Grid', 'Snapshot', 'Status', 'changes', 'follow']

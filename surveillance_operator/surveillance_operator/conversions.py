@@ -29,8 +29,9 @@ from surveillance_interfaces.msg import (
     MarkerDetectionArray,
     MissionStatus,
 )
-from surveillance_operator.snapshot import Container, Grid, Health, Status, Transition
+from surveillance_operator.snapshot import Container, Health, Status, Transition
 from surveillance_runtime.conversions import map_from, points_from_cloud, seconds_of
+from surveillance_runtime.place.occupancy_grid import Grid
 
 MOST_CELLS = 16_000_000
 MOST_POINTS = 20_000
@@ -90,7 +91,7 @@ def percent_from(message: UInt8) -> float:
 
 def grid_from(message: OccupancyGrid) -> Grid:
     """Return a map; see `map_from`."""
-    return Grid(*map_from(message, MOST_CELLS))
+    return map_from(message, MOST_CELLS)
 
 
 def cloud_from(message: PointCloud2) -> NDArray[np.float64]:

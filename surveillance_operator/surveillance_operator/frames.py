@@ -18,8 +18,9 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from surveillance_behaviour.policy.policies import POLICIES
-from surveillance_operator.regions import OCCUPIED, regions
-from surveillance_operator.snapshot import NO_POINTS, TRAIL_STEP, Grid, Health, Snapshot
+from surveillance_operator.regions import regions
+from surveillance_operator.snapshot import NO_POINTS, TRAIL_STEP, Health, Snapshot
+from surveillance_runtime.place.occupancy_grid import Grid
 
 Parts = dict[str, Any]
 
@@ -46,15 +47,13 @@ def _grid(grid: Grid | None) -> Any:
         return None
     # Transparent where nothing is known, so that the page's own colours show through.
     colours = np.zeros((*grid.cells.shape, 2), np.uint8)
-    colours[grid.cells >= OCCUPIED] = 0, 255
-    colours[(grid.cells >= 0) & (grid.cells < OCCUPIED)] = 128, 28
+    colours[grid.occupied] = 0, 255
+    colours[grid.free] = 128, 28
     file = io.BytesIO()
     Image.fromarray(colours[::-1], 'LA').save(file, 'PNG', optimize=True)
-    rows, columns = grid.cells.shape
-    left, bottom = grid.origin
     return {
         'image': 'data:image/png;base64,' + base64.b64encode(file.getvalue()).decode(),
-        'box': [left, bottom, left + columns * grid.resolution, bottom + rows * grid.resolution],
+        'box': list(grid.bounds),
         'known': list(grid.known),
     }
 

@@ -6,16 +6,22 @@ place. Where places share one part, each cell belongs to the nearest of them.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from surveillance_operator.snapshot import Box, Grid
+from surveillance_runtime.place.occupancy_grid import (
+    FREE,
+    OCCUPIED,
+    Box,
+    Grid,
+    distance_to,
+    drawn_lines,
+)
 
-OCCUPIED = 65
-"""From this on a cell is a wall, as nav2's map_server has it by default, percent."""
 MOST_CELLS = 200_000
 """Of a larger map several cells are taken together."""
 
@@ -47,83 +53,57 @@ def regions(
         positions: A point in each place, metres.
         doors: The doors' openings: x1, y1, x2, y2, metres.
     """
-    # Only here: most processes never draw a map and need not wait for the import.
-    from scipy import ndimage
+    import cv2  # Most processes never draw a map.
 
-    free, side = _free(grid)
-    for line in doors.values():
-        free[_cells_along(line, grid, side, free.shape)] = False
-    parts, _ = ndimage.label(free)
+    coarse = _coarse(grid)
+    across = drawn_lines(coarse, list(doors.values())).astype(np.uint8)
+    free = coarse.free & (cv2.dilate(across, np.ones((3, 3), np.uint8)) == 0)
+    _, parts, boxes, _ = cv2.connectedComponentsWithStats(free.astype(np.uint8), connectivity=4)
     owners: dict[int, list[str]] = {}
-    points = {}
     for name, point in sorted(positions.items()):
-        column, row = (int((point[i] - grid.origin[i]) // side) for i in (0, 1))
-        if 0 <= row < free.shape[0] and 0 <= column < free.shape[1] and parts[row, column]:
-            points[name] = (row + 0.5, column + 0.5)
-            owners.setdefault(int(parts[row, column]), []).append(name)
+        if part := coarse.at(parts, *point):
+            owners.setdefault(part, []).append(name)
     found = {}
-    boxes = ndimage.find_objects(parts)
     for part, names in owners.items():
         # Only the part's own box is looked at: a map may have hundreds.
-        rows, columns = boxes[part - 1]
-        mask = parts[rows, columns] == part
-        inside = [(points[n][0] - rows.start, points[n][1] - columns.start) for n in names]
-        x, y = grid.origin
-        corner = x + side * columns.start, y + side * rows.start
+        left, bottom, columns, rows = boxes[part, :4].tolist()
+        mask = parts[bottom : bottom + rows, left : left + columns] == part
+        own = Grid(mask.astype(np.int8), coarse.resolution, coarse.box(bottom, left, 0, 0)[:2])
+        cells = [coarse.cell_of(*positions[name]) for name in names]
+        inside = [(row - bottom, column - left) for row, column in cells]
         nearest = _nearest(mask, inside)
         for number, name in enumerate(names):
-            found[name] = _region(mask & (nearest == number), inside[number], corner, side)
+            found[name] = _region(mask & (nearest == number), inside[number], own)
     return found
 
 
-def _free(grid: Grid) -> tuple[NDArray[np.bool_], float]:
-    """Return which cells are free, and the side of a cell, metres."""
-    factor = int(np.ceil(np.sqrt(max(1.0, grid.cells.size / MOST_CELLS))))
-    free = (grid.cells >= 0) & (grid.cells < OCCUPIED)
-    rows, columns = (size // factor * factor for size in free.shape)
-    blocks = free[:rows, :columns].reshape(rows // factor, factor, columns // factor, factor)
-    coarse: NDArray[np.bool_] = np.all(blocks, axis=(1, 3))
-    return coarse, grid.resolution * factor
+def _coarse(grid: Grid) -> Grid:
+    """Return a grid of at most about `MOST_CELLS`, free where all of it is."""
+    factor = min(math.ceil(math.sqrt(grid.cells.size / MOST_CELLS)), *grid.cells.shape)
+    rows, columns = (size // factor * factor for size in grid.cells.shape)
+    blocks = grid.free[:rows, :columns].reshape(rows // factor, factor, columns // factor, factor)
+    cells = np.where(blocks.all(axis=(1, 3)), FREE, OCCUPIED).astype(np.int8)
+    return Grid(cells, grid.resolution * factor, grid.origin)
 
 
-def _cells_along(
-    line: Line, grid: Grid, side: float, shape: tuple[int, ...]
-) -> tuple[NDArray[np.int_], NDArray[np.int_]]:
-    """Return rows and columns of the cells on a line and beside it."""
-    start, end = np.array(line[:2]), np.array(line[2:])
-    steps = max(2, int(3 * np.hypot(*(end - start)) / side))
-    points = start + np.linspace(0.0, 1.0, steps)[:, None] * (end - start)
-    cells = np.floor((points - grid.origin) / side).astype(int)
-    around = np.stack(np.meshgrid([-1, 0, 1], [-1, 0, 1]), axis=-1).reshape(-1, 2)
-    cells = (cells[:, None] + around).reshape(-1, 2)
-    inside = ((cells >= 0) & (cells < (shape[1], shape[0]))).all(axis=1)
-    return cells[inside, 1], cells[inside, 0]
-
-
-def _nearest(mask: NDArray[np.bool_], points: list[tuple[float, float]]) -> NDArray[np.int_]:
+def _nearest(mask: NDArray[np.bool_], cells: list[tuple[int, int]]) -> NDArray[np.intp]:
     rows, columns = np.indices(mask.shape)
-    distances = [np.hypot(rows + 0.5 - row, columns + 0.5 - column) for row, column in points]
-    nearest: NDArray[np.int_] = np.argmin(distances, axis=0)
+    distances = [np.hypot(rows - row, columns - column) for row, column in cells]
+    nearest: NDArray[np.intp] = np.argmin(distances, axis=0)
     return nearest
 
 
-def _region(
-    mask: NDArray[np.bool_], point: tuple[float, float], origin: tuple[float, float], side: float
-) -> Region:
-    from scipy import ndimage
-
-    inside = ndimage.distance_transform_edt(np.pad(mask, 1))[1:-1, 1:-1]
+def _region(mask: NDArray[np.bool_], cell: tuple[int, int], grid: Grid) -> Region:
+    inside = distance_to(~np.pad(mask, 1), 1.0)[1:-1, 1:-1]
     rows, columns = np.indices(mask.shape)
     # The robot stops at the point and would hide a name there; above it is better than below.
-    away = np.hypot(rows + 0.5 - point[0], columns + 0.5 - point[1]) + 0.02 * rows
+    away = np.hypot(rows - cell[0], columns - cell[1]) + 0.02 * rows
     row, column = np.unravel_index(np.argmax(np.minimum(inside, 0.8 * away)), mask.shape)
-    x, y = origin
-    label = (x + side * (float(column) + 0.5), y + side * (float(row) + 0.5))
     boxes = tuple(
-        (x + side * left, y + side * bottom, x + side * right, y + side * top)
-        for left, bottom, right, top in _rectangles(mask)
+        grid.box(bottom, left, top, right) for left, bottom, right, top in _rectangles(mask)
     )
-    return Region(boxes, label, side * float(inside[row, column]))
+    label = grid.centre_of(int(row), int(column))
+    return Region(boxes, label, grid.resolution * float(inside[row, column]))
 
 
 def _rectangles(mask: NDArray[np.bool_]) -> list[tuple[int, int, int, int]]:

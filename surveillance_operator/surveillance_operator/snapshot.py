@@ -10,13 +10,13 @@ import math
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from surveillance_behaviour.policy.world import Decision
+from surveillance_runtime.place.occupancy_grid import Grid
 
 NO_POINTS: NDArray[np.float64] = np.empty((0, 2))
 TRAIL_STEP = 0.1
@@ -31,36 +31,8 @@ HISTORY_SECONDS = 3600.0
 MOST_HISTORY = 5000
 """How far back histories go, seconds of the mission's time, and their most entries."""
 
-Box = tuple[float, float, float, float]
-"""Left, bottom, right, top, metres."""
 Pose = tuple[float, float, float]
 """x, y in metres and yaw in radians."""
-
-
-@dataclass(frozen=True, eq=False)
-class Grid:
-    """A map.
-
-    Attributes:
-        cells: Occupancy in percent, -1 where it is not known; shape (rows, columns), south first.
-        resolution: Side of a cell, metres.
-        origin: Lower left corner, x and y in metres, map frame.
-    """
-
-    cells: NDArray[np.int8]
-    resolution: float
-    origin: tuple[float, float] = (0.0, 0.0)
-
-    @cached_property
-    def known(self) -> Box:
-        """What encloses all that is known, map frame; the whole map if nothing is."""
-        rows, columns = (np.flatnonzero((self.cells >= 0).any(axis=axis)) for axis in (1, 0))
-        if not rows.size:
-            rows, columns = (np.arange(size) for size in self.cells.shape)
-        x, y = self.origin
-        left, right = (x + self.resolution * float(edge) for edge in (columns[0], columns[-1] + 1))
-        bottom, top = (y + self.resolution * float(edge) for edge in (rows[0], rows[-1] + 1))
-        return left, bottom, right, top
 
 
 @dataclass(frozen=True)

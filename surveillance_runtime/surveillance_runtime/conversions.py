@@ -20,6 +20,8 @@ from surveillance_runtime.robot_arm import TrajectoryPoint
 if TYPE_CHECKING:
     from trajectory_msgs.msg import JointTrajectory
 
+    from surveillance_runtime.place.occupancy_grid import Grid
+
 PlanarPose = tuple[float, float, float]
 """x, y in metres and yaw in radians."""
 FARTHEST = 2e7
@@ -116,10 +118,8 @@ def planar_covariance(deviation: float, turn_deviation: float) -> NDArray[np.flo
     return covariance
 
 
-def map_from(
-    message: OccupancyGrid, most_cells: int
-) -> tuple[NDArray[np.int8], float, tuple[float, float]]:
-    """Return a map's cells, shape (rows, columns), south first, their side, and its origin.
+def map_from(message: OccupancyGrid, most_cells: int) -> Grid:
+    """Return a map.
 
     Args:
         message: The map.
@@ -128,6 +128,9 @@ def map_from(
     Raises:
         ValueError: It has no cells, not as many as it says, or too many.
     """
+    # Only here: most processes never see a map.
+    from surveillance_runtime.place.occupancy_grid import Grid
+
     info = message.info
     size = f'{info.width} x {info.height}'
     if info.width * info.height > most_cells:
@@ -145,16 +148,18 @@ def map_from(
     cells, side = cells.reshape(info.height, info.width), float(info.resolution)
     if abs(yaw) > 1e-6:
         return _straightened(cells, side, (x, y, yaw), most_cells)
-    return cells, side, (x, y)
+    return Grid(cells, side, (x, y))
 
 
 def _straightened(
     cells: NDArray[np.int8], side: float, origin: PlanarPose, most_cells: int
-) -> tuple[NDArray[np.int8], float, tuple[float, float]]:
-    """Return a map whose cells are turned drawn with cells that are not; beside it is unknown.
+) -> Grid:
+    """Return a map whose cells are turned, drawn with cells that are not; beside it is unknown.
 
     The new cells are smaller, so that no wall gets a gap.
     """
+    from surveillance_runtime.place.occupancy_grid import Grid
+
     x, y, yaw = origin
     cos, sin = math.cos(yaw), math.sin(yaw)
     rows, columns = cells.shape
@@ -173,7 +178,7 @@ def _straightened(
         line = np.floor((cos * up - sin * right) / side).astype(int)
         inside = (column >= 0) & (column < columns) & (line >= 0) & (line < rows)
         drawn[row, inside] = cells[line[inside], column[inside]]
-    return drawn, drawn_side, (x + west, y + south)
+    return Grid(drawn, drawn_side, (x + west, y + south))
 
 
 def trajectory_from(message: JointTrajectory) -> tuple[list[str], list[TrajectoryPoint]]:

@@ -14,7 +14,7 @@ import pytest
 import yaml
 
 from surveillance_controllers.geometry import Scan
-from surveillance_controllers.planning.grid_map import GridMap, with_walls
+from surveillance_runtime.place.occupancy_grid import Grid, with_walls
 
 
 class Operator:
@@ -78,7 +78,7 @@ class Flat:
         cells[20:40, 81] = 0
         cells[44:50, 20:26] = 100
         cells[61:65, 100:110] = 0
-        self.grid = GridMap(cells, self.RESOLUTION, (0.0, 0.0))
+        self.grid = Grid(cells, self.RESOLUTION, (0.0, 0.0))
         self.noise = np.random.default_rng(5)
 
     def scan(

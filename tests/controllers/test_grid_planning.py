@@ -12,27 +12,27 @@ from hypothesis import strategies as st
 from skimage.graph import MCP_Geometric
 
 from surveillance_controllers import geometry
-from surveillance_controllers.planning.grid_map import GridMap, distance_to, drawn_lines, with_walls
 from surveillance_controllers.planning.grid_planning import (
     GridPlanner,
     NoPathError,
     PlanningParameters,
 )
+from surveillance_runtime.place.occupancy_grid import Grid, distance_to, drawn_lines, with_walls
 
 RESOLUTION = 0.05
 ROBOT = PlanningParameters(radius=0.2)
 
 
-def two_rooms(door: tuple[float, float] = (1.5, 2.5)) -> GridMap:
+def two_rooms(door: tuple[float, float] = (1.5, 2.5)) -> Grid:
     """Two rooms of 4 m x 4 m, side by side, joined by an opening between two heights (metres)."""
     cells = np.zeros((80, 161), np.int8)
     cells[0] = cells[-1] = cells[:, 0] = cells[:, -1] = 100
     cells[:, 80] = 100
     cells[int(door[0] / RESOLUTION) : int(door[1] / RESOLUTION), 80] = 0
-    return GridMap(cells, RESOLUTION, (0.0, 0.0))
+    return Grid(cells, RESOLUTION, (0.0, 0.0))
 
 
-def true_clearance(grid: GridMap, path: np.ndarray) -> float:
+def true_clearance(grid: Grid, path: np.ndarray) -> float:
     """Return the least distance from points along a path to the occupied squares, by brute
     force.
     """
@@ -99,7 +99,7 @@ def test_an_opening_as_wide_as_is_asked_for_is_passed_at_any_angle(
     width = 2.0 * (radius + robot.margin + math.sqrt(2.0) * RESOLUTION) + 1e-6
     along = np.array([math.cos(math.radians(degrees)), math.sin(math.radians(degrees))])
     across = np.array([-along[1], along[0]])
-    empty = GridMap(np.zeros((120, 120), np.int8), RESOLUTION, (-3.0, -3.0))
+    empty = Grid(np.zeros((120, 120), np.int8), RESOLUTION, (-3.0, -3.0))
     for shift in (0.0, 0.01, 0.024, 0.04):
         middle = shift * (along + across)
         ends = [(middle + side * along * width / 2, side * along * 5.0) for side in (-1, 1)]
@@ -189,7 +189,7 @@ def test_in_any_clutter_a_path_is_free_and_not_longer_than_the_grid_s(seed: int)
         row, column = draw.integers(0, 56, 2)
         height, width = draw.integers(1, 12, 2)
         cells[row : row + height, column : column + width] = 100
-    grid = GridMap(cells, RESOLUTION, (-1.0, 2.0))
+    grid = Grid(cells, RESOLUTION, (-1.0, 2.0))
     robot = PlanningParameters(radius=0.1, margin=0.04, comfort=0.2)
     planner = GridPlanner(grid, robot)
     start, goal = (grid.centres_of(c)[0] for c in draw.integers(3, 57, (2, 2)))
@@ -246,7 +246,7 @@ def test_distances_and_lines_on_a_grid() -> None:
 )
 def test_maps_that_are_none_are_refused(cells: np.ndarray, resolution: float, text: str) -> None:
     with pytest.raises(ValueError, match=text):
-        GridMap(cells, resolution, (0, 0))
+        Grid(cells, resolution, (0, 0))
 
 
 def test_what_comes_and_goes_leaves_the_costs_as_a_fresh_planner_has_them(flat: Any) -> None:

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from surveillance_controllers.geometry import Pose, Scan, composed, relative
 from surveillance_controllers.motion.localisation import Localiser
-from surveillance_controllers.planning.grid_map import GridMap
+from surveillance_runtime.place.occupancy_grid import Grid
 
 POSES = st.tuples(st.floats(-5, 5), st.floats(-5, 5), st.floats(-3, 3))
 
@@ -79,7 +79,7 @@ def test_of_rooms_that_look_alike_the_one_wins_that_the_way_out_shows() -> None:
         cells[2:42, column : column + 38] = 0
         cells[42:44, column + 14 : column + 26] = 0
     cells[44:64, 2:160] = 0
-    grid = GridMap(cells, 0.05, (0.0, 0.0))
+    grid = Grid(cells, 0.05, (0.0, 0.0))
     localiser = Localiser(grid, (1.0, 1.0, 0.0))
     angles = np.linspace(-math.pi, math.pi, 180, endpoint=False)
 
@@ -140,9 +140,7 @@ def test_rays_that_tell_nothing_are_no_doubt(flat: Any) -> None:
 @pytest.mark.parametrize('shape', [(1, 1), (1, 40), (3, 2), (60, 60)])
 @pytest.mark.parametrize('value', [-1, 0, 100])
 def test_a_map_of_any_size_is_searched(shape: tuple[int, int], value: int) -> None:
-    localiser = Localiser(
-        GridMap(np.full(shape, value, np.int8), 0.05, (0.0, 0.0)), (0.02, 0.02, 0.0)
-    )
+    localiser = Localiser(Grid(np.full(shape, value, np.int8), 0.05, (0.0, 0.0)), (0.02, 0.02, 0.0))
     angles = np.linspace(0.0, 6.2, 90)
     for met, reach in ((0.5, 8.0), (999.0, 1000.0)):
         scan = Scan(angles, np.full(90, met), reach)

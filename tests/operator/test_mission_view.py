@@ -12,10 +12,11 @@ from hypothesis import strategies as st
 from rich.console import Console
 
 from surveillance_behaviour.policy.world import Decision
-from surveillance_operator.snapshot import Grid, Health, Snapshot, Status, changes
+from surveillance_operator.snapshot import Health, Snapshot, Status, changes
 from surveillance_operator.watch import raster
 from surveillance_operator.watch.raster import Frame, rasterise
 from surveillance_operator.watch.view import MissionView, node_page
+from surveillance_runtime.place.occupancy_grid import Grid
 
 STATUS = Status(95.0, 'surveillance', 'MOVE_TO_NEXT_ROOM', 'A', 'B', False, 'arrived in A', ())
 DECISION = Decision(90.0, 'A', 'B', 'B', 'URGENT', 'tour', 'B waits longest', {})

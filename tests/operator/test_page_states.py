@@ -13,13 +13,13 @@ from surveillance_operator.page.hub import Hub
 from surveillance_operator.page.server import Page
 from surveillance_operator.snapshot import (
     Container,
-    Grid,
     Health,
     History,
     Snapshot,
     Status,
     Transition,
 )
+from surveillance_runtime.place.occupancy_grid import Grid
 from tests.operator.browser import CHROMIUM, DESK, DRIVER, MISSING, PHONE, Viewer
 
 pytestmark = [

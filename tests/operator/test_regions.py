@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from surveillance_operator.regions import Region, regions
-from surveillance_operator.snapshot import Grid
+from surveillance_runtime.place.occupancy_grid import Grid
 
 WALL = 100
 
@@ -52,3 +52,8 @@ def test_a_place_in_a_wall_or_off_the_map_has_no_region() -> None:
 def test_a_large_map_is_taken_coarsely() -> None:
     found = regions(two_rooms(size=1200), {'A': (20.0, 300.0)}, {})
     assert len(found['A'].boxes) < 20
+
+
+def test_a_map_of_one_long_row_of_cells_has_its_region() -> None:
+    strip = Grid(np.zeros((1, 900_000), np.int8), 0.05)
+    assert regions(strip, {'A': (5.0, 0.02)}, {})['A'].boxes == ((0.0, 0.0, 45_000.0, 0.05),)

@@ -64,18 +64,17 @@ def turned_map(yaw: float) -> OccupancyGrid:
 
 @pytest.mark.parametrize('yaw', [0.3, math.pi / 2, math.pi, -2.5])
 def test_a_turned_map_is_drawn_anew_without_gaps_in_its_walls(yaw: float) -> None:
-    cells, side, (west, south) = map_from(turned_map(yaw), 10_000)
+    grid = map_from(turned_map(yaw), 10_000)
     along = np.linspace(0.05, 1.95, 200)
     cos, sin = math.cos(yaw), math.sin(yaw)
 
     def values(x: NDArray[np.float64], y: float) -> set[int]:
-        columns = np.floor((3.0 + cos * x - sin * y - west) / side).astype(int)
-        rows = np.floor((-2.0 + sin * x + cos * y - south) / side).astype(int)
-        return set(cells[rows, columns].tolist())
+        points = np.stack([3.0 + cos * x - sin * y, -2.0 + sin * x + cos * y], axis=1)
+        return set(grid.cells[tuple(grid.cells_of(points).T)].tolist())
 
     assert values(along, 1.05) == {100}
     assert values(along, 0.85) == values(along, 1.25) == {0}
-    occupied = (cells == 100).sum() * side**2
+    occupied = grid.occupied.sum() * grid.resolution**2
     assert occupied == pytest.approx(2.0 * 0.1, rel=0.5)
 
 

@@ -13,7 +13,6 @@ from surveillance_controllers import geometry
 from surveillance_controllers.geometry import Scan
 from surveillance_controllers.motion.driving import Drive, State
 from surveillance_controllers.motion.navigator import Navigator
-from surveillance_controllers.planning.grid_map import GridMap
 from surveillance_controllers.planning.grid_planning import GridPlanner, NoPathError
 from surveillance_runtime.place import occupancy_grid
 from surveillance_simulation.robot.robot import Robot
@@ -35,7 +34,7 @@ points = st.tuples(st.floats(2.0, 18.0), st.floats(2.0, 18.0))
 @pytest.fixture(scope='module')
 def planner() -> GridPlanner:
     drawn = occupancy_grid.draw(PLAN)
-    return GridPlanner(GridMap(drawn.cells, drawn.resolution, drawn.origin))
+    return GridPlanner(drawn)
 
 
 @settings(max_examples=40)
@@ -69,7 +68,7 @@ def driven(world: World, seed: int, goals: list[str]) -> tuple[Robot, float]:
     """Drive through places on cores alone; return the robot and how far it left its paths."""
     robot = Robot(world, rng=np.random.default_rng(seed))
     drawn = occupancy_grid.draw(world.plan)
-    grid = GridMap(drawn.cells, drawn.resolution, drawn.origin)
+    grid = drawn
     planner, navigator = GridPlanner(grid), Navigator()
     navigator.set_map(grid)
     furthest = 0.0

@@ -35,7 +35,7 @@ from surveillance_controllers.geometry import (
     in_map,
     relative,
 )
-from surveillance_controllers.planning.grid_map import GridMap, distance_to
+from surveillance_runtime.place.occupancy_grid import Grid, distance_to
 
 
 @dataclass(frozen=True)
@@ -127,7 +127,7 @@ class Localiser:
 
     def __init__(
         self,
-        grid: GridMap,
+        grid: Grid,
         pose: Pose,
         parameters: LocalisationParameters | None = None,
         before_search: Callable[[], None] = lambda: None,
@@ -148,7 +148,7 @@ class Localiser:
         self._used_at: float | None = None
         self.set_map(grid)
 
-    def set_map(self, grid: GridMap) -> None:
+    def set_map(self, grid: Grid) -> None:
         """Replace the map; the estimate stays."""
         self.grid = grid
         half = np.float32(grid.resolution / 2)
@@ -436,8 +436,7 @@ class Localiser:
         return south + (north - south) * v, slope_x, slope_y
 
     def _can_stand(self, pose: Pose) -> bool:
-        cell = self.grid.cells_of(pose[:2])
-        return bool(self.grid.contains(cell)[0] and self._standable[cell[0, 0], cell[0, 1]])
+        return bool(self.grid.at(self._standable, *pose[:2]))
 
     @property
     def _headings(self) -> Points:

@@ -20,7 +20,7 @@ from surveillance_controllers.motion.obstacle_memory import ObstacleMemory
 from surveillance_controllers.motion.path_following import Velocity
 from surveillance_controllers.motion.place_regions import PlaceRegions, Segment
 from surveillance_controllers.motion.tracking import Mover, Tracker
-from surveillance_controllers.planning.grid_map import GridMap, with_walls
+from surveillance_runtime.place.occupancy_grid import Grid, with_walls
 
 SETTLE_SECONDS = 0.2
 """A place counts once the robot has been in it for this long, so that a doorway does not
@@ -65,7 +65,7 @@ class Navigator:
         self._localisation = localisation
         self._guesses = tuple(guesses)
         self._positions: dict[str, Points] = {}
-        self._grid: GridMap | None = None
+        self._grid: Grid | None = None
         self._localiser: Localiser | None = None
         self._memory: ObstacleMemory | None = None
         self._tracker = Tracker()
@@ -123,7 +123,7 @@ class Navigator:
         """Which of the obstacles stay, shape (n,); the others may be people."""
         return np.zeros(0, np.bool_) if self._memory is None else self._memory.stay
 
-    def set_map(self, grid: GridMap) -> None:
+    def set_map(self, grid: Grid) -> None:
         """Take the map, or another one."""
         self._grid = grid
         self._redraw()

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surveillance_controllers.geometry import Points, Pose, Scan, composed, in_map
-from surveillance_controllers.planning.grid_map import GridMap, distance_to
+from surveillance_runtime.place.occupancy_grid import Grid, distance_to
 
 _Cell = tuple[int, int]
 """Column and row."""
@@ -49,7 +49,7 @@ class ObstacleMemory:
 
     def __init__(
         self,
-        grid: GridMap,
+        grid: Grid,
         cell: float = 0.05,
         apart: float = 0.25,
         reach: float = 4.0,
@@ -68,7 +68,7 @@ class ObstacleMemory:
         self._free: dict[_Cell, float] = {}
         self.set_map(grid)
 
-    def set_map(self, grid: GridMap) -> None:
+    def set_map(self, grid: Grid) -> None:
         """Replace the map; obstacles that it has are the map's from now on."""
         self._grid = grid
         self._known = distance_to(grid.occupied, grid.resolution)

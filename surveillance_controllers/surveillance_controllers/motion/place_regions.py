@@ -10,12 +10,11 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 
-import cv2
 import numpy as np
 from numpy.typing import ArrayLike
 
 from surveillance_controllers.geometry import Points
-from surveillance_controllers.planning.grid_map import GridMap, drawn_lines
+from surveillance_runtime.place.occupancy_grid import Grid, drawn_lines, regions
 
 Segment = tuple[float, float, float, float]
 
@@ -48,7 +47,7 @@ class PlaceRegions:
 
     def __init__(
         self,
-        grid: GridMap,
+        grid: Grid,
         doors: Iterable[Segment],
         positions: Mapping[str, ArrayLike],
     ) -> None:
@@ -60,13 +59,7 @@ class PlaceRegions:
         # A little longer than the opening, so that no gap remains beside the frame.
         lines = [_stretched(door, 2 * grid.resolution) for door in doors]
         passable = grid.free & ~drawn_lines(grid, lines)
-        _, labels = cv2.connectedComponents(passable.astype(np.uint8), connectivity=4)
-        _, nearest = cv2.distanceTransformWithLabels(
-            (~passable).astype(np.uint8), cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL
-        )
-        region_of = np.zeros(int(nearest.max()) + 1, dtype=np.int32)
-        region_of[nearest[passable]] = labels[passable]
-        self._regions = region_of[nearest]
+        self._regions = regions(passable)
         self._places: dict[int, list[str]] = {}
         for name, point in self._points.items():
             region = self._region(*point)
@@ -99,16 +92,8 @@ class PlaceRegions:
         return None
 
     def _region(self, x: float, y: float) -> int | None:
-        if not (math.isfinite(x) and math.isfinite(y)):
-            return None
-        # In plain numbers: this is asked with each scan, and for one point numpy takes ten times
-        # as long.
-        west, south = self._grid.origin
-        column = math.floor((x - west) / self._grid.resolution)
-        row = math.floor((y - south) / self._grid.resolution)
-        rows, columns = self._regions.shape
-        on_map = 0 <= row < rows and 0 <= column < columns
-        return int(self._regions[row, column]) if on_map else None
+        region: int | None = self._grid.at(self._regions, x, y)
+        return region
 
 
 def _sides(door: Segment) -> tuple[np.ndarray, np.ndarray]:

@@ -22,9 +22,9 @@ from skimage.graph import MCP_Geometric
 
 from surveillance_controllers import geometry
 from surveillance_controllers.geometry import Points
-from surveillance_controllers.planning.grid_map import GridMap, distance_to, points_on, with_walls
 from surveillance_controllers.planning.grid_search import Cell, GridSearch
 from surveillance_runtime.parameters import parameter
+from surveillance_runtime.place.occupancy_grid import Grid, distance_to, points_on, with_walls
 from surveillance_runtime.robot_base import robot_radius
 
 Lines = Mapping[str, tuple[float, float, float, float]]
@@ -74,7 +74,7 @@ class GridPlanner:
         doors: All doors, open or closed: a goal is not moved through one.
     """
 
-    grid: GridMap
+    grid: Grid
     parameters: PlanningParameters = field(default_factory=PlanningParameters)
     doors: Lines = field(default_factory=dict)
     _closed: Lines = field(default_factory=dict, init=False)
@@ -237,10 +237,7 @@ class GridPlanner:
     def _cell(self, what: str, point: Points) -> Cell:
         cell = self.grid.cells_of(point)
         if not np.isfinite(point).all() or not self.grid.contains(cell)[0]:
-            rows, columns = self.grid.cells.shape
-            west, south = self.grid.origin
-            east = west + columns * self.grid.resolution
-            north = south + rows * self.grid.resolution
+            west, south, east, north = self.grid.bounds
             raise NoPathError(
                 f'{what} {_shown(point)} lies outside of the map, which goes from '
                 f'({west:.2f}, {south:.2f}) to ({east:.2f}, {north:.2f})'

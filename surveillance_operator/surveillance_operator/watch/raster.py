@@ -13,8 +13,8 @@ from numpy.typing import ArrayLike, NDArray
 from rich.segment import Segment
 from rich.style import Style
 
-from surveillance_operator.regions import OCCUPIED
-from surveillance_operator.snapshot import Box, Grid, Pose
+from surveillance_operator.snapshot import Pose
+from surveillance_runtime.place.occupancy_grid import Box, Grid
 
 UNKNOWN, FREE, WALL, LINK, OLD_TRAIL, TRAIL, OPEN_DOOR, CLOSED_DOOR, OBSTACLE = range(9)
 """What a pixel shows; those above `FREE` are drawn on the ground that the first two are."""
@@ -78,7 +78,7 @@ def rasterise(grid: Grid, frame: Frame) -> NDArray[np.uint8]:
     Returns:
         Shape (2 * frame.rows, frame.columns), north first; not to be written to.
     """
-    kinds = np.where(grid.cells >= OCCUPIED, WALL, np.where(grid.cells >= 0, FREE, UNKNOWN))
+    kinds = np.where(grid.occupied, WALL, np.where(grid.free, FREE, UNKNOWN))
     kinds = kinds.astype(np.uint8)[::-1]
     west, north = grid.origin[0], grid.origin[1] + len(kinds) * grid.resolution
     for axis, offset, count in (

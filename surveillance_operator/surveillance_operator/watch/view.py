@@ -27,9 +27,10 @@ from rich.text import Text
 
 from surveillance_fsm import Interrupt
 from surveillance_operator.frames import health
-from surveillance_operator.snapshot import Box, Snapshot, why
+from surveillance_operator.snapshot import Snapshot, why
 from surveillance_operator.watch import raster
 from surveillance_operator.watch.raster import Canvas, Frame, rasterise
+from surveillance_runtime.place.occupancy_grid import Box
 
 SIDE_BY_SIDE = 76
 """From this many columns on the panel stands beside the map, else below."""

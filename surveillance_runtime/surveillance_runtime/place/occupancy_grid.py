@@ -1,37 +1,95 @@
-"""A place as a grid of cells: the map that planner and localisation work on."""
+"""A map as a grid of cells: a place drawn on it, distances on it, its connected regions.
+
+Cells are those of nav_msgs/OccupancyGrid: row 0 lies in the south, column 0 in the west; 0 is free,
+100 occupied, -1 unknown. A point is x, y in metres in the map's frame; arrays of points have shape
+(n, 2). OpenCV is imported where it is used: it takes 0.2 s, and many nodes have no map.
+"""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
 
 import numpy as np
-import numpy.typing as npt
+from numpy.typing import ArrayLike, NDArray
 
 from surveillance_runtime.place import boxes
-from surveillance_runtime.place.floor_plan import WALL_THICKNESS, FloorPlan
+from surveillance_runtime.place.floor_plan import WALL_THICKNESS, FloorPlan, Point
 
 FREE = 0
 OCCUPIED = 100
 UNKNOWN = -1
+OCCUPIED_FROM = 65
+"""Cells of this value and above are taken as occupied, as map_server and AMCL do by default."""
+
+Box = tuple[float, float, float, float]
+"""Left, bottom, right, top, metres."""
+Points = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Grid:
-    """Cells of a plane, row 0 in the south, column 0 in the west.
+    """A map.
 
     Attributes:
-        cells: (rows, columns) int8: 0 free, 100 occupied, -1 unknown, as in nav_msgs/OccupancyGrid.
+        cells: Occupancy, shape (rows, columns), int8.
         resolution: Side of a cell, metres.
-        origin: South-west corner of the cell in row 0 and column 0, metres.
+        origin: South-west corner of row 0, column 0: x, y in metres.
+
+    Raises:
+        ValueError: The cells are no such array, or the resolution is not above 0.
     """
 
-    cells: npt.NDArray[np.int8]
+    cells: NDArray[np.int8]
     resolution: float
-    origin: tuple[float, float]
+    origin: tuple[float, float] = (0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        if self.cells.ndim != 2 or 0 in self.cells.shape:
+            raise ValueError(f'a map of shape {self.cells.shape}: expected rows and columns')
+        if not self.resolution > 0:
+            raise ValueError(f'a map of resolution {self.resolution}: expected more than 0 m')
+
+    @property
+    def occupied(self) -> NDArray[np.bool_]:
+        """Where something is, shape (rows, columns)."""
+        return np.asarray(self.cells >= OCCUPIED_FROM)
+
+    @property
+    def free(self) -> NDArray[np.bool_]:
+        """Where nothing is, as far as known, shape (rows, columns)."""
+        return np.asarray((self.cells >= 0) & (self.cells < OCCUPIED_FROM))
+
+    @property
+    def bounds(self) -> Box:
+        """What the whole map covers."""
+        return self.box(0, 0, *self.cells.shape)
+
+    @cached_property
+    def known(self) -> Box:
+        """What encloses all that is known; the whole map if nothing is."""
+        rows, columns = (np.flatnonzero((self.cells >= 0).any(axis=axis)) for axis in (1, 0))
+        if not rows.size:
+            return self.bounds
+        return self.box(rows[0], columns[0], rows[-1] + 1, columns[-1] + 1)
+
+    def box(self, bottom: int, left: int, top: int, right: int) -> Box:
+        """Return what the rows from bottom to before top cover of the columns from left to before
+        right.
+        """
+        (x, y), side = self.origin, self.resolution
+        return (
+            x + side * float(left),
+            y + side * float(bottom),
+            x + side * float(right),
+            y + side * float(top),
+        )
 
     def cell_of(self, x: float, y: float) -> tuple[int, int]:
-        """Return row and column of the cell around a point (metres), which may lie outside."""
+        """Return row and column of the cell around a point, which may lie outside of the map."""
+        # In plain numbers, as `at` and `centre_of`: numpy takes ten times as long for one point.
         return (
             math.floor((y - self.origin[1]) / self.resolution),
             math.floor((x - self.origin[0]) / self.resolution),
@@ -44,10 +102,124 @@ class Grid:
             self.origin[1] + (row + 0.5) * self.resolution,
         )
 
-    def contains(self, row: int, column: int) -> bool:
-        """Tell whether a cell lies on the grid."""
+    def at(self, field: NDArray[Any], x: float, y: float) -> Any:
+        """Return what a field of the map's shape holds in the cell around a point, as a plain
+        value; None off the map, where what is no number lies, too.
+        """
+        if not (math.isfinite(x) and math.isfinite(y)):
+            return None
+        row, column = self.cell_of(x, y)
+        rows, columns = field.shape
+        return field.item(row, column) if 0 <= row < rows and 0 <= column < columns else None
+
+    def cells_of(self, points: ArrayLike) -> NDArray[np.intp]:
+        """Return the row and column of each point, shape (n, 2); they may lie outside of the
+        map.
+        """
+        # Coordinate by coordinate: numpy is slow on many short rows.
+        xy = np.asarray(points, dtype=float).reshape(-1, 2).T
+        columns_rows = np.floor((xy - np.reshape(self.origin, (2, 1))) / self.resolution)
+        # Far outside, and what is no number, is outside: no larger number survives the conversion.
+        cells: NDArray[np.intp] = np.fmin(np.fmax(columns_rows, -1), 2**40).astype(np.intp)
+        return cells[::-1].T
+
+    def centres_of(self, cells: ArrayLike) -> Points:
+        """Return the centre of each cell (row, column), shape (n, 2), metres."""
+        rows_columns = np.asarray(cells, dtype=float).reshape(-1, 2)
+        return np.asarray((rows_columns[:, ::-1] + 0.5) * self.resolution + self.origin)
+
+    def contains(self, cells: ArrayLike) -> NDArray[np.bool_]:
+        """Return which cells (row, column) lie on the map, shape (n,)."""
+        row, column = np.asarray(cells).reshape(-1, 2).T
         rows, columns = self.cells.shape
-        return 0 <= row < int(rows) and 0 <= column < int(columns)
+        return np.asarray((row >= 0) & (row < rows) & (column >= 0) & (column < columns))
+
+    def interpolated(self, field: NDArray[np.float32], points: ArrayLike) -> Points:
+        """Return the values of a field of the map's shape at points, bilinear between cell centres.
+
+        Outside of the map the value is that of the nearest cell.
+
+        Returns:
+            Shape (n,).
+        """
+        xy = np.asarray(points, dtype=float).reshape(-1, 2)
+        column = np.clip((xy[:, 0] - self.origin[0]) / self.resolution - 0.5, 0, None)
+        row = np.clip((xy[:, 1] - self.origin[1]) / self.resolution - 0.5, 0, None)
+        rows, columns = self.cells.shape
+        row, column = np.minimum(row, rows - 1), np.minimum(column, columns - 1)
+        low_row = np.minimum(row.astype(np.intp), max(rows - 2, 0))
+        low_column = np.minimum(column.astype(np.intp), max(columns - 2, 0))
+        up, right = row - low_row, column - low_column
+        high_row = np.minimum(low_row + 1, rows - 1)
+        high_column = np.minimum(low_column + 1, columns - 1)
+        south = field[low_row, low_column] * (1 - right) + field[low_row, high_column] * right
+        north = field[high_row, low_column] * (1 - right) + field[high_row, high_column] * right
+        return np.asarray(south * (1 - up) + north * up, dtype=float)
+
+
+def distance_to(mask: NDArray[np.bool_], resolution: float) -> NDArray[np.float32]:
+    """Return how far each cell's centre is from the centre of the nearest cell of `mask`, metres.
+
+    Where `mask` is empty, the distance is infinite.
+    """
+    if not mask.any():
+        return np.full(mask.shape, np.inf, dtype=np.float32)
+    import cv2
+
+    away = cv2.distanceTransform((~mask).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
+    return np.asarray(away * np.float32(resolution), dtype=np.float32)
+
+
+def points_on(line: ArrayLike, spacing: float) -> Points:
+    """Points at most `spacing` metres apart on a segment x1, y1, x2, y2; shape (n, 2), n from 2."""
+    x1, y1, x2, y2 = np.asarray(line, dtype=float)
+    steps = max(2, int(np.ceil(np.hypot(x2 - x1, y2 - y1) / spacing)) + 1)
+    share = np.linspace(0.0, 1.0, steps)[:, None]
+    return np.asarray((1 - share) * (x1, y1) + share * (x2, y2))
+
+
+def drawn_lines(grid: Grid, lines: ArrayLike) -> NDArray[np.bool_]:
+    """Return the cells that line segments run through.
+
+    Args:
+        grid: The map.
+        lines: Segments x1, y1, x2, y2, shape (n, 4), metres.
+
+    Returns:
+        Shape of the map; a line is at least one cell wide and has no gaps. What lies outside of
+        the map is left out.
+    """
+    mask = np.zeros(grid.cells.shape, dtype=np.bool_)
+    for line in np.asarray(lines, dtype=float).reshape(-1, 4):
+        cells = grid.cells_of(points_on(line, grid.resolution / 2))
+        cells = cells[grid.contains(cells)]
+        mask[cells[:, 0], cells[:, 1]] = True
+    return mask
+
+
+def with_walls(grid: Grid, lines: ArrayLike) -> Grid:
+    """Return the map with further walls: segments x1, y1, x2, y2, shape (n, 4), metres."""
+    cells = grid.cells.copy()
+    cells[drawn_lines(grid, lines)] = OCCUPIED
+    return Grid(cells, grid.resolution, grid.origin)
+
+
+def regions(free: NDArray[np.bool_]) -> NDArray[np.int32]:
+    """Return each cell's region: the connected pieces of what is free, numbered from 1.
+
+    What is not free belongs to the region nearest to it, so that a doorway is divided along its
+    middle.
+    """
+    import cv2
+
+    labels = cv2.connectedComponents(free.astype(np.uint8), connectivity=4)[1]
+    nearest = cv2.distanceTransformWithLabels(
+        (~free).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5, labelType=cv2.DIST_LABEL_PIXEL
+    )[1]
+    seeds = np.zeros(int(nearest.max()) + 1, np.int32)
+    seeds[nearest[free]] = labels[free]
+    found: NDArray[np.int32] = seeds[nearest]
+    return found
 
 
 def draw(plan: FloorPlan, resolution: float = 0.05, margin: float = 0.5) -> Grid:
@@ -61,40 +233,23 @@ def draw(plan: FloorPlan, resolution: float = 0.05, margin: float = 0.5) -> Grid
         resolution: Side of a cell, metres.
         margin: Width of the unknown border around the walls, metres.
     """
-    import cv2  # takes 0.2 s, and a node that only needs the rooms does without
+    import cv2
 
-    solid = _filled(
-        plan, boxes.boxes_around(plan.wall_pieces(), WALL_THICKNESS), resolution, margin
-    )
-    free = (solid.cells == FREE).astype(np.uint8)
-    reached = cv2.connectedComponents(free, connectivity=4)[1]
+    solid = walled(plan, plan.wall_pieces(), resolution, margin)
+    reached = cv2.connectedComponents(solid.free.astype(np.uint8), connectivity=4)[1]
     inside = {reached[solid.cell_of(x, y)] for x, y, _ in plan.place.positions.values()} - {0}
-    cells = solid.cells.copy()
-    cells[(cells == FREE) & ~np.isin(reached, list(inside))] = UNKNOWN
-    return Grid(cells, resolution, solid.origin)
+    solid.cells[solid.free & ~np.isin(reached, list(inside))] = UNKNOWN
+    return solid
 
 
-def regions(plan: FloorPlan, resolution: float = 0.05) -> tuple[Grid, npt.NDArray[np.int32]]:
-    """Return the grid with all doors closed, and each cell's region.
-
-    Regions are connected pieces of free space, numbered from 1; cells of walls and doors belong to
-    the region nearest to them, so that a doorway is divided along its middle.
-    """
-    import cv2  # see draw
-
-    lines = plan.wall_pieces() + [door.ends for door in plan.doors.values()]
-    grid = _filled(plan, boxes.boxes_around(lines, WALL_THICKNESS), resolution, margin=0.5)
-    free = (grid.cells == FREE).astype(np.uint8)
-    labels = cv2.connectedComponents(free, connectivity=4)[1]
-    nearest = cv2.distanceTransformWithLabels(
-        1 - free, cv2.DIST_L2, cv2.DIST_MASK_5, labelType=cv2.DIST_LABEL_PIXEL
-    )[1]
-    seeds = np.zeros(int(nearest.max()) + 1, np.int32)
-    seeds[nearest[free == 1]] = labels[free == 1]
-    return grid, seeds[nearest]
-
-
-def _filled(plan: FloorPlan, solid: boxes.Array, resolution: float, margin: float) -> Grid:
+def walled(
+    plan: FloorPlan,
+    lines: list[tuple[Point, Point]],
+    resolution: float = 0.05,
+    margin: float = 0.5,
+) -> Grid:
+    """Return a grid around a place on which walls stand along lines; all else is free."""
+    solid = boxes.boxes_around(lines, WALL_THICKNESS)
     west, south, east, north = plan.bounds
     # The corner of the grid falls on a multiple of the resolution: maps of one place line up.
     origin_x = math.floor((west - margin) / resolution) * resolution

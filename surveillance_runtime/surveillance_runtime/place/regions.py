@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from surveillance_runtime.place.floor_plan import WALL_THICKNESS, FloorPlan
-from surveillance_runtime.place.occupancy_grid import FREE, OCCUPIED, draw, regions
+from surveillance_runtime.place.occupancy_grid import distance_to, draw, regions, walled
 from surveillance_runtime.place.rooms import PlaceError
 
 
@@ -29,17 +29,16 @@ class Regions:
 
     def __init__(self, plan: FloorPlan) -> None:
         self._plan = plan
-        self.grid, self._labels = regions(plan)
+        lines = plan.wall_pieces() + [door.ends for door in plan.doors.values()]
+        self.grid = walled(plan, lines)
+        self._labels = regions(self.grid.free)
         self._names = self._named()
         self._check_doors()
         self._check_station()
 
     def room_at(self, x: float, y: float) -> str | None:
         """Return the room that a point (metres) lies in, None outside of every room."""
-        row, column = self.grid.cell_of(x, y)
-        if not self.grid.contains(row, column):
-            return None
-        return self._names.get(int(self._labels[row, column]))
+        return self._names.get(self.grid.at(self._labels, x, y))
 
     def masks(self) -> dict[str, npt.NDArray[np.bool_]]:
         """Return the cells (rows, columns) of each room on `grid`, every door closed."""
@@ -47,15 +46,13 @@ class Regions:
 
     def _named(self) -> dict[int, str]:
         names: dict[int, str] = {}
-        outside = int(self._labels[0, 0])
+        outside, free = int(self._labels[0, 0]), self.grid.free
         for room, (x, y, _) in self._plan.place.positions.items():
             where = ('room_positions', room)
-            row, column = self.grid.cell_of(x, y)
-            inside = self.grid.contains(row, column)
-            label = int(self._labels[row, column]) if inside else outside
-            if label == outside:
+            label = self.grid.at(self._labels, x, y)
+            if label in (None, outside):
                 raise PlaceError(where, f'({x:g}, {y:g}) lies outside: expected walls all around')
-            if self.grid.cells[row, column] != FREE:
+            if not self.grid.at(free, x, y):
                 raise PlaceError(
                     where, f'({x:g}, {y:g}) lies in a wall or a door: expected free space'
                 )
@@ -116,8 +113,7 @@ def check_passable(plan: FloorPlan, radius: float) -> None:
                 f'as the robot is {2 * radius:g} m wide',
             )
     grid = draw(plan)
-    solid = (grid.cells != OCCUPIED).astype(np.uint8)
-    clearance = cv2.distanceTransform(solid, cv2.DIST_L2, cv2.DIST_MASK_PRECISE) * grid.resolution
+    clearance = distance_to(grid.occupied, grid.resolution)
     # A cell's centre may be half a cell farther from the wall than the wall's own surface.
     fits = (clearance > radius - grid.resolution / 2).astype(np.uint8)
     pieces = cv2.connectedComponents(fits, connectivity=8)[1]

@@ -174,8 +174,7 @@ class _Ways:
 
     def is_free(self, at: Point) -> bool:
         """Tell whether a person can be at a point."""
-        row, column = self._grid.cell_of(*at)
-        return self._grid.contains(row, column) and bool(self._free[row, column])
+        return bool(self._grid.at(self._free, *at))
 
     def left(self, goal: str, at: Point) -> float:
         """Return how much of the way to a room is left, metres; a way near walls counts more."""
