@@ -288,7 +288,7 @@ def among_people(model: PeopleModel, seconds: float, seed: int, place: str) -> D
     robot = Robot(world, rng=rng, people=people)
     drawn = occupancy_grid.draw(world.plan)
     grid = drawn
-    doors = {door.name: door.ends[0] + door.ends[1] for door in world.plan.doors.values()}
+    doors = {door.name: door.segment for door in world.plan.doors.values()}
     planner, navigator = GridPlanner(grid, doors=doors), Navigator()
     navigator.set_map(grid)
     navigator.move(robot.base.odometry)

@@ -347,7 +347,7 @@ class _Facts:
         if len(values) != len(names):
             raise CallError(f'{PLANNER} gave {len(values)} of {len(names)} parameters')
         lines = {
-            name.removeprefix('doors.'): _door_line(*value.double_array_value)
+            name.removeprefix('doors.'): Door(name, *value.double_array_value).segment
             for name, value in zip(names[1:], values[1:], strict=True)
             if len(value.double_array_value) == 4
         }
@@ -422,8 +422,3 @@ def _mismatch(reason: str) -> str:
 
 def _with_position(place: str, point: tuple[float, float]) -> Callable[[Snapshot], Snapshot]:
     return lambda old: replace(old, positions={**old.positions, place: point})
-
-
-def _door_line(x: float, y: float, yaw: float, width: float) -> tuple[float, float, float, float]:
-    (x1, y1), (x2, y2) = Door('', x, y, yaw, width).ends
-    return x1, y1, x2, y2

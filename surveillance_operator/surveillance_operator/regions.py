@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from surveillance_runtime.place.floor_plan import Segment
 from surveillance_runtime.place.occupancy_grid import (
     FREE,
     OCCUPIED,
@@ -24,8 +25,6 @@ from surveillance_runtime.place.occupancy_grid import (
 
 MOST_CELLS = 200_000
 """Of a larger map several cells are taken together."""
-
-Line = tuple[float, float, float, float]
 
 
 @dataclass(frozen=True)
@@ -44,7 +43,7 @@ class Region:
 
 
 def regions(
-    grid: Grid, positions: Mapping[str, tuple[float, float]], doors: Mapping[str, Line]
+    grid: Grid, positions: Mapping[str, tuple[float, float]], doors: Mapping[str, Segment]
 ) -> dict[str, Region]:
     """Return the region of each place whose point lies on free floor.
 

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surveillance_behaviour.policy.world import Decision
+from surveillance_runtime.place.floor_plan import Segment
 from surveillance_runtime.place.occupancy_grid import Grid
 
 NO_POINTS: NDArray[np.float64] = np.empty((0, 2))
@@ -208,7 +209,7 @@ class Snapshot:
     positions: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     links: frozenset[tuple[str, str]] = frozenset()
     doors: Mapping[str, bool] | None = None
-    door_lines: Mapping[str, tuple[float, float, float, float]] = field(default_factory=dict)
+    door_lines: Mapping[str, Segment] = field(default_factory=dict)
     visited_at: Mapping[str, float] = field(default_factory=dict)
     urgent: frozenset[str] = frozenset()
     pose: Pose | None = None

@@ -14,10 +14,11 @@ from surveillance_controllers.motion.driving import Drive, State
 from surveillance_controllers.motion.navigator import Navigator
 from surveillance_controllers.motion.obstacle_memory import ObstacleMemory
 from surveillance_controllers.motion.path_following import Velocity
-from surveillance_controllers.motion.place_regions import PlaceRegions, door_segment
+from surveillance_controllers.motion.place_regions import PlaceRegions
 from surveillance_controllers.planning.door_watch import DoorWatch
 from surveillance_controllers.planning.grid_planning import NoPathError
 from surveillance_controllers.planning.map_planner import route
+from surveillance_runtime.place.floor_plan import Door
 
 
 @pytest.fixture
@@ -281,7 +282,7 @@ def test_places_in_one_region_are_told_apart_by_their_points(flat: Any) -> None:
 
 
 def test_a_door_s_segment_lies_along_its_yaw() -> None:
-    assert door_segment(1, 2, math.pi / 2, 1.2) == pytest.approx((1, 1.4, 1, 2.6))
+    assert Door('D', 1, 2, math.pi / 2, 1.2).segment == pytest.approx((1, 1.4, 1, 2.6))
 
 
 DOORS = {'D1': {'R1', 'C1'}, 'D2': {'C1', 'C2'}, 'D3': {'C2', 'R1'}, 'D4': {'C2', 'R2'}}

@@ -49,11 +49,7 @@ def test_a_path_never_touches_a_wall_or_a_closed_door(
     for door in closed:
         world.set_door(door, False)
     planner.set_closed(
-        {
-            name: (*door.ends[0], *door.ends[1])
-            for name, door in world.plan.doors.items()
-            if name in closed
-        }
+        {name: door.segment for name, door in world.plan.doors.items() if name in closed}
     )
     assume(world.is_free(*start, RADIUS + 0.05))
     try:

@@ -18,8 +18,9 @@ from surveillance_controllers.motion.driving import Drive, Spin
 from surveillance_controllers.motion.localisation import LocalisationParameters, Localiser
 from surveillance_controllers.motion.obstacle_memory import ObstacleMemory
 from surveillance_controllers.motion.path_following import Velocity
-from surveillance_controllers.motion.place_regions import PlaceRegions, Segment
+from surveillance_controllers.motion.place_regions import PlaceRegions
 from surveillance_controllers.motion.tracking import Mover, Tracker
+from surveillance_runtime.place.floor_plan import Segment
 from surveillance_runtime.place.occupancy_grid import Grid, with_walls
 
 SETTLE_SECONDS = 0.2

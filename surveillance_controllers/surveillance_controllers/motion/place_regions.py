@@ -14,23 +14,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from surveillance_controllers.geometry import Points
+from surveillance_runtime.place.floor_plan import Segment
 from surveillance_runtime.place.occupancy_grid import Grid, drawn_lines, regions
-
-Segment = tuple[float, float, float, float]
-
-
-def door_segment(x: float, y: float, yaw: float, width: float) -> Segment:
-    """Return the opening of a door as a segment x1, y1, x2, y2.
-
-    Args:
-        x: Of the centre, metres.
-        y: Of the centre, metres.
-        yaw: Direction of the line along the opening, rad.
-        width: Of the opening, metres.
-    """
-    along_x, along_y = math.cos(yaw) * width / 2, math.sin(yaw) * width / 2
-    return x - along_x, y - along_y, x + along_x, y + along_y
-
 
 BESIDE = 0.3
 """How far beside a door one is in one of its two rooms, metres."""

@@ -10,10 +10,10 @@ import numpy as np
 from surveillance_controllers.controller_parameters import MotionSettings
 from surveillance_controllers.geometry import Mount, Points
 from surveillance_controllers.motion.path_following import DriveParameters
-from surveillance_controllers.motion.place_regions import Segment, door_segment
 from surveillance_controllers.motion.transforms import lidar_mount
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.parameters import ParameterError, parameter
+from surveillance_runtime.place.floor_plan import Door, Segment
 
 
 def door_segments(node: PatrolNode) -> dict[str, Segment]:
@@ -28,7 +28,7 @@ def door_segments(node: PatrolNode) -> dict[str, Segment]:
             raise ParameterError(
                 f'parameter doors.{name}: got {values}, expected [x, y, yaw, width]'
             )
-        segments[name] = door_segment(*values)
+        segments[name] = Door(name, *values).segment
     return segments
 
 

@@ -10,13 +10,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from surveillance_controllers.map_knowledge import MapKnowledge, keep_up
-from surveillance_controllers.motion.place_regions import Segment
 from surveillance_fsm import Interrupt
 from surveillance_fsm.ros import ServiceCaller
 from surveillance_interfaces.msg import DoorStates
 from surveillance_interfaces.srv import SetDoor
 from surveillance_ontology.patrol_ontology import OntologyNotReadyError
 from surveillance_runtime.node import PatrolNode
+from surveillance_runtime.place.floor_plan import Segment
 from surveillance_runtime.qos import STATE_QOS
 
 RETRY_PERIOD = 1.0

@@ -24,11 +24,11 @@ from surveillance_controllers import geometry
 from surveillance_controllers.geometry import Points
 from surveillance_controllers.planning.grid_search import Cell, GridSearch
 from surveillance_runtime.parameters import parameter
+from surveillance_runtime.place.floor_plan import Segment
 from surveillance_runtime.place.occupancy_grid import Grid, distance_to, points_on, with_walls
 from surveillance_runtime.robot_base import robot_radius
 
-Lines = Mapping[str, tuple[float, float, float, float]]
-"""Named segments x1, y1, x2, y2, metres."""
+Lines = Mapping[str, Segment]
 
 _BLOCKED = 1e4
 """Cost of a blocked cell in the search for what blocks; more than any detour."""

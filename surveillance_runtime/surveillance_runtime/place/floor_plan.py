@@ -18,6 +18,8 @@ from surveillance_runtime.place.rooms import Place, PlaceError, place_from
 
 Point = tuple[float, float]
 Pose = tuple[float, float, float]
+Segment = tuple[float, float, float, float]
+"""A line from x1, y1 to x2, y2, metres."""
 
 WALL_THICKNESS = 0.1
 WALL_HEIGHT = 2.5
@@ -58,6 +60,12 @@ class Door:
         dx = math.cos(self.yaw) * self.width / 2
         dy = math.sin(self.yaw) * self.width / 2
         return (self.x - dx, self.y - dy), (self.x + dx, self.y + dy)
+
+    @property
+    def segment(self) -> Segment:
+        """The opening, from jamb to jamb."""
+        start, end = self.ends
+        return *start, *end
 
 
 @dataclass(frozen=True)
