@@ -26,6 +26,7 @@ from surveillance_runtime.configuration import (
 )
 from surveillance_runtime.parameters import ParameterError, ParameterSpec
 from surveillance_runtime.place.rooms import GEOMETRY_KEYS, PLACE_KEYS
+from surveillance_runtime.testing import claim_domain
 
 _HEAD = """\
 # Parameters
@@ -52,7 +53,8 @@ def collect() -> dict[str, Any]:
 
     tables: dict[str, Any] = {}
     context = rclpy.Context()
-    rclpy.init(context=context, domain_id=101)
+    # The simulator tells its map, doors and a scan as it is made.
+    rclpy.init(context=context, domain_id=claim_domain())
     here = os.getcwd()
     try:
         with tempfile.TemporaryDirectory() as folder:

@@ -5,12 +5,18 @@ from __future__ import annotations
 import json
 import re
 import shutil
+import socket
 import subprocess
 import sys
+from contextlib import suppress
+
+import pytest
+import rclpy
 
 from launcher.package_commands import HELP, all_helps
-from launcher.parameter_tables import as_markdown
+from launcher.parameter_tables import as_markdown, collect
 from surveillance_runtime.configuration import SCHEMA, read_schema
+from surveillance_runtime.discovery import LAST_DOMAIN
 from tests.launcher.conftest import ROOT
 
 COLLECT = (
@@ -25,6 +31,25 @@ def test_the_schema_is_what_the_nodes_declare(tmp_path):
     subprocess.run(words, cwd=ROOT, check=True, capture_output=True)
     hint = 'write it anew: python3 launch.py params --write'
     assert json.loads(path.read_text()) == json.loads(SCHEMA.read_text()), hint
+
+
+def test_nodes_are_made_where_no_claimed_domain_hears_them(monkeypatch):
+    class BegunError(Exception):
+        pass
+
+    def begin(*, context, domain_id):
+        used.append(domain_id)
+        raise BegunError
+
+    used = []
+    monkeypatch.setattr(rclpy, 'init', begin)
+    with socket.socket(socket.AF_UNIX) as claim:
+        with suppress(OSError):
+            # Either this claim holds, or somebody else's does.
+            claim.bind(f'\0surveillance-domain-{LAST_DOMAIN}')
+        with pytest.raises(BegunError):
+            collect()
+    assert used != [LAST_DOMAIN]
 
 
 def test_the_page_of_parameters_is_written_from_the_schema():
