@@ -105,7 +105,9 @@ def test_a_node_that_is_removed_while_it_spins_is_heard_no_more(
     monkeypatch.setattr(SingleThreadedExecutor, 'remove_node', late)
     teller.create_timer(0.001, lambda: ticks.append('kept'))
     spun.executor.remove_node(listener)
-    spun.until(lambda: 'kept' in ticks)
+    ticks.clear()
+    # What was ready, and what a wait under way brings, is called still: one of each timer.
+    spun.until(lambda: ticks.count('kept') >= 3)
     ticks.clear()
     spun.until(lambda: ticks.count('kept') >= 10)
     assert 'removed' not in ticks
