@@ -5,8 +5,10 @@ Everything here blocks while the server answers and belongs on a worker thread.
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 from surveillance_ontology.armor.access import DATA
 from surveillance_ontology.armor.client import (
@@ -16,11 +18,14 @@ from surveillance_ontology.armor.client import (
 )
 from surveillance_ontology.map_building import RoomNote, extended
 from surveillance_ontology.patrol_ontology import NEVER, PatrolOntology, checked_names, is_gone
+from surveillance_runtime.files import FileError, in_one_line, read_file, replace_text
 from surveillance_runtime.parameters import parameter
-from surveillance_runtime.place import Place, PlaceError
+from surveillance_runtime.place import Place, PlaceError, description_of, edited_place
 
 MOST_REPLACED = 10
 """Servers in a row that may lose the ontology while the map is entered, before that is an error."""
+LARGEST = 20_000_000
+"""More bytes than this are no place that was edited."""
 
 
 @dataclass(frozen=True)
@@ -54,6 +59,11 @@ class Source:
         True,
         'Places that nobody has visited count as never visited, and so as URGENT; '
         'else as visited when the map was built.',
+    )
+    state_file: str = parameter(
+        '',
+        'File that keeps the rooms added and removed over a restart of the process; empty: '
+        'nothing is kept.',
     )
 
 
@@ -92,8 +102,37 @@ class MapKeeper:
         self._on_built = on_built
         self._began: int | None = None
         self._gave_up_mending = False
-        self.place = place
+        self._described = None if place is None else description_of(place)
+        self._kept = Path(source.state_file).expanduser() if source.state_file else None
+        self.place = self._edited() or place
         self.is_built = False
+
+    def _edited(self) -> Place | None:
+        """Return the place as an earlier process left it; None where nobody edited it."""
+        if self._kept is None or not self._kept.exists():
+            return None
+        try:
+            kept = json.loads(read_file(self._kept, LARGEST))
+            if kept['described'] == self._described:
+                return checked_names(edited_place(kept['edited']))
+            problem = 'is of another place; rooms that were added or removed are as described'
+        except FileError as error:
+            problem = str(error)
+        except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
+            problem = 'holds no place; rooms that were added or removed are as described'
+        self._reports.warn(f'parameter state_file: {self._kept}: {problem}')
+        return None
+
+    def _keep(self, place: Place) -> None:
+        if self._kept is None:
+            return
+        state = {'described': self._described, 'edited': description_of(place)}
+        try:
+            replace_text(self._kept, json.dumps(state) + '\n')
+        except OSError as error:
+            self._reports.warn(
+                f'parameter state_file: {in_one_line(error)}; the change is lost at a restart'
+            )
 
     def ensure_built(self) -> None:
         """Build the map unless the server has it; goes on until it is done or the node stops."""
@@ -203,6 +242,8 @@ class MapKeeper:
         except ArmorError as error:
             self.place = before
             return f'the ontology was not changed: {error}'
+        if description_of(self.place) != description_of(before):
+            self._keep(self.place)
         return ''
 
     def without_room(self, place: Place, name: str) -> Place:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from pathlib import Path
 
@@ -29,7 +30,7 @@ from surveillance_ontology.map_building import (
 )
 from surveillance_ontology.map_keeper import MapKeeper, Reports, Source
 from surveillance_ontology.patrol_ontology import PatrolOntology
-from surveillance_runtime.place import Place, PlaceError, make_place
+from surveillance_runtime.place import Place, PlaceError, description_of, make_place
 
 from .seven_rooms import IRI, ONTOLOGY, SEVEN_ROOMS
 
@@ -216,3 +217,25 @@ def test_the_keeper_goes_on_until_the_server_is_there(tmp_path: Path) -> None:
     missing.ensure_built()
     assert said['failed'][0].startswith('cannot build the map: path ')
     service.close()
+
+
+@pytest.mark.parametrize(
+    'content',
+    ['', '[]', '{"described": null}', '[' * 100_000, '{"described": %s, "edited": {"map": 3}}'],
+)
+def test_a_state_file_that_cannot_be_used_is_told_and_left(tmp_path: Path, content: str) -> None:
+    path = tmp_path / 'state.json'
+    path.write_text(content.replace('%s', json.dumps(description_of(seven()))))
+    said: list[str] = []
+    keeper = MapKeeper(
+        PatrolOntology(ArmorClient('test', 'map', Replaced(0))),
+        Source(ONTOLOGY, IRI, state_file=str(path)),
+        seven(),
+        lambda: 100,
+        lambda: False,
+        Reports(said.append, said.append, said.append, said.append),
+        lambda: None,
+    )
+    assert keeper.place == seven()
+    assert len(said) == 1
+    assert said[0].startswith(f'parameter state_file: {path}: ')

@@ -214,6 +214,33 @@ def test_rooms_join_and_leave(armor: ArmorClient, call: Caller, built: OntologyM
         assert "'Robot1' is the robot's name" in refused.message
 
 
+def test_rooms_that_were_added_and_removed_are_there_after_a_restart(
+    graph: Any, armor: ArmorClient, call: Caller, tmp_path: Path
+) -> None:
+    graph.add(ArmorServer)
+    parameters = {**PLACE, 'state_file': str(tmp_path / 'builder.json')}
+    builder = graph.add(OntologyMapBuilder, parameters)
+    assert call('reference_name').name == 'surveillance'
+    here = point_message((1.0, 2.0, 0.0))
+    assert call('add_room', room_name='R5', position=here, doors=['D8']).success
+    assert call('add_room', room_name='E', position=here, doors=['D8']).success
+    assert call('add_room', room_name='R6', position=here, doors=['loose']).success
+    assert call('remove_room', room_name='R1').success
+    graph.remove(builder)
+    builder = graph.add(OntologyMapBuilder, parameters)
+    assert call('reference_name').name == 'surveillance'
+    assert call('room_position', room_name='R5').position.y == 2.0
+    assert not call('room_position', room_name='R1').valid
+    assert not armor.query.check_ind_exists('R1')
+    PatrolOntology(armor).record_place('E', 1)
+    assert reach(armor) == ['C1', 'C2', 'R5']
+    assert call('remove_room', room_name='R6').success
+    graph.remove(builder)
+    graph.add(OntologyMapBuilder, {**parameters, 'room_positions.E': [9.0, 9.0]})
+    assert call('reference_name').name == 'surveillance'
+    assert not call('room_position', room_name='R5').valid, 'another place was described'
+
+
 def room(name: str, *connections: tuple[str, str]) -> OntologyPlace:
     return OntologyPlace(
         name=name,

@@ -15,5 +15,7 @@ from surveillance_runtime.place.regions import check_passable as check_passable
 from surveillance_runtime.place.rooms import Place as Place
 from surveillance_runtime.place.rooms import PlaceError as PlaceError
 from surveillance_runtime.place.rooms import Position as Position
+from surveillance_runtime.place.rooms import description_of as description_of
+from surveillance_runtime.place.rooms import edited_place as edited_place
 from surveillance_runtime.place.rooms import make_place as make_place
 from surveillance_runtime.place.rooms import problem_in_name as problem_in_name

@@ -173,6 +173,32 @@ def make_place(rooms: Any, room_positions: Any, robot_room: Any, recharge_rooms:
     return place
 
 
+def description_of(place: Place) -> dict[str, Any]:
+    """Return a place as its file says it, without the closed doors."""
+    return {
+        'map': {room: list(doors) for room, doors in place.rooms.items()},
+        'room_positions': {room: list(point) for room, point in place.positions.items()},
+        'robot_room': place.start,
+        'recharge_rooms': list(place.recharge_rooms),
+    }
+
+
+def edited_place(description: Mapping[str, Any]) -> Place:
+    """Make the place that `description_of` described, whose new doors may lead nowhere yet.
+
+    Raises:
+        PlaceError: A name, a position or a list is none.
+    """
+    checked = _rooms(description.get('map'))
+    positions = _positions(description.get('room_positions'), checked)
+    start = _member(('robot_room',), description.get('robot_room'), checked)
+    stations = tuple(
+        _member(('recharge_rooms',), station, checked)
+        for station in description.get('recharge_rooms', ())
+    )
+    return Place(checked, positions, start, stations)
+
+
 def place_from(parameters: Mapping[str, Any]) -> Place:
     """Check what a place's file says of its rooms, and make the `Place` of it; see `make_place`."""
     return make_place(
