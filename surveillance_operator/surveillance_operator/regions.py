@@ -95,9 +95,12 @@ def _nearest(mask: NDArray[np.bool_], cells: list[tuple[int, int]]) -> NDArray[n
 def _region(mask: NDArray[np.bool_], cell: tuple[int, int], grid: Grid) -> Region:
     inside = distance_to(~np.pad(mask, 1), 1.0)[1:-1, 1:-1]
     rows, columns = np.indices(mask.shape)
-    # The robot stops at the point and would hide a name there; above it is better than below.
-    away = np.hypot(rows - cell[0], columns - cell[1]) + 0.02 * rows
-    row, column = np.unravel_index(np.argmax(np.minimum(inside, 0.8 * away)), mask.shape)
+    # The robot stops at the point and would hide a name there; above it is better than below, and
+    # than beside it: a name is wider than high.
+    beside = abs(columns - cell[1])
+    away = np.hypot(rows - cell[0], beside / 3) + 0.02 * rows
+    score = np.where(mask, np.minimum(inside, 0.8 * away) - 0.1 * beside, -np.inf)
+    row, column = np.unravel_index(np.argmax(score), mask.shape)
     boxes = tuple(
         grid.box(bottom, left, top, right) for left, bottom, right, top in _rectangles(mask)
     )
