@@ -19,7 +19,7 @@ from launcher.instance_lock import claim
 from launcher.options import DEFAULT_MEMORY, make_parser, shared_options
 from surveillance_runtime import node_table
 from surveillance_runtime.command_line import EXIT_BAD_INPUT, CommandParser
-from surveillance_runtime.files import in_one_line
+from surveillance_runtime.files import in_one_line, replace_text
 from surveillance_runtime.suggestions import nearest
 
 if TYPE_CHECKING:
@@ -231,7 +231,7 @@ def _service(argv: list[str]) -> int:
         return 0
     path = service.unit_path()
     path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(text, encoding='utf-8')
+    replace_text(path, text)
     print(f'written: {path}')
     print(f'start it: systemctl --user daemon-reload && systemctl --user enable --now {path.name}')
     print('also without a login: loginctl enable-linger')

@@ -17,7 +17,7 @@ from surveillance_operator.map_command import facts, graph_over_doors, in_words,
 from surveillance_operator.recording import bag
 from surveillance_operator.recording.runs import find_run, run_parser
 from surveillance_runtime.command_line import EXIT_BAD_INPUT
-from surveillance_runtime.files import PLACE, RECORD, RECORDING, FileError
+from surveillance_runtime.files import PLACE, RECORD, RECORDING, FileError, replace_text
 from surveillance_runtime.place import read_place_file
 from surveillance_runtime.place.drawing import Run, draw_place
 from surveillance_runtime.place.floor_plan import FloorPlan
@@ -58,7 +58,7 @@ def write_report(folder: Path) -> Path:
         speed = _fastest(events)
         bound = graph_over_doors(plan).tour.bound / speed if plan is not None and speed else None
         path = folder / NAME
-        path.write_text(_page(folder, events, drawn, bound), encoding='utf-8')
+        replace_text(path, _page(folder, events, drawn, bound))
     return path
 
 

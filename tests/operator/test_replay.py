@@ -7,6 +7,7 @@ import http.client
 import json
 import os
 import re
+import resource
 import subprocess
 import sys
 import time
@@ -130,6 +131,18 @@ def test_the_report_is_one_file_that_tells_everything(run: Path) -> None:
     picture = draw_picture(run)
     assert picture is not None
     assert picture.stat().st_size > 10_000
+
+
+def test_a_report_that_a_full_disk_does_not_take_leaves_the_old_one(run: Path) -> None:
+    before = write_report(run).read_text()
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (1000, limits[1]))
+    try:
+        with pytest.raises(FileError, match='File too large'):
+            write_report(run)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    assert (run / 'report.html').read_text() == before
 
 
 def test_what_failed_again_and_again_is_one_row_of_the_report(run: Path) -> None:
