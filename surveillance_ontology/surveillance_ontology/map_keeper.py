@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from surveillance_ontology.armor.access import DATA
@@ -20,7 +20,13 @@ from surveillance_ontology.map_building import RoomNote, extended
 from surveillance_ontology.patrol_ontology import NEVER, PatrolOntology, checked_names, is_gone
 from surveillance_runtime.files import FileError, in_one_line, read_file, replace_text
 from surveillance_runtime.parameters import parameter
-from surveillance_runtime.place import Place, PlaceError, description_of, edited_place
+from surveillance_runtime.place import (
+    Place,
+    PlaceError,
+    description_of,
+    edited_place,
+    problem_in_name,
+)
 
 MOST_REPLACED = 10
 """Servers in a row that may lose the ontology while the map is entered, before that is an error."""
@@ -103,36 +109,58 @@ class MapKeeper:
         self._began: int | None = None
         self._gave_up_mending = False
         self._described = None if place is None else description_of(place)
-        self._kept = Path(source.state_file).expanduser() if source.state_file else None
-        self.place = self._edited() or place
+        self._kept = source.state_file
+        self._by_hand: frozenset[str] = frozenset()
+        self.place = self._edited(place)
         self.is_built = False
 
-    def _edited(self) -> Place | None:
-        """Return the place as an earlier process left it; None where nobody edited it."""
-        if self._kept is None or not self._kept.exists():
-            return None
+    def _edited(self, place: Place | None) -> Place | None:
+        """Return the place as an earlier process left it; as described where nobody edited it."""
         try:
-            kept = json.loads(read_file(self._kept, LARGEST))
+            path = Path(self._kept).expanduser()
+            if not self._kept or not path.exists():
+                return place
+            kept = json.loads(read_file(path, LARGEST))
+            edited = checked_names(edited_place(kept['edited']))
+            by_hand = frozenset(kept.get('by_hand', ()))
+            if any(problem_in_name('kept', name) for name in by_hand):
+                raise PlaceError(('by_hand',), 'expected names')
             if kept['described'] == self._described:
-                return checked_names(edited_place(kept['edited']))
+                self._by_hand = by_hand
+                return edited
+            if place is not None:
+                # An ontology that was kept, too, has rooms that nobody knows the way to.
+                self._by_hand = frozenset({*edited.rooms, *edited.doors} - _names(place))
             problem = 'is of another place; rooms that were added or removed are as described'
         except FileError as error:
             problem = str(error)
-        except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
-            problem = 'holds no place; rooms that were added or removed are as described'
-        self._reports.warn(f'parameter state_file: {self._kept}: {problem}')
-        return None
-
-    def _keep(self, place: Place) -> None:
-        if self._kept is None:
-            return
-        state = {'described': self._described, 'edited': description_of(place)}
-        try:
-            replace_text(self._kept, json.dumps(state) + '\n')
         except OSError as error:
-            self._reports.warn(
-                f'parameter state_file: {in_one_line(error)}; the change is lost at a restart'
-            )
+            problem = error.strerror or str(error)
+        except (ValueError, LookupError, TypeError, AttributeError, RecursionError, OverflowError):
+            problem = 'holds no place; rooms that were added or removed are as described'
+        except RuntimeError as error:  # there is no such user
+            problem = str(error)
+        self._reports.warn(f'parameter state_file: {self._kept}: {problem}')
+        return place
+
+    def _keep(self, place: Place, by_hand: frozenset[str]) -> None:
+        self._by_hand = by_hand
+        if not self._kept:
+            return
+        state = {
+            'described': self._described,
+            'edited': description_of(place),
+            'by_hand': sorted(by_hand),
+        }
+        try:
+            replace_text(Path(self._kept).expanduser(), json.dumps(state) + '\n')
+        except OSError as error:
+            problem = in_one_line(error)
+        except RuntimeError as error:
+            problem = str(error)
+        else:
+            return
+        self._reports.warn(f'parameter state_file: {problem}; the change is lost at a restart')
 
     def ensure_built(self) -> None:
         """Build the map unless the server has it; goes on until it is done or the node stops."""
@@ -167,7 +195,12 @@ class MapKeeper:
             self._began = self._now()
         source = self._source
         return self._ontology.build(
-            place, source.path, source.uri, self._first_visit(), self._now()
+            place,
+            source.path,
+            source.uri,
+            self._first_visit(),
+            self._now(),
+            self._by_hand - _names(place),
         )
 
     def _first_visit(self) -> int:
@@ -206,7 +239,15 @@ class MapKeeper:
             self._gave_up_mending = False
 
     def extend(self, notes: Sequence[RoomNote], robot_room: str) -> None:
-        """Take in rooms that were described by a message."""
+        """Take in rooms that were described by a message; what was edited by hand stays so."""
+        known = self.place.positions if self.place is not None else {}
+        notes = [
+            replace(note, position=known[note.name]) if note.name in self._by_hand else note
+            for note in notes
+            if note.name in known or note.name not in self._by_hand
+        ]
+        if robot_room in self._by_hand and robot_room not in known:
+            robot_room = ''
         try:
             place = checked_names(extended(self.place, notes, robot_room))
         except PlaceError as error:
@@ -231,19 +272,23 @@ class MapKeeper:
         """
         if self.place is None:
             return 'there is no map yet'
-        before = self.place
+        before, by_hand = self.place, self._by_hand
         try:
             # First, as in `extend`: who learns of a new room from the ontology asks for its point.
-            self.place = checked_names(change(before))
-            self._ontology.change(before, self.place, self._first_visit())
+            after = self.place = checked_names(change(before))
+            edited = _differences(before, after)
+            if edited:
+                # Before the ontology has it: a builder that dies in between makes up for it.
+                self._keep(after, by_hand | edited)
+            self._ontology.change(before, after, self._first_visit())
         except PlaceError as error:
             self.place = before
             return str(error)
         except ArmorError as error:
             self.place = before
+            if edited:
+                self._keep(before, by_hand)
             return f'the ontology was not changed: {error}'
-        if description_of(self.place) != description_of(before):
-            self._keep(self.place)
         return ''
 
     def without_room(self, place: Place, name: str) -> Place:
@@ -256,3 +301,17 @@ class MapKeeper:
         if name in self._ontology.robot_places():
             raise PlaceError(('map', name), 'the robot is in it, it cannot be removed')
         return left
+
+
+def _names(place: Place) -> set[str]:
+    return {*place.rooms, *place.doors}
+
+
+def _differences(before: Place, after: Place) -> set[str]:
+    """Return the rooms that are not the same in two places, and the doors that are gone."""
+    old, new = (
+        {room: (doors, place.positions[room]) for room, doors in place.rooms.items()}
+        for place in (before, after)
+    )
+    rooms = {room for room in (*old, *new) if old.get(room) != new.get(room)}
+    return rooms | (before.doors.keys() - after.doors.keys())

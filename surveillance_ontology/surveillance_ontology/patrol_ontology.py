@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Protocol
 
@@ -148,7 +148,13 @@ class PatrolOntology:
         return self.reference in self._armor.utils.get_all_refs()
 
     def build(
-        self, place: Place, path: str, uri: str, first_visit: int = NEVER, now: int | None = None
+        self,
+        place: Place,
+        path: str,
+        uri: str,
+        first_visit: int = NEVER,
+        now: int | None = None,
+        gone: Iterable[str] = (),
     ) -> Place:
         """Load the ontology and enter a place, as far as it is not there yet.
 
@@ -161,6 +167,7 @@ class PatrolOntology:
             first_visit: Time of visit of places that the ontology does not know, seconds.
             now: The robot's time in an ontology that knows none of the places, seconds; None
                 leaves it as it is.
+            gone: Rooms and doors that the ontology may still have, and is to have no more.
 
         Returns:
             The place with the closed doors that the ontology has.
@@ -176,7 +183,8 @@ class PatrolOntology:
             room: [door for door in doors if door in place.rooms[room]]
             for room, doors in known.items()
         }
-        todo = self._differences(mine, shown_doors(place), first_visit)
+        todo = [self._request('REMOVE IND', name) for name in sorted(gone)]
+        todo += self._differences(mine, shown_doors(place), first_visit)
         if not known and now is not None:
             todo.append(self._set_value('now', self._robot, now))
         self._carry_out(

@@ -221,7 +221,16 @@ def test_the_keeper_goes_on_until_the_server_is_there(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     'content',
-    ['', '[]', '{"described": null}', '[' * 100_000, '{"described": %s, "edited": {"map": 3}}'],
+    [
+        '',
+        '[]',
+        '{"described": null}',
+        '[' * 100_000,
+        '{"described": %s, "edited": {"map": 3}}',
+        '{"described": %s, "edited": {"map": {"A": ["D"]}, "room_positions": {"A": [1'
+        + '0' * 400
+        + ', 0]}, "robot_room": "A"}}',
+    ],
 )
 def test_a_state_file_that_cannot_be_used_is_told_and_left(tmp_path: Path, content: str) -> None:
     path = tmp_path / 'state.json'
@@ -239,3 +248,99 @@ def test_a_state_file_that_cannot_be_used_is_told_and_left(tmp_path: Path, conte
     assert keeper.place == seven()
     assert len(said) == 1
     assert said[0].startswith(f'parameter state_file: {path}: ')
+
+
+class Dies(InProcessTransport):
+    """A transport whose client is killed when it sends a change."""
+
+    dies = ''
+
+    def call_list(self, requests: Batch) -> ListResponse:
+        if any(self.dies in request.args for request in requests):
+            raise KeyboardInterrupt
+        return super().call_list(requests)
+
+
+def kept(service: ArmorService, path: str, place: Place | None) -> tuple[MapKeeper, list[str]]:
+    """Return a keeper with a state file, and what it says."""
+    said: list[str] = []
+    source = Source(ONTOLOGY, IRI, state_file=path)
+    client = ArmorClient('test', 'map', Dies(service))
+    reports = Reports(lambda _: None, said.append, said.append, said.append)
+    keeper = MapKeeper(
+        PatrolOntology(client), source, place, lambda: 100, lambda: False, reports, lambda: None
+    )
+    keeper.ensure_built()
+    return keeper, said
+
+
+def test_a_builder_killed_within_an_edit_makes_up_for_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    service = ArmorService(warn=lambda _: None)
+    path = str(tmp_path / 'state.json')
+    edits: tuple[tuple[str, Callable[[Place], Place]], ...] = (
+        ('R5', lambda place: place.with_room('R5', (1, 2, 0), ['D8'])),
+        ('R1', lambda place: place.without_room('R1')),
+    )
+    for name, edit in edits:
+        keeper, _ = kept(service, path, seven())
+        monkeypatch.setattr(Dies, 'dies', name)
+        with pytest.raises(KeyboardInterrupt):
+            keeper.edit(edit)
+        monkeypatch.undo()
+    keeper, said = kept(service, path, seven())
+    query = ArmorClient('test', 'map', InProcessTransport(service)).query
+    assert keeper.place is not None
+    assert sorted(query.ind_b2_class('LOCATION')) == sorted(keeper.place.rooms)
+    assert ('R5' in keeper.place.rooms, 'R1' in keeper.place.rooms, said) == (True, False, [])
+    other = make_place(
+        seven().rooms, {room: [9.0, 9.0] for room in seven().rooms}, seven().start, []
+    )
+    keeper, said = kept(service, path, other)
+    assert sorted(query.ind_b2_class('LOCATION')) == sorted(other.rooms), 'R5 leads nowhere'
+    assert len(said) == 1
+    assert 'of another place' in said[0]
+    service.close()
+
+
+def test_a_map_that_is_sent_again_changes_nothing_that_was_edited(tmp_path: Path) -> None:
+    service = ArmorService(warn=lambda _: None)
+    path = str(tmp_path / 'state.json')
+    sent = [
+        RoomNote('E', (0, 0, 0), (('A', 'D1'), ('B', 'D2'), ('C', 'D3'))),
+        RoomNote('A', (1, 0, 0), (('E', 'D1'),)),
+        RoomNote('B', (2, 0, 0), (('E', 'D2'),)),
+        RoomNote('C', (3, 0, 0), (('E', 'D3'),)),
+    ]
+    keeper, said = kept(service, path, None)
+    keeper.extend(sent, 'A')
+    changes: tuple[Callable[[Place], Place], ...] = (
+        lambda place: place.without_room('A'),
+        lambda place: place.without_room('B'),
+        lambda place: place.with_room('B', (7, 7, 0), ['D2']),
+    )
+    for change in changes:
+        assert keeper.edit(change) == ''
+    for again in (keeper, kept(service, path, None)[0]):
+        again.extend(sent, 'A')
+        assert again.place is not None
+        assert sorted(again.place.rooms) == ['B', 'C', 'E']
+        assert again.place.positions['B'] == (7, 7, 0)
+    again.extend([RoomNote('F', (4, 0, 0), (('E', 'D4'),))], 'A')
+    assert 'F' in again.place.rooms
+    assert again.edit(lambda place: place.with_room('A', (1, 0, 0), ['D1'])) == ''
+    assert 'A' in again.place.rooms
+    assert said == []
+    service.close()
+
+
+@pytest.mark.parametrize('path', ['n' * 300, '~nobody-of-this-name/state.json'])
+def test_a_state_file_that_no_file_can_be_is_told(path: str) -> None:
+    service = ArmorService(warn=lambda _: None)
+    keeper, said = kept(service, path, seven())
+    assert keeper.place == seven()
+    assert len(said) == 1
+    assert keeper.edit(lambda place: place.with_room('R5', (1, 2, 0), ['D8'])) == ''
+    assert 'the change is lost at a restart' in said[1]
+    service.close()
