@@ -14,7 +14,7 @@ from typing import Any
 
 import pytest
 
-from surveillance_ontology.armor.access import DATA, Settings
+from surveillance_ontology.armor.access import DATA, SafePaths, Settings
 from surveillance_ontology.armor.protocol import DirectiveRequest
 from surveillance_ontology.armor.service import ArmorService
 from surveillance_ontology.documents import reading, writing
@@ -273,6 +273,34 @@ def test_a_disk_that_does_not_answer_keeps_neither_readers_nor_the_collector(
         assert 'it broke' in answers.get(timeout=30).error_description
         save.join()
     assert gc.isenabled()
+
+
+def test_what_was_loaded_meanwhile_is_not_saved_into_the_file_of_what_was_dropped(
+    ask: Ask, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in 'ab':
+        text = f'Ontology(<{IRI}> ClassAssertion(<{IRI}#C> <{IRI}#{name}>))'
+        (tmp_path / f'{name}.owl').write_text(text)
+    assert ask('DROP').success
+    assert ask('LOAD FILE', 'a.owl', IRI, 'false', '', 'false').success
+    before = (tmp_path / 'a.owl').read_bytes()
+    to_write = SafePaths.to_write
+
+    def late(paths: SafePaths, *args: Any) -> Path:
+        monkeypatch.undo()
+        done = threading.Thread(target=meanwhile)
+        done.start()
+        done.join(30)
+        return to_write(paths, *args)
+
+    def meanwhile() -> None:
+        ask('DROP')
+        ask('LOAD FILE', 'b.owl', IRI, 'false', '', 'false')
+
+    monkeypatch.setattr(SafePaths, 'to_write', late)
+    assert ask('SAVE').error_description == 'SAVE: map was loaded anew meanwhile'
+    assert (tmp_path / 'a.owl').read_bytes() == before
+    assert ask('SAVE').success
 
 
 def test_names_that_rdf_xml_cannot_hold_are_saved_as_ntriples(ask: Ask) -> None:

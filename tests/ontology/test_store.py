@@ -283,6 +283,36 @@ def test_a_closed_journal_is_free_although_a_process_that_just_starts_holds_its_
     os.close(inherited)
 
 
+@pytest.mark.parametrize('left', [0, 5])
+def test_a_journal_that_somebody_cut_costs_nothing_that_is_known(tmp_path: Path, left: int) -> None:
+    journal = Journal(tmp_path)
+    journal.append([['a', 1]])
+    os.truncate(tmp_path / 'journal-0.log', left)
+    journal.append([['b', 2]])
+    journal.append([['c', 3]])
+    assert journal.is_incomplete
+    journal.close()
+    journal = Journal(tmp_path)
+    assert journal.records() == [['b', 2], ['c', 3]]
+    assert len(journal.notes) == 1
+    journal.close()
+
+
+def test_what_was_cut_from_the_journal_is_in_a_snapshot(server: Server) -> None:
+    server.ask('ADD IND CLASS', 'A', 'DOOR')
+    store = server.service.session.store
+    assert store is not None
+    os.truncate(store.directory / 'journal-0.log', 0)
+    server.ask('ADD IND CLASS', 'B', 'DOOR')
+    snapshot = store._snapshot
+    assert snapshot is not None
+    snapshot.join(60.0)
+    assert server.notes[-1].endswith('the journal was cut; all that is known is written anew')
+    server.ask('ADD IND CLASS', 'C', 'DOOR')
+    server.restart()
+    assert names(server.ask('QUERY IND CLASS', 'DOOR')) == ['A', 'B', 'C']
+
+
 def test_a_store_of_a_newer_version_is_refused(tmp_path: Path) -> None:
     journal = Journal(tmp_path / 'store')
     journal.append([['more', 'map', []]])

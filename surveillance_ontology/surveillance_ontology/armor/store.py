@@ -75,6 +75,7 @@ class Journal:
         notes: One line for each part that was found damaged or missing.
         size: Bytes of the segments since the snapshot.
         snapshot_size: Bytes of the snapshot.
+        is_incomplete: Somebody cut the last segment; only a snapshot makes up for it.
     """
 
     def __init__(self, directory: Path) -> None:
@@ -218,8 +219,17 @@ class Journal:
         return found.st_size
 
     def _cut(self) -> None:
-        """Remove what a write that failed may have left behind the records."""
-        os.ftruncate(self._file.fileno(), self._end)
+        """Remove what a write that failed may have left behind the records.
+
+        Where somebody cut the file, what follows begins a line of its own, and a snapshot is due.
+        """
+        descriptor = self._file.fileno()
+        if os.fstat(descriptor).st_size >= self._end:
+            os.ftruncate(descriptor, self._end)
+            return
+        self.is_incomplete = True
+        os.ftruncate(descriptor, self._end - 1)
+        self._file.write(b'\n')
 
     def _path(self, kind: str, number: int) -> Path:
         return self._directory / f'{kind}-{number}.log'
@@ -232,6 +242,7 @@ class Journal:
         found = os.fstat(file.fileno())
         self._file, self._number, self._place = file, number, str(path)
         self._file_id, self._end = (found.st_dev, found.st_ino), found.st_size
+        self.is_incomplete = False
 
     def _sync_directory(self) -> None:
         descriptor = os.open(self._directory, os.O_RDONLY)
@@ -514,7 +525,8 @@ class Store:
                 not give all of them, the next change tries again.
         """
         journal = self._journal
-        if self._waiting or journal.size < max(self._compact_from, journal.snapshot_size):
+        is_small = journal.size < max(self._compact_from, journal.snapshot_size)
+        if self._waiting or (is_small and not journal.is_incomplete):
             return
 
         def write() -> None:
@@ -525,6 +537,11 @@ class Store:
                         # What waits is in the references already. Or one of them came or went
                         # meanwhile, or is in use. The next change tries again.
                         return
+                    if journal.is_incomplete:
+                        self.warn(
+                            f'{self.directory}: the journal was cut; '
+                            'all that is known is written anew'
+                        )
                     number = journal.begin_snapshot()
                     states = [_state(ref) for ref in kept]
                 records = (record for state in states for record in _records(*state))

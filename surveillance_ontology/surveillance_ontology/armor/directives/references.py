@@ -209,16 +209,19 @@ def _save(session: Session, request: DirectiveRequest, path: str) -> DirectiveRe
     # Late, as what LOAD WEB needs: a server that starts again is to be back at once.
     from surveillance_ontology.documents.writing import write_ontology
 
-    with session.references.locked(request.reference_name) as ref:
-        session.check_free(ref, request.client_name)
-        path = path or _loaded_file(session, ref)
+    with session.references.locked(request.reference_name) as first:
+        session.check_free(first, request.client_name)
+        chosen = path or _loaded_file(session, first)
     # While nobody waits for the reference: the disk may not answer.
-    target = session.paths.to_write(path, ONTOLOGY_ENDINGS)
+    target = session.paths.to_write(chosen, ONTOLOGY_ENDINGS)
     saving = session.saving(target)
     with contextlib.ExitStack() as turn:
         while True:
             with session.references.locked(request.reference_name) as ref:
                 session.check_free(ref, request.client_name)
+                if ref is not first and not path:
+                    # Its own file is another one.
+                    raise DirectiveError(f'SAVE: {ref.name} was loaded anew meanwhile')
                 # Whose turn it is waits for no reference: a list may hold it, and wait for a turn.
                 if saving.acquire(blocking=False):
                     turn.callback(saving.release)
