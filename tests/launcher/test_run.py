@@ -246,7 +246,7 @@ def test_the_last_lines_of_a_run_can_be_typed_and_tell_what_could_not_be_written
         record.write('start', 0.0, machine='surveillance', place='E', places=['E'])
         record.write('visit', 9.0, place='E', distance=1.0)
     report, replay = what_to_look_at(folder)
-    assert report == f'report: {folder}/report.html: Is a directory'
+    assert report == f'report: {folder}/report.html: expected a file, got a folder'
     assert shlex.split(replay)[1:] == ['python3', 'launch.py', 'replay', str(folder)]
     assert what_to_look_at(tmp_path) == []
 
