@@ -132,7 +132,7 @@ class Completion:
 
         Where there are rules, that may take too long where it is but open who is the same.
         """
-        if self._wanted or self._engine.unknown_values_matter():
+        if self._wanted or self._engine.unknowns_matter():
             return True
         return not self._has_rules and next(self._engine.open_cases(), None) is not None
 

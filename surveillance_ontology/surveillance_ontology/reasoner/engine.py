@@ -238,11 +238,11 @@ class Engine:
         """Yield sentences about what is not derived because it would need reasoning by cases."""
         yield from self._open_cases().sentences()
 
-    def unknown_values_matter(self) -> bool:
+    def unknowns_matter(self) -> bool:
         """Tell whether reasoning by cases is needed for a rule or key that could apply by a value
-        which must exist and is not known.
+        which must exist and is not known, or because somebody who must exist is one of those known.
         """
-        return self._open_cases().unknown_values_matter()
+        return self._open_cases().unknowns_matter()
 
     def _open_cases(self) -> OpenCases:
         known, program, network = self._open, self.program, self._network

@@ -29,7 +29,9 @@ from surveillance_ontology.reasoner.clauses import (
     RangeAtom,
     StoppedError,
     closure,
+    turned,
 )
+from surveillance_ontology.reasoner.difference import clique
 from surveillance_ontology.reasoner.joins import JoinContext, compile_call
 from surveillance_ontology.reasoner.value_sets import EVERY, NONE, ValueSet, point
 
@@ -61,6 +63,7 @@ class OpenCases:
         self._asked = tuple(_asked_for_unknown(program))
         self._lower = [counter for counter in lower if not counter.is_data]
         self._upper = [counter for counter in upper if not counter.is_data and counter.n > 1]
+        self._filling = tuple(_filling(program, upper))
         self._clauses = [
             clause
             for clause in program.clauses
@@ -95,13 +98,27 @@ class OpenCases:
                 prop = local_name(asked.atom.predicate.name)
                 yield _sentence(asked.clause.origin, name, f'a value of {prop} that is not known')
 
-    def unknown_values_matter(self) -> bool:
+    def unknowns_matter(self) -> bool:
         """Tell whether reasoning by cases is needed for a rule or key that could apply by a value
-        which must exist and is not known.
+        which must exist and is not known, or because somebody who must exist is one of those known.
         """
         return any(
             asked.is_decided and self._with_unknown(asked) is not None for asked in self._asked
-        )
+        ) or any(self._is_full(*filling) for filling in self._filling)
+
+    def _is_full(self, limit: AtMostCounter, existentials: list[Existential]) -> bool:
+        """Tell whether who must exist is for somebody one of those related, as no more may be."""
+        for z in limit.succ if limit.label is None else limit.label.members:
+            missing = sum(
+                one.n
+                for one in existentials
+                if z in one.label.members and len(_witnesses(one, z)) < one.n
+            )
+            if missing:
+                size = max(1, limit.n + 1 - missing)
+                if clique(list(limit.related(z)), size, self._context.different) is not None:
+                    return True
+        return False
 
     def _with_unknown(self, asked: _Asked) -> str | None:
         """Return somebody for whom a rule, or a key, could apply by such a value."""
@@ -223,6 +240,36 @@ def values_may_split(program: Program) -> bool:
             if splitting and left.size < existential.n:
                 return True
     return False
+
+
+def _filling(
+    program: Program, upper: list[AtMostCounter]
+) -> Iterator[tuple[AtMostCounter, list[Existential]]]:
+    """Yield each upper bound with those who must exist that it may count.
+
+    The engine itself finds who is the only one related.
+    """
+    above: dict[Predicate, list[tuple[Predicate, bool]]] = {}
+    for clause in program.clauses:
+        atoms = [
+            atom
+            for atom in (*clause.body, clause.head)
+            if isinstance(atom, PredicateAtom) and atom.predicate.kind == 'object'
+        ]
+        if len(clause.body) == 1 and len(atoms) == 2:
+            sub, sup = atoms
+            above.setdefault(sub.predicate, []).append((sup.predicate, sup.terms != sub.terms))
+
+    def following(role: tuple[Predicate, bool]) -> list[tuple[Predicate, bool]]:
+        found = above.get(role[0], ())
+        return [turned((sup, role[1])) if turns else (sup, role[1]) for sup, turns in found]
+
+    reached = [(one, closure((one.prop, one.inverse), following)) for one in program.existentials]
+    for limit in upper:
+        if not limit.is_data and (limit.n > 1 or limit.filler is not None):
+            counted = [one for one, roles in reached if (limit.prop, limit.inverse) in roles]
+            if counted:
+                yield limit, counted
 
 
 class _Asked(NamedTuple):

@@ -601,6 +601,29 @@ def test_beside_a_rule_too_every_value_that_must_exist_is_looked_at() -> None:
     assert kb.unsupported == ()
 
 
+def test_beside_a_rule_too_a_full_count_names_who_must_exist() -> None:
+    some = ex.ObjectSomeValuesFrom(Q, A)
+    most = SubClassOf(B, ex.ObjectMaxCardinality(2, P, THING))
+    full = [
+        ax.SubObjectPropertyOf(Q, P),
+        *(ax.ObjectPropertyAssertion(P, i, one) for one in (j, k)),
+        ax.DifferentIndividuals(frozenset({j, k})),
+        ClassAssertion(B, i),
+    ]
+    kb = reasoned(
+        IDLE, most, SubClassOf(B, some), SubClassOf(A, C), ax.DisjointClasses((C, D)), *full
+    )
+    assert kb.unsupported == ()
+    assert not kb.holds(ClassAssertion(A, j))
+    kb.add(ClassAssertion(D, k))
+    assert kb.reason()
+    assert kb.holds(ClassAssertion(A, j))
+    assert kb.holds(ax.ObjectPropertyAssertion(Q, i, j))
+    kb.remove(ClassAssertion(D, k))
+    assert kb.reason()
+    assert not kb.holds(ClassAssertion(A, j))
+
+
 def test_beside_a_rule_too_disjoint_properties_share_no_value() -> None:
     kb = reasoned(
         IDLE,
