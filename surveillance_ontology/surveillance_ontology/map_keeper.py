@@ -111,6 +111,7 @@ class MapKeeper:
         self._described = None if place is None else description_of(place)
         self._kept = source.state_file
         self._by_hand: frozenset[str] = frozenset()
+        self._entered: set[str] = set()
         self.place = self._edited(place)
         self.is_built = False
 
@@ -130,7 +131,9 @@ class MapKeeper:
                 return edited
             if place is not None:
                 # An ontology that was kept, too, has rooms that nobody knows the way to.
-                self._by_hand = frozenset({*edited.rooms, *edited.doors} - _names(place))
+                self._entered = _names(edited)
+            if not by_hand:
+                return place
             problem = 'is of another place; rooms that were added or removed are as described'
         except FileError as error:
             problem = str(error)
@@ -160,7 +163,7 @@ class MapKeeper:
             problem = str(error)
         else:
             return
-        self._reports.warn(f'parameter state_file: {problem}; the change is lost at a restart')
+        self._reports.warn(f'parameter state_file: {problem}; edited rooms are lost at a restart')
 
     def ensure_built(self) -> None:
         """Build the map unless the server has it; goes on until it is done or the node stops."""
@@ -194,14 +197,19 @@ class MapKeeper:
         if self._began is None:
             self._began = self._now()
         source = self._source
-        return self._ontology.build(
+        built = self._ontology.build(
             place,
             source.path,
             source.uri,
             self._first_visit(),
             self._now(),
-            self._by_hand - _names(place),
+            (self._by_hand | self._entered) - _names(place),
         )
+        if self._described is not None and self._entered != _names(built):
+            # For whoever comes after it with another place.
+            self._entered = _names(built)
+            self._keep(built, self._by_hand)
+        return built
 
     def _first_visit(self) -> int:
         return NEVER if self._source.urgent_at_start or self._began is None else self._began
