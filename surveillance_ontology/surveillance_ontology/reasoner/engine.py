@@ -419,7 +419,11 @@ class Engine:
             if isinstance(origin, SameIndividual) and origin not in self.told.axioms:
                 continue
             x, y = equality.find(merge.first), equality.find(merge.second)
-            if x == y or not all(self._holds(self.current(fact)) for fact in merge.premises):
+            if x == y:
+                continue
+            if not all(self._holds(self.current(fact)) for fact in merge.premises):
+                for ask in self._network.merging:  # By other premises they may still be.
+                    ask(x, y)
                 continue
             if self.difference.different(x, y):
                 self.conflicts.add(merge)
@@ -471,6 +475,7 @@ class Engine:
         if representative not in self.equality.members:
             return
         self.renamed = self._split_happened = True
+        self._touch_before_removal(representative)
         facts = list(self._facts_about(representative, self._filled()))
         for fact in facts:
             if self.asserted.pop(fact, None) and self.changed is not None:

@@ -47,6 +47,7 @@ class Network:
 
     Attributes:
         initial: Clauses without a condition on facts; run them once at the start.
+        merging: Ask clauses whether two individuals are the same by what holds.
         naming: Clauses that name an individual; run them when it comes to stand for another, or
             ceases to.
         touch_insert, touch_delete: Called with an individual whose difference from others may have
@@ -74,6 +75,7 @@ class Network:
         )
         self.initial: list[Callable[[], None]] = []
         self.naming: list[Callable[[], None]] = []
+        self.merging: list[Callable[[str, str], None]] = []
         self.touch_insert: list[Callable[[str], None]] = []
         self.touch_delete: list[Callable[[str], None]] = []
         self.touch_related: list[Callable[[str], list[str]]] = []
@@ -178,6 +180,7 @@ class Network:
                     merge(first or x, second or y, origin, premises)
                     return
 
+        self.merging.append(request)
         triggered = False
         for atom in body:
             if isinstance(atom, PredicateAtom):

@@ -19,9 +19,11 @@ from surveillance_ontology.owl.axioms import (
     ClassAssertion,
     DataPropertyAssertion,
     Declaration,
+    DifferentIndividuals,
     DisjointClasses,
     EquivalentClasses,
     FunctionalObjectProperty,
+    ObjectPropertyAssertion,
     ObjectPropertyRange,
     Rule,
     SameIndividual,
@@ -398,3 +400,33 @@ def test_the_clock_changes_only_the_places_that_cross_the_threshold() -> None:
     kb.change([value('now', 'Robot1', NOW)], [value('now', 'Robot1', NOW + 11)])
     kb.reason()
     assert kb.instances(n('URGENT')) == set()
+
+
+def test_a_conflict_stays_while_a_rule_has_other_premises_for_it() -> None:
+    x, y = Variable('x:x'), Variable('x:y')
+    rule = Rule((ObjectPropertyAtom('x:p', x, y),), (SameIndividualAtom(x, 'x:k'),))
+    facts = [ObjectPropertyAssertion('x:p', 'x:i', f'x:{one}') for one in 'mn']
+    kb = KnowledgeBase('x:', [rule, DifferentIndividuals(frozenset({'x:i', 'x:k'})), *facts])
+    assert not kb.reason()
+    kb.remove(facts[0])
+    assert not kb.reason()
+    kb.remove(facts[1])
+    assert kb.reason()
+
+
+def test_what_a_difference_gave_goes_with_the_sameness_it_rested_on() -> None:
+    different = DifferentIndividuals(frozenset({'x:j', 'x:k'}))
+    rule = Rule(
+        (DifferentIndividualsAtom('x:m', Variable('x:y')),), (ClassAtom('x:B', Variable('x:y')),)
+    )
+    same = SameIndividual(frozenset({'x:k', 'x:m'}))
+    kb = KnowledgeBase('x:', [rule, different])
+    for _ in range(2):
+        assert kb.reason()
+        assert not kb.holds(ClassAssertion('x:B', 'x:j'))
+        kb.add(same)
+        assert kb.reason()
+        assert kb.holds(ClassAssertion('x:B', 'x:j'))
+        kb.remove(same)
+    assert kb.reason()
+    assert not kb.holds(ClassAssertion('x:B', 'x:j'))
