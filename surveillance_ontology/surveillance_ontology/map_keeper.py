@@ -6,6 +6,7 @@ Everything here blocks while the server answers and belongs on a worker thread.
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -18,7 +19,7 @@ from surveillance_ontology.armor.client import (
 )
 from surveillance_ontology.map_building import RoomNote, extended
 from surveillance_ontology.patrol_ontology import NEVER, PatrolOntology, checked_names, is_gone
-from surveillance_runtime.files import FileError, in_one_line, read_file, replace_text
+from surveillance_runtime.files import FileError, in_one_line, read_json, replace_text
 from surveillance_runtime.parameters import parameter
 from surveillance_runtime.place import (
     Place,
@@ -109,7 +110,9 @@ class MapKeeper:
         self._began: int | None = None
         self._gave_up_mending = False
         self._described = None if place is None else description_of(place)
-        self._kept = source.state_file
+        # Of a user whom nobody knows, a path that is not there.
+        path = os.path.expanduser(source.state_file)
+        self._kept = Path(path) if path else None
         self._by_hand: frozenset[str] = frozenset()
         self._entered: set[str] = set()
         self.place = self._edited(place)
@@ -118,10 +121,9 @@ class MapKeeper:
     def _edited(self, place: Place | None) -> Place | None:
         """Return the place as an earlier process left it; as described where nobody edited it."""
         try:
-            path = Path(self._kept).expanduser()
-            if not self._kept or not path.exists():
+            kept = read_json(self._kept, LARGEST) if self._kept is not None else None
+            if kept is None:
                 return place
-            kept = json.loads(read_file(path, LARGEST))
             edited = checked_names(edited_place(kept['edited']))
             by_hand = frozenset(kept.get('by_hand', ()))
             if any(problem_in_name('kept', name) for name in by_hand):
@@ -137,18 +139,14 @@ class MapKeeper:
             problem = 'is of another place; rooms that were added or removed are as described'
         except FileError as error:
             problem = str(error)
-        except OSError as error:
-            problem = error.strerror or str(error)
-        except (ValueError, LookupError, TypeError, AttributeError, RecursionError, OverflowError):
+        except (ValueError, LookupError, TypeError, AttributeError):
             problem = 'holds no place; rooms that were added or removed are as described'
-        except RuntimeError as error:  # there is no such user
-            problem = str(error)
         self._reports.warn(f'parameter state_file: {self._kept}: {problem}')
         return place
 
     def _keep(self, place: Place, by_hand: frozenset[str]) -> None:
         self._by_hand = by_hand
-        if not self._kept:
+        if self._kept is None:
             return
         state = {
             'described': self._described,
@@ -156,14 +154,11 @@ class MapKeeper:
             'by_hand': sorted(by_hand),
         }
         try:
-            replace_text(Path(self._kept).expanduser(), json.dumps(state) + '\n')
+            replace_text(self._kept, json.dumps(state) + '\n')
         except OSError as error:
-            problem = in_one_line(error)
-        except RuntimeError as error:
-            problem = str(error)
-        else:
-            return
-        self._reports.warn(f'parameter state_file: {problem}; edited rooms are lost at a restart')
+            self._reports.warn(
+                f'parameter state_file: {in_one_line(error)}; edited rooms are lost at a restart'
+            )
 
     def ensure_built(self) -> None:
         """Build the map unless the server has it; goes on until it is done or the node stops."""

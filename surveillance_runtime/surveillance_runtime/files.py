@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import json
+import math
 import os
 from pathlib import Path
+from typing import Any
 
 from surveillance_fsm import files
 from surveillance_runtime.suggestions import like
@@ -54,6 +57,41 @@ def read_file(path: Path, most: int) -> bytes:
         return files.read_file(path, most)
     except OSError as error:
         raise FileError(in_one_line(error)) from None
+
+
+def read_json(path: Path, most: int) -> Any:
+    """Return what a small JSON file holds, whose numbers are finite; None where no file is.
+
+    Raises:
+        FileError: It cannot be read, holds more than `most` bytes or something else.
+    """
+    try:
+        if not path.exists():
+            return None
+        data = read_file(path, most)
+        found = json.loads(data, parse_int=_whole, parse_float=_finite, parse_constant=_finite)
+        if found is None:
+            raise ValueError('holds nothing')
+        return found
+    except FileError:
+        raise
+    except OSError as error:  # a name that is too long, a folder that may not be entered
+        raise FileError(in_one_line(error)) from None
+    except (ValueError, OverflowError, RecursionError) as error:
+        raise FileError(f'{path}: {error}') from None
+
+
+def _finite(text: str) -> float:
+    """Return a number of a file; one that is none would make every comparison false in silence."""
+    number = float(text)
+    if not math.isfinite(number):
+        raise ValueError(f'got {text:.20}, expected a finite number')
+    return number
+
+
+def _whole(text: str) -> int:
+    _finite(text)
+    return int(text)
 
 
 def replace_text(path: Path, text: str) -> None:

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import json
 import math
+import os
 from collections.abc import Mapping
 from pathlib import Path
 
 from surveillance_fsm import Interrupt
-from surveillance_runtime.files import in_one_line, read_file, replace_text
+from surveillance_runtime.files import FileError, in_one_line, read_json, replace_text
 from surveillance_runtime.node import PatrolNode
 
 WRITE_PERIOD = 0.2
@@ -32,7 +33,7 @@ class StateFile:
 
     def __init__(self, node: PatrolNode, path: str) -> None:
         self._node = node
-        self._path = Path(path).expanduser() if path else None
+        self._path = Path(os.path.expanduser(path)) if path else None
         self._state: State | None = None
         self._complaint = ''
         self._news = Interrupt()
@@ -87,11 +88,13 @@ class StateFile:
             self._complaint = ''
 
     def _read(self) -> State:
-        if self._path is None or not self._path.exists():
+        if self._path is None:
             return {}
         try:
-            state = json.loads(read_file(self._path, LARGEST))
-        except (ValueError, RecursionError):
+            state = read_json(self._path, LARGEST)
+            if state is None:
+                return {}
+        except FileError:
             state = None
         if not isinstance(state, dict):
             self._complain(f'parameter state_file: {self._path} holds no state; it begins anew')

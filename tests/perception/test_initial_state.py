@@ -173,6 +173,7 @@ def test_a_scan_whose_node_was_killed_goes_on_where_it_was(graph: Any, tmp_path:
         '{"notes": {}, "poses": [1], "seconds": NaN}',
         '{"notes": {"12": ["C1", [1e999, 2], {}]}, "poses": [1], "seconds": 1.0}',
         '{"notes": {"12": ["C1", [1, 2], {}], "13": "R1"}, "poses": [1], "seconds": 1.0}',
+        '{"notes": {}, "poses": [1], "seconds": 1' + '0' * 400 + '}',
     ],
 )
 def test_what_was_found_and_is_damaged_counts_for_nothing(

@@ -8,7 +8,14 @@ from pathlib import Path
 
 import pytest
 
-from surveillance_runtime.files import FileError, LineFile, in_one_line, read_file, replace_text
+from surveillance_runtime.files import (
+    FileError,
+    LineFile,
+    in_one_line,
+    read_file,
+    read_json,
+    replace_text,
+)
 
 
 @pytest.mark.parametrize('kind', ['a pipe', 'a folder', 'a device'])
@@ -136,3 +143,14 @@ def test_lines_go_to_where_a_link_points_behind_the_last_whole_one(tmp_path: Pat
 
 def test_an_error_that_names_no_file_is_said_all_the_same() -> None:
     assert in_one_line(OSError('the port is taken')) == 'the port is taken'
+
+
+@pytest.mark.parametrize('text', ['', 'null', 'NaN', '1e999', '1' + '0' * 400, '[' * 100_000])
+def test_a_json_file_that_holds_nothing_of_use_is_one_line(tmp_path: Path, text: str) -> None:
+    path = tmp_path / 'state.json'
+    assert read_json(path, 1_000_000) is None
+    path.write_text(text)
+    with pytest.raises(FileError, match=r'state\.json: '):
+        read_json(path, 1_000_000)
+    with pytest.raises(FileError, match='too long'):
+        read_json(tmp_path / ('n' * 300), 1_000_000)

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import contextlib
 import json
-import math
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from surveillance_runtime.files import read_file, replace_text
+from surveillance_runtime.files import FileError, read_json, replace_text
 
 LARGEST = 100_000_000
 """Bytes that are read at most."""
@@ -34,15 +33,15 @@ class KeptFile:
             take: Takes it, or raises any of the errors of a dictionary that holds something else,
                 and has taken nothing then.
         """
-        if self._path is None or not self._path.exists():
+        if self._path is None:
             return ''
         try:
-            take(
-                json.loads(
-                    read_file(self._path, LARGEST), parse_float=_finite, parse_constant=_finite
-                )
-            )
-        except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
+            kept = read_json(self._path, LARGEST)
+            if kept is not None:
+                take(kept)
+        except FileError as error:
+            return f'{error}; what was learned before is not used'
+        except (ValueError, KeyError, TypeError, AttributeError) as error:
             return f'{self._path}: what was learned before is not used: {error}'
         return ''
 
@@ -55,11 +54,3 @@ class KeptFile:
             self._path.parent.mkdir(parents=True, exist_ok=True)
             replace_text(self._path, text)
             self._written = text
-
-
-def _finite(text: str) -> float:
-    """Return a number of a file; one that is none would make every comparison false in silence."""
-    number = float(text)
-    if not math.isfinite(number):
-        raise ValueError(f'got {text}, expected a finite number')
-    return number
