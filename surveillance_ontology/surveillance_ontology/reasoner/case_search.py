@@ -420,9 +420,9 @@ class CaseSearch:
         model = self.model
         related = self._related(x, limit)
         if model.parent[x] is None:
-            for y in related:
-                if model.parent[y] not in (None, x):
-                    self._introduce(x, limit, y, choices)
+            unnamed = [y for y in related if model.parent[y] not in (None, x)]
+            for y in unnamed:
+                self._introduce(x, limit, y, choices, len(unnamed))
             if model.is_gone(x) or any(map(model.is_gone, related)):
                 model.recount[x] = None
                 return
@@ -441,13 +441,18 @@ class CaseSearch:
                 choices |= apart
         self._either(pairs, choices)
 
-    def _introduce(self, x: int, limit: Count, y: int, choices: Choices) -> None:
-        """Make an unnamed individual that a named one counts one of so many."""
+    def _introduce(self, x: int, limit: Count, y: int, choices: Choices, waiting: int) -> None:
+        """Make an unnamed individual that a named one counts one of so many.
+
+        ``waiting``: How many such there are. Each of them may take a number that none has yet, and
+        it is open which.
+        """
         options: list[Alternative] = []
         for number in range(limit.n):
             key = (x, limit, number)
             options.append(Root(y, key))
-            if key not in self.model.roots:
+            waiting -= key not in self.model.roots
+            if not waiting:
                 break
         self._either(options, choices | self._reasons(x, limit, y))
 

@@ -653,6 +653,18 @@ def test_as_many_values_as_there_are_all_follow() -> None:
     assert kb.holds(ax.DataPropertyAssertion(T, i, whole(2)))
 
 
+def test_the_unnamed_may_be_any_of_those_that_a_named_one_may_have() -> None:
+    axioms = (
+        ax.DifferentIndividuals(frozenset(('i', 'k'))),
+        SubClassOf(THING, ex.ObjectHasValue(ex.ObjectInverseOf('p'), 'k')),
+        ClassAssertion(ex.ObjectMaxCardinality(3, 'p', THING), 'k'),
+    )
+    three = ClassAssertion(ex.ObjectMinCardinality(3, 'q', THING), 'i')
+    four = ClassAssertion(ex.ObjectMinCardinality(4, 'q', THING), 'i')
+    assert reasoned(*axioms, three).consistent
+    assert not reasoned(*axioms, four).consistent
+
+
 def assert_as_by_cases(seed: int) -> None:
     drawn = PlainOntology(seed)
     rng = drawn.random
