@@ -24,10 +24,10 @@ from surveillance_behaviour.map_from_markers.assembly import (
 )
 from surveillance_behaviour.map_from_markers.initial_scan import InitialScan, Progress
 from surveillance_behaviour.map_from_markers.scan_peers import CameraScanner, MarkerInquiry
-from surveillance_behaviour.mission.kept_file import KeptFile
 from surveillance_fsm.ros import CallError, ServiceCaller
 from surveillance_interfaces.msg import OntologyMap
 from surveillance_interfaces.srv import ReferenceName
+from surveillance_runtime.files import KeptFile
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.place.parameters import described_place
 from surveillance_runtime.process import run_node
@@ -66,7 +66,7 @@ class InitialState(PatrolNode):
         )
         self._survey = Survey(self.get_parameter('robot_room').value, (0.0, 0.0))
         self._progress = Progress()
-        self._file = KeptFile(record, '.survey.json')
+        self._file = KeptFile.of_record(record, '.survey.json')
         self._missing: list[str] = []
         if problem := self._file.read(self._take_kept):
             self.get_logger().warn(problem)

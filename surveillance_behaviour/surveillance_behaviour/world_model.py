@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import Any
 
 from surveillance_behaviour.decision import DecisionSettings
-from surveillance_behaviour.mission.kept_file import KeptFile
 from surveillance_behaviour.mission.mission_log import account_of, on_present_clock, read
 from surveillance_behaviour.peers.ports import Ontology, Places, Point, UnknownPlaceError
 from surveillance_behaviour.policy.battery_reserve import DrawEstimate
@@ -24,7 +23,7 @@ from surveillance_behaviour.policy.world import PolicyMemory, World
 from surveillance_fsm import Interrupt
 from surveillance_fsm.exceptions import CallError
 from surveillance_ontology.patrol_ontology import Snapshot
-from surveillance_runtime.files import FileError
+from surveillance_runtime.files import FileError, KeptFile
 
 SIMULTANEOUS = 1.0
 """Seconds by which what several threads take for the present may differ."""
@@ -66,7 +65,7 @@ class Experience:
         The visits in the record itself count: they are on the clock of its end. A file that cannot
         be read counts as none; `problem` says what is wrong with it.
         """
-        experience = cls(KeptFile(record, '.experience.json'))
+        experience = cls(KeptFile.of_record(record, '.experience.json'))
         experience.problem = experience.file.read(experience._take)
         if record and Path(record).is_file():
             try:

@@ -5,11 +5,9 @@ Everything here blocks while the server answers and belongs on a worker thread.
 
 from __future__ import annotations
 
-import json
-import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
+from typing import Any
 
 from surveillance_ontology.armor.access import DATA
 from surveillance_ontology.armor.client import (
@@ -19,7 +17,7 @@ from surveillance_ontology.armor.client import (
 )
 from surveillance_ontology.map_building import RoomNote, extended
 from surveillance_ontology.patrol_ontology import NEVER, PatrolOntology, checked_names, is_gone
-from surveillance_runtime.files import FileError, in_one_line, read_json, replace_text
+from surveillance_runtime.files import KeptFile
 from surveillance_runtime.parameters import parameter
 from surveillance_runtime.place import (
     Place,
@@ -31,8 +29,6 @@ from surveillance_runtime.place import (
 
 MOST_REPLACED = 10
 """Servers in a row that may lose the ontology while the map is entered, before that is an error."""
-LARGEST = 20_000_000
-"""More bytes than this are no place that was edited."""
 
 
 @dataclass(frozen=True)
@@ -110,54 +106,43 @@ class MapKeeper:
         self._began: int | None = None
         self._gave_up_mending = False
         self._described = None if place is None else description_of(place)
-        # Of a user whom nobody knows, a path that is not there.
-        path = os.path.expanduser(source.state_file)
-        self._kept = Path(path) if path else None
+        self._kept = KeptFile(
+            source.state_file, 'rooms that were added or removed are as described'
+        )
         self._by_hand: frozenset[str] = frozenset()
         self._entered: set[str] = set()
-        self.place = self._edited(place)
+        self.place = place
         self.is_built = False
+        if problem := self._kept.read(self._take_kept):
+            reports.warn(f'parameter state_file: {problem}')
 
-    def _edited(self, place: Place | None) -> Place | None:
-        """Return the place as an earlier process left it; as described where nobody edited it."""
-        try:
-            kept = read_json(self._kept, LARGEST) if self._kept is not None else None
-            if kept is None:
-                return place
-            edited = checked_names(edited_place(kept['edited']))
-            by_hand = frozenset(kept.get('by_hand', ()))
-            if any(problem_in_name('kept', name) for name in by_hand):
-                raise PlaceError(('by_hand',), 'expected names')
-            if kept['described'] == self._described:
-                self._by_hand = by_hand
-                return edited
-            if place is not None:
-                # An ontology that was kept, too, has rooms that nobody knows the way to.
-                self._entered = _names(edited)
-            if not by_hand:
-                return place
-            problem = 'is of another place; rooms that were added or removed are as described'
-        except FileError as error:
-            problem = str(error)
-        except (ValueError, LookupError, TypeError, AttributeError):
-            problem = 'holds no place; rooms that were added or removed are as described'
-        self._reports.warn(f'parameter state_file: {self._kept}: {problem}')
-        return place
+    def _take_kept(self, kept: dict[str, Any]) -> None:
+        """Take the place as an earlier process left it."""
+        edited = checked_names(edited_place(kept['edited']))
+        by_hand = frozenset(kept.get('by_hand', ()))
+        if any(problem_in_name('kept', name) for name in by_hand):
+            raise PlaceError(('by_hand',), 'expected names')
+        if kept['described'] == self._described:
+            self.place, self._by_hand = edited, by_hand
+            return
+        if self.place is not None:
+            # An ontology that was kept, too, has rooms that nobody knows the way to.
+            self._entered = _names(edited)
+        if by_hand:
+            raise ValueError('it is of another place')
 
     def _keep(self, place: Place, by_hand: frozenset[str]) -> None:
         self._by_hand = by_hand
-        if self._kept is None:
-            return
-        state = {
-            'described': self._described,
-            'edited': description_of(place),
-            'by_hand': sorted(by_hand),
-        }
-        try:
-            replace_text(self._kept, json.dumps(state) + '\n')
-        except OSError as error:
+        problem = self._kept.write(
+            {
+                'described': self._described,
+                'edited': description_of(place),
+                'by_hand': sorted(by_hand),
+            }
+        )
+        if problem:
             self._reports.warn(
-                f'parameter state_file: {in_one_line(error)}; edited rooms are lost at a restart'
+                f'parameter state_file: {problem}; edited rooms are lost at a restart'
             )
 
     def ensure_built(self) -> None:

@@ -8,8 +8,8 @@ What others may use, by module:
 - `parameters`: `parameter`, `parameters` and `converted`, the fields of a record that a node
   declares; `ParameterError`. `configuration`: files, place and arguments merged and checked,
   without ROS.
-- `files`: `FileError`, the error of all files; `LineFile` and `replace_text`, which leave no half;
-  `in_one_line`, what users read of an `OSError`.
+- `files`: `FileError`, the error of all files; `LineFile`, `KeptFile` and `replace_text`, which
+  leave no half; `in_one_line`, what users read of an `OSError`.
 - `waiting`: `AwaitedWork` and `AwaitedEvent` for callbacks. `state_file`: `StateFile`, what
   outlives a killed process.
 - `place`: `Place`, `FloorPlan`, `read_place_file`, without ROS.

@@ -1,4 +1,4 @@
-"""Files that nodes and commands leave: their names in a run, their errors, two ways to write."""
+"""Files that nodes and commands leave: their names in a run, their errors, three ways to write."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import errno
 import json
 import math
 import os
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -105,6 +106,65 @@ def replace_text(path: Path, text: str) -> None:
         OSError: It cannot be written; the error has its name, and the old file is whole.
     """
     files.replace_file(path, text.encode('utf-8'))
+
+
+class KeptFile:
+    """A small JSON object that a node keeps for whoever comes after it.
+
+    Args:
+        path: The file; empty: nothing is kept.
+        loss: Ends each line about a file that cannot be read: what that means.
+    """
+
+    LARGEST = 100_000_000
+    """Bytes that are read at most."""
+
+    def __init__(self, path: str = '', loss: str = '') -> None:
+        self._path = Path(os.path.expanduser(path)) if path else None
+        self._loss = loss
+        self._written = ''
+
+    @classmethod
+    def of_record(cls, record: str, ending: str) -> KeptFile:
+        """Return what was learned on the mission of a record, which stands beside the record."""
+        if not record:
+            return cls()
+        path = Path(record + ending).absolute()
+        with contextlib.suppress(OSError):
+            path.parent.mkdir(parents=True, exist_ok=True)
+        return cls(str(path), 'what was learned before is not used')
+
+    def __bool__(self) -> bool:
+        """Tell whether anything is kept."""
+        return self._path is not None
+
+    def read(self, take: Callable[[dict[str, Any]], None]) -> str:
+        """Give what the file holds; return what is wrong with it, empty when it is right.
+
+        Args:
+            take: Takes it, or raises any of the errors of a dictionary that holds something else,
+                and has taken nothing then.
+        """
+        try:
+            found = read_json(self._path, self.LARGEST) if self._path is not None else None
+            if found is not None:
+                take(found)
+        except FileError as error:
+            return f'{error}; {self._loss}'
+        except (ValueError, LookupError, TypeError, AttributeError) as error:
+            return f'{self._path}: does not fit: {error}; {self._loss}'
+        return ''
+
+    def write(self, content: Mapping[str, Any]) -> str:
+        """Write the file in one piece if that changes it; return why it is not written, or ''."""
+        text = json.dumps(content) + '\n'
+        if self._path is not None and text != self._written:
+            try:
+                replace_text(self._path, text)
+            except OSError as error:
+                return in_one_line(error)
+            self._written = text
+        return ''
 
 
 class LineFile:

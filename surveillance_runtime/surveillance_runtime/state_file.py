@@ -2,20 +2,15 @@
 
 from __future__ import annotations
 
-import json
 import math
-import os
 from collections.abc import Mapping
-from pathlib import Path
 
 from surveillance_fsm import Interrupt
-from surveillance_runtime.files import FileError, in_one_line, read_json, replace_text
+from surveillance_runtime.files import KeptFile
 from surveillance_runtime.node import PatrolNode
 
 WRITE_PERIOD = 0.2
 """Least time between two writes, seconds of steady time."""
-LARGEST = 10_000
-"""More bytes than this are no state of a node."""
 
 State = Mapping[str, float | str]
 
@@ -33,14 +28,20 @@ class StateFile:
 
     def __init__(self, node: PatrolNode, path: str) -> None:
         self._node = node
-        self._path = Path(os.path.expanduser(path)) if path else None
-        self._state: State | None = None
+        self._file = KeptFile(path, 'it begins anew')
+        self._state: State = {}
         self._complaint = ''
         self._news = Interrupt()
-        self.found: State = self._read()
-        if self._path is not None:
+        self.found: State = {}
+        self._complain(self._file.read(self._take))
+        if self._file:
             node.stopping.subscribe(self._news.set)
             node.spawn(self._work, 'state file')
+
+    def _take(self, found: State) -> None:
+        if not isinstance(found, dict):
+            raise TypeError('expected an object')
+        self.found = found
 
     def number(self, name: str) -> float | None:
         """Return a finite number of the state that was found; None when there is none of this
@@ -58,50 +59,24 @@ class StateFile:
 
     def save(self, state: State) -> None:
         """Have a state written instead of the last one; returns at once."""
-        if self._path is not None:
-            self._state = state
-            self._news.set()
+        self._state = state
+        self._news.set()
 
     def _work(self) -> None:
         stopping = self._node.stopping
-        written: State | None = None
         while True:
             self._news.wait()
             self._news.clear()
-            state = self._state
-            if state is not written and state is not None:
-                self._write(state)
-                written = state
+            if self._state:
+                problem = self._file.write(self._state)
+                self._complain(problem and f'{problem}; the state is not kept')
             if stopping.is_set():
                 return
             stopping.wait(WRITE_PERIOD)
             if stopping.is_set():
                 self._news.set()
 
-    def _write(self, state: State) -> None:
-        assert self._path is not None
-        try:
-            replace_text(self._path, json.dumps(state) + '\n')
-        except OSError as error:
-            self._complain(f'parameter state_file: {in_one_line(error)}; the state is not kept')
-        else:
-            self._complaint = ''
-
-    def _read(self) -> State:
-        if self._path is None:
-            return {}
-        try:
-            state = read_json(self._path, LARGEST)
-            if state is None:
-                return {}
-        except FileError:
-            state = None
-        if not isinstance(state, dict):
-            self._complain(f'parameter state_file: {self._path} holds no state; it begins anew')
-            return {}
-        return state
-
-    def _complain(self, text: str) -> None:
-        if text != self._complaint:
-            self._complaint = text
-            self._node.get_logger().warn(text)
+    def _complain(self, problem: str) -> None:
+        if problem and problem != self._complaint:
+            self._node.get_logger().warn(f'parameter state_file: {problem}')
+        self._complaint = problem

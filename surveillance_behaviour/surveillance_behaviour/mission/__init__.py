@@ -2,6 +2,5 @@
 
 - `mission`: where the robot is, what it heads for and what failed (`Mission`, `MissionSettings`);
 - `recovery`: what to try after a failure, and which places to leave alone for a while;
-- `mission_log`: the record on disk (`MissionRecord`, `read`, `summarize`);
-- `kept_file`: a file beside it, for what a node has found out (`KeptFile`).
+- `mission_log`: the record on disk (`MissionRecord`, `read`, `summarize`).
 """
