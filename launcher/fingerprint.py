@@ -10,6 +10,7 @@ from collections.abc import Iterable
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
+from surveillance_fsm.files import parse_json
 from surveillance_runtime.files import replace_text
 
 JOURNAL = 'surveillance-setup.json'
@@ -40,7 +41,7 @@ class Journal:
     def read(cls, venv: Path) -> Journal:
         """Return the journal in `venv`; an empty one where none is, or where it cannot be read."""
         try:
-            stored = json.loads((venv / JOURNAL).read_text(encoding='utf-8'))
+            stored = parse_json((venv / JOURNAL).read_text(encoding='utf-8'))
             return cls(**stored)
         except (OSError, ValueError, TypeError):
             return cls()

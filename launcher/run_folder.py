@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from launcher.system import LaunchError, NotNowError
+from surveillance_fsm.files import parse_json
 from surveillance_runtime.suggestions import like
 
 STATE = 'run.json'
@@ -111,7 +112,7 @@ def look_into(folder: Path) -> Found | None:
     except OSError:
         return None
     try:
-        stored = json.loads(os.read(descriptor, 1_000_000))
+        stored = parse_json(os.read(descriptor, 1_000_000))
         try:
             fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
             running = False

@@ -7,12 +7,14 @@ from __future__ import annotations
 
 import errno
 import glob
+import json
 import os
 import secrets
 import stat
 import time
 from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 _KINDS = {
     stat.S_IFDIR: 'a folder',
@@ -45,6 +47,18 @@ def read_file(path: str | Path, most: int) -> bytes:
             return file.read(most)  # files of /proc say that they are empty
     finally:
         os.close(descriptor)
+
+
+def parse_json(text: str | bytes, **options: Any) -> Any:
+    """Return what a text of JSON holds; `options` are those of `json.loads`.
+
+    Raises:
+        ValueError: It is none, or is nested too deep.
+    """
+    try:
+        return json.loads(text, **options)
+    except RecursionError:
+        raise ValueError('damaged: nested too deep') from None
 
 
 def file_to_write(path: str | Path) -> Path:

@@ -27,7 +27,7 @@ from surveillance_fsm.clock import elapsed_of
 from surveillance_fsm.container import Container
 from surveillance_fsm.exceptions import MachineFileError, describe, shown
 from surveillance_fsm.execution import Noted, RawTransition, unfold
-from surveillance_fsm.files import read_file, replace_file
+from surveillance_fsm.files import parse_json, read_file, replace_file
 from surveillance_fsm.frame import History
 from surveillance_fsm.log import logerr, logwarn
 from surveillance_fsm.state import State
@@ -237,7 +237,7 @@ def read_record(path: str | Path) -> list[Transition]:
     except (OSError, UnicodeDecodeError) as error:
         raise MachineFileError(f'{path}: {getattr(error, "strerror", error)}') from error
     try:
-        header = json.loads(lines[0])
+        header = parse_json(lines[0])
         known = header['format'] == RECORD_FORMAT and header['version'] == RECORD_VERSION
     except (ValueError, KeyError, TypeError):
         known = False
@@ -248,7 +248,7 @@ def read_record(path: str | Path) -> list[Transition]:
         if not line:
             continue
         try:
-            transitions.append(Transition(**json.loads(line)))
+            transitions.append(Transition(**parse_json(line)))
         except (ValueError, TypeError) as error:
             if number == len(lines):
                 break
@@ -619,9 +619,7 @@ def load(machine: Container, path: str | Path) -> None:
     """
     try:
         text = read_file(path, LARGEST_CHECKPOINT).decode('utf-8', 'surrogatepass')
-        restore(machine, json.loads(text))
-    except RecursionError:
-        raise MachineFileError(f'{path}: damaged: nested too deep') from None
+        restore(machine, parse_json(text))
     except (OSError, ValueError, MachineFileError) as error:
         raise MachineFileError(f'{path}: {getattr(error, "strerror", describe(error))}') from error
 

@@ -161,7 +161,8 @@ class Player:
             if number - self._number > MOST_LINES:
                 self._jump(self._time)
                 return
-            now, parts = self._line.line(number)
+            then, parts = self._line.line(number)
+            now = now if then is None else then
             changed.update(parts)
         self._number = number
         self._tell(changed, now)
@@ -233,7 +234,7 @@ def open_player(recording: Recording, hub: Hub, stack: contextlib.ExitStack) -> 
         stack.callback(conversion.stop)
         conversion.start()
         read = conversion.share
-    line = Timeline(path)
+    line = Timeline(path, lambda problem: print(f'replay: {problem}', file=sys.stderr))
     stack.callback(line.close)
     return Player(line, hub, _sights(recording, stack), read)
 

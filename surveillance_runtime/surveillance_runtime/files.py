@@ -70,7 +70,9 @@ def read_json(path: Path, most: int) -> Any:
         if not path.exists():
             return None
         data = read_file(path, most)
-        found = json.loads(data, parse_int=_whole, parse_float=_finite, parse_constant=_finite)
+        found = files.parse_json(
+            data, parse_int=_whole, parse_float=_finite, parse_constant=_finite
+        )
         if found is None:
             raise ValueError('holds nothing')
         return found
@@ -78,7 +80,7 @@ def read_json(path: Path, most: int) -> Any:
         raise
     except OSError as error:  # a name that is too long, a folder that may not be entered
         raise FileError(in_one_line(error)) from None
-    except (ValueError, OverflowError, RecursionError) as error:
+    except (ValueError, OverflowError) as error:
         raise FileError(f'{path}: {error}') from None
 
 

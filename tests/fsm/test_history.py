@@ -171,6 +171,12 @@ def test_a_record_that_was_cut_off_is_read_as_far_as_it_goes(tmp_path):
     path.write_text(''.join([lines[0], '{broken\n', *lines[2:]]))
     with pytest.raises(MachineFileError, match=r'record\.jsonl:2: '):
         read_record(path)
+    path.write_text(lines[0] + '[' * 200_000 + '\n' + lines[2])
+    with pytest.raises(MachineFileError, match=r'record\.jsonl:2: .*nested too deep'):
+        read_record(path)
+    path.write_text('[' * 200_000)
+    with pytest.raises(MachineFileError, match=r'record\.jsonl:1: not a surveillance-fsm-record'):
+        read_record(path)
     path.write_text('something else\n')
     with pytest.raises(MachineFileError, match=r'record\.jsonl:1: not a surveillance-fsm-record'):
         read_record(path)

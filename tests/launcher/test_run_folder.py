@@ -130,3 +130,8 @@ def test_the_run_that_is_gone_on_with_stays_though_it_is_the_oldest(tmp_path, mo
     monkeypatch.chdir(tmp_path)
     chosen = find(tmp_path, folders[0].name).folder
     assert prune(tmp_path, 0, chosen) == [folders[1]]
+
+
+def test_a_state_nested_too_deep_holds_no_run(tmp_path):
+    (tmp_path / STATE).write_text('[' * 200_000)
+    assert look_into(tmp_path) is None

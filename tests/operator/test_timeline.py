@@ -87,6 +87,26 @@ def test_a_full_disk_tears_no_line_that_others_follow(
     assert line.at(1002.0)[2]['pose'] == [1.0, 0.0, 0.0]
 
 
+@pytest.mark.parametrize(
+    'body', [b'"now":!', b'"now":' + b'[' * 200_000, b'"p":{}}', b'"now":1,"p":3}']
+)
+def test_a_damaged_line_is_left_out_and_said_once(body: bytes, tmp_path: Path) -> None:
+    path = tmp_path / 'timeline.jsonl'
+    record(path, 4)
+    lines = path.read_bytes().splitlines(keepends=True)
+    head = lines[2].partition(b'"now"')[0]
+    path.write_bytes(b''.join([*lines[:2], head + body + b'\n', lines[3]]))
+    said: list[str] = []
+    line = Timeline(path, said.append)
+    assert line.line(2) == (None, {})
+    assert line.at(1002.5)[:2] == (2, 1.0)
+    _, now, parts = line.at(1003.0)
+    assert (now, parts['pose']) == (3.0, [0.3, 0.0, 0.0])
+    assert len(said) == 1
+    assert f'{path}: a damaged line is left out' in said[0]
+    line.close()
+
+
 @pytest.mark.parametrize('content', [None, '', 'no time line\n'])
 def test_what_is_no_time_line_is_said_in_one_line(content: str | None, tmp_path: Path) -> None:
     path = tmp_path / 'timeline.jsonl'

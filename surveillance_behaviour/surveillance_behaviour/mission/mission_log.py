@@ -45,6 +45,7 @@ from pathlib import Path
 from typing import Any
 
 from surveillance_behaviour.decision import RECHARGE
+from surveillance_fsm.files import parse_json
 from surveillance_runtime.files import FileError, LineFile, read_file
 
 EVENTS: Mapping[str, tuple[str, ...]] = {
@@ -234,11 +235,11 @@ def _events(content: bytes, where: str) -> Iterator[Event]:
 
 def _event(line: bytes, where: str) -> Event:
     try:
-        values = json.loads(line)
+        values = parse_json(line)
         name, time = str(values.pop('event')), float(values.pop('time'))
         if not math.isfinite(time):
             raise ValueError
-    except (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError):
+    except (ValueError, KeyError, TypeError, AttributeError, OverflowError):
         shown = line.decode(errors='replace')[:60]
         raise FileError(
             f'{where}: expected a JSON object with event and time, got {shown!r}'

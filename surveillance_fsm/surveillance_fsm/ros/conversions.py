@@ -11,6 +11,7 @@ from std_msgs.msg import Header
 from surveillance_fsm.container import Container
 from surveillance_fsm.exceptions import InvalidStateError
 from surveillance_fsm.export import to_mermaid
+from surveillance_fsm.files import parse_json
 from surveillance_fsm.history import Transition, presentable
 from surveillance_fsm.structure import Structure
 from surveillance_fsm.userdata import UserData, raw
@@ -89,8 +90,8 @@ def userdata_from(text: str) -> UserData:
         InvalidStateError: It is no JSON object.
     """
     try:
-        values = json.loads(text or '{}')
-    except (ValueError, RecursionError) as error:
+        values = parse_json(text or '{}')
+    except ValueError as error:
         raise InvalidStateError(f'userdata must be a JSON object: {error}') from None
     if not isinstance(values, dict):
         raise InvalidStateError(f'userdata must be a JSON object, not {text[:80]!r}')

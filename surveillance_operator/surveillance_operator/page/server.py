@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import inspect
 import ipaddress
-import json
 import secrets
 import socket
 import threading
@@ -34,6 +33,7 @@ from starlette.staticfiles import StaticFiles
 from starlette.types import ASGIApp, Receive, Scope, Send
 
 from surveillance_fsm.exceptions import CallError
+from surveillance_fsm.files import parse_json
 from surveillance_operator.page.hub import Hub
 
 STATIC = Path(__file__).with_name('static')
@@ -197,8 +197,8 @@ class Page:
             if len(body) > LONGEST_BODY:
                 return JSONResponse({'ok': False, 'text': 'the request is too long'}, 413)
         try:
-            given = json.loads(body or b'{}')
-        except (ValueError, RecursionError):
+            given = parse_json(body or b'{}')
+        except ValueError:
             given = None
         if not isinstance(given, dict):
             return JSONResponse({'ok': False, 'text': 'expected a JSON object'}, 400)

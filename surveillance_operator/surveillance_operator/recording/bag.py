@@ -26,6 +26,7 @@ from mcap.records import Channel, Message, Schema
 from mcap.stream_reader import StreamReader
 from mcap.writer import CompressionType, Writer
 
+from surveillance_fsm.files import parse_json
 from surveillance_runtime.files import RECORDING, replace_text
 
 METADATA = 'metadata.yaml'
@@ -323,7 +324,7 @@ def _register(writer: Writer, topic: TopicType) -> int:
 
 def _topic_of(schema: Schema, channel: Channel) -> TopicType:
     try:
-        return TopicType(**json.loads(channel.metadata['topic']))
+        return TopicType(**parse_json(channel.metadata['topic']))
     except (KeyError, TypeError, ValueError):
         return TopicType(channel.topic, schema.name, schema.data.decode(errors='replace'))
 

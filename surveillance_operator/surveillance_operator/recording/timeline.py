@@ -10,9 +10,11 @@ from __future__ import annotations
 import bisect
 import json
 import re
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from surveillance_fsm.files import parse_json
 from surveillance_operator.frames import Framer, Parts, lengthen
 from surveillance_operator.snapshot import Snapshot
 from surveillance_runtime.files import FileError, LineFile
@@ -91,6 +93,7 @@ class Timeline:
 
     Args:
         path: The file.
+        warn: Called with one line for each line of the file that is damaged; it changes nothing.
 
     Attributes:
         times: Of the lines, seconds since 1970, ascending.
@@ -100,7 +103,9 @@ class Timeline:
         FileError: There is no such file, or nothing in it.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, warn: Callable[[str], None] = lambda _: None) -> None:
+        self._warn = warn
+        self._damaged: set[int] = set()
         self.times: list[float] = []
         self.marks: dict[str, list[float]] = {name: [] for name in MARKS}
         self._offsets: list[int] = []
@@ -139,18 +144,28 @@ class Timeline:
         now = 0.0
         trail: list[Any] = []
         for each in range(first, number + 1):
-            now, changed = self.line(each)
+            then, changed = self.line(each)
+            now = now if then is None else then
             trail = changed.pop('trail', trail)
             if changed.get('pose') and each > first:
                 lengthen(trail, changed['pose'])
             parts.update(changed)
         return number, now, {**parts, 'trail': trail}
 
-    def line(self, number: int) -> tuple[float, Parts]:
-        """Return the mission's time of a line, and the parts that it changes."""
+    def line(self, number: int) -> tuple[float | None, Parts]:
+        """Return the mission's time of a line, and the parts that it changes.
+
+        A damaged line has no time and changes nothing.
+        """
         self._file.seek(self._offsets[number])
-        content = json.loads(self._file.readline())
-        return float(content['now']), content['p']
+        try:
+            content = parse_json(self._file.readline())
+            return float(content['now']), dict(content['p'])
+        except (ValueError, LookupError, TypeError, OverflowError) as error:
+            if number not in self._damaged:
+                self._damaged.add(number)
+                self._warn(f'{self._file.name}: a damaged line is left out: {error}')
+            return None, {}
 
     def next_mark(self, kind: str, time: float) -> float | None:
         """Return when the next event of a kind happened after a time."""
