@@ -13,36 +13,28 @@ from collections.abc import Iterator
 from types import TracebackType
 from typing import TextIO
 
-_BUILD_STEP = re.compile(r'\[(\d+)/(\d+)\]')
-_PIP_STEP = re.compile(
-    r'(Collecting|Downloading|Building wheels? for|Installing build dependencies|'
-    r'Installing collected packages|Getting requirements)\s*:?\s*(\S*)'
+_STEPS = tuple(
+    (re.compile(output), shown)
+    for output, shown in (
+        (r'.*\[(\d+/\d+)\]', r'compiling \1'),
+        (r'Collecting (\S+)', r'looking for \1'),
+        (r'Downloading (?:\S*/)?([^\s/-]+)', r'downloading \1'),
+        (r'Installing collected packages', 'installing'),
+        (r'Building wheels? for (\S+)', r'building \1'),
+        (r'Installing build dependencies|Getting requirements', 'fetching build tools'),
+        (r'Get:\d+ \S+ \S+ \S+ ([a-z\d][\w.+-]*) ', r'downloading \1'),
+        (r'(?:Unpacking|Setting up) (\S+) ', r'installing \1'),
+    )
 )
-_APT_STEP = re.compile(
-    r'(?:Get:\d+ \S+ \S+ \S+ ([a-z\d][\w.+-]*)|Unpacking (\S+)|Setting up (\S+)) '
-)
+"""Lines of pip, apt and the build, and what each says of progress."""
 _PLAIN_EVERY = 15.0
 
 
 def describe(line: str) -> str:
     """Return what a line of pip's, apt's or the build's output says of progress; or nothing."""
-    if build := _BUILD_STEP.search(line):
-        done, total = int(build[1]), int(build[2])
-        return f'compiling {done}/{total}'
-    if step := _PIP_STEP.match(line.strip()):
-        verb = step[1]
-        if verb == 'Downloading':
-            return f'downloading {step[2].rsplit("/", 1)[-1].split("-", 1)[0]}'
-        if verb == 'Collecting':
-            return f'looking for {step[2]}'
-        if verb == 'Installing collected packages':
-            return 'installing'
-        if verb.startswith('Building'):
-            return f'building {step[2]}'
-        return 'fetching build tools'
-    if step := _APT_STEP.match(line.strip()):
-        fetched, unpacked, ready = step.groups()
-        return f'downloading {fetched}' if fetched else f'installing {unpacked or ready}'
+    for output, shown in _STEPS:
+        if found := output.match(line.strip()):
+            return found.expand(shown)
     return ''
 
 

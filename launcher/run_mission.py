@@ -40,7 +40,7 @@ def run_mission(run: Run, config: Path, runs: Path, resume: Path | None = None) 
     claims = claim(nodes, ros_domain(run), run.namespace)
     if run.record not in (None, NOT_RECORDED):
         runs = Path(run.record)
-    folder, how = _chosen_folder(run, runs, resume)
+    folder, how = chosen_folder(run, runs, resume)
     deleted = run_folder.prune(runs, run.keep * 1e9, folder)
     state = run_folder.RunState(folder, options_of(run))
     merged = configuration(config, run, folder)
@@ -81,7 +81,7 @@ def run_mission(run: Run, config: Path, runs: Path, resume: Path | None = None) 
     return code
 
 
-def _chosen_folder(run: Run, runs: Path, resume: Path | None) -> tuple[Path, str]:
+def chosen_folder(run: Run, runs: Path, resume: Path | None) -> tuple[Path, str]:
     """Return the folder to work in, and what there is to say about it."""
     if resume is not None:
         return resume, f'going on with {_short(resume)}'
@@ -91,6 +91,8 @@ def _chosen_folder(run: Run, runs: Path, resume: Path | None) -> tuple[Path, str
         if same:
             how = 'which had not come to its end; --fresh begins anew'
             return found.folder, f'going on with {_short(found.folder)}, {how}'
+        left = f'{_short(found.folder)} was begun with other options and has not come to its end'
+        return run_folder.make_folder(runs), f'{left}; --resume goes on with it'
     return run_folder.make_folder(runs), ''
 
 

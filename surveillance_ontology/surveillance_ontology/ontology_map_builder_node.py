@@ -7,6 +7,7 @@ contradicts itself is built anew, too. Where the robot is, and what it visited, 
 
 from __future__ import annotations
 
+import math
 import sys
 from collections.abc import Callable
 from typing import Any
@@ -32,6 +33,8 @@ from surveillance_runtime.waiting import AwaitedEvent, AwaitedWork
 
 SECONDS_PER_ROOM = 0.005
 """By which the longest wait grows with the map."""
+APART = 0.5
+"""Metres; whoever adds a room whose point is nearer than this to another's is told."""
 PATIENCE = 1.0
 """Steady seconds after which an ontology that contradicts itself is built anew: who knows where the
 robot is, or changes two facts one after the other, may end the contradiction before."""
@@ -134,6 +137,7 @@ class OntologyMapBuilder(PatrolNode):
     async def _on_add_room(self, request: Any, response: Any) -> Any:
         name, position = request.room_name, position_from_ros(request.position)
         done = f'{name} has {", ".join(request.doors)}'
+        before = self._keeper.place.positions if self._keeper.place else {}
         response = await self._edit(
             lambda place: place.with_room(name, position, request.doors), done, response
         )
@@ -142,6 +146,9 @@ class OntologyMapBuilder(PatrolNode):
             loose = [door for door in request.doors if len(place.doors.get(door, ())) == 1]
             if loose:
                 response.message += f'; no other place has {", ".join(loose)} yet'
+            near = [other for other, at in before.items() if math.dist(at, position) < APART]
+            if near and name not in before:
+                response.message += f'; its point is that of {", ".join(near)}'
         return response
 
     async def _on_remove_room(self, request: Any, response: Any) -> Any:

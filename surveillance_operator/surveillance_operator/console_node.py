@@ -85,6 +85,8 @@ class ConsoleNode(PatrolNode):
             self.finish()
 
     def _on_line(self, line: str) -> None:
+        if self.ended.is_set():
+            return  # a pipe has more lines than the `exit`
         for each in answer(line, self._actions, self._why, _columns()):
             if each.ends:
                 self.finish()

@@ -16,6 +16,7 @@ from rcl_interfaces.srv import GetParameters, ListParameters, SetParameters
 from rclpy.parameter import Parameter, parameter_value_to_python
 from std_srvs.srv import Trigger
 
+from surveillance_fsm.exceptions import CallError, CallInterruptedError
 from surveillance_fsm.ros import ServiceCaller, UnavailableError
 from surveillance_interfaces.srv import (
     AddRoom,
@@ -265,6 +266,9 @@ class MissionActions:
             )
         except UnavailableError as error:
             raise UnavailableError(self._away(service) or str(error)) from None
+        except CallInterruptedError:
+            away = self._away(service) or f'this program ends before {service} has answered'
+            raise CallError(away) from None
 
     def _away(self, service: str) -> str:
         """Say which node a service lacks; empty when all that it needs are there."""

@@ -113,7 +113,7 @@ def test_one_console_addresses_every_controller(graph: Any, operator: Any, capfd
     operator.type('plan set []')
     operator.type('move 1 0')
     operator.type('jump')
-    operator.type('exit')
+    operator.type('exit\ngo R3')
     assert node.ended.wait(60.0)
     assert node.failure is None
     node.stop()
@@ -121,6 +121,7 @@ def test_one_console_addresses_every_controller(graph: Any, operator: Any, capfd
     assert '[battery_controller] The battery is at 42 %.' in shown
     assert 'no request is waiting: expected one before this command' in shown
     assert 'motion_controller is not running' in shown.splitlines()
+    assert 'go: ' not in shown
     assert "'jump' is no command: expected one of battery, " in shown
 
 

@@ -19,7 +19,13 @@ from launcher.options import make_parser
 from launcher.run import MARKERS, PAGE, RECORDER, Run, options_of, page_address, resumed, run_from
 from launcher.run_configuration import check_assignments, check_clocks, configuration, with_mode_of
 from launcher.run_folder import RunState, make_folder
-from launcher.run_mission import alarm_caller, summary, watch_command, what_to_look_at
+from launcher.run_mission import (
+    alarm_caller,
+    chosen_folder,
+    summary,
+    watch_command,
+    what_to_look_at,
+)
 from launcher.run_processes import command, node_environ, ros_arguments
 from launcher.system import LaunchError
 from surveillance_behaviour.mission.mission_log import MissionRecord
@@ -333,3 +339,17 @@ def test_the_hint_to_watch_leads_to_this_run(monkeypatch):
     assert watch_command(named) == 'python3 launch.py watch --domain 7 --namespace robot2'
     monkeypatch.setenv('ROS_DOMAIN_ID', '3')
     assert watch_command(Run()) == 'python3 launch.py watch --domain 3'
+
+
+def test_an_unfinished_run_of_other_options_is_told_at_the_start(tmp_path):
+    old = make_folder(tmp_path)
+    state = RunState(old, options_of(Run(seconds=3.0)))
+    state.end(ended=False)
+    assert chosen_folder(Run(), tmp_path, None)[0] == old
+    folder, how = chosen_folder(Run(mode='MANUAL'), tmp_path, None)
+    assert folder != old
+    assert how.endswith(
+        f'{old.name} was begun with other options and has not come to its end; '
+        '--resume goes on with it'
+    )
+    assert chosen_folder(Run(mode='MANUAL', fresh=True), tmp_path, None)[1] == ''

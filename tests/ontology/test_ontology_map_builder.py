@@ -194,6 +194,10 @@ def test_rooms_join_and_leave(armor: ArmorClient, call: Caller, built: OntologyM
     assert (added.success, added.message) == (True, 'R5 has D8; no other place has D8 yet')
     assert armor.query.objectprop_b2_ind('connectedTo', 'R5') == []
     assert call('add_room', room_name='E', position=here, doors=['D8']).message == 'E has D8'
+    beside = point_message((1.2, 2.0, 0.0))
+    near = call('add_room', room_name='R6', position=beside, doors=['D9'])
+    assert near.message == 'R6 has D9; no other place has D9 yet; its point is that of E, R5'
+    assert call('remove_room', room_name='R6').success
     assert reach(armor) == ['C1', 'C2', 'R5']
     assert call('room_position', room_name='R5').position.y == 2.0
     assert 'R5' in armor.query.ind_b2_class('ROOM')

@@ -96,6 +96,25 @@ def test_a_movement_of_the_arm_is_waited_for(graph: Any) -> None:
     timer.join()
 
 
+def test_a_call_that_the_end_of_the_program_cuts_short_says_so(
+    graph: Any, actions: MissionActions
+) -> None:
+    actions._node.stopping.set()
+    with pytest.raises(CallError, match=r'^robot_behavior is not running$'):
+        actions.go_to('R3')
+    moves = AwaitedEvent(graph.node)
+
+    async def move(_request: Any, response: Any) -> Any:
+        await moves.wait_for(lambda: False)
+        return response
+
+    graph.node.create_service(MarkerRoutine, 'move_arm', move)
+    graph.add(PatrolNode, name='arm_controller')
+    graph.until(lambda: actions._callers['move_arm'].is_ready() and not actions._away('move_arm'))
+    with pytest.raises(CallError, match=r'^this program ends before move_arm has answered$'):
+        actions.move_arm('left')
+
+
 def test_a_refusal_is_said_in_the_words_of_the_node(graph: Any, actions: MissionActions) -> None:
     serve(graph, GoTo, 'go_to', success=False, message='no place is called R9')
     serve(graph, WhyNot, 'why_not', success=True, message='R3 can wait', premises=['URGENT(R3)'])
