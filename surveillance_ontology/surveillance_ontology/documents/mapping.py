@@ -67,6 +67,11 @@ _RESTRICTIONS = (
     *(name for row in CARDINALITIES for name in row[:2]),
 )
 BUILT_IN = (OWL, RDF, RDFS, XSD, SWRL)
+_VALUES: tuple[tuple[str, type, Callable[..., Axiom]], ...] = (
+    ('object_property', str, ax.ObjectPropertyAssertion),
+    ('data_property', Literal, ax.DataPropertyAssertion),
+)
+"""What a property of one kind takes, and what a statement with it is."""
 
 
 _TRUE = Literal('true', XSD + 'boolean')
@@ -108,6 +113,7 @@ class Mapping:
         self._expressions: dict[str, ex.ClassExpression] = {}
         self._open: set[str] = set()
         self._variables: set[str] = set()
+        self._plain: dict[str, tuple[type, Callable[..., Axiom]]] = {}
         for subject, predicate, value in graph.triples:
             self._nodes.setdefault(subject, {}).setdefault(predicate, []).append(value)
             if predicate == _TYPE and isinstance(value, str):
@@ -148,6 +154,10 @@ class Mapping:
         for kind, name in declared:
             self._kinds.setdefault(name, set()).add(kind)
         self._guess_kinds()
+        for kind, value, record in _VALUES:
+            for name, kinds in self._kinds.items():
+                if kinds == {kind} and not name.startswith(BUILT_IN):
+                    self._plain[name] = value, record
         for subject, properties in self._nodes.items():
             self._subject(subject, properties)
 
@@ -175,7 +185,7 @@ class Mapping:
                     if subject not in self._kinds and not subject.startswith(BUILT_IN):
                         for value in values:
                             below.setdefault(str(value), []).append(subject)
-                elif subject != self._header:
+                elif predicate not in self._kinds and subject != self._header:
                     guess(predicate, (isinstance(value, Literal) for value in values))
         self._kinds.update((name, kinds) for name, kinds in guessed.items() if kinds)
         # A superproperty may have its kind from its own superproperty.
@@ -434,8 +444,12 @@ class Mapping:
         for predicate, values in properties.items():
             if predicate == _TYPE or predicate in _STRUCTURE:
                 continue
+            of_value, record = self._plain.get(predicate, (None, None))
             for value in values:
-                self._attempt(subject, self._triple, subject, predicate, value)
+                if record is not None and type(value) is of_value:
+                    self.axioms[record(predicate, subject, value)] = None
+                else:
+                    self._attempt(subject, self._triple, subject, predicate, value)
 
     def _named_restriction(self, subject: str, properties: dict[str, list[Node]]) -> None:
         self._add(ax.EquivalentClasses((subject, self._restriction(subject, properties))))

@@ -69,6 +69,7 @@ class OntologyDocument:
     prefixes: dict[str, str]
 
 
+@uncollected()
 def read_ontology(
     source: str | Path | bytes,
     iri: str,
@@ -93,36 +94,38 @@ def read_ontology(
         OntologyFileError: Not readable, too large, or not an ontology; nothing is half-read.
     """
     folder = None if isinstance(source, bytes) else Path(source).parent
-    seen = set() if isinstance(source, bytes) else {Path(source).resolve()}
+    with collected():
+        seen = set() if isinstance(source, bytes) else {Path(source).resolve()}
     form, main = _read(source, iri, size_limit)
     documents: list[tuple[str, Mapping | Axioms, Path | None]] = [('', main, folder)]
     missing: dict[str, str] = {}
     for _, document, place in documents:
         for name in document.imports:
-            path = _imported(name, place)
-            if path is None:
-                missing[name] = 'no file beside it'
-            elif not may_read(path):
-                missing[name] = f'{path} may not be read'
-            elif path.resolve() not in seen:
-                seen.add(path.resolve())
-                _, other = _read(path, name, size_limit)
-                documents.append((f'{path.name}: ', other, path.parent))
+            with collected():
+                path = _imported(name, place)
+                if path is None:
+                    missing[name] = 'no file beside it'
+                elif not may_read(path):
+                    missing[name] = f'{path} may not be read'
+                elif path.resolve() not in seen:
+                    seen.add(path.resolve())
+                    _, other = _read(path, name, size_limit)
+                    documents.append((f'{path.name}: ', other, path.parent))
     several = len(documents) > 1
     declared = [pair for _, document, _ in documents if several for pair in document.declared]
     axioms: dict[Axiom, None] = {}
     blanks: set[str] = set()
     unsupported: list[str] = []
     for number, (prefix, document, _) in enumerate(documents):
-        with uncollected():
-            document.read(declared)
-        read = _apart(document.axioms, blanks, f'_:d{number}.') if several else document.axioms
-        for axiom in read:
-            if not isinstance(axiom, Import) or axiom.iri in missing:
-                axioms[axiom] = None
+        document.read(declared)
+        if several:
+            axioms.update(dict.fromkeys(_apart(document.axioms, blanks, f'_:d{number}.')))
+        else:
+            axioms = document.axioms
         unsupported += (prefix + text for text in document.unsupported)
     unsupported += (f'owl:imports <{name}> is not followed: {why}' for name, why in missing.items())
-    return OntologyDocument(list(axioms), unsupported, form, main.iri, main.prefixes)
+    kept = [axiom for axiom in axioms if not isinstance(axiom, Import) or axiom.iri in missing]
+    return OntologyDocument(kept, unsupported, form, main.iri, main.prefixes)
 
 
 def _apart(axioms: Iterable[Axiom], taken: set[str], prefix: str) -> Iterator[Axiom]:
