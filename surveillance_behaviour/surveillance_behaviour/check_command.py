@@ -19,6 +19,7 @@ from surveillance_fsm.clock import WALL_CLOCK
 from surveillance_fsm.export import to_ascii, to_graphviz, to_mermaid
 from surveillance_fsm.verify import Finding, verify
 from surveillance_runtime.command_line import CommandParser
+from surveillance_runtime.suggestions import nearest
 
 DRAWINGS: dict[str, Callable[[Container], str]] = {
     'mermaid': to_mermaid,
@@ -52,7 +53,7 @@ def build(name: str) -> Container:
         module_name, _, factory_name = name.partition(':')
         if not factory_name:
             raise ValueError(
-                f"no machine '{name}': expected one of {', '.join(MACHINES)}, or module:factory"
+                f"no machine '{name}': expected {nearest(name, MACHINES)}, or module:factory"
             )
         try:
             module = importlib.import_module(module_name)

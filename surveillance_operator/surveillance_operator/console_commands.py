@@ -26,6 +26,7 @@ from surveillance_controllers.manual.commands import (
 from surveillance_fsm.exceptions import CallError, UnavailableError
 from surveillance_runtime.configuration import declared, read_schema
 from surveillance_runtime.parameters import ParameterSpec, shown
+from surveillance_runtime.suggestions import nearest
 
 if TYPE_CHECKING:  # the launcher's prompt needs the words alone, without ROS
     from surveillance_operator.mission_actions import MissionActions
@@ -85,7 +86,7 @@ def _known(actions: MissionActions, place: str) -> str:
             lines.append(f'{fact}  [asserted]')
         else:
             lines += ['  ' * depth + text for depth, text in actions.explain(fact)]
-    return '\n'.join(lines) or f'nothing is known of {place}'
+    return '\n'.join(lines)
 
 
 def _list_parameters(actions: MissionActions, node: str) -> str:
@@ -287,7 +288,7 @@ def answer(
 
 def _exit(name: str, actions: MissionActions) -> Answer:
     if name not in CONTROLLED:
-        return Answer(f'exit {name}: expected one of {", ".join(CONTROLLED)}')
+        return Answer(f'exit {name}: expected {nearest(name, CONTROLLED)}')
     return _told(actions, name, EXIT.name)
 
 

@@ -37,12 +37,13 @@ from surveillance_ontology.armor_client import (
     ArmorServiceCallError,
     ArmorServiceInternalError,
 )
-from surveillance_ontology.patrol_ontology import facts_of
+from surveillance_ontology.patrol_ontology import PatrolOntology, facts_of
 from surveillance_operator.topics import BEHAVIOUR, CONTROLLERS
 from surveillance_runtime.configuration import argument_value, declared
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.parameters import shown
 from surveillance_runtime.place import problem_in_name
+from surveillance_runtime.suggestions import nearest
 
 _DISCOVERY = 2.0
 """Seconds in which a node that has just started finds the services that there are."""
@@ -198,7 +199,7 @@ class MissionActions:
     def command(self, controller: str, line: str) -> str:
         """Give a controller one of its console's commands: the answers of mode MANUAL."""
         if controller not in CONTROLLERS:
-            raise ValueError(f'{controller!r}: expected one of {", ".join(CONTROLLERS)}')
+            raise ValueError(f'{controller!r}: expected {nearest(controller, CONTROLLERS)}')
         answer = self._call(
             f'{controller}/command', ConsoleCommand.Request(line=str(line)[:20_000])
         )
@@ -210,6 +211,9 @@ class MissionActions:
         """Return what the ontology knows of a place: facts, and whether each is asserted."""
         queries = facts_of(_name(place))
         found = self._ask(lambda armor: [armor.query.facts_by_origin(each) for each in queries])
+        if not any(every for every, _ in found):
+            places = self._ask(lambda armor: PatrolOntology(armor).places())
+            raise ValueError(f'nothing is known of {place}: expected {nearest(place, places)}')
         return [(str(fact), fact in asserted) for every, asserted in found for fact in every]
 
     def explain(self, fact: str) -> list[tuple[int, str]]:

@@ -22,6 +22,7 @@ from surveillance_operator.recording.runs import Recording, find_recording, run_
 from surveillance_operator.recording.timeline import MARKS, Timeline
 from surveillance_runtime.command_line import EXIT_BAD_INPUT
 from surveillance_runtime.files import TIMELINE, FileError
+from surveillance_runtime.suggestions import nearest
 
 if TYPE_CHECKING:
     from surveillance_operator.recording.stored import RecordedSights
@@ -137,7 +138,7 @@ class Player:
 
     def _jump_to_mark(self, kind: str) -> str:
         if kind not in MARKS:
-            raise ValueError(f'{kind!r}: expected one of {", ".join(MARKS)}')
+            raise ValueError(f'{kind!r}: expected {nearest(kind, MARKS)}')
         with self._lock:
             at = self._line.next_mark(kind, self._time)
             if at is None:

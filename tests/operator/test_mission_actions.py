@@ -261,6 +261,8 @@ def test_facts_and_their_proofs_come_from_the_ontology(graph: Any, actions: Miss
     assert depth == 0
     assert 'connectedTo' in first
     assert {depth for depth, _ in premises} >= {1}
+    with pytest.raises(ValueError, match=r"^nothing is known of AA: expected 'A'$"):
+        actions.facts('AA')
     with pytest.raises(ValueError, match='does not hold'):
         actions.explain('connectedTo(A, A)')
 

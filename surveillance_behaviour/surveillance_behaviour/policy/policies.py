@@ -32,6 +32,7 @@ from numpy.typing import NDArray
 from surveillance_behaviour.policy.graph import PatrolGraph
 from surveillance_behaviour.policy.plan import plan_of
 from surveillance_behaviour.policy.world import Score, World
+from surveillance_runtime.suggestions import nearest
 
 Scores = Mapping[str, Score]
 DEFAULT_POLICY = 'tour'
@@ -51,7 +52,7 @@ def make_policy(name: str) -> Policy:
         ValueError: There is no such policy.
     """
     if name not in POLICIES:
-        raise ValueError(f'unknown policy {name!r}, expected one of {", ".join(POLICIES)}')
+        raise ValueError(f'unknown policy {name!r}, expected {nearest(name, POLICIES)}')
     return POLICIES[name]
 
 

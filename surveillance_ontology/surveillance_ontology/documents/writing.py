@@ -23,6 +23,7 @@ from surveillance_ontology.owl.axioms import (
 )
 from surveillance_ontology.owl.expressions import Literal
 from surveillance_ontology.owl.vocabulary import OWL, RDF, RDFS, SWRL, XSD
+from surveillance_runtime.suggestions import nearest
 
 FORMATS = ('rdfxml', 'ntriples')
 _XML = ('http://www.w3.org/XML/1998/namespace', 'http://www.w3.org/2000/xmlns/')
@@ -72,7 +73,7 @@ def ontology_bytes(
         return ''.join(map(_ntriple, triples)).encode()
     if format == 'rdfxml':
         return _RdfXml(list(triples), iri, prefixes or {}).document().encode()
-    raise OntologyFileError(f'format {format!r}: expected one of {", ".join(FORMATS)}')
+    raise OntologyFileError(f'format {format!r}: expected {nearest(format, FORMATS)}')
 
 
 # --- N-Triples ---

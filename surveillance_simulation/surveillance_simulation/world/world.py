@@ -179,7 +179,7 @@ class World:
         self._known(name, self._panels, 'marker')
         if state not in MARKER_STATES:
             raise PlaceError(
-                (), f"marker state '{state}': expected one of {', '.join(MARKER_STATES)}"
+                (), f"marker state '{state}': expected {nearest(state, MARKER_STATES)}"
             )
         self._panels[name] = replace(self._panels[name], state=state)
         self.version += 1
