@@ -62,7 +62,7 @@ class CellReadings(NamedTuple):
 
     entries: Indices
     correlation: Reals
-    lead: Patches
+    lead: Reals
     error: Array
 
     def chosen(self, which: npt.NDArray[np.bool_] | Indices) -> CellReadings:
@@ -83,6 +83,15 @@ class CellDifferences:
         differing = np.minimum(np.arange(cells + 1), codes.bits**2)
         self._share = len(self._codes) * bdtr(differing, codes.bits**2, 0.5)
         self._flips = _differences(np.eye(cells, dtype=np.float32).reshape(cells, codes.side, -1))
+        # the border is black in all codes: what is white inside makes all of their differences
+        inside = np.zeros((codes.side, codes.side), bool)
+        inside[1:-1, 1:-1] = True
+        self._inside = self._flips[inside.ravel()]
+        squares = np.square(self._codes)
+        # a code without differences has no correlation with any
+        energy = np.maximum(squares.sum(axis=1, keepdims=True), 1e-6)
+        self._inner = self._white[:, inside] / np.sqrt(energy)
+        self._shares = squares / energy
         covariance = self._flips @ self._flips.T
         self._freedom = float(np.trace(covariance) ** 2 / np.square(covariance).sum())
 
@@ -136,21 +145,31 @@ class CellDifferences:
 
         The error is infinite where the print rather shows another code.
         """
-        scale = np.sqrt(np.square(room) @ np.square(self._codes).T)
-        scale *= np.linalg.norm(seen, axis=1)[:, None]
-        correlation = (seen * room) @ self._codes.T / np.maximum(scale, 1e-6)
-        two = np.partition(correlation, -2, axis=1)[:, -2:]
-        second, best = _unexplained(two.T)
+        correlation = self._correlation(seen, room)
+        entries = correlation.argmax(axis=1)
+        rows = np.arange(len(correlation))
+        highest = correlation[rows, entries]
+        correlation[rows, entries] = -1.0
+        best, second = _unexplained(highest), _unexplained(correlation.max(axis=1))
         freedom = self._freedom * room.mean(axis=1, dtype=float)
         by_chance = betainc((freedom - 1.0) / 2.0, 0.5, np.minimum(best, 1.0)) / 2.0
         # each code is tried with levels and with logarithms
         error = 2.0 * len(self._codes) * by_chance + (second / best) ** (-freedom / 2.0)
-        entries = correlation.argmax(axis=1)
         likely = np.flatnonzero(error < _LIKELY)
         if len(likely):
             other_code = self._other_code(seen[likely], room[likely], entries[likely], best[likely])
             error[likely[other_code]] = np.inf
-        return CellReadings(entries, two[:, 1], second / best, error)
+        return CellReadings(entries, highest, second / best, error)
+
+    def _correlation(self, seen: Patches, room: Patches) -> Patches:
+        """Return correlations (m, codes) of differences (m, n) that show in so much room."""
+        seen = seen / np.maximum(np.linalg.norm(seen, axis=1, keepdims=True), 1e-6)
+        correlation = ((seen * room) @ self._inside.T) @ self._inner.T
+        short = np.flatnonzero(room.min(axis=1) < 1.0)
+        if len(short):
+            share = np.square(room[short]) @ self._shares.T
+            correlation[short] /= np.sqrt(np.maximum(share, 1e-6))
+        return np.asarray(correlation)
 
     def _other_code(
         self, seen: Patches, room: Patches, entries: Indices, unexplained: Reals

@@ -67,6 +67,9 @@ class TemplateFit:
         self._samples = samples
         cells = codes.side + 2
         self._flat = codes.cells.reshape(len(codes.ids), cells * cells)
+        # border and margin are the same in all codes
+        self._own = np.flatnonzero((self._flat != self._flat[0]).any(axis=0))
+        self._own_cells = np.ascontiguousarray(self._flat[:, self._own])
         step = 2.0 / codes.side / samples
         self.count = codes.side * samples + 2 * _MARGIN_SAMPLES
         positions: Array = (np.arange(self.count, dtype=float) - (self.count - 1) / 2.0) * step
@@ -136,9 +139,9 @@ class TemplateFit:
         square = centred.reshape(-1, self.count, self.count)
         agreement = (down.transpose(0, 2, 1) @ square @ across).reshape(len(patches), -1)
         if listed is None:
-            everything = agreement @ self._flat.T
+            everything = agreement[:, self._own] @ self._own_cells.T
             count = min(_SHORTLIST, everything.shape[1])
-            listed = np.argpartition(-everything, count - 1, axis=1)[:, :count]
+            listed = np.argpartition(everything, -count, axis=1)[:, -count:]
         rows = np.arange(len(patches))[:, None]
         codes = self._flat[listed]
         energy = self._energy(self.codes.cells[listed], footprint)
