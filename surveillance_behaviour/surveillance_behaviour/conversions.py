@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from typing import Any
 
-from geometry_msgs.msg import Point as PointMessage
 from sensor_msgs.msg import BatteryState
 
 from surveillance_behaviour.map_from_markers.assembly import PlaceNote
-from surveillance_behaviour.peers.ports import Point
 from surveillance_behaviour.policy.world import Decision
 from surveillance_interfaces.msg import Decision as DecisionMessage
 from surveillance_interfaces.msg import OntologyMap, OntologyPlace, RoomConnection
@@ -18,21 +16,6 @@ from surveillance_runtime.conversions import point_message, seconds_of
 
 MOST_CANDIDATES = 10_000
 """Of a decision; more are refused."""
-
-
-def point_from(message: PointMessage) -> Point:
-    """Return a point in metres."""
-    return (message.x, message.y, message.z)
-
-
-def points_from(messages: Iterable[PointMessage]) -> list[Point]:
-    """Return a path in metres."""
-    return [point_from(message) for message in messages]
-
-
-def point_messages(points: Iterable[Sequence[float]]) -> list[PointMessage]:
-    """Return a path as messages."""
-    return [point_message(point) for point in points]
 
 
 def decision_message(decision: Decision, sequence: int, stamp: Any) -> DecisionMessage:

@@ -56,11 +56,6 @@ def array_from_points(points: Iterable[Point]) -> Points:
     return np.array([(p.x, p.y, p.z) for p in points], dtype=float).reshape(-1, 3)
 
 
-def points_from_array(array: Points) -> list[Point]:
-    """Return the rows of an array of shape (n, 2) or (n, 3) as points."""
-    return [point_message(row) for row in array]
-
-
 def path_from_array(array: Points, stamp: Any) -> PathMessage:
     """Return the rows of an array of shape (n, 2) or (n, 3), metres, as a path in the map frame."""
     message = PathMessage()

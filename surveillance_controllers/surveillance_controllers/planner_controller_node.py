@@ -24,6 +24,7 @@ from surveillance_controllers.map_knowledge import MapKnowledge
 from surveillance_fsm.ros import GoalAbortedError, GoalRun, GoalServer
 from surveillance_interfaces.action import ComputePath, Plan
 from surveillance_ontology.patrol_ontology import OntologyNotReadyError
+from surveillance_runtime.conversions import point_messages
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.process import run_node
 from surveillance_runtime.qos import STATE_QOS
@@ -76,7 +77,7 @@ class PlannerController(PatrolNode):
         start, end = conversions.array_from_points([goal.start, goal.goal])
         path = self._path(start, end, run, 'compute a path')
         self._show(path)
-        return ComputePath.Result(path=conversions.points_from_array(path))
+        return ComputePath.Result(path=point_messages(path))
 
     def _plan(self, goal: Any, run: GoalRun) -> Plan.Result:
         try:
@@ -96,7 +97,7 @@ class PlannerController(PatrolNode):
             path = self._path(start, target, run, f'plan the way to {goal.target}')
         self._show(path)
         spacing = self._settings.spacing(geometry.length(path))
-        via_points = conversions.points_from_array(geometry.equally_spaced(path, spacing))
+        via_points = point_messages(geometry.equally_spaced(path, spacing))
         for count in range(1, len(via_points) + 1):
             run.feedback(Plan.Feedback(via_points=via_points[:count]))
             if not run.sleep(self._settings.via_point_delay):

@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from geometry_msgs.msg import Point
-
 from surveillance_interfaces.msg import (
     ArmorDirectiveReq,
     ArmorDirectiveRes,
@@ -20,7 +18,7 @@ from surveillance_ontology.armor import protocol
 from surveillance_ontology.armor.facts import ShortFact
 from surveillance_ontology.armor.protocol import DirectiveRequest, DirectiveResponse
 from surveillance_ontology.map_building import RoomNote
-from surveillance_runtime.place import Position
+from surveillance_runtime.conversions import point_from
 
 if TYPE_CHECKING:
     from surveillance_ontology.armor.session import NumberedChange  # A client needs none of it.
@@ -109,12 +107,7 @@ def changes_from_ros(msg: FactChanges) -> Sequence[tuple[ShortFact, bool, bool]]
     ]
 
 
-def position_from_ros(msg: Point) -> Position:
-    """Read a position, metres."""
-    return msg.x, msg.y, msg.z
-
-
 def room_note_from_ros(msg: OntologyPlace) -> RoomNote:
     """Read the description of a room."""
     connections = tuple((c.connected_to, c.through_door) for c in msg.connections)
-    return RoomNote(msg.name, position_from_ros(msg.position), connections)
+    return RoomNote(msg.name, point_from(msg.position), connections)

@@ -19,10 +19,10 @@ from rclpy.event_handler import SubscriptionEventCallbacks
 from surveillance_interfaces.msg import FactChanges, OntologyMap
 from surveillance_interfaces.srv import AddRoom, ReferenceName, RemoveRoom, RoomPosition, SetDoor
 from surveillance_ontology.armor_client import CHANGES_QOS, CHANGES_TOPIC, ArmorClient
-from surveillance_ontology.conversions import position_from_ros, room_note_from_ros
+from surveillance_ontology.conversions import room_note_from_ros
 from surveillance_ontology.map_keeper import MapKeeper, Reports, Source
 from surveillance_ontology.patrol_ontology import PatrolOntology, checked_names
-from surveillance_runtime.conversions import point_message
+from surveillance_runtime.conversions import point_from, point_message
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.parameters import ParameterError
 from surveillance_runtime.place import Place, PlaceError
@@ -135,7 +135,7 @@ class OntologyMapBuilder(PatrolNode):
         return response
 
     async def _on_add_room(self, request: Any, response: Any) -> Any:
-        name, position = request.room_name, position_from_ros(request.position)
+        name, position = request.room_name, point_from(request.position)
         done = f'{name} has {", ".join(request.doors)}'
         before = self._keeper.place.positions if self._keeper.place else {}
         response = await self._edit(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
@@ -67,6 +67,18 @@ def point_message(coordinates: Sequence[float] | NDArray[np.float64]) -> Point:
     """Return a point from x, y and perhaps z, metres."""
     x, y, z = (*(float(each) for each in coordinates), 0.0)[:3]
     return Point(x=x, y=y, z=z)
+
+
+def point_messages(
+    points: Iterable[Sequence[float] | NDArray[np.float64]] | NDArray[np.float64],
+) -> list[Point]:
+    """Return points, or the rows of an array of shape (n, 2) or (n, 3), as messages."""
+    return [point_message(point) for point in points]
+
+
+def point_from(message: Point) -> tuple[float, float, float]:
+    """Return a point, metres."""
+    return message.x, message.y, message.z
 
 
 def pose_from(message: Pose) -> PlanarPose:

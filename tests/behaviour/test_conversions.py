@@ -13,7 +13,7 @@ from sensor_msgs.msg import BatteryState
 from surveillance_behaviour import conversions
 from surveillance_behaviour.policy.world import Decision
 from surveillance_interfaces.msg import Decision as DecisionMessage
-from surveillance_runtime.conversions import point_message
+from surveillance_runtime.conversions import point_from, point_message, point_messages
 
 numbers = st.floats(allow_nan=False, allow_infinity=False)
 names = st.text('ABCR0123456789_', min_size=1, max_size=6)
@@ -22,7 +22,7 @@ names = st.text('ABCR0123456789_', min_size=1, max_size=6)
 @settings(max_examples=50)
 @given(st.lists(st.tuples(numbers, numbers, numbers), max_size=5))
 def test_paths_come_back(path: list[tuple[float, float, float]]) -> None:
-    assert conversions.points_from(conversions.point_messages(path)) == path
+    assert [point_from(each) for each in point_messages(path)] == path
 
 
 @settings(max_examples=50)

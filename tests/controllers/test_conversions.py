@@ -21,6 +21,7 @@ from surveillance_controllers.motion.path_following import Velocity
 from surveillance_runtime.conversions import (
     cloud_from_points,
     point_message,
+    point_messages,
     points_from_cloud,
     pose_estimate,
     pose_from,
@@ -35,7 +36,7 @@ YAW = st.floats(-3.1, 3.1)
 @given(st.lists(st.tuples(NUMBER, NUMBER, NUMBER), max_size=6))
 @settings(max_examples=40)
 def test_points_come_back(points: list[tuple[float, float, float]]) -> None:
-    messages = conversions.points_from_array(np.array(points).reshape(-1, 3))
+    messages = point_messages(np.array(points).reshape(-1, 3))
     assert conversions.array_from_points(messages).tolist() == [list(p) for p in points]
 
 

@@ -15,7 +15,6 @@ import pytest
 from geometry_msgs.msg import PoseWithCovarianceStamped
 
 from surveillance_controllers.controller_parameters import MotionSettings
-from surveillance_controllers.conversions import points_from_array
 from surveillance_controllers.motion import docking
 from surveillance_controllers.motion import nav2 as nav2_motion
 from surveillance_controllers.motion.arrival import MotionFailedError
@@ -23,6 +22,7 @@ from surveillance_controllers.motion_controller_node import MotionController
 from surveillance_fsm import Interrupt
 from surveillance_fsm.ros import CallInterruptedError, GoalCaller, GoalEnd, UnavailableError
 from surveillance_interfaces.action import FollowPath
+from surveillance_runtime.conversions import point_messages
 from surveillance_runtime.parameters import ParameterError
 from surveillance_runtime.qos import STATE_QOS
 
@@ -127,7 +127,7 @@ def test_feedback_comes_once_a_period_however_often_nav2_tells_it(
     graph.add(MotionController, parameters)
     seen: list[float] = []
     caller = GoalCaller(graph.node, FollowPath, 'follow_path')
-    goal = FollowPath.Goal(path=points_from_array(PATH))
+    goal = FollowPath.Goal(path=point_messages(PATH))
     ended = in_background(
         lambda: caller.run(
             goal, accept_timeout=60.0, on_feedback=lambda f: seen.append(f.position.x)

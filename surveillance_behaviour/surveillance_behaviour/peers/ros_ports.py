@@ -36,7 +36,12 @@ from surveillance_interfaces.msg import Decision as DecisionMessage
 from surveillance_interfaces.msg import RobotPlace
 from surveillance_interfaces.srv import Reason, ReferenceName, RoomPosition
 from surveillance_ontology.armor_client import RosTransport
-from surveillance_runtime.conversions import nanoseconds_of, point_message
+from surveillance_runtime.conversions import (
+    nanoseconds_of,
+    point_from,
+    point_message,
+    point_messages,
+)
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.parameters import parameter
 from surveillance_runtime.qos import STATE_QOS
@@ -140,7 +145,7 @@ class RosPlaces:
         answer = self._service.call(request, self._deadlines.answer, interrupt)
         if not answer.valid:
             raise UnknownPlaceError(f'{self._service.name}: there is no place {place}')
-        return conversions.point_from(answer.position)
+        return point_from(answer.position)
 
 
 TRACE_STEP = 0.3
@@ -162,18 +167,18 @@ class RosMotion:
         request = ComputePath.Goal(start=point_message(start), goal=point_message(goal))
         limits = self._deadlines
         result = run(self._planner, request, limits.answer, limits.plan, interrupt)
-        return conversions.points_from(result.path)
+        return [point_from(each) for each in result.path]
 
     def follow(self, path: Sequence[Point], interrupt: Interrupt) -> Point:
         """Drive along the path."""
-        request = FollowPath.Goal(path=conversions.point_messages(path))
+        request = FollowPath.Goal(path=point_messages(path))
         limits = self._deadlines
 
         def moved(feedback: FollowPath.Feedback) -> None:
-            self._moved(conversions.point_from(feedback.position))
+            self._moved(point_from(feedback.position))
 
         result = run(self._controller, request, limits.answer, limits.move, interrupt, moved)
-        end = conversions.point_from(result.position)
+        end = point_from(result.position)
         self._moved(end)
         return end
 
@@ -306,14 +311,14 @@ class RosRoutine:
         limits = self._deadlines
         goal = Plan.Goal(target=target)
         result = run(self._planner, goal, limits.answer, limits.plan, interrupt)
-        return conversions.points_from(result.via_points)
+        return [point_from(each) for each in result.via_points]
 
     def control(self, via_points: Sequence[Point], interrupt: Interrupt) -> Point:
         """Drive through the points."""
         limits = self._deadlines
-        goal = Control.Goal(point_set=conversions.point_messages(via_points))
+        goal = Control.Goal(point_set=point_messages(via_points))
         result = run(self._controller, goal, limits.answer, limits.move, interrupt)
-        return conversions.point_from(result.reached_point)
+        return point_from(result.reached_point)
 
     def recharge(self, interrupt: Interrupt) -> None:
         """Have the battery charged; give up when its level does not change for too long.

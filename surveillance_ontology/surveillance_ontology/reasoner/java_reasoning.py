@@ -33,7 +33,6 @@ from surveillance_ontology.reasoner.completion import Completion
 from surveillance_ontology.reasoner.engine import Engine
 from surveillance_ontology.reasoner.explanation import Explanation
 
-KINDS = ('hermit', 'pellet')
 _ONE_AT_A_TIME = threading.Lock()
 """owlready2 keeps state of its own while it reasons."""
 
@@ -57,7 +56,7 @@ class JavaKnowledgeBase(KnowledgeBase):
     Args:
         iri: The ontology's IRI.
         axioms: The first assertions.
-        kind: One of `KINDS`.
+        kind: 'hermit' or 'pellet'.
     """
 
     def __init__(self, iri: str, axioms: Iterable[Axiom] = (), kind: str = 'hermit') -> None:
