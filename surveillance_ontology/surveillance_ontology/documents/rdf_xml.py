@@ -22,9 +22,11 @@ from surveillance_ontology.owl.vocabulary import RDF, XSD
 Node: TypeAlias = str | Literal
 Triple: TypeAlias = tuple[str, str, Node]
 
-_SYNTAX = {
-    RDF + name for name in ('about', 'ID', 'nodeID', 'resource', 'datatype', 'parseType', 'bagID')
-}
+_TYPE, _DESCRIPTION = RDF + 'type', RDF + 'Description'
+_ABOUT, _ID, _NODE_ID, _RESOURCE = (RDF + name for name in ('about', 'ID', 'nodeID', 'resource'))
+_DATATYPE, _PARSE_TYPE = RDF + 'datatype', RDF + 'parseType'
+_SYNTAX = {_ABOUT, _ID, _NODE_ID, _RESOURCE, _DATATYPE, _PARSE_TYPE, RDF + 'bagID'}
+_BASE = XML + 'base'
 
 
 @dataclass
@@ -122,8 +124,8 @@ class _Reader(XmlReader):
             name = percent_encoded(name)
             attributes = {percent_encoded(key): value for key, value in attributes.items()}
         if attributes:
-            if XML + 'base' in attributes:
-                base = self.resolve(base, attributes.pop(XML + 'base'))
+            if _BASE in attributes:
+                base = self.resolve(base, attributes.pop(_BASE))
             language = self.language(attributes, language)
         if parent.kind == 'root':
             if name == RDF + 'RDF' and not self.seen_root:
@@ -148,9 +150,9 @@ class _Reader(XmlReader):
     def node(self, name: str, attributes: dict[str, str], base: str, language: str) -> str:
         if ':' not in name:
             raise self.fail(f'element {name!r} has no namespace')
-        about = attributes.pop(RDF + 'about', None)
-        ident = attributes.pop(RDF + 'ID', None)
-        node_id = attributes.pop(RDF + 'nodeID', None)
+        about = attributes.pop(_ABOUT, None)
+        ident = attributes.pop(_ID, None)
+        node_id = attributes.pop(_NODE_ID, None)
         if [about, ident, node_id].count(None) < 2:
             raise self.fail('expected one of rdf:about, rdf:ID and rdf:nodeID')
         if about is not None:
@@ -161,15 +163,15 @@ class _Reader(XmlReader):
             subject = self.blank_named(node_id)
         else:
             subject = self.new_blank()
-        if name != RDF + 'Description':
-            self.emit(subject, RDF + 'type', name)
+        if name != _DESCRIPTION:
+            self.emit(subject, _TYPE, name)
         for key, value in attributes.items():
             self.attribute(subject, key, value, base, language)
         self.stack.append(_Frame('node', subject, base=base, language=language))
         return subject
 
     def attribute(self, subject: str, key: str, value: str, base: str, language: str) -> None:
-        if key == RDF + 'type':
+        if key == _TYPE:
             self.emit(subject, key, self.resolve(base, value))
         elif ':' not in key:
             raise self.fail(f'attribute {key!r} has no namespace')
@@ -190,15 +192,18 @@ class _Reader(XmlReader):
         self.stack.append(frame)
         if not attributes:
             return
-        ident = attributes.pop(RDF + 'ID', None)
+        if len(attributes) == 1 and _RESOURCE in attributes:
+            frame.kind, frame.object = 'empty', self.referred(base, attributes[_RESOURCE])
+            return
+        ident = attributes.pop(_ID, None)
         if ident is not None:
             frame.reified = self.named(base, ident)
-        parse_type = attributes.pop(RDF + 'parseType', None)
-        frame.datatype = attributes.pop(RDF + 'datatype', '')
+        parse_type = attributes.pop(_PARSE_TYPE, None)
+        frame.datatype = attributes.pop(_DATATYPE, '')
         if frame.datatype:
             frame.datatype = self.resolve(base, frame.datatype)
-        resource = attributes.pop(RDF + 'resource', None)
-        node_id = attributes.pop(RDF + 'nodeID', None)
+        resource = attributes.pop(_RESOURCE, None)
+        node_id = attributes.pop(_NODE_ID, None)
         kinds = (parse_type, frame.datatype or None, resource, node_id)
         if kinds.count(None) < 3 or (attributes and (parse_type or frame.datatype)):
             raise self.fail(f'property {name!r} has attributes that exclude each other')

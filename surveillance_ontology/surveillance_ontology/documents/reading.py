@@ -232,6 +232,25 @@ def _text(data: bytes) -> str:
         raise OntologyFileError(f'not UTF-8: {error.reason}', line, 1) from None
 
 
+class _Names(dict[str, str]):
+    """The names of nodes, by the nodes as N-Triples has them.
+
+    Args:
+        reports: Where names that are no IRIs are reported.
+    """
+
+    def __init__(self, reports: list[str]) -> None:
+        super().__init__()
+        self._known: dict[str, str] = {}
+        self._reports = reports
+
+    def __missing__(self, node: str) -> str:
+        is_blank = node.startswith('_:')
+        name = node if is_blank else legal(node[1:-1], self._known, self._reports)
+        self[node] = name
+        return name
+
+
 def _rdf_text(data: bytes, iri: str, form: str) -> Graph:
     """Parse a document; the graph knows no places.
 
@@ -252,19 +271,10 @@ def _rdf_text(data: bytes, iri: str, form: str) -> Graph:
         'jsonld': pyoxigraph.RdfFormat.JSON_LD,
     }[form]
     graph = Graph()
-    known: dict[str, str] = {}
-    names: dict[str, str] = {}
+    names = _Names(graph.unsupported)
+    properties: set[str] = set()
     default = pyoxigraph.DefaultGraph()
-
-    def name(node: object) -> str:
-        text = str(node)
-        found = names.get(text)
-        if found is None:
-            is_blank = text.startswith('_:')
-            found = text if is_blank else legal(text[1:-1], known, graph.unsupported)
-            names[text] = found
-        return found
-
+    literal, triple = pyoxigraph.Literal, pyoxigraph.Triple
     try:
         base = None if form == 'ntriples' else iri
         # Lenient: names that are no IRIs, which JSON-LD would drop in silence, come as they are.
@@ -272,25 +282,29 @@ def _rdf_text(data: bytes, iri: str, form: str) -> Graph:
             subject, predicate, node, of_graph = quad
             if of_graph != default:
                 raise OntologyFileError('named graphs are not read')
-            if isinstance(node, pyoxigraph.Triple):
-                raise OntologyFileError('triples about triples (RDF 1.2) are not read')
             value: Node
-            if not isinstance(node, pyoxigraph.Literal):
-                value = name(node)
-            elif node.language:
-                try:
-                    value = Literal(node.value, RDF + 'langString', language_tag(node.language))
-                except ValueError as error:
-                    graph.unsupported.append(str(error))
-                    value = Literal(node.value)
+            if isinstance(node, literal):
+                language = node.language
+                if not language:
+                    value = Literal(node.value, names[str(node.datatype)])
+                else:
+                    try:
+                        value = Literal(node.value, RDF + 'langString', language_tag(language))
+                    except ValueError as error:
+                        graph.unsupported.append(str(error))
+                        value = Literal(node.value)
+            elif isinstance(node, triple):
+                raise OntologyFileError('triples about triples (RDF 1.2) are not read')
             else:
-                value = Literal(node.value, name(node.datatype))
-            about, says = name(subject), name(predicate)
-            if is_absolute(says):
-                graph.triples.append((about, says, value))
-            else:
-                what = f'a statement about {local_name(about)} is left out'
-                graph.unsupported.append(f'{what}: its property {says!r} is no IRI')
+                value = names[str(node)]
+            about, says = names[str(subject)], names[str(predicate)]
+            if says not in properties:
+                if not is_absolute(says):
+                    what = f'a statement about {local_name(about)} is left out'
+                    graph.unsupported.append(f'{what}: its property {says!r} is no IRI')
+                    continue
+                properties.add(says)
+            graph.triples.append((about, says, value))
     except SyntaxError as error:
         message = _PARSER_PLACE.sub('', str(error.msg), count=1)
         place = error.lineno or 0, error.offset or 0

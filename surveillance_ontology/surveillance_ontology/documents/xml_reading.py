@@ -21,6 +21,7 @@ _MAX_DEPTH = 20_000
 DEEPEST = 100
 """How deep expressions may nest; what reads, derives and writes them is recursive."""
 XML = 'http://www.w3.org/XML/1998/namespace'
+_LANGUAGE = XML + 'lang'
 
 
 class OntologyFileError(ValueError):
@@ -167,8 +168,10 @@ class XmlReader:
 
         What is no tag is reported, and the texts are kept without one.
         """
+        if _LANGUAGE not in attributes:
+            return outer
         try:
-            return language_tag(attributes.pop(XML + 'lang', outer))
+            return language_tag(attributes.pop(_LANGUAGE))
         except ValueError as error:
             self.unsupported.append(f'line {self.parser.CurrentLineNumber}: xml:lang {error}')
             return ''
