@@ -32,6 +32,9 @@ LOOKING = 3.0
 """Simulated seconds that a program looks through the camera where the arm has come to rest."""
 MIN_STEP = 0.001
 """The shortest step of time, seconds."""
+OBEYS_WITHIN = 0.02
+"""At a set speed of time the base is moved on this often, real seconds: a command is obeyed then,
+not with the next measurement. At full speed no sleep is longer: a command may end the idle step."""
 LONGEST_DEBT = 0.5
 """What a busy machine falls behind by more than this is not caught up with, simulated seconds."""
 
@@ -114,7 +117,7 @@ class ClockRate:
     Attributes:
         is_waiting: Whether time stood still, when last asked, until a program answers.
         awaits_picture: Whether that is one that reads a picture, or sees that the arm rests.
-        pause: At full speed, real seconds from the last `due` until the next step may be due.
+        pause: At full speed, real seconds from the last `due` until it is to be asked again.
     """
 
     def __init__(self, model: ClockRateModel, steady: float) -> None:
@@ -260,5 +263,5 @@ class ClockRate:
             self._owed -= step
             passed = step
         if model.speed == 0.0:
-            self.pause = max(step - self._owed, MIN_STEP) / model.ceiling
+            self.pause = min(max(step - self._owed, MIN_STEP) / model.ceiling, OBEYS_WITHIN)
         return passed

@@ -30,7 +30,13 @@ from surveillance_runtime.qos import STATE_QOS
 from surveillance_runtime.serialized import stamp_of_serialized
 from surveillance_runtime.state_file import StateFile
 from surveillance_simulation import conversions
-from surveillance_simulation.clock_rate import DRIVING, PLANNING, ClockRate, ClockRateModel
+from surveillance_simulation.clock_rate import (
+    DRIVING,
+    OBEYS_WITHIN,
+    PLANNING,
+    ClockRate,
+    ClockRateModel,
+)
 from surveillance_simulation.feeds.camera_feed import CameraFeed
 from surveillance_simulation.feeds.fault_services import FaultServices
 from surveillance_simulation.feeds.sensor_feed import SensorFeed
@@ -47,9 +53,6 @@ _UNDER_WAY = (
 )
 
 
-OBEYS_WITHIN = 0.02
-"""At a set speed of time the base is moved on this often, real seconds: a command is obeyed then,
-not with the next measurement. At full speed no sleep is longer: a command may end the idle step."""
 LOOK_PERIOD = 0.5
 """Real seconds between two looks whether a program that time waits for is to be given up."""
 
@@ -143,7 +146,7 @@ class Simulator(PatrolNode):
                 # The answer wakes it: useless ticks would take the time that the answer needs.
                 self._timer.cancel()
             elif self._rate.pause is not None:
-                self._timer.timer_period_ns = round(1e9 * min(self._rate.pause, OBEYS_WITHIN))
+                self._timer.timer_period_ns = round(1e9 * self._rate.pause)
                 self._timer.reset()
         if measure:
             self._sensors.publish(self._stamp())

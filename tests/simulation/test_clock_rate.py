@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from surveillance_simulation.clock_rate import ClockRate, ClockRateModel
+from surveillance_simulation.clock_rate import OBEYS_WITHIN, ClockRate, ClockRateModel
 
 
 def run(model: ClockRateModel, real: float, tick: float, *, moving: bool = True) -> float:
@@ -82,6 +82,14 @@ def test_nothing_is_waited_for_at_a_set_speed() -> None:
     rate.estimate(0.0)
     assert rate.due(5.0, 5.0, moving=True) > 0.0
     assert not rate.is_waiting
+
+
+def test_a_command_ends_an_idle_step_that_may_go_no_faster() -> None:
+    rate = ClockRate(ClockRateModel(speed=0.0, ceiling=1.0, idle_step=5.0), 0.0)
+    assert rate.due(0.0, 0.01, moving=False) == 0.0
+    assert rate.pause is not None
+    assert rate.pause <= OBEYS_WITHIN, 'the command waits for the end of the idle step'
+    assert rate.due(0.0, 0.2, moving=True) == 0.1
 
 
 def test_time_stands_at_the_end_of_the_mission_s_wait_until_it_waits_again() -> None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import itertools
 import json
 import math
-import time
 from pathlib import Path
 from typing import Any
 
@@ -235,23 +234,6 @@ def test_the_battery_hears_of_a_drain(graph: Any) -> None:
     assert ask(graph, DrainBattery, 'drain_battery', percent=30.0).success
     graph.until(lambda: drained)
     assert drained[0].data == 30.0
-
-
-def test_a_command_ends_an_idle_step_that_may_go_no_faster(graph: Any) -> None:
-    simulator(graph, speed=0.0, top_speed=1.0, idle_step=5.0)
-    speeds: list[float] = []
-    graph.node.create_subscription(
-        Odometry, 'odom', lambda message: speeds.append(message.twist.twist.linear.x), SENSOR_QOS
-    )
-    commands = graph.node.create_publisher(Twist, 'cmd_vel', 1)
-    graph.until(lambda: commands.get_subscription_count() and speeds)
-    count = len(speeds)
-    graph.until(lambda: len(speeds) > count)  # an idle step has just begun
-    sent, command = time.monotonic(), Twist()
-    command.linear.x = 0.3
-    commands.publish(command)
-    graph.until(lambda: speeds[-1] > 0.0)
-    assert time.monotonic() - sent < 3.0
 
 
 def test_markers_break_and_move(graph: Any) -> None:
