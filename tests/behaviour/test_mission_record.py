@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import errno
+import json
 import math
 import os
 import re
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import given, settings
@@ -263,6 +265,31 @@ def test_a_damaged_snapshot_is_named(path: Path) -> None:
     path.write_text('{"event": "snapshot", "time": 1, "account": {"summary": {}}}\n')
     with pytest.raises(FileError, match='a snapshot of the mission record is damaged'):
         summarize(read(path))
+
+
+@pytest.mark.parametrize('value', ['x', None, [], {'A': []}, 10**400], ids=range(5))
+@pytest.mark.parametrize('where', ['last_seen', 'visits', 'seconds', 'distance', 'unvisited'])
+def test_a_snapshot_whose_numbers_are_none_is_named(path: Path, where: str, value: object) -> None:
+    with MissionRecord(path) as record:
+        record.write('visit', 1.0, place='A', distance=2.0)
+        account: Any = record._account.to_json()
+    part = account if where in account else account['summary']
+    part[where] = value
+    line = json.dumps({'event': 'snapshot', 'time': 2.0, 'account': account})
+    path.write_text(f'{line}\n{{"event": "end", "time": 3.0}}\n')
+    with pytest.raises(FileError, match='a snapshot of the mission record is damaged'):
+        summarize(read(path))
+    MissionRecord(path).close()
+
+
+@pytest.mark.parametrize('value', ['null', '"far"', '[]', 'NaN'])
+def test_a_number_that_is_none_is_named_and_a_mission_goes_on(path: Path, value: str) -> None:
+    path.parent.mkdir()
+    path.write_text(f'{{"event": "visit", "time": 1, "place": "E", "distance": {value}}}\n')
+    with pytest.raises(FileError, match=r"jsonl:1: event 'visit': distance is .* a number"):
+        read(path)
+    with MissionRecord(path) as record:
+        record.write('visit', 2.0, place='E', distance=0.0)
 
 
 def test_an_empty_record_says_so(path: Path) -> None:

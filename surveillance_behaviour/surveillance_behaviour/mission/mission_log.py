@@ -60,6 +60,8 @@ EVENTS: Mapping[str, tuple[str, ...]] = {
     'snapshot': ('account',),
 }
 """The events of a record with the fields each must have, beside ``event`` and ``time``."""
+_NUMBERS = frozenset({'distance', 'seconds'})
+"""Which of the fields are numbers, metres and seconds."""
 
 
 A_DATE = 1e9
@@ -193,6 +195,14 @@ def _check(name: str, fields: Mapping[str, object], where: str) -> None:
     missing = [key for key in EVENTS[name] if key not in fields]
     if missing:
         raise FileError(f'{where}: event {name!r} lacks {", ".join(missing)}')
+    for key in _NUMBERS.intersection(EVENTS[name]):
+        try:
+            found = math.isfinite(float(str(fields[key])))
+        except ValueError:
+            found = False
+        if not found:
+            shown = str(fields[key])[:40]
+            raise FileError(f'{where}: event {name!r}: {key} is {shown!r}, expected a number')
 
 
 def read(path: str | Path) -> list[Event]:
@@ -359,14 +369,25 @@ class Account:
         try:
             summary = Summary(**kept['summary'])
             for counter in ('visits', 'rules', 'failures'):
-                setattr(summary, counter, Counter(getattr(summary, counter)))
+                counts = getattr(summary, counter).items()
+                setattr(summary, counter, Counter({key: int(count) for key, count in counts}))
+            for number in ('seconds', 'charging_seconds', 'distance'):
+                setattr(summary, number, float(getattr(summary, number)))
+            summary.recharges, summary.restarts = int(summary.recharges), int(summary.restarts)
+            if summary.threshold is not None:
+                summary.threshold = float(summary.threshold)
+            summary.unvisited = _times(summary.unvisited)
             left_at = None if kept['left_at'] is None else CutOff(**kept['left_at'])
             if left_at is not None and left_at.explored < 0.0:
                 left_at = replace(left_at, explored=math.inf)
             self.summary, self.left_at = summary, left_at
-            self.last_seen, self.visits = dict(kept['last_seen']), dict(kept['visits'])
-        except (KeyError, TypeError, ValueError) as error:
+            self.last_seen, self.visits = _times(kept['last_seen']), _times(kept['visits'])
+        except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
             raise FileError(f'a snapshot of the mission record is damaged: {error}') from None
+
+
+def _times(kept: Mapping[str, float]) -> dict[str, float]:
+    return {place: float(at) for place, at in kept.items()}
 
 
 def is_other_simulation(before: float, now: float) -> bool:

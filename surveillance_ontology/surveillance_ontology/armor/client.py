@@ -18,7 +18,6 @@ business of the client's `Transport`. The client for ROS is
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Generator, Iterable, Sequence
 from contextlib import suppress
 from functools import update_wrapper
@@ -33,6 +32,7 @@ from typing import (
     overload,
 )
 
+from surveillance_fsm.files import parse_json
 from surveillance_ontology.armor.facts import ShortFact, parse_fact
 from surveillance_ontology.armor.protocol import (
     DirectiveRequest,
@@ -505,7 +505,7 @@ class Query(ClientPart):
             One dictionary of variable and value for each row, without the unbound variables.
         """
         objects = yield from self._objects('QUERY SPARQL ROWS', query, str(timeout_ms))
-        return [json.loads(row) for row in objects]
+        return [parse_json(row) for row in objects]
 
     @operation
     def facts(self, pattern: str) -> Steps[list[ShortFact]]:
