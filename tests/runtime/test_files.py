@@ -10,6 +10,7 @@ import pytest
 
 from surveillance_runtime.files import (
     FileError,
+    KeptFile,
     LineFile,
     in_one_line,
     read_file,
@@ -154,3 +155,35 @@ def test_a_json_file_that_holds_nothing_of_use_is_one_line(tmp_path: Path, text:
         read_json(path, 1_000_000)
     with pytest.raises(FileError, match='too long'):
         read_json(tmp_path / ('n' * 300), 1_000_000)
+
+
+@pytest.mark.parametrize(
+    ('content', 'words'),
+    [
+        ('[' * 200_000, 'nested too deep'),
+        ('{"level": Infinity}', 'expected a finite number'),
+        ('[]', 'does not fit'),
+        ('{"other": 1}', "does not fit: 'level'"),
+    ],
+)
+def test_a_kept_file_that_is_damaged_is_one_line(tmp_path: Path, content: str, words: str) -> None:
+    path = tmp_path / 'kept.json'
+    path.write_text(content)
+    taken: list[int] = []
+    said = KeptFile(str(path), 'it begins anew').read(lambda kept: taken.append(kept['level']))
+    assert said.startswith(f'{path}: ')
+    assert words in said
+    assert said.endswith('; it begins anew')
+    assert '\n' not in said
+    assert taken == []
+
+
+def test_what_is_kept_is_found_and_a_file_that_cannot_be_written_is_told(tmp_path: Path) -> None:
+    taken: list[int] = []
+    assert KeptFile.of_record(str(tmp_path / 'new' / 'm.jsonl'), '.level').write({'level': 7}) == ''
+    for kept in (KeptFile(str(tmp_path / 'new' / 'm.jsonl.level')), KeptFile()):
+        assert kept.read(lambda found: taken.append(found['level'])) == ''
+    assert taken == [7]
+    there = tmp_path / 'absent' / 'kept.json'
+    assert KeptFile(str(there)).write({'level': 7}).startswith(f'{there}: No such file')
+    assert KeptFile().write({'level': 7}) == ''
