@@ -115,6 +115,7 @@ class XmlReader:
         self.depth = 0
         self.unsupported: list[str] = []
         self._legal: dict[str, str] = {}
+        self._absolute: dict[str, str] = {}
         self._entities = {b'amp', b'lt', b'gt', b'quot', b'apos'}
         parser = expat.ParserCreate('UTF-8', namespace_separator='')
         parser.buffer_text = True
@@ -177,11 +178,17 @@ class XmlReader:
             return ''
 
     def resolve(self, base: str, reference: str) -> str:
-        """Return an IRI reference against a base IRI."""
+        """Return an IRI reference against a base IRI; an absolute IRI is one text throughout."""
+        known = self._absolute.get(reference)
+        if known is not None:
+            return known
         try:
-            return resolve(base, legal(reference, self._legal, self.unsupported))
+            found = resolve(base, legal(reference, self._legal, self.unsupported))
         except OntologyFileError as error:
             raise self.fail(error.message) from None
+        if found == reference and is_absolute(found):
+            self._absolute[found] = found
+        return found
 
     def _start(self, name: str, attributes: dict[str, str]) -> None:
         self.depth += 1
