@@ -153,7 +153,9 @@ class KeptFile:
                 take(found)
         except FileError as error:
             return f'{error}; {self._loss}'
-        except (ValueError, LookupError, TypeError, AttributeError) as error:
+        except KeyError as error:
+            return f'{self._path}: expected {error} in it; {self._loss}'
+        except (ValueError, IndexError, TypeError, AttributeError) as error:
             return f'{self._path}: does not fit: {error}; {self._loss}'
         return ''
 
