@@ -1,7 +1,8 @@
 """Moving by Nav2 and docking by a docking server, with both servers scripted.
 
-Their message packages come with them and are no wheels, so plain classes stand in for the types
-here; what is asked of the servers, and what is made of their answers, is what is looked at.
+Their messages, nav2_msgs, come with them and are no wheel, so classes with the fields and constants
+that Jazzy's definitions have (docs.ros.org, nav2_msgs: Jazzy, action definitions) stand in for the
+types here. As rosidl's do, they refuse a field that they do not have.
 """
 
 from __future__ import annotations
@@ -27,6 +28,54 @@ from surveillance_runtime.parameters import ParameterError
 from surveillance_runtime.qos import STATE_QOS
 
 PATH = np.array([[0.0, 0, 0], [3, 0, 0], [3, 4, 0]])
+ACTIONS: dict[str, tuple[dict[str, Any], dict[str, Any], dict[str, int]]] = {
+    'NavigateThroughPoses': (
+        {'poses': [], 'behavior_tree': ''},
+        {'error_code': 0, 'error_msg': ''},
+        {'NONE': 0},
+    ),
+    'FollowPath': (
+        {'path': None, 'controller_id': '', 'goal_checker_id': '', 'progress_checker_id': ''},
+        {'result': None, 'error_code': 0, 'error_msg': ''},
+        {'NONE': 0, 'UNKNOWN': 100, 'FAILED_TO_MAKE_PROGRESS': 105, 'NO_VALID_CONTROL': 106},
+    ),
+    'DockRobot': (
+        {
+            'use_dock_id': True,
+            'dock_id': '',
+            'dock_pose': None,
+            'dock_type': '',
+            'max_staging_time': 1000.0,
+            'navigate_to_staging_pose': True,
+        },
+        {'success': True, 'error_code': 0, 'num_retries': 0, 'error_msg': ''},
+        {'NONE': 0, 'DOCK_NOT_IN_DB': 901, 'FAILED_TO_STAGE': 903, 'FAILED_TO_CHARGE': 906},
+    ),
+    'UndockRobot': (
+        {'dock_type': '', 'max_undocking_time': 30.0},
+        {'success': True, 'error_code': 0, 'error_msg': ''},
+        {'NONE': 0, 'DOCK_NOT_VALID': 902, 'FAILED_TO_CONTROL': 905, 'UNKNOWN': 999},
+    ),
+}
+"""The fields of goal and result with their defaults, and the constants of the result."""
+
+
+def message_type(fields: dict[str, Any], constants: dict[str, int] | None = None) -> Any:
+    def fill(self: Any, **given: Any) -> None:
+        for name, value in (fields | given).items():
+            setattr(self, name, value)
+
+    return type('Message', (), {'__slots__': tuple(fields), '__init__': fill, **(constants or {})})
+
+
+TYPES = {
+    name: SimpleNamespace(Goal=message_type(goal), Result=message_type(result, constants))
+    for name, (goal, result, constants) in ACTIONS.items()
+}
+
+
+def result(action: str, **fields: Any) -> Any:
+    return TYPES[action].Result(**fields)
 
 
 class Servers:
@@ -53,15 +102,11 @@ class Servers:
 @pytest.fixture
 def servers(monkeypatch: pytest.MonkeyPatch) -> Servers:
     servers = Servers()
-    for package, names in (
-        ('nav2_msgs', ['NavigateThroughPoses']),
-        ('opennav_docking_msgs', ['DockRobot', 'UndockRobot']),
-    ):
-        module = ModuleType(f'{package}.action')
-        for name in names:
-            setattr(module, name, SimpleNamespace(Goal=SimpleNamespace))
-        monkeypatch.setitem(sys.modules, package, ModuleType(package))
-        monkeypatch.setitem(sys.modules, f'{package}.action', module)
+    package, module = ModuleType('nav2_msgs'), ModuleType('nav2_msgs.action')
+    vars(package)['action'] = module
+    vars(module).update(TYPES)
+    monkeypatch.setitem(sys.modules, 'nav2_msgs', package)
+    monkeypatch.setitem(sys.modules, 'nav2_msgs.action', module)
     monkeypatch.setattr(nav2_motion, 'GoalCaller', servers.caller)
     monkeypatch.setattr(docking, 'GoalCaller', servers.caller)
     return servers
@@ -166,8 +211,15 @@ def test_the_place_is_tracked_on_the_way(graph: Any, servers: Servers) -> None:
     [
         (GoalEnd('aborted', None), 'Nav2 aborted the goal'),
         (
-            GoalEnd('aborted', SimpleNamespace(error_code=9101, error_msg='No path found')),
-            'the goal .error code 9101, No path found.',
+            GoalEnd(
+                'aborted',
+                result('NavigateThroughPoses', error_code=106, error_msg='Collision ahead'),
+            ),
+            'the goal .error code 106 NO_VALID_CONTROL, Collision ahead.',
+        ),
+        (
+            GoalEnd('aborted', result('NavigateThroughPoses', error_code=4321)),
+            'the goal .error code 4321.$',
         ),
         (UnavailableError('action navigate_through_poses: no server'), 'poses: no server'),
     ],
@@ -205,19 +257,19 @@ def test_a_way_to_elsewhere_does_not_dock(graph: Any, servers: Servers, run: Any
 
 
 def test_a_dock_that_is_not_found_fails_the_way(graph: Any, servers: Servers, run: Any) -> None:
-    refused = SimpleNamespace(success=False, error_code=903)
+    refused = result('DockRobot', success=False, error_code=903, error_msg='No way there')
     servers.ends['dock_robot'] = GoalEnd('aborted', refused)
-    with pytest.raises(MotionFailedError, match=r'docking: .* aborted the goal \(error code 903\)'):
+    reason = r'docking: .* aborted the goal \(error code 903 FAILED_TO_STAGE, No way there\)'
+    with pytest.raises(MotionFailedError, match=reason):
         docked(graph, (3.0, 4.0, 0.0)).follow(PATH, run, lambda _: None)
 
 
 def test_without_their_messages_both_say_what_to_install(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    for package in ('nav2_msgs', 'opennav_docking_msgs'):
-        monkeypatch.setitem(sys.modules, package, None)
-        monkeypatch.setitem(sys.modules, f'{package}.action', None)
+    monkeypatch.setitem(sys.modules, 'nav2_msgs', None)
+    monkeypatch.setitem(sys.modules, 'nav2_msgs.action', None)
     with pytest.raises(ParameterError, match='install ros-jazzy-nav2-msgs'):
         nav2_motion.navigate_through_poses()
-    with pytest.raises(ParameterError, match='install ros-jazzy-opennav-docking-msgs'):
+    with pytest.raises(ParameterError, match=r'docking: .* install ros-jazzy-nav2-msgs'):
         docking.docking_actions()

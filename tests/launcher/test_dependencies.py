@@ -24,7 +24,7 @@ DISTRIBUTIONS = {
     're2': 'google-re2',
 }
 # Looked for at run time and done without when absent: an installed ROS has them.
-OPTIONAL = {'tf2_msgs', 'nav2_msgs', 'opennav_docking_msgs', 'mujoco', 'launch', 'launch_ros'}
+OPTIONAL = {'tf2_msgs', 'nav2_msgs', 'mujoco', 'launch', 'launch_ros'}
 # Known to type checkers alone.
 TYPES = {'_typeshed'}
 # With rclpy[fastrtps] and common_interfaces.

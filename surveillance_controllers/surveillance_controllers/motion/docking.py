@@ -1,6 +1,7 @@
 """Docking by a docking server (opennav_docking) at the end of a way to the station.
 
-The server's messages come with it; without them docking cannot start and says so.
+In Jazzy the server's messages stand in nav2_msgs (Humble had opennav_docking_msgs); without them
+docking cannot start and says so.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from geometry_msgs.msg import PoseStamped
 from surveillance_controllers.controller_parameters import MotionSettings
 from surveillance_controllers.geometry import Points
 from surveillance_controllers.motion.arrival import Motion, MotionFailedError
+from surveillance_controllers.motion.nav2 import reason_of
 from surveillance_fsm.ros import CallError, GoalCaller, GoalRun
 from surveillance_runtime.conversions import pose_message
 from surveillance_runtime.node import PatrolNode
@@ -24,15 +26,14 @@ def docking_actions() -> tuple[Any, Any]:
     """Return the docking server's action types, to dock and to undock.
 
     Raises:
-        ParameterError: opennav_docking_msgs is not installed.
+        ParameterError: nav2_msgs is not installed.
     """
     try:
-        from opennav_docking_msgs.action import DockRobot, UndockRobot
+        from nav2_msgs.action import DockRobot, UndockRobot
     except ImportError:
         raise ParameterError(
-            'parameter docking: got opennav, but the Python package opennav_docking_msgs is not '
-            'installed: install ros-jazzy-opennav-docking-msgs and source its workspace, or use '
-            'docking:=none'
+            'parameter docking: got opennav, but the Python package nav2_msgs is not installed: '
+            'install ros-jazzy-nav2-msgs and source its workspace, or use docking:=none'
         ) from None
     return DockRobot, UndockRobot
 
@@ -47,7 +48,7 @@ class DockingMotion:
             server may take to appear and accept a goal.
 
     Raises:
-        ParameterError: opennav_docking_msgs is not installed.
+        ParameterError: nav2_msgs is not installed.
     """
 
     def __init__(self, node: PatrolNode, inner: Motion, settings: MotionSettings) -> None:
@@ -108,5 +109,5 @@ class DockingMotion:
         except CallError as error:
             raise MotionFailedError(f'{what}: {error}', at) from error
         if end.status != 'succeeded' or not end.result.success:
-            code = '' if end.result is None else f' (error code {end.result.error_code})'
-            raise MotionFailedError(f'{what}: the docking server {end.status} the goal{code}', at)
+            why = reason_of(end.result)
+            raise MotionFailedError(f'{what}: the docking server {end.status} the goal{why}', at)

@@ -112,7 +112,7 @@ class Nav2Motion:
         except CallError as error:
             raise MotionFailedError(str(error), position) from error
         if end.status != 'succeeded':
-            raise MotionFailedError(f'Nav2 {end.status} the goal{_why(end.result)}', position)
+            raise MotionFailedError(f'Nav2 {end.status} the goal{reason_of(end.result)}', position)
         return path[-1] if position is None else position
 
     def _poses(self, path: Points) -> list[PoseStamped]:
@@ -152,9 +152,26 @@ class Nav2Motion:
         """Nothing: Nav2's own behaviours turn the robot where that is wanted."""
 
 
-def _why(result: Any) -> str:
+def reason_of(result: Any) -> str:
     """Return what Nav2 says of a goal that it did not reach, in brackets; empty: nothing."""
     code = getattr(result, 'error_code', 0)
     text = str(getattr(result, 'error_msg', '')).strip()
-    said = [f'error code {code}'] * bool(code) + [text] * bool(text)
+    name = _error_name(result, code) if code else ''
+    said = [f'error code {code}{name and " " + name}'] * bool(code) + [text] * bool(text)
     return f' ({", ".join(said)})' if said else ''
+
+
+def _error_name(result: Any, code: int) -> str:
+    """Return the constant of an error code; empty: none has it.
+
+    A navigator hands on the codes of its planner and controller, too, which stand in the results
+    of their own actions; each action of Nav2 numbers its errors in a range of its own.
+    """
+    from nav2_msgs import action
+
+    kinds = [getattr(kind, 'Result', None) for _, kind in sorted(vars(action).items())]
+    for kind in (type(result), *kinds):
+        for name in dir(kind):
+            if name.isupper() and '__' not in name and getattr(kind, name) == code:
+                return name
+    return ''
