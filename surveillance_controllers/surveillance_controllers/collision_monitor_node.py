@@ -97,6 +97,7 @@ class CollisionMonitor(PatrolNode):
         self._frames = Transforms(self)
         self._wanted = Velocity()
         self._scan: Scan | None = None
+        self._lidars: set[str] = set()
         self._is_held_back = False
         self._base = CommandPublisher(
             self,
@@ -123,11 +124,23 @@ class CollisionMonitor(PatrolNode):
         with conversions.refusing(self, 'scan'):
             mount = self._mount or self._frames.mount_of(message.header.frame_id)
             self._scan = conversions.scan_from(message, mount, self._settings.radius)
+            self._note_lidar(message.header.frame_id)
             self._base.hear('scan')
             allowed_now = self._allowed()
             # Only what cannot wait for the next command.
             if abs(allowed_now.speed) < abs(self._base.wanted.speed):
                 self._base.command(allowed_now)
+
+    def _note_lidar(self, frame: str) -> None:
+        """Warn of each further lidar on the topic: a scan takes the place of the one before."""
+        if frame in self._lidars:
+            return
+        self._lidars.add(frame)
+        if len(self._lidars) > 1:
+            self.get_logger().warn(
+                f'scan: lidars with the frames {", ".join(sorted(self._lidars))} share the topic '
+                'and hide each other: expected one; merge their scans, or remap one away'
+            )
 
     def _allowed(self) -> Velocity:
         if self._scan is None:
