@@ -89,9 +89,10 @@ def test_a_movement_of_the_arm_is_waited_for(graph: Any) -> None:
         moves.happen()
 
     graph.node.create_service(MarkerRoutine, 'move_arm', move)
+    hurried = MissionActions(graph.add(PatrolNode, name='hurried'), timeout=0.2)
+    graph.until(lambda: hurried._callers['move_arm'].is_ready())
     timer = threading.Timer(0.5, arrive)
     timer.start()
-    hurried = MissionActions(graph.add(PatrolNode, name='hurried'), timeout=0.2)
     assert hurried.move_arm('left') == 'at pose left'
     timer.join()
 
