@@ -97,7 +97,7 @@ class CollisionMonitor(PatrolNode):
         self._frames = Transforms(self)
         self._wanted = Velocity()
         self._scan: Scan | None = None
-        self._lidars: set[str] = set()
+        self._lidars: list[str] = []
         self._is_held_back = False
         self._base = CommandPublisher(
             self,
@@ -132,15 +132,15 @@ class CollisionMonitor(PatrolNode):
                 self._base.command(allowed_now)
 
     def _note_lidar(self, frame: str) -> None:
-        """Warn of each further lidar on the topic: a scan takes the place of the one before."""
-        if frame in self._lidars:
-            return
-        self._lidars.add(frame)
-        if len(self._lidars) > 1:
-            self.get_logger().warn(
-                f'scan: lidars with the frames {", ".join(sorted(self._lidars))} share the topic '
-                'and hide each other: expected one; merge their scans, or remap one away'
-            )
+        """Warn once of a second lidar on the topic: a scan takes the place of the one before."""
+        if len(self._lidars) < 2 and frame not in self._lidars:
+            self._lidars.append(frame)
+            if len(self._lidars) == 2:
+                self.get_logger().warn(
+                    f'scan: lidars with the frames {" and ".join(map(repr, self._lidars))} '
+                    'share the topic and hide each other: expected one; merge their scans, or '
+                    'remap one away'
+                )
 
     def _allowed(self) -> Velocity:
         if self._scan is None:

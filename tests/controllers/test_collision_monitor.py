@@ -119,7 +119,8 @@ def test_two_lidars_on_one_topic_are_told_of_once(graph: Any) -> None:
     see('front')
     see('back')
     see('front')
+    see('a third one')
     see('back')
     graph.until(warnings)
     assert len(warnings()) == 1
-    assert 'the frames back, front share the topic' in warnings()[0]
+    assert "the frames 'front' and 'back' share the topic" in warnings()[0]

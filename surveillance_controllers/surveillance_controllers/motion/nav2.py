@@ -155,7 +155,7 @@ class Nav2Motion:
 def reason_of(result: Any) -> str:
     """Return what Nav2 says of a goal that it did not reach, in brackets; empty: nothing."""
     code = getattr(result, 'error_code', 0)
-    text = str(getattr(result, 'error_msg', '')).strip()
+    text = ' '.join(str(getattr(result, 'error_msg', '')).split())
     name = _error_name(result, code) if code else ''
     said = [f'error code {code}{name and " " + name}'] * bool(code) + [text] * bool(text)
     return f' ({", ".join(said)})' if said else ''
