@@ -235,6 +235,8 @@ def test_an_executor_that_stops_in_the_middle_aborts(graph):
     spinner.start()
     state = action(node, server_wait_timeout=1.5, preempt_timeout=SHORT)
     server = next(n for n in graph._nodes if isinstance(n, ScriptedActionServer))
+    # The state's own wait is short, since it is as well how long it trusts its executor.
+    graph.until(state._caller.is_ready)
     run = Background(machine_of(state))
     try:
         assert server.began.wait(60.0)

@@ -153,6 +153,14 @@ class Robot:
             raise AssertionError(f'{error}: {self.time.standing()}') from None
         assert self.time.error is None, repr(self.time.error)
 
+    def until_visited(self, places: set[str], since: float, latest: float) -> None:
+        """Run the mission until all places were visited since then, or until ``latest``."""
+        now = since
+        while now < latest and self.visited(since) != places:
+            now = min(now + 20.0, latest)
+            self.until(now)
+        assert self.visited(since) == places
+
     def summary(self) -> Summary:
         """Return what the record says."""
         return summarize(read(self.record))

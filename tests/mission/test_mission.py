@@ -67,8 +67,7 @@ def test_every_node_may_leave_and_come_back(robot: Robot, graph: Any) -> None:
         robot.time.at(moment, lambda name=name: robot.leave(name))
         robot.time.at(moment + 8.0, lambda name=name: robot.arrive(name))
         moment += 50.0
-    robot.until(moment + 300.0, timeout=110.0)
-    assert robot.visited(since=moment) == PLACES
+    robot.until_visited(PLACES, since=moment, latest=moment + 300.0)
     assert any(message.waiting_for_help for message in status)
     assert robot.summary().restarts == 1
 
@@ -111,10 +110,9 @@ def test_whatever_planner_and_controller_answer_the_mission_goes_on(
     robot.nodes['scripted_motion'] = motion
     motion.planning.extend([GOOD, REJECTED, GOOD, ABORTED, SILENT, EMPTY, ELSEWHERE, NOT_FINITE])
     motion.moving.extend([GOOD, SHORT, GOOD, ABORTED, SILENT, GOOD, REJECTED])
-    robot.until(500.0)
+    robot.until_visited(PLACES, since=200.0, latest=500.0)
     assert not motion.planning
     assert not motion.moving
-    assert robot.visited(since=200.0) == PLACES
     reasons = ' '.join(event.text('reason') for event in robot.events() if event.name == 'failure')
     for words in (
         'the goal was rejected',
