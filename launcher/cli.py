@@ -192,15 +192,15 @@ def _params(argv: list[str]) -> int:
     )
     parser.add_argument('name', nargs='?', metavar='NODE', help='of this node alone')
     parser.add_argument(
-        '--write', action='store_true', help='write the schema, docs/parameters.md and helps anew'
+        '--write', action='store_true', help='write the schema, reference pages and helps anew'
     )
     options = parser.parse_args(argv)
     chosen = [node_table.find(options.name)] if options.name else list(node_table.NODES)
     _enter(['params', *argv])
-    from launcher import parameter_tables, run_configuration
+    from launcher import reference_tables, run_configuration
 
     if options.write:
-        for path in parameter_tables.write(CHECKOUT):
+        for path in reference_tables.write(CHECKOUT):
             print(f'written: {path}')
         return 0
     run = wanted_run(options)
@@ -208,7 +208,7 @@ def _params(argv: list[str]) -> int:
     merged = run_configuration.configuration(CONFIG, run)
     run_configuration.check_assignments(merged, chosen)
     namespace = (run.namespace or '').strip('/')
-    parameter_tables.show(merged, chosen, f'/{namespace}' if namespace else '', print)
+    reference_tables.show(merged, chosen, f'/{namespace}' if namespace else '', print)
     return 0
 
 

@@ -7,7 +7,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseArray
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.time import Time
@@ -18,7 +17,6 @@ from surveillance_interfaces.msg import MarkerDetectionArray
 from surveillance_perception.conversions import (
     camera_from_ros,
     detections_to_ros,
-    diagnostics_to_ros,
     image_from_any,
     image_to_ros,
     poses_to_ros,
@@ -40,6 +38,8 @@ try:
 except ImportError:
     TFMessage = None
 
+REPORT_PERIOD = 1.0
+"""Seconds over which images are counted for the node's health."""
 IDS_QOS = QoSProfile(depth=200, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 """Each id is sent once, so whoever comes late gets those that were sent before."""
 
@@ -146,7 +146,6 @@ class ArucoDetector(PatrolNode):
         self._poses = self.create_publisher(PoseArray, 'aruco_detector/poses', 10)
         self._annotated = self.create_publisher(Image, 'aruco_detector/annotated', IMAGES_QOS)
         self._transforms = None if TFMessage is None else self.create_publisher(TFMessage, 'tf', 10)
-        self._diagnostics = self.create_publisher(DiagnosticArray, 'diagnostics', 10)
         topic = 'camera/rgb/image_raw'
         ImageSubscription(self, Image, topic, self._images.put)
         ImageSubscription(self, CompressedImage, topic + '/compressed', self._images.put)
@@ -154,14 +153,7 @@ class ArucoDetector(PatrolNode):
             CameraInfo, 'camera/rgb/camera_info', self._on_camera_info, SENSOR_QOS
         )
         self.create_subscription(Bool, 'arm/at_rest', self._on_rest, STATE_QOS)
-        period = self.parameter(
-            'diagnostics_period',
-            1.0,
-            'Seconds between two messages on diagnostics.',
-            minimum=0.01,
-            read_only=True,
-        )
-        self.create_timer(period, self._diagnose)
+        self.create_timer(REPORT_PERIOD, self._report)
         self.spawn(self._work, 'marker detection')
 
     def on_stop(self) -> None:
@@ -205,7 +197,8 @@ class ArucoDetector(PatrolNode):
 
     def _refuse(self, reason: str) -> None:
         reason = ' '.join(reason.split())
-        self._watch.refuse(reason)
+        self._watch.refuse()
+        self.health.error('images', reason)
         self.get_logger().error(reason, throttle_duration_sec=5.0)
 
     def _adopt(self) -> None:
@@ -226,7 +219,7 @@ class ArucoDetector(PatrolNode):
             self._said_left_out = True
             self.get_logger().warn(
                 f'{self._watch.left_out} candidates of an image were left unread to bound the work '
-                '(max_candidates); diagnostics counts them from now on'
+                '(max_candidates); /diagnostics counts them from now on'
             )
         for marker_id in new:
             self._ids.publish(Int32(data=marker_id))
@@ -255,18 +248,21 @@ class ArucoDetector(PatrolNode):
             )
         return camera
 
-    def _diagnose(self) -> None:
-        further = {
-            'dropped in all': self._images.dropped,
-            'taken in motion in all': self.skipped,
-            'confirmed ids': ' '.join(str(each) for each in sorted(self._watch.confirmed)),
-        }
-        stamp = self.get_clock().now().to_msg()
-        statistics = self._watch.take_statistics()
+    def _report(self) -> None:
+        """Note how the stream of images was in the last period."""
+        statistics, health = self._watch.take_statistics(), self.health
         in_motion, self._skipped_before = self.skipped - self._skipped_before, self.skipped
-        self._diagnostics.publish(
-            diagnostics_to_ros(self.get_name(), stamp, statistics, in_motion, further)
-        )
+        if statistics.is_silent(in_motion):
+            health.warn('images', 'no images')
+        elif not statistics.refused:
+            health.clear('images')
+        health.figure('images', statistics.images)
+        health.figure('refused', statistics.refused)
+        health.figure('candidates_left_out', statistics.left_out)
+        health.figure('ms_per_image', f'{statistics.mean_milliseconds:.1f}')
+        health.figure('dropped_in_all', self._images.dropped)
+        health.figure('taken_in_motion_in_all', self.skipped)
+        health.figure('confirmed_ids', ' '.join(map(str, sorted(self._watch.confirmed))))
 
 
 def main(args: Sequence[str] | None = None) -> int:

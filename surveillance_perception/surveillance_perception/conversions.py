@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
-from typing import Any
+from collections.abc import Iterable
 
 import cv2
 import numpy as np
 import numpy.typing as npt
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from geometry_msgs.msg import Point, Pose, PoseArray, Quaternion, TransformStamped, Vector3
 from nav_msgs.msg import Odometry
 from scipy.spatial.transform import Rotation
@@ -26,7 +24,7 @@ from surveillance_perception.arm.view_coverage import View
 from surveillance_perception.detection.camera_model import DISTORTION_MODELS, Array, CameraModel
 from surveillance_perception.detection.detector import Detection
 from surveillance_perception.detection.fusion import FusedPosition, FusedPositions
-from surveillance_perception.detection.marker_stream import Sighting, Statistics
+from surveillance_perception.detection.marker_stream import Sighting
 from surveillance_perception.detection.pose import MarkerPose
 from surveillance_perception.marker_registry import MarkedPlace
 from surveillance_perception.stream.encodings import image_of_pixels, printable
@@ -223,39 +221,6 @@ def transforms_to_ros(header: Header, sightings: Iterable[Sighting]) -> list[Tra
         transform.transform.rotation = pose.orientation
         transforms.append(transform)
     return transforms
-
-
-def diagnostics_to_ros(
-    name: str, stamp: Any, statistics: Statistics, in_motion: int, further: Mapping[str, Any]
-) -> DiagnosticArray:
-    """Return how the stream of images was, with further figures to show.
-
-    Args:
-        name: Of the node.
-        stamp: Of the message.
-        statistics: Of the images since the last message.
-        in_motion: How many of that time were left out because the arm moved.
-        further: Figures by name.
-    """
-    status = DiagnosticStatus(name=f'{name}: pictures', hardware_id='camera')
-    status.level, status.message = DiagnosticStatus.OK, 'looking'
-    if statistics.refused:
-        status.level, status.message = DiagnosticStatus.ERROR, statistics.last_error
-    elif in_motion and not statistics.images:
-        status.message = 'waiting for the arm to rest'
-    elif not statistics.images:
-        status.level, status.message = DiagnosticStatus.WARN, 'no images'
-    figures = {
-        'pictures': statistics.images,
-        'refused': statistics.refused,
-        'candidates left out': statistics.left_out,
-        'ms per image': f'{statistics.mean_milliseconds:.1f}',
-        **further,
-    }
-    status.values = [KeyValue(key=key, value=str(value)) for key, value in figures.items()]
-    message = DiagnosticArray(status=[status])
-    message.header.stamp = stamp
-    return message
 
 
 def scan_plan_from_ros(goal: ScanSurroundings.Goal, horizontal: float, vertical: float) -> ScanPlan:

@@ -12,8 +12,6 @@ import cv2
 import numpy as np
 import PIL.Image
 import pytest
-from builtin_interfaces.msg import Time
-from diagnostic_msgs.msg import DiagnosticStatus
 from geometry_msgs.msg import PoseWithCovariance
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -24,7 +22,6 @@ from std_msgs.msg import Header
 from surveillance_perception import conversions
 from surveillance_perception.arm.trajectory import ArmState, motion_to
 from surveillance_perception.detection.camera_model import CameraModel
-from surveillance_perception.detection.marker_stream import Statistics
 from surveillance_perception.detection.pose import pose_of
 from surveillance_perception.stream.image_files import ImageError, decode_image
 from surveillance_perception.testing.marker_scene import (
@@ -221,19 +218,3 @@ def test_trajectory_keeps_names_times_and_values():
     assert np.allclose(times, motion.times, atol=1e-6)
     assert np.allclose([p.positions for p in message.points], motion.positions)
     assert np.allclose([p.velocities for p in message.points], motion.speeds)
-
-
-@pytest.mark.parametrize(
-    ('statistics', 'in_motion', 'level'),
-    [
-        (Statistics(images=1), 0, DiagnosticStatus.OK),
-        (Statistics(), 5, DiagnosticStatus.OK),
-        (Statistics(), 0, DiagnosticStatus.WARN),
-        (Statistics(refused=1), 5, DiagnosticStatus.ERROR),
-    ],
-)
-def test_an_arm_on_its_way_to_the_next_view_is_no_fault(
-    statistics: Statistics, in_motion: int, level: bytes
-) -> None:
-    told = conversions.diagnostics_to_ros('detector', Time(), statistics, in_motion, {})
-    assert told.status[0].level == level

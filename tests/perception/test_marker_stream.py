@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from surveillance_perception.detection.marker_stream import Confirmation, sizes_from
+import pytest
+
+from surveillance_perception.detection.marker_stream import Confirmation, Statistics, sizes_from
 
 
 def test_known_id_is_confirmed_once_after_its_images():
@@ -31,3 +33,16 @@ def test_what_is_seen_too_rarely_is_never_confirmed():
 
 def test_sizes_are_read_by_id():
     assert sizes_from(['14:0.3', '15:0.05']) == {14: 0.3, 15: 0.05}
+
+
+@pytest.mark.parametrize(
+    ('statistics', 'in_motion', 'silent'),
+    [
+        (Statistics(images=1), 0, False),
+        (Statistics(), 5, False),
+        (Statistics(), 0, True),
+        (Statistics(refused=1), 0, False),
+    ],
+)
+def test_an_arm_on_its_way_to_the_next_view_is_no_fault(statistics, in_motion, silent):
+    assert statistics.is_silent(in_motion) == silent

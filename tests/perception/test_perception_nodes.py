@@ -8,7 +8,7 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from diagnostic_msgs.msg import DiagnosticStatus
 from geometry_msgs.msg import Point, PoseArray
 from rcl_interfaces.srv import SetParameters
 from rclpy.parameter import Parameter
@@ -66,7 +66,6 @@ class Camera:
         self.detections = graph.listen(MarkerDetectionArray, 'aruco_detector/detections')
         self.poses = graph.listen(PoseArray, 'aruco_detector/poses')
         self.drawn = graph.listen(Image, 'aruco_detector/annotated', SENSOR_QOS)
-        self.diagnostics = graph.listen(DiagnosticArray, 'diagnostics')
 
     def ready(self) -> None:
         self.graph.until(lambda: self.images.get_subscription_count())
@@ -132,14 +131,13 @@ def test_compressed_images_are_looked_at_too(graph: Any) -> None:
 
 
 def test_images_that_are_none_are_named_and_the_node_goes_on(graph: Any) -> None:
-    camera, node = detector(graph, diagnostics_period=0.02)
+    camera, node = detector(graph)
     good = image_to_ros(ROOM, Header())
 
     def named(reason: str) -> bool:
         return any(
-            status.level == DiagnosticStatus.ERROR and reason in status.message
-            for message in camera.diagnostics
-            for status in message.status
+            level == DiagnosticStatus.ERROR and reason in text
+            for level, text in node.health.findings()
         )
 
     for encoding, width, reason in (

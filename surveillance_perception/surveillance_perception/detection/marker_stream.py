@@ -93,12 +93,19 @@ class Statistics:
     seconds: float = 0.0
     refused: int = 0
     left_out: int = 0
-    last_error: str = ''
 
     @property
     def mean_milliseconds(self) -> float:
         """Time for an image; 0 without any."""
         return 1e3 * self.seconds / self.images if self.images else 0.0
+
+    def is_silent(self, in_motion: int) -> bool:
+        """Tell whether no image came at all.
+
+        Args:
+            in_motion: Images that were left out because the arm moved.
+        """
+        return not (self.images or self.refused or in_motion)
 
 
 class Confirmation:
@@ -214,10 +221,9 @@ class MarkerStream:
         self.statistics.seconds += time.perf_counter() - start
         return sightings, new
 
-    def refuse(self, error: str) -> None:
-        """Take note of an image that could not be used."""
+    def refuse(self) -> None:
+        """Count an image that could not be used."""
         self.statistics.refused += 1
-        self.statistics.last_error = error
 
     def take_statistics(self) -> Statistics:
         """Return the statistics since the last call, which begin anew."""

@@ -1,4 +1,4 @@
-"""The schema and docs/parameters.md say what the nodes declare."""
+"""The schema, docs/parameters.md and docs/interfaces.md say what the nodes declare and offer."""
 
 from __future__ import annotations
 
@@ -13,24 +13,30 @@ from contextlib import suppress
 import pytest
 import rclpy
 
+from launcher.node_survey import survey
 from launcher.package_commands import HELP, all_helps
-from launcher.parameter_tables import as_markdown, collect
+from launcher.reference_tables import parameters_page
 from surveillance_runtime.configuration import SCHEMA, read_schema
 from surveillance_runtime.discovery import LAST_DOMAIN
 from tests.launcher.conftest import ROOT
 
-COLLECT = (
-    'import json, sys; from launcher.parameter_tables import collect; '
-    'json.dump(collect(), open(sys.argv[1], "w"))'
-)
+SURVEY = """
+import json, sys
+from launcher.node_survey import survey
+from launcher.reference_tables import interfaces_page
+found = survey()
+print(json.dumps([found.parameters, interfaces_page(found)]), file=open(sys.argv[1], 'w'))
+"""
 
 
-def test_the_schema_is_what_the_nodes_declare(tmp_path):
+def test_schema_and_interfaces_are_those_of_the_nodes(tmp_path):
     path = tmp_path / 'now.json'
-    words = [sys.executable, '-c', COLLECT, str(path)]
+    words = [sys.executable, '-c', SURVEY, str(path)]
     subprocess.run(words, cwd=ROOT, check=True, capture_output=True)
-    hint = 'write it anew: python3 launch.py params --write'
-    assert json.loads(path.read_text()) == json.loads(SCHEMA.read_text()), hint
+    parameters, page = json.loads(path.read_text())
+    hint = 'write them anew: python3 launch.py params --write'
+    assert parameters == json.loads(SCHEMA.read_text()), hint
+    assert page == (ROOT / 'docs' / 'interfaces.md').read_text(), hint
 
 
 def test_nodes_are_made_where_no_claimed_domain_hears_them(monkeypatch):
@@ -48,12 +54,12 @@ def test_nodes_are_made_where_no_claimed_domain_hears_them(monkeypatch):
             # Either this claim holds, or somebody else's does.
             claim.bind(f'\0surveillance-domain-{LAST_DOMAIN}')
         with pytest.raises(BegunError):
-            collect()
+            survey()
     assert used != [LAST_DOMAIN]
 
 
 def test_the_page_of_parameters_is_written_from_the_schema():
-    assert (ROOT / 'docs' / 'parameters.md').read_text() == as_markdown(read_schema())
+    assert (ROOT / 'docs' / 'parameters.md').read_text() == parameters_page(read_schema())
 
 
 def test_params_prints_each_value_with_its_source():
