@@ -23,7 +23,7 @@ from surveillance_ontology.reasoner.clauses import (
 from surveillance_ontology.reasoner.engine import Engine
 from surveillance_ontology.reasoner.normal_form import is_positive
 from surveillance_ontology.reasoner.open_cases import values_may_split
-from surveillance_ontology.reasoner.property_chains import chains_turn_back
+from surveillance_ontology.reasoner.property_chains import chains_take_cases
 
 _MOST_ASSERTIONS = 20_000
 
@@ -105,7 +105,7 @@ class Completion:
 
         They do not where nothing unnamed must exist and no class requires something of a certain
         individual that matters, nor where each class that requires somebody says all by itself, no
-        chain comes back from somebody unnamed, and nothing is counted or excluded. Nor where there
+        chain takes cases, and nothing is counted or excluded. Nor where there
         are rules, and no value that must exist is one of several that matter.
         """
         if program.unsupported or program.interacting:
@@ -118,7 +118,7 @@ class Completion:
             return False
         if any(_names(atom) for clause in clauses for atom in clause.body):
             return True
-        if chains_turn_back(program):
+        if chains_take_cases(program):
             return True
         if self._has_rules:
             return values_may_split(program)

@@ -37,7 +37,7 @@ from surveillance_ontology.reasoner.clauses import (
     closure,
     turned,
 )
-from surveillance_ontology.reasoner.value_sets import EVERY, ValueSet, point
+from surveillance_ontology.reasoner.value_sets import EVERY, NONE, ValueSet, point
 
 Token: TypeAlias = 'Predicate | tuple[Any, ...]'
 Tokens: TypeAlias = frozenset[Token]
@@ -766,14 +766,18 @@ class Contexts:
     def _along_value(self, context: Context, held: _Values) -> None:
         for prop in tuple(held.props):
             for rule in self._value_rules.get(prop, ()):
-                if not (rule.props <= held.props and rule.xs <= context.tokens):
+                if not rule.xs <= context.tokens:
                     continue
                 head = rule.head
                 if head[0] == 'clash':
-                    rest = held.values & ~rule.values
+                    rest = held.values & ~(
+                        rule.values & self._had(context, rule.props - held.props)
+                    )
                     if rest != held.values:
                         held.values = rest
                         self._changed = True
+                elif not rule.props <= held.props:
+                    continue
                 elif held.values.within(rule.values):
                     if head[0] == 'x':
                         self._add(context, head[1])
@@ -782,6 +786,17 @@ class Contexts:
                         self._changed = True
                 elif not (held.values & rule.values).decided:
                     self._gap(context, rule.origin, _DATES)
+
+    def _had(self, context: Context, props: frozenset[Predicate]) -> ValueSet:
+        """Return the values that an individual certainly has by all of some properties."""
+        found = EVERY
+        for prop in props:
+            certain = NONE
+            for held in context.values:
+                if prop in held.props and held.values.size == held.count:
+                    certain |= held.values
+            found &= certain
+        return found
 
     def _counted_values(self, context: Context, condition: AtLeast | AtMost) -> list[_Values]:
         admitted = condition.values

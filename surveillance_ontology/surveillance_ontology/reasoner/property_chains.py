@@ -44,12 +44,15 @@ def spell_out_chains(program: Program) -> None:
     _Spelling(program).run()
 
 
-def chains_turn_back(program: Program) -> bool:
-    """Tell whether a chain may lead over somebody unnamed and back to where it came from.
+def chains_take_cases(program: Program) -> bool:
+    """Tell whether steps from one individual to the next may not find all that chains imply.
 
-    Then it may join two named individuals, which steps from one to the next do not find.
+    They do not where a chain leads over somebody unnamed and back to where it came from, as it may
+    then join two named individuals, nor where those that a chain leads to are counted.
     """
     chains = _Spelling(program).chains
+    if any(chains.is_complex((least.prop, least.inverse)) for least in program.at_least):
+        return True
     roles = {(each.prop, each.inverse) for each in program.existentials}
     try:
         return any(_turns(chains, chains.steps(role), roles) for role in chains)
@@ -247,6 +250,7 @@ class _Spelling:
             if not clause.named_only:
                 self._extend(clause)
         self._individuals()
+        self._loops()
 
     def _relates_members(self) -> bool:
         """Tell whether a class relates its members to somebody unnamed, a name, or themselves."""
@@ -422,6 +426,15 @@ class _Spelling:
                 head = PredicateAtom(role[0], terms)
                 origin = Clause((), head)
                 self._automaton([SameAtom((_X, constant))], _X, turned(role), [], _X, head, origin)
+
+    def _loops(self) -> None:
+        """Chains whose every step relates an individual to itself."""
+        for role in self.chains:
+            for chain in self.chains.implying(role):
+                body = tuple(dict.fromkeys(PredicateAtom(prop, (_X, _X)) for prop, _ in chain))
+                head = PredicateAtom(role[0], (_X, _X))
+                if not role[1] and head not in body:
+                    self._add(Clause(body, head))
 
 
 def _moved(atom: BodyAtom, old: Term, new: Term) -> BodyAtom:

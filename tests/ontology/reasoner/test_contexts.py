@@ -6,6 +6,7 @@ from __future__ import annotations
 import pytest
 
 from surveillance_ontology import KnowledgeBase
+from surveillance_ontology.owl.axiom_text import axiom_text
 from surveillance_ontology.owl.axioms import (
     AsymmetricObjectProperty,
     Axiom,
@@ -15,11 +16,13 @@ from surveillance_ontology.owl.axioms import (
     Declaration,
     DifferentIndividuals,
     DisjointClasses,
+    DisjointDataProperties,
     EquivalentClasses,
     FunctionalDataProperty,
     FunctionalObjectProperty,
     InverseFunctionalObjectProperty,
     InverseObjectProperties,
+    IrreflexiveObjectProperty,
     NegativeObjectPropertyAssertion,
     ObjectPropertyAssertion,
     ObjectPropertyDomain,
@@ -35,6 +38,7 @@ from surveillance_ontology.owl.expressions import (
     ClassExpression,
     DataAllValuesFrom,
     DataComplementOf,
+    DataHasValue,
     DataMinCardinality,
     DataOneOf,
     DataSomeValuesFrom,
@@ -192,6 +196,21 @@ def test_an_unknown_value_is_not_outside_a_range() -> None:
     assert not kb.reason()
 
 
+@pytest.mark.parametrize(
+    'required',
+    [
+        (DataHasValue(T, whole(1)), DataHasValue(S, Literal('01', XSD + 'int'))),
+        (DataMinCardinality(2, T, XSD + 'boolean'), DataSomeValuesFrom(S, XSD + 'boolean')),
+    ],
+)
+def test_what_has_the_same_value_by_disjoint_properties_is_impossible(
+    required: tuple[ClassExpression, ...],
+) -> None:
+    disjoint = DisjointDataProperties((S, T))
+    kb = reasoned(disjoint, SubClassOf(A, some(P, B)), *(SubClassOf(B, one) for one in required))
+    assert kb.holds(SubClassOf(A, NOTHING))
+
+
 def test_the_one_neighbour_is_what_must_exist() -> None:
     kb = reasoned(
         SubClassOf(A, some(Q, B)),
@@ -227,6 +246,33 @@ def test_chains_lead_to_an_individual_that_a_class_names() -> None:
     assert kb.superclasses(A) == {C}
     assert kb.instances(C) == {i, j}
     assert kb.object_values(R, i) == {k}
+
+
+def test_a_chain_of_what_relates_to_itself_leads_back() -> None:
+    kb = reasoned(
+        SubPropertyChainOf((P, Q), R),
+        SubClassOf(A, ObjectIntersectionOf((ObjectHasSelf(P), ObjectHasSelf(Q)))),
+        EquivalentClasses((B, ObjectHasSelf(R))),
+    )
+    assert kb.superclasses(A) == {B}
+    kb.add(IrreflexiveObjectProperty(R))
+    kb.reason()
+    assert kb.holds(SubClassOf(A, NOTHING))
+
+
+def test_a_count_of_unnamed_individuals_that_chains_lead_to_is_named() -> None:
+    counted = EquivalentClasses((D, ObjectMinCardinality(2, R)))
+    kb = KnowledgeBase(
+        'x:',
+        [
+            SubPropertyChainOf((P, Q), R),
+            *(SubClassOf(A, some(P, some(Q, one))) for one in (B, C)),
+            DisjointClasses((B, C)),
+            counted,
+        ],
+    )
+    kb.reason()
+    assert kb.unsupported == (f'{axiom_text(counted)}: a property with chains is counted',)
 
 
 def test_chains_of_a_hierarchy_of_properties_cost_what_each_costs() -> None:
