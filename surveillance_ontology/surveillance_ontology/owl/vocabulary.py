@@ -16,6 +16,11 @@ TOP_DATA, BOTTOM_DATA = OWL + 'topDataProperty', OWL + 'bottomDataProperty'
 TOP_LITERAL = RDFS + 'Literal'
 
 
+def is_anonymous(individual: str) -> bool:
+    """Tell whether an individual has no IRI."""
+    return individual.startswith('_:')
+
+
 def local_name(iri: str) -> str:
     """Return what follows the last `#`, else the last `/`, else the whole."""
     for mark in ('#', '/'):

@@ -11,6 +11,7 @@ from itertools import combinations, islice, product
 from typing import Any
 
 from surveillance_ontology.owl.axioms import Axiom
+from surveillance_ontology.owl.vocabulary import is_anonymous
 from surveillance_ontology.reasoner.clauses import (
     AtLeast,
     AtMost,
@@ -273,7 +274,7 @@ class AtMostCounter(_Counter):
 
 
 class KeyWatcher:
-    """Finds members of a class that share a value of every key property."""
+    """Finds named members of a class that share a value, a named one, of every key property."""
 
     def __init__(self, key: Key, merge: MergeRequest) -> None:
         self._key, self._merge = key, merge
@@ -287,15 +288,17 @@ class KeyWatcher:
     def gain(self, x: str) -> None:
         """Look for individuals that `x` now shares its key with."""
         cls = self._key.cls
-        if cls is not None and x not in cls.members:
+        if is_anonymous(x) or (cls is not None and x not in cls.members):
             return
         shared: dict[str, list[Fact]] | None = None
         for prop, inverse in self._key.props:
             succ, pred = (prop.pred, prop.succ) if inverse else (prop.succ, prop.pred)
             found: dict[str, list[Fact]] = {}
             for value in succ.get(x, ()):
+                if prop.kind == 'object' and is_anonymous(value):
+                    continue
                 for y in pred.get(value, ()):
-                    if y != x and (shared is None or y in shared):
+                    if y != x and not is_anonymous(y) and (shared is None or y in shared):
                         pair = [(prop, value, x), (prop, value, y)]
                         if not inverse:
                             pair = [(prop, x, value), (prop, y, value)]

@@ -13,7 +13,7 @@ from fractions import Fraction
 from typing import Any, NamedTuple, TypeAlias
 
 from surveillance_ontology.owl.expressions import DatatypeRestriction, Literal
-from surveillance_ontology.owl.vocabulary import OWL, XSD
+from surveillance_ontology.owl.vocabulary import OWL, XSD, is_anonymous
 from surveillance_ontology.reasoner.case_model import (
     Alternative,
     Apart,
@@ -195,11 +195,14 @@ class CaseJoins:
         elif match.given[term] == node:
             yield match
 
-    def _named(self, x: int) -> Choices | None:
-        """Return the choices by which an individual has a name; None where it has none."""
+    def _named(self, x: int, is_key: bool = False) -> Choices | None:
+        """Return the choices by which an individual has a name, for a key an IRI; None where it
+        has none.
+        """
         model = self._model
         labels, nominals = model.labels[x], model.rules.nominal_of
-        return min((labels[nominals[name]] for name in model.names[x]), default=None)
+        names = (name for name in model.names[x] if not (is_key and is_anonymous(name)))
+        return min((labels[nominals[name]] for name in names), default=None)
 
     def _node(self, match: _Match, term: Term) -> tuple[int, Choices] | None:
         """Return the individual that a term stands for; None where that is open."""
@@ -386,6 +389,13 @@ class CaseJoins:
         head = rule.head
         alternatives = list(match.against)
         choices = match.choices
+        if rule.is_key:
+            for node in match.given.values():
+                if not isinstance(node, _Known) and node not in self._model.sets:
+                    named = self._named(node, is_key=True)
+                    if named is None:
+                        return
+                    choices |= named
         if head is not None:
             nodes: list[Any] = []
             for term in head.terms:

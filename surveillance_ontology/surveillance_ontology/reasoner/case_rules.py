@@ -156,6 +156,8 @@ class NamedRule:
 
     body: tuple[NamedAtom, ...]
     head: OfConcept | OfRole | OfProp | SameAtom | DifferentAtom | None
+    is_key: bool = False
+    """Whether anonymous individuals take no part (OWL 2 Structural Specification, 9.5)."""
 
 
 class CaseRules:
@@ -569,7 +571,7 @@ class CaseRules:
                 pair = (one, place)
                 body.append(OfProp(str(prop), pair) if is_data else self._link(prop, *pair))
         if len(body) > 2:
-            self.named.append(NamedRule(tuple(body), SameAtom((x, y))))
+            self.named.append(NamedRule(tuple(body), SameAtom((x, y)), is_key=True))
 
     def _link(self, prop: PropertyExpression, x: Term, y: Term) -> FactAtom:
         """Return the atom that relates two individuals."""

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from surveillance_ontology.owl.axioms import Axiom
+from surveillance_ontology.owl.vocabulary import is_anonymous
 from surveillance_ontology.reasoner.clauses import Fact, Premises
 
 
@@ -96,9 +97,10 @@ class Equality:
 
     def join(self, merge: Merge) -> tuple[str, str]:
         """Join two classes; return (representative that stays, one that goes): the smaller IRI
-        stays.
+        stays, before anonymous individuals.
         """
-        kept, gone = sorted((self.find(merge.first), self.find(merge.second)))
+        pair = self.find(merge.first), self.find(merge.second)
+        kept, gone = sorted(pair, key=lambda name: (is_anonymous(name), name))
         members = self.members.setdefault(kept, {kept})
         joining = self.members.pop(gone, {gone})
         members |= joining

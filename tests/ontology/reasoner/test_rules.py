@@ -279,6 +279,23 @@ def test_keys_apply_by_values_that_are_not_known() -> None:
     assert set(kb.justification(None)) == {few, key, apart, *(is_a(A, one) for one in (i, j, k))}
 
 
+@pytest.mark.parametrize('by_cases', [False, True])
+def test_keys_leave_anonymous_individuals_alone(by_cases: bool) -> None:
+    someone = '_:b0'
+    also = [is_a(ObjectUnionOf((C, D)), someone)] if by_cases else []
+    facts = [is_a(A, one) for one in (i, someone)] + [has(S, one, 1) for one in (i, someone)]
+    kb = base(HasKey(A, (), (S,)), *facts, rel(P, k, someone), *also)
+    assert not kb.holds(rel(P, k, i))
+    named = same(someone, j)
+    kb.add(named)
+    kb.reason()
+    assert kb.holds(same(i, j))
+    assert kb.object_values(P, k) == {i, j, someone}
+    kb.remove(named)
+    kb.reason()
+    assert not kb.holds(rel(P, k, i))
+
+
 def test_a_rule_hands_on_a_value_that_is_not_known() -> None:
     member = is_a(DataSomeValuesFrom(S, _AT_LEAST_18), i)
     given = Rule((DataPropertyAtom(S, X, V),), (DataPropertyAtom(T, X, V),))
