@@ -59,6 +59,33 @@ def test_explanations(ask: Ask) -> None:
     assert tree
 
 
+def test_nothing_is_said_to_hold_that_does_not(ask: Ask) -> None:
+    ask('ADD IND CLASS', 'R3', 'ROOM')
+    for fact in ('owl:sameAs(R3, Robot1)', 'owl:Thing(R9)'):
+        assert not ask('QUERY EXPLAIN', fact).success
+        absence = ask('QUERY EXPLAIN ABSENCE', fact)
+        assert (absence.success, absence.exit_code, absence.queried_objects) == (False, 0, [])
+        assert absence.error_description.startswith(f'{fact} does not hold in map')
+    mistyped = ask('QUERY EXPLAIN ABSENCE', 'URGENTT(Rr)')
+    assert mistyped.queried_objects
+    assert mistyped.error_description.startswith(f'map has no class {iri("URGENTT")}')
+    value = ask('QUERY EXPLAIN', 'now(Robot1, 5)')
+    assert value.error_description == 'now(Robot1, 5) is neither asserted nor derived in map'
+    wrong = ask('QUERY EXPLAIN ABSENCE', 'URGENT')
+    assert wrong.error_description.startswith('QUERY EXPLAIN ABSENCE: argument fact')
+    ask('ADD DATAPROP IND', 'visitedAt', 'R3', 'LONG', '4')
+    ask('ADD DATAPROP IND', 'visitedAt', 'R3', 'LONG', '5')
+    absence = ask('QUERY EXPLAIN ABSENCE', 'URGENT(Robot1)')
+    assert (absence.success, absence.is_consistent) == (False, False)
+    assert absence.error_description == 'map is inconsistent'
+
+
+def test_the_words_of_owl_are_known(ask: Ask) -> None:
+    for words in ('QUERY CLASS CLASS', 'QUERY IND CLASS'):
+        for name in ('owl:Thing', 'owl:Nothing'):
+            assert ask(words, name).error_description == ''
+
+
 def test_facts_by_pattern(ask: Ask) -> None:
     ask('ADD DATAPROP IND', 'visitedAt', 'R3', 'LONG', '1665579720')
     ask('ADD OBJECTPROP IND', 'isIn', 'Robot1', 'R3')

@@ -45,6 +45,7 @@ from surveillance_ontology.owl.expressions import (
     ClassExpression,
     DataHasValue,
     DataRange,
+    Literal,
     ObjectComplementOf,
     ObjectHasValue,
     ObjectIntersectionOf,
@@ -52,7 +53,7 @@ from surveillance_ontology.owl.expressions import (
     ObjectUnionOf,
     PropertyExpression,
 )
-from surveillance_ontology.owl.vocabulary import NOTHING, THING, local_name
+from surveillance_ontology.owl.vocabulary import NOTHING, OWL, THING, local_name
 
 
 def _entities(iris: Iterable[str]) -> list[str]:
@@ -69,7 +70,7 @@ def _unknown(ref: Reference, *asked: tuple[str, str]) -> str:
     """Return which entities are unknown, with the nearest known class or property; or nothing."""
     unknown: list[str] = []
     for kind, iri in asked:
-        if not ref.kb.is_known(kind, iri):
+        if not iri.startswith(OWL) and not ref.kb.is_known(kind, iri):
             known = {local_name(name): name for name in ref.kb.schema_names(kind)}
             alike = difflib.get_close_matches(local_name(iri), known, n=1)
             instead = f' (there is {render_entity(known[alike[0]])})' if alike else ''
@@ -174,7 +175,7 @@ def _object_properties(ref: Reference, ind: str) -> DirectiveResponse:
 )
 def _explain(_: Session, ref: Reference, fact: str) -> DirectiveResponse:
     with ref.held() as kb:
-        asked = _full_fact(ref, fact)
+        asked = _full_fact('QUERY EXPLAIN', ref, fact)
         explanation = kb.explain(asked)
         unknown = _unknown(ref, *entities_of(asked)) if explanation is None else ''
     if explanation is None:
@@ -194,10 +195,18 @@ def _explain(_: Session, ref: Reference, fact: str) -> DirectiveResponse:
     'an English sentence, then each missing condition; nothing where it holds.',
 )
 def _explain_absence(ref: Reference, fact: str) -> DirectiveResponse:
-    absence = ref.kb.explain_absence(_full_fact(ref, fact))
-    if absence is None:
+    asked = _full_fact('QUERY EXPLAIN ABSENCE', ref, fact)
+    absence = ref.kb.explain_absence(asked)
+    unknown = _unknown(ref, *entities_of(asked))
+    if absence is not None:
+        found = [absence.sentence(), *absence.missing]
+        return DirectiveResponse(queried_objects=found, error_description=unknown)
+    if ref.kb.holds(asked):
         return DirectiveResponse(error_description=f'{fact} holds in {ref.name}')
-    return DirectiveResponse(queried_objects=[absence.sentence(), *absence.missing])
+    problem = f'{fact} does not hold in {ref.name}{": " if unknown else ""}{unknown}'
+    if not ref.kb.consistent:
+        problem = f'{ref.name} is inconsistent'
+    return DirectiveResponse(success=False, error_description=problem)
 
 
 @query(
@@ -312,7 +321,7 @@ def _entity(ref: Reference, name: str) -> str:
     return f'{ref.kb.iri}#{name[1:-1]}' if bracketed else parse_entity(name, ref.kb.iri)
 
 
-def _full_fact(ref: Reference, text: str) -> Fact:
+def _full_fact(words: str, ref: Reference, text: str) -> Fact:
     try:
         short = parse_names(text)
         read: Callable[[str], str] = partial(_entity, ref)
@@ -325,13 +334,13 @@ def _full_fact(ref: Reference, text: str) -> Fact:
         if value.startswith('"'):
             return DataPropertyAssertion(prop, read(subject), parse_rendered(value))
         if ref.kb.is_known('data_property', prop):
-            values = ref.kb.data_values(prop, read(subject))
-            for literal in sorted(values, key=_literal):
-                if literal.lexical == value:
-                    return DataPropertyAssertion(prop, read(subject), literal)
+            values = sorted(ref.kb.data_values(prop, read(subject)), key=_literal)
+            same = next((one for one in values if one.lexical == value), None)
+            if same or not ref.kb.is_known('object_property', prop):
+                return DataPropertyAssertion(prop, read(subject), same or Literal(value))
         return ObjectPropertyAssertion(prop, read(subject), read(value))
     except ValueError as error:
-        raise DirectiveError(f'QUERY EXPLAIN: argument fact {error}') from None
+        raise DirectiveError(f'{words}: argument fact {error}') from None
 
 
 _RESTRICTION = re.compile('(Object|Data)(Some|All|Min|Max|Exact)(?:ValuesFrom|Cardinality)')
