@@ -7,18 +7,15 @@ first reasoning) goes to a worker thread, so that other clients are not kept wai
 from __future__ import annotations
 
 import sys
-import threading
 import time
-from collections import Counter, deque
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.clock import Clock, ClockType
 from rclpy.event_handler import PublisherEventCallbacks
-from rclpy.task import Future
 
 from surveillance_fsm.ros.waiting import reported
 from surveillance_interfaces.msg import ArmorDirectiveRes, FactChanges
@@ -28,6 +25,7 @@ from surveillance_ontology.armor.protocol import DirectiveRequest
 from surveillance_ontology.armor.service import ArmorService
 from surveillance_ontology.armor.session import ChangeFeed, NumberedChange
 from surveillance_ontology.armor.store import Store
+from surveillance_ontology.armor.turns import Backlog, Turns
 from surveillance_ontology.armor_client import CHANGES_TOPIC
 from surveillance_ontology.conversions import changes_to_ros, fill_response, request_from_ros
 from surveillance_runtime.files import FileError
@@ -50,81 +48,7 @@ WORKERS = 4
 QUERIES = 2
 """Long queries of one ontology at a time."""
 LONG_QUERIES = ('SPARQL', 'AT', 'EXPLAIN')
-
-
-class _Backlog:
-    """What waits, taken in turn from each client that has some."""
-
-    def __init__(self) -> None:
-        self._clients: dict[str, deque[Any]] = {}
-        self._count = 0
-
-    def __len__(self) -> int:
-        return self._count
-
-    def put(self, client: str, item: Any) -> None:
-        """Add what a client wants."""
-        self._clients.setdefault(client, deque()).append(item)
-        self._count += 1
-
-    def take(self) -> Any:
-        """Take the oldest item of the client whose turn it is."""
-        name = next(iter(self._clients))
-        waiting = self._clients.pop(name)
-        taken = waiting.popleft()
-        if waiting:
-            self._clients[name] = waiting
-        self._count -= 1
-        return taken
-
-
-class _Workers:
-    """Threads for directives that may take long, taken in turn from each client.
-
-    An ontology that is used for long keeps some of the threads waiting for it, the others go on.
-
-    Args:
-        node: The node whose callbacks await the results.
-        each: How many directives of one ontology run at a time.
-    """
-
-    def __init__(self, node: PatrolNode, each: int = 1) -> None:
-        self._node = node
-        self._each = each
-        self._threads = AwaitedWork(node, WORKERS)
-        self._lock = threading.Lock()
-        self._waiting: dict[str, _Backlog] = {}
-        self._running: Counter[str] = Counter()
-
-    def run(self, name: str, client: str, work: Callable[[], Any]) -> Future:
-        """Have work done on an ontology; its result is to be awaited."""
-        future, report = reported(self._node, work)
-        with self._lock:
-            self._waiting.setdefault(name, _Backlog()).put(client, report)
-            more = self._running[name] < self._each
-            self._running[name] += more
-        if more:
-            self._threads.put(partial(self._next, name))
-        return future
-
-    def stop(self) -> None:
-        """Let the threads end once they are done with what they do."""
-        self._threads.stop()
-
-    def _next(self, name: str) -> None:
-        waiting = self._waiting[name]
-        with self._lock:
-            report = waiting.take() if waiting else None
-        if report is not None:
-            report()
-        with self._lock:
-            if not waiting:
-                self._running[name] -= 1
-                if not self._running[name]:
-                    del self._waiting[name], self._running[name]
-                return
-        # Behind what waits for other ontologies.
-        self._threads.put(partial(self._next, name))
+_Answer = TypeVar('_Answer')
 
 
 class ArmorServer(PatrolNode):
@@ -151,11 +75,12 @@ class ArmorServer(PatrolNode):
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._pause = self.create_timer(PUBLISH_DELAY, self._on_pause, clock=steady)
         self._pause.cancel()
-        self._work, self._queries = _Workers(self), _Workers(self, QUERIES)
+        self._pools: list[AwaitedWork] = []
+        self._work, self._queries = self._turns(), self._turns(QUERIES)
         # Apart from each other and from the rest: a disk may not answer.
-        self._documents = {'LOAD': _Workers(self), 'SAVE': _Workers(self)}
+        self._documents = {'LOAD': self._turns(), 'SAVE': self._turns()}
         group = ReentrantCallbackGroup()
-        self._backlog = _Backlog()
+        self._backlog: Backlog[tuple[Any, Any]] = Backlog()
         self._single = self.create_service(
             ArmorDirective, 'armor_interface_srv', self._on_directive, callback_group=group
         )
@@ -168,8 +93,8 @@ class ArmorServer(PatrolNode):
 
     def on_stop(self) -> None:
         """End the workers and queries that run."""
-        for workers in (self._work, self._queries, *self._documents.values()):
-            workers.stop()
+        for threads in self._pools:
+            threads.stop()
         self._service.session.sparql.close()
 
     def destroy_node(self) -> None:
@@ -222,8 +147,8 @@ class ArmorServer(PatrolNode):
         directive = request_from_ros(request.armor_request)
         answer = self._service.execute_at_once(directive)
         if answer is None:
-            work = self._workers(directive)
-            answer = await work.run(
+            answer = await self._done(
+                self._turns_of(directive),
                 directive.reference_name,
                 directive.client_name,
                 lambda: self._service.execute(directive),
@@ -231,8 +156,22 @@ class ArmorServer(PatrolNode):
         fill_response(response.armor_response, answer)
         return response
 
-    def _workers(self, directive: DirectiveRequest) -> _Workers:
-        """Return whose turn it is: what takes long must not keep changes and REASON waiting."""
+    def _turns(self, each: int = 1) -> Turns:
+        """Make threads of their own for directives of one kind; see `Turns`."""
+        threads = AwaitedWork(self, WORKERS)
+        self._pools.append(threads)
+        return Turns(threads.put, each)
+
+    async def _done(
+        self, turns: Turns, name: str, client: str, work: Callable[[], _Answer]
+    ) -> _Answer:
+        future, report = reported(self, work)
+        turns.put(name, client, report)
+        answer: _Answer = await future
+        return answer
+
+    def _turns_of(self, directive: DirectiveRequest) -> Turns:
+        """Return where a directive waits: what takes long must not keep changes waiting."""
         if directive.primary.upper() in LONG_QUERIES:
             return self._queries
         return self._documents.get(directive.command.upper(), self._work)
@@ -241,7 +180,9 @@ class ArmorServer(PatrolNode):
         directives = [request_from_ros(msg) for msg in request.armor_requests]
         names = ' '.join(sorted({directive.reference_name for directive in directives}))
         client = directives[0].client_name if directives else ''
-        answer = await self._work.run(names, client, lambda: self._service.execute_list(directives))
+        answer = await self._done(
+            self._work, names, client, lambda: self._service.execute_list(directives)
+        )
         response.success = answer.success
         response.is_consistent = answer.is_consistent
         rows = [fill_response(ArmorDirectiveRes(), row) for row in answer.responses]

@@ -163,7 +163,7 @@ def test_an_ontology_that_is_used_for_long_keeps_nobody_waiting_for_another(
             graph.node.executor.create_task(ask_all)
             for request in asked:
                 graph.node.executor.create_task(ask, request)
-        graph.until(lambda: [len(w._waiting.get('map', ())) for w in server_waits] == [9, 3, 4, 4])
+        graph.until(lambda: [turns.waiting('map') for turns in server_waits] == [9, 3, 4, 4])
         other.utils.load_ref_from_file(ONTOLOGY, IRI)
         assert other.manipulation.add_class('NEW')
         assert other.batch([other.request('REASON')]).success
