@@ -81,7 +81,7 @@ def replace_file(path: str | Path, data: bytes, *, durable: bool = False) -> Non
     """Write a file so that whoever reads it finds all of the old content or all of the new one.
 
     Args:
-        path: The file, or a link to it, which stays; its folder is there.
+        path: The file, or a link to it, which stays, with its rights; its folder is there.
         data: What it is to hold.
         durable: On return it is on the disk, and outlives a failure of power.
 
@@ -89,6 +89,10 @@ def replace_file(path: str | Path, data: bytes, *, durable: bool = False) -> Non
         OSError: It cannot be written, or is none; the error has its name, and the old one is whole.
     """
     target = file_to_write(path)
+    mode = target.stat().st_mode if target.exists() else None
+    if mode is not None and not os.access(target, os.W_OK, effective_ids=True):
+        # Its folder would let it be replaced all the same.
+        raise OSError(errno.EACCES, os.strerror(errno.EACCES), str(path))
     _remove_abandoned(target)
     draft = target.with_name(f'{_drafts(target)}{secrets.token_hex(4)}{_DRAFT}')
     try:
@@ -97,6 +101,8 @@ def replace_file(path: str | Path, data: bytes, *, durable: bool = False) -> Non
         with open(handle, 'wb') as file:
             file.write(data)
             file.flush()
+            if mode is not None:
+                os.fchmod(handle, stat.S_IMODE(mode))
             if durable:
                 os.fsync(handle)
         os.replace(draft, target)

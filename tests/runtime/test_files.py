@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import resource
+import tempfile
 from pathlib import Path
 
 import pytest
@@ -114,6 +115,29 @@ def test_a_file_that_cannot_be_replaced_is_named_and_stays_whole(tmp_path: Path)
     assert in_one_line(refused.value) == f'{path}: File too large'
     assert path.read_text() == 'old'
     assert os.listdir(tmp_path) == ['state.json'], 'a draft is left'
+
+
+def test_a_file_keeps_its_rights(tmp_path: Path) -> None:
+    (path := tmp_path / 'file').write_text('old')
+    path.chmod(0o600)
+    replace_text(path, 'new')
+    assert (path.read_text(), path.stat().st_mode & 0o777) == ('new', 0o600)
+
+
+def test_a_read_only_file_is_not_replaced() -> None:
+    user = os.geteuid()
+    with tempfile.TemporaryDirectory() as folder:
+        Path(folder).chmod(0o777)
+        (path := Path(folder) / 'file').write_text('old')
+        path.chmod(0o444)
+        os.seteuid(user or 65534)  # root may write everything
+        try:
+            with pytest.raises(PermissionError) as error:
+                replace_text(path, 'new')
+        finally:
+            os.seteuid(user)
+        assert error.value.filename == str(path)
+        assert path.read_text() == 'old'
 
 
 def test_a_link_stays_and_what_it_leads_to_is_replaced(tmp_path: Path) -> None:
