@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 
-import cv2
 import numpy as np
 import numpy.typing as npt
 from geometry_msgs.msg import Point, Pose, PoseArray, Quaternion, TransformStamped, Vector3
@@ -62,8 +61,7 @@ def image_from_compressed(message: CompressedImage, max_pixels: int) -> ImageArr
     Raises:
         ImageError: The data is no image, or the image is larger than `max_pixels`.
     """
-    flags = cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION
-    return decode_image(bytes(message.data), 'compressed image', max_pixels, flags)
+    return decode_image(bytes(message.data), 'compressed image', max_pixels, upright=False)
 
 
 def image_from_any(message: Image | CompressedImage, max_pixels: int) -> ImageArray:

@@ -8,8 +8,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from surveillance_perception import MarkerDetector
+from surveillance_perception.detection import dictionary_named
 from surveillance_perception.stream.encodings import ENCODING_NAMES, image_of_pixels, printable
-from surveillance_perception.stream.image_files import ImageError
+from surveillance_perception.stream.image_files import ImageError, decode_image
 
 GREY = np.arange(10, 250, 10, dtype=np.uint8).reshape(4, 6)
 COLOUR = np.stack([GREY, GREY[::-1], GREY[:, ::-1]], axis=2)
@@ -47,6 +49,35 @@ def test_sixteen_bits_fill_the_eight(encoding, bits, big_endian):
     found = read(encoding, stored, big_endian=big_endian).astype(float)
     assert found.max() == 255
     assert np.allclose(found / 255, GREY / GREY.max(), atol=0.005)
+
+
+def marker_in_ten_bits(defective):
+    """Return a faint marker of ten bits, and some pixels of the sensor that are always white."""
+    generator = np.random.default_rng(defective)
+    sheet = np.full((240, 320), 200, np.uint16)
+    sheet[60:160, 80:180] = 120 + dictionary_named('DICT_5X5_100').generateImageMarker(12, 100) // 4
+    sheet[generator.integers(0, 240, defective), generator.integers(0, 320, defective)] = 65535
+    return sheet
+
+
+@pytest.mark.parametrize('defective', [0, 40])
+def test_marker_of_ten_bits_is_read_however_it_is_sent(defective):
+    values = marker_in_ten_bits(defective)
+    packed = cv2.imencode('.png', values)[1].tobytes()
+    coloured = np.dstack([values] * 3 + [np.full_like(values, 65535)])
+    for image in (
+        read('mono16', values, 240, 320),
+        read('rgba16', coloured, 240, 320),
+        decode_image(packed, 'image'),
+    ):
+        assert [each.marker_id for each in MarkerDetector().detect(image)] == [12]
+
+
+@pytest.mark.parametrize('encoding', ENCODING_NAMES)
+def test_odd_sizes_are_read(encoding):
+    data = bytes(13 * 9 * 32)
+    image = image_of_pixels(encoding, 13, 9, 13 * 8 + 1, data, max_pixels=LIMIT)
+    assert image.shape[:2] == (9, 13)
 
 
 @pytest.mark.parametrize(

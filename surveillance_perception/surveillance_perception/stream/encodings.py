@@ -1,22 +1,19 @@
 """Pixels of the encodings that cameras send, as the 8-bit grey or BGR images that detectors read.
 
 Where an encoding carries brightness apart (YUV) or has to be interpolated anyway (Bayer), the
-image becomes grey: nothing here needs its colour. Sixteen bits are scaled so that the brightest
-value fits into eight, because cameras fill between ten and sixteen of them.
+image becomes grey: nothing here needs its colour.
 
 The names are those of `sensor_msgs/image_encodings.hpp`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 
-from surveillance_perception.stream.image_files import ImageArray, ImageError
+from surveillance_perception.stream.image_files import ImageArray, ImageError, Values, eight_bits
 
 _LONGEST_NAME = 40
 
@@ -29,7 +26,7 @@ class _Encoding:
         channels: Values of a pixel; for YUV 4:2:2 two.
         wide: Whether a value has 16 bits.
         conversion: OpenCV's conversion to grey or BGR; None takes the values as they are.
-        multiple: Width and height must be multiples of these.
+        brightness: Which value of a pixel is its brightness, where the others are left out.
         planes: Rows of data for each row of pixels, times two (3: 4:2:0 with its colour behind,
             6: 4:4:4).
     """
@@ -37,7 +34,7 @@ class _Encoding:
     channels: int
     wide: bool = False
     conversion: int | None = None
-    multiple: tuple[int, int] = (1, 1)
+    brightness: int | None = None
     planes: int = 2
 
 
@@ -58,14 +55,14 @@ def _table() -> dict[str, _Encoding]:
         }
         for pattern in ('RGGB', 'BGGR', 'GBRG', 'GRBG'):
             conversion = getattr(cv2, f'COLOR_Bayer{pattern}2GRAY')
-            table[f'bayer_{pattern.lower()}{bits}'] = _Encoding(1, wide, conversion, (2, 2))
+            table[f'bayer_{pattern.lower()}{bits}'] = _Encoding(1, wide, conversion)
     for name in ('yuv422', 'uyvy'):
-        table[name] = _Encoding(2, False, cv2.COLOR_YUV2GRAY_UYVY, (2, 1))
+        table[name] = _Encoding(2, brightness=1)
     for name in ('yuv422_yuy2', 'yuyv'):
-        table[name] = _Encoding(2, False, cv2.COLOR_YUV2GRAY_YUYV, (2, 1))
+        table[name] = _Encoding(2, brightness=0)
     for name in ('nv12', 'nv21'):
         # the rows of brightness come first, those of colour are not looked at
-        table[name] = _Encoding(1, multiple=(2, 2), planes=3)
+        table[name] = _Encoding(1, planes=3)
     table['nv24'] = _Encoding(1, planes=6)
     return table
 
@@ -110,11 +107,6 @@ def image_of_pixels(
         raise ImageError(f'image of {size} pixels is empty')
     if width * height > max_pixels:
         raise ImageError(f'image of {size} pixels is larger than {max_pixels} pixels')
-    if width % how.multiple[0] or height % how.multiple[1]:
-        raise ImageError(
-            f'image of {size} pixels, expected multiples of '
-            f'{how.multiple[0]}x{how.multiple[1]} for {encoding}'
-        )
     row = width * how.channels * (2 if how.wide else 1)
     if step < row:
         raise ImageError(
@@ -129,10 +121,14 @@ def image_of_pixels(
     whole = np.frombuffer(data, np.uint8, step * (rows - 1)).reshape(rows - 1, step)
     last = np.frombuffer(data, np.uint8, row, step * (rows - 1))
     used = np.concatenate([whole[:, :row], last[None]])[:height]
-    pixels = _eight_bits(used, big_endian) if how.wide else used
+    values = used.view('>u2' if big_endian else '<u2') if how.wide else used
+    # OpenCV takes the machine's own order of bytes only
+    values = values.astype(values.dtype.newbyteorder('='), copy=False)
     if how.channels > 1:
-        pixels = pixels.reshape(height, width, how.channels)
-    return _converted(np.ascontiguousarray(pixels), how.conversion, encoding)
+        values = values.reshape(height, width, how.channels)
+    if how.brightness is not None:
+        values = values[..., how.brightness]
+    return eight_bits(_converted(np.ascontiguousarray(values), how.conversion, encoding))
 
 
 def printable(text: str) -> str:
@@ -143,21 +139,11 @@ def printable(text: str) -> str:
     return repr(shown)
 
 
-def _eight_bits(rows: npt.NDArray[np.uint8], big_endian: bool) -> ImageArray:
-    order: Callable[[str], np.dtype[np.uint16]] = np.dtype
-    values = np.ascontiguousarray(rows).view(order('>u2' if big_endian else '<u2'))
-    brightest = int(values.max())
-    if brightest <= 255:
-        return values.astype(np.uint8)
-    native = values.astype(np.uint16, copy=False)
-    return np.asarray(cv2.convertScaleAbs(native, alpha=255.0 / brightest), dtype=np.uint8)
-
-
-def _converted(pixels: ImageArray, conversion: int | None, encoding: str) -> ImageArray:
+def _converted(values: Values, conversion: int | None, encoding: str) -> Values:
     if conversion is None:
-        return pixels
+        return values
     try:
-        return np.asarray(cv2.cvtColor(pixels, conversion), dtype=np.uint8)
+        return np.asarray(cv2.cvtColor(values, conversion))
     except cv2.error as error:
-        shape = f'{pixels.shape[1]}x{pixels.shape[0]}'
+        shape = f'{values.shape[1]}x{values.shape[0]}'
         raise ImageError(f'image of {shape} pixels of {encoding} cannot be converted') from error

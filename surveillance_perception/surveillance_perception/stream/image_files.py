@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import warnings
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -17,6 +18,8 @@ _set_level = cv2.setLogLevel if hasattr(cv2, 'setLogLevel') else cv2.utils.loggi
 _set_level(0)
 
 ImageArray = npt.NDArray[np.uint8]
+Values = npt.NDArray[Any]
+"""Pixels of 8 or 16 bits."""
 
 IMAGE_SUFFIXES = ('.png', '.jpg', '.jpeg', '.bmp', '.pgm', '.ppm', '.tif', '.tiff', '.webp')
 
@@ -29,6 +32,8 @@ MAX_BYTES = 500_000_000
 
 _PNG = b'\x89PNG\r\n\x1a\n'
 _FORMATS = ('PNG', 'JPEG', 'BMP', 'WEBP', 'TIFF', 'PPM')
+# of 16-bit values: what is taken for white, and rows that are looked at to find it
+_WHITE_PERCENTILE, _SAMPLED_ROWS = 99.7, 128
 
 
 class ImageError(ValueError):
@@ -36,7 +41,7 @@ class ImageError(ValueError):
 
 
 def decode_image(
-    data: bytes, what: str, max_pixels: int = MAX_PIXELS, flags: int = cv2.IMREAD_COLOR
+    data: bytes, what: str, max_pixels: int = MAX_PIXELS, *, upright: bool = True
 ) -> ImageArray:
     """Return a BGR image (height, width, 3) from an encoded one, such as a JPEG.
 
@@ -46,7 +51,7 @@ def decode_image(
         data: The encoded image.
         what: Names it in an error.
         max_pixels: The largest image that is taken.
-        flags: How OpenCV decodes it; unless given, turned upright by its EXIF orientation.
+        upright: Whether it is turned as its EXIF orientation says.
 
     Raises:
         ImageError: `data` is empty, no image, or a larger one.
@@ -55,6 +60,9 @@ def decode_image(
         raise ImageError(f'{what} is empty, expected an encoded image')
     _check_size(_size_in_header(data, what, max_pixels), what, max_pixels)
     _check_chunks(data, what)
+    flags = cv2.IMREAD_COLOR | cv2.IMREAD_ANYDEPTH
+    if not upright:
+        flags |= cv2.IMREAD_IGNORE_ORIENTATION
     try:
         image = cv2.imdecode(np.frombuffer(data, np.uint8), flags)
     except cv2.error as error:
@@ -62,7 +70,21 @@ def decode_image(
     if image is None:
         raise ImageError(f'{what} is no image that OpenCV can decode')
     _check_size((image.shape[1], image.shape[0]), what, max_pixels)
-    return np.asarray(image, dtype=np.uint8)
+    return eight_bits(image)
+
+
+def eight_bits(values: Values) -> ImageArray:
+    """Return pixels with 8 bits a channel; those of 16 are scaled.
+
+    Cameras fill between ten and sixteen of the bits. White is what a few pixels in a thousand
+    exceed at most: single ones of a sensor are defective and always bright.
+    """
+    if values.dtype == np.uint8:
+        return values
+    every = 1 + min(values.shape[:2]) // _SAMPLED_ROWS
+    white = float(np.percentile(values[::every, ::every], _WHITE_PERCENTILE))
+    scaled = cv2.convertScaleAbs(values, alpha=255.0 / max(white, 255.0))
+    return np.asarray(scaled, dtype=np.uint8)
 
 
 def read_image(path: Path, max_pixels: int = MAX_PIXELS) -> ImageArray:
