@@ -44,8 +44,8 @@ LEG = 13.3
 REFERENCE = 'surveillance'
 START = 1_700_000_000.0
 REASON = (
-    'of 2 CORRIDOR places within reach, by tour: it leads to R3, which went unvisited for 230.4 s; '
-    'this round leaves no place longer than 260 s'
+    '(last visit 42.0 s ago) from 2 reachable CORRIDOR places; it is on the way to R3 '
+    '(last visit 230.4 s ago); the longest wait on this round is 260 s'
 )
 CLASSES = ('URGENT', 'CORRIDOR', 'ROOM')
 
@@ -82,7 +82,11 @@ class Month:
             now += LEG
             place = self._chance.choice(names)
             self.record.write(
-                'decision', now - 11.0, place=place, rule='CORRIDOR', reason=f'{place} {REASON}'
+                'decision',
+                now - 11.0,
+                place=place,
+                rule='CORRIDOR',
+                reason=f'tour chose {place} {REASON}',
             )
             path = [[round(self._chance.uniform(0, 20), 2) for _ in range(2)] for _ in range(20)]
             self.record.write('visit', now, place=place, distance=5.5, path=path)

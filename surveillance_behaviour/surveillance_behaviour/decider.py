@@ -233,17 +233,18 @@ class Decider:
         if to_charge and not self.experience.sent_to_charge:
             why = why_charge(world, self.battery(), self.settings)
             self.send_to_charge(why or 'charging was begun')
+        battery = self.battery()
         try:
-            decision = decide(world, self.battery(), self.settings)
+            decision = decide(world, battery, self.settings)
         except RequestError as error:
             # What a person asked for in vain is no failure of the patrol.
             if self.experience.requested == world.requested:
                 self.experience.requested = ''
-            self._warn(f'{error}: it goes on without that')
-            decision = decide(replace(world, requested=''), self.battery(), self.settings)
+            self._warn(f'{error}: continuing without it')
+            decision = decide(replace(world, requested=''), battery, self.settings)
         self.model.target = decision.target
         if decision.rule == RECHARGE and not self.experience.sent_to_charge:
-            self.experience.sent_to_charge = decision.reason.rpartition(': ')[0]
+            self.experience.sent_to_charge = why_charge(world, battery, self.settings)
         if self.model.contradiction:
             reason = f'{decision.reason}; {self.model.contradiction}'
             decision = replace(decision, reason=reason)

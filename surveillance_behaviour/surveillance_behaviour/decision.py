@@ -155,7 +155,7 @@ def why_charge(world: World, battery: Battery, settings: DecisionSettings) -> st
         return f'the battery is low ({battery.level_text()})'
     if battery.level is None:
         return ''
-    required, words = settings.battery.require_recharge, 'the place is not on the map'
+    required, words = settings.battery.require_recharge, f'{world.place} is not on the map'
     if world.place in world.graph.index:
         required, words = reserve(
             world.graph,
@@ -168,7 +168,7 @@ def why_charge(world: World, battery: Battery, settings: DecisionSettings) -> st
         )
     if battery.level >= required:
         return ''
-    return f'the battery is at {battery.level:g} %, below {required:.1f} %: {words}'
+    return f'the battery is at {battery.level:g} %, below {required:.1f} % ({words})'
 
 
 def _to_charge(world: World, stations: Sequence[str], why: str) -> Decision:
@@ -179,7 +179,7 @@ def _to_charge(world: World, stations: Sequence[str], why: str) -> Decision:
             f'no charging place ({", ".join(stations)}) can be reached from {world.place}'
         )
     best = min(within, key=lambda station: (station in world.avoided, within[station]))
-    reason = f'{why}: {best} is the nearest charging place, {within[best]:.1f} s away'
+    reason = f'{why}; {best} is the nearest charging place, {within[best]:.1f} s away'
     return _straight_to(world, best, RECHARGE, 'nearest', reason, within)
 
 
@@ -222,17 +222,13 @@ def _best(world: World, rule: str, allowed: Sequence[str], scores: Scores, polic
             -order.index(place),
         ),
     )
+    threshold = f', threshold {world.threshold:g} s' if rule == URGENT else ''
+    name = f'{best} ({world.wait_in_words(best)}{threshold})'
+    kind = 'place' if rule == ANY else f'{rule} place'
     if len(allowed) == 1:
-        choice = f'{best} is the only {_kind(rule)} place within reach'
+        choice = f'{name} is the only reachable {kind}'
     else:
-        choice = f'{best} of {len(allowed)} {_kind(rule)} places within reach, by {policy}'
-    if rule == URGENT:
-        wait = (
-            f'unvisited {world.unvisited(best):.1f} s'
-            if best in world.visited_at
-            else 'not visited yet'
-        )
-        choice += f' ({wait}, threshold {world.threshold:g} s)'
+        choice = f'{policy} chose {name} from {len(allowed)} reachable {kind}s'
     return Decision(
         time=world.now,
         from_place=world.place,
@@ -240,13 +236,9 @@ def _best(world: World, rule: str, allowed: Sequence[str], scores: Scores, polic
         target=scores[best].target,
         rule=rule,
         policy=policy,
-        reason=f'{choice}: {scores[best].words}',
+        reason=f'{choice}; {scores[best].words}',
         scores={place: scores[place].value for place in order},
     )
-
-
-def _kind(rule: str) -> str:
-    return 'open' if rule == ANY else rule
 
 
 def tour_warning(tour: float, threshold: float) -> str:
@@ -307,8 +299,8 @@ def why_not(place: str, world: World, battery: Battery, settings: DecisionSettin
     except NowhereToGoError as error:
         return WhyNot(str(error), _premises(place, world, ''))
     if decision.place == place:
-        return WhyNot(f'{place} is where it would go now [{decision.rule}]: {decision.reason}')
-    instead = f'it goes to {decision.place} [{decision.rule}]'
+        return WhyNot(f'the robot would go to {place} now [{decision.rule}]: {decision.reason}')
+    instead = f'the robot goes to {decision.place} [{decision.rule}]'
     if decision.rule in (RECHARGE, REQUEST):
         return WhyNot(f'{instead}: {decision.reason}')
     premises = _premises(place, world, '' if decision.rule == ANY else decision.rule)
@@ -321,16 +313,15 @@ def why_not(place: str, world: World, battery: Battery, settings: DecisionSettin
         )
     if place not in decision.scores:
         if place in world.avoided:
-            return WhyNot(f'{place} could not be reached lately and is left alone; {instead}')
+            return WhyNot(f'{place} could not be reached lately and is avoided for now; {instead}')
         return WhyNot(
-            f'{place} is not {decision.rule}, and {_listed(decision.scores)} '
-            f'{"is" if len(decision.scores) == 1 else "are"}; '
-            f'{place} {world.wait_in_words(place)}, the threshold is '
-            f'{world.threshold:g} s; {instead}',
+            f'{place} is not {decision.rule} ({world.wait_in_words(place)}, threshold '
+            f'{world.threshold:g} s), but {_listed(decision.scores)} '
+            f'{"is" if len(decision.scores) == 1 else "are"}; {instead}',
             premises,
         )
     return WhyNot(
-        f'{place} scores {decision.scores[place]:.1f} by {settings.policy}, {decision.place} '
+        f'{settings.policy} scores {place} {decision.scores[place]:.1f} and {decision.place} '
         f'{decision.scores[decision.place]:.1f}; {instead}: {decision.reason}',
         premises,
     )

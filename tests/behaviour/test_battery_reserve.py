@@ -24,8 +24,8 @@ def test_the_reserve_covers_the_worst_leg_and_the_way_home() -> None:
     away = graph.seconds('C2', 'R4') + graph.seconds('R4', 'E')
     assert level == pytest.approx(away + 5.0)
     assert words == (
-        f'R4 and home from there takes {away:.1f} s at 1 % a second, '
-        f'at most {away:.1f} % in 99 of 100 times, with 5 % to spare'
+        f'to R4 and home takes {away:.1f} s at 1 %/s, '
+        f'in 99 of 100 cases at most {away:.1f} %, plus a margin of 5 %'
     )
 
 

@@ -60,7 +60,7 @@ def test_a_request_behind_a_door_that_closed_is_said_and_the_patrol_goes_on() ->
     world.closed.update(world.rooms['R4'])
     assert told.decide(2.0, NOBODY).rule != REQUEST
     assert told.decide(3.0, NOBODY).rule != REQUEST
-    words = 'R4, as requested, cannot be reached from E: it goes on without that'
+    words = 'R4, as requested, cannot be reached from E: continuing without it'
     assert [each for each in said if 'R4' in each] == [words]
 
 
@@ -73,7 +73,7 @@ def test_a_request_waits_while_no_charging_place_can_be_reached() -> None:
     world.closed.update(world.rooms['E'])
     with pytest.raises(NowhereToGoError, match='no charging place'):
         told.decide(2.0, NOBODY)
-    assert not [each for each in said if 'goes on' in each]
+    assert not [each for each in said if 'continuing without' in each]
     world.battery.set_level(100.0)
     assert told.decide(3.0, NOBODY).place == 'R1'
 

@@ -175,7 +175,7 @@ def reserve(
         if other in graph.index
     }
     finite = {other: seconds for other, seconds in away.items() if math.isfinite(seconds)}
-    fixed = f'the level that requires charging is {limits.require_recharge:g} %'
+    fixed = 'battery_require_recharge'
     if not finite or draw.rate <= 0.0:
         return limits.require_recharge, fixed
     worst = max(sorted(finite), key=lambda other: finite[other])
@@ -185,8 +185,8 @@ def reserve(
         return limits.require_recharge, fixed
     most = max(limits.require_recharge, limits.stop_recharge - limits.margin)
     words = (
-        f'{worst} and home from there takes {finite[worst]:.1f} s at {draw.rate:.3g} % a second, '
-        f'at most {needed:.1f} % in 99 of 100 times, with {limits.margin:g} % to spare'
+        f'to {worst} and home takes {finite[worst]:.1f} s at {draw.rate:.3g} %/s, '
+        f'in 99 of 100 cases at most {needed:.1f} %, plus a margin of {limits.margin:g} %'
     )
     return min(level, most), words
 

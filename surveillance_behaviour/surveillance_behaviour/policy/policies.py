@@ -66,8 +66,7 @@ def oldest(world: World, allowed: Sequence[str]) -> Scores:
     """Return the time each place went unvisited."""
     scores = {}
     for place in allowed:
-        seconds = world.unvisited(place)
-        scores[place] = Score(seconds, place, f'it {world.wait_in_words(place)}')
+        scores[place] = Score(world.unvisited(place), place, 'the longest wait decides')
     return scores
 
 
@@ -80,12 +79,8 @@ def lookahead(world: World, allowed: Sequence[str]) -> Scores:
         worth[graph.index[world.place]] = -np.inf
         best = int(np.argmax(worth))
         target = graph.places[best]
-        scores[place] = Score(
-            float(worth[best]),
-            target,
-            f'{_leads_to(place, target)} went unvisited for {world.idleness[best]:.1f} s '
-            f'and is {world.idleness[best] - worth[best]:.1f} s away',
-        )
+        away = world.idleness[best] - worth[best]
+        scores[place] = Score(float(worth[best]), target, _towards(world, place, target, away))
     return scores
 
 
@@ -93,22 +88,15 @@ def tour(world: World, allowed: Sequence[str]) -> Scores:
     """Return the next place of the plan, then how near each place is to its target; see `plan`."""
     plan, graph = plan_of(world), world.graph
     next_place, target = (graph.places[index] for index in plan.advance(world))
-    words = (
-        f'which {world.wait_in_words(target)}; '
-        f'this round leaves no place longer than {plan.longest:.1f} s'
-    )
+    words = f'the longest wait on this round is {plan.longest:.1f} s'
     return {
         place: Score(
             0.0 if place == next_place else -1.0 - graph.seconds(place, target),
             target,
-            f'{_heads_for(place, target)}, {words}',
+            f'{_way_to(world, place, target) or "it is next on the round"}; {words}',
         )
         for place in allowed
     }
-
-
-def _heads_for(place: str, target: str) -> str:
-    return 'it is the next on the round' if place == target else f'it leads to {target}'
 
 
 def heuristic_reactive(world: World, allowed: Sequence[str]) -> Scores:
@@ -116,12 +104,8 @@ def heuristic_reactive(world: World, allowed: Sequence[str]) -> Scores:
     idle = np.array([world.unvisited(place) for place in allowed])
     far = np.array([world.graph.seconds(world.place, place) for place in allowed])
     return {
-        place: Score(
-            float(value),
-            place,
-            f'it went unvisited for {seconds:.1f} s and is {away:.1f} s away',
-        )
-        for place, value, seconds, away in zip(allowed, _worth(idle, far), idle, far, strict=True)
+        place: Score(float(value), place, _towards(world, place, place, away))
+        for place, value, away in zip(allowed, _worth(idle, far), far, strict=True)
     }
 
 
@@ -143,8 +127,7 @@ def heuristic_cognitive(world: World, allowed: Sequence[str]) -> Scores:
         place: Score(
             -float(first[graph.index[place]] + rest[graph.index[place]]),
             target,
-            f'{_leads_to(place, target)} went unvisited for {idle[goal]:.1f} s '
-            f'and is {far[goal]:.1f} s away',
+            _towards(world, place, target, far[goal]),
         )
         for place in allowed
     }
@@ -189,7 +172,7 @@ def cycle(world: World, allowed: Sequence[str]) -> Scores:
         place: Score(
             -float(ahead.index(place)),
             place,
-            f'it is {ahead.index(place) + 1} steps on, on the tour',
+            f'it is number {ahead.index(place) + 1} of the next places on the tour',
         )
         for place in allowed
     }
@@ -208,8 +191,17 @@ def _worth(idle: NDArray[np.float64], far: NDArray[np.float64]) -> NDArray[np.fl
     return worth
 
 
-def _leads_to(place: str, target: str) -> str:
-    return 'it' if place == target else f'it leads to {target}, which'
+def _way_to(world: World, place: str, target: str) -> str:
+    """Return where a place leads to in the end; empty when that is the place itself."""
+    if place == target:
+        return ''
+    return f'it is on the way to {target} ({world.wait_in_words(target)})'
+
+
+def _towards(world: World, place: str, target: str, seconds: float) -> str:
+    """Return the target and how far away it is."""
+    way = _way_to(world, place, target)
+    return f'{way}, which is {seconds:.1f} s away' if way else f'it is {seconds:.1f} s away'
 
 
 POLICIES: Mapping[str, Policy] = {

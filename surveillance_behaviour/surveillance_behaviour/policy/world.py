@@ -83,10 +83,10 @@ class World:
         return self.now - self.visited_at.get(place, self.since)
 
     def wait_in_words(self, place: str) -> str:
-        """Return how long ``place`` went unvisited, as the end of a clause."""
+        """Return how long ago ``place`` was visited."""
         if place not in self.visited_at:
-            return 'has not been visited yet'
-        return f'went unvisited for {self.unvisited(place):.1f} s'
+            return 'not visited yet'
+        return f'last visit {self.unvisited(place):.1f} s ago'
 
     @cached_property
     def idleness(self) -> NDArray[np.float64]:
