@@ -72,7 +72,7 @@ def main(argv: Sequence[str]) -> int:
     except KeyboardInterrupt:
         signal.signal(signal.SIGINT, signal.SIG_IGN)  # one is enough
         ready = Environment(CHECKOUT).ready()
-        more = '' if ready else '; the next start goes on with the set-up'
+        more = '' if ready else '; the next start continues the set-up'
         print(f'\nlaunch.py: interrupted{more}', file=sys.stderr)
         return EXIT_INTERRUPTED
 
@@ -135,7 +135,7 @@ def _node(argv: list[str]) -> int:
     parser = CommandParser(
         prog='launch.py node',
         usage='%(prog)s [options] NAME [--ros-args ...]',
-        description='Runs one node in this terminal, with the parameters of config/.',
+        description='Runs one node in this terminal with the parameters of config/.',
         parents=[shared_options()],
     )
     parser.add_argument('name', metavar='NAME', help='see launch.py list')
@@ -173,7 +173,7 @@ def _node(argv: list[str]) -> int:
 
 
 def _list(argv: list[str]) -> int:
-    CommandParser(prog='launch.py list', description='Names the nodes.').parse_args(argv)
+    CommandParser(prog='launch.py list', description='Lists the nodes.').parse_args(argv)
     width = max(len(node.name) for node in node_table.NODES)
     for package in dict.fromkeys(node.package for node in node_table.NODES):
         print(package)
@@ -187,12 +187,12 @@ def _params(argv: list[str]) -> int:
     parser = CommandParser(
         prog='launch.py params',
         usage='%(prog)s [options] [NODE]',
-        description='Prints the parameters that the nodes get, and where each value comes from.',
+        description='Prints the value of each parameter and where it comes from.',
         parents=[shared_options()],
     )
-    parser.add_argument('name', nargs='?', metavar='NODE', help='of this node alone')
+    parser.add_argument('name', nargs='?', metavar='NODE', help='only of this node')
     parser.add_argument(
-        '--write', action='store_true', help='write the schema, reference pages and helps anew'
+        '--write', action='store_true', help='write the schema, reference pages and help texts'
     )
     options = parser.parse_args(argv)
     chosen = [node_table.find(options.name)] if options.name else list(node_table.NODES)
@@ -218,10 +218,10 @@ def _service(argv: list[str]) -> int:
     parser = CommandParser(
         prog='launch.py service',
         usage='%(prog)s [--print] [options of run]',
-        description="Writes a unit of the user's systemd that keeps the robot running.",
+        description='Writes a systemd user unit that keeps the robot running.',
         parents=[make_parser(help_too=False)],
     )
-    parser.add_argument('--print', action='store_true', help='print the unit, write nothing')
+    parser.add_argument('--print', action='store_true', help='print the unit and write nothing')
     options = parser.parse_args(argv)
     words = [word for word in argv if word != '--print']
     # All nodes at their limit would be more than most machines have.
@@ -234,13 +234,13 @@ def _service(argv: list[str]) -> int:
     replace_text(path, text)
     print(f'written: {path}')
     print(f'start it: systemctl --user daemon-reload && systemctl --user enable --now {path.name}')
-    print('also without a login: loginctl enable-linger')
+    print('to run it without a login: loginctl enable-linger')
     return 0
 
 
 def _setup(argv: list[str]) -> int:
     CommandParser(
-        prog='launch.py setup', description='Sets up what the other commands need.'
+        prog='launch.py setup', description='Sets up .venv for the other commands.'
     ).parse_args(argv)
     environment = _environment(())
     if environment is not None:

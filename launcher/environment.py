@@ -292,7 +292,7 @@ class _Command:
             reason = f'no space left for {self._log.parent}, which takes {SPACE // 10**6} MB'
         elif any(word in line for line in output for word in ('NewConnectionError', 'resolve')):
             reason += ' (is this machine online?)'
-        return f'the set-up stopped: {reason} (more in {self._log}); the next start goes on'
+        return f'the set-up stopped: {reason} (more in {self._log}); the next start continues'
 
 
 def keep_bytecode(environ: MutableMapping[str, str], checkout: Path = CHECKOUT) -> None:

@@ -178,7 +178,7 @@ class LogFile(RotatingFileHandler):
         if not self._told:
             self._told = True
             why = getattr(error, 'strerror', None) or error
-            self._warn(f'{self.baseFilename}: {why}: the log goes on here only')
+            self._warn(f'{self.baseFilename}: {why}: the log continues only here')
 
 
 def bounded(text: str) -> str:

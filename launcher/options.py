@@ -15,16 +15,16 @@ from surveillance_runtime.command_line import CommandParser
 DEFAULT_KEEP = 20.0
 DEFAULT_MEMORY = 2048
 _DESCRIPTION = """\
-Patrols, with every node as a process of its own, until Ctrl-C; or does what COMMAND says. What the
-project needs is set up first, where it is not yet."""
+Runs a patrol until Ctrl-C, each node in its own process, or runs COMMAND. The first start sets up
+.venv."""
 _COMMANDS = """\
 commands (each has its own --help):
-  run                       patrol: the same as without a command
-  node NAME [ROS args]      run one node by itself in this terminal
-  list                      name the nodes
-  params [NODE]             print every parameter's value and where it comes from
+  run                       run a patrol: the same as without a command
+  node NAME [ROS args]      run one node in this terminal
+  list                      list the nodes
+  params [NODE]             print the value of each parameter and where it comes from
   service                   write a systemd unit that keeps the robot running
-  setup                     set up and do no more
+  setup                     only set up .venv
   test [pytest args]        run the test suite
   lint                      check format, lint and types
 """
@@ -62,7 +62,7 @@ def shared_options() -> argparse.ArgumentParser:
         choices=node_table.MODES,
         type=str.upper,
         metavar='|'.join(node_table.MODES),
-        help='what stands in for the hardware: a simulated place, chance, or you at the console '
+        help='what replaces the hardware: a simulation, random values, or you at the console '
         f'(default: {node_table.DEFAULT_MODE})',
     )
     parser.add_argument(
@@ -70,7 +70,7 @@ def shared_options() -> argparse.ArgumentParser:
         choices=node_table.BEHAVIOURS,
         default=node_table.DEFAULT_BEHAVIOUR,
         metavar='|'.join(node_table.BEHAVIOURS),
-        help='surveillance knows its map, patrol learns it from markers (default: %(default)s)',
+        help='surveillance starts with a map, patrol learns it from markers (default: %(default)s)',
     )
     parser.add_argument(
         '--map',
@@ -84,7 +84,7 @@ def shared_options() -> argparse.ArgumentParser:
         dest='parameters',
         type=Path,
         metavar='FILE',
-        help='a ROS parameter file; what it says goes before config/parameters.yaml and the place',
+        help='a ROS parameter file; it overrides config/parameters.yaml and the place',
     )
     parser.add_argument(
         '-p',
@@ -92,23 +92,23 @@ def shared_options() -> argparse.ArgumentParser:
         action='append',
         default=[],
         metavar='[NODE:]NAME:=VALUE',
-        help='set a parameter; goes before every file',
+        help='set a parameter; it overrides every file',
     )
     parser.add_argument(
         '--log-level',
         choices=node_table.LOG_LEVELS,
         type=str.lower,
         metavar='|'.join(node_table.LOG_LEVELS),
-        help='the least severity that the nodes print (default: info)',
+        help='lowest severity that the nodes print (default: info)',
     )
     parser.add_argument(
-        '--namespace', metavar='NAME', help='goes before all names, for a second robot'
+        '--namespace', metavar='NAME', help='prefix of all ROS names, for a second robot'
     )
     parser.add_argument(
         '--domain',
         type=int,
         metavar='N',
-        help='ROS domain, 0 to 101: robots in different ones do not hear each other '
+        help='ROS domain, 0 to 101; robots in different domains do not hear each other '
         '(default: ROS_DOMAIN_ID, else 0)',
     )
     return parser
@@ -145,7 +145,7 @@ def _add_process_options(group: argparse._ArgumentGroup) -> None:
     group.add_argument(
         '--composed',
         action='store_true',
-        help='all nodes in one process, which takes less memory and starts sooner',
+        help='run all nodes in one process: less memory, faster start',
     )
     group.add_argument(
         '--only',
@@ -153,7 +153,7 @@ def _add_process_options(group: argparse._ArgumentGroup) -> None:
         action='extend',
         default=[],
         metavar='NODE,...',
-        help='start these nodes and no others: the rest runs elsewhere',
+        help='start only these nodes; the others run elsewhere',
     )
     group.add_argument(
         '--without',
@@ -161,7 +161,7 @@ def _add_process_options(group: argparse._ArgumentGroup) -> None:
         action='extend',
         default=[],
         metavar='NODE,...',
-        help='start all but these nodes, which run elsewhere',
+        help='do not start these nodes; they run elsewhere',
     )
     group.add_argument(
         '--memory',
@@ -172,18 +172,19 @@ def _add_process_options(group: argparse._ArgumentGroup) -> None:
         ),
         default=DEFAULT_MEMORY,
         metavar='MB',
-        help='a node that holds more is started again; 0: any (default: %(default)s)',
+        help='restart a node that uses more memory; 0: no limit (default: %(default)s)',
     )
     group.add_argument(
         '--alarm',
         default='',
         metavar='COMMAND',
-        help='run this, with one line as its last argument, when the robot needs somebody',
+        help='run this when the robot needs a person; the last argument says why',
     )
     group.add_argument(
         '--network',
         action='store_true',
-        help='hear nodes of other machines, which may then steer the robot (default: this machine)',
+        help='talk to nodes on other machines, which can then control the robot (default: only '
+        'this machine)',
     )
 
 
@@ -191,39 +192,42 @@ def _add_recording_options(group: argparse._ArgumentGroup) -> None:
     group.add_argument(
         '--record',
         metavar='off|DIR',
-        help='where the run keeps its recording, log and record; off: no recording (default: runs)',
+        help='folder for the files of runs; off: no recording (default: runs)',
     )
     group.add_argument(
         '--keep',
         type=_number(float, 'a number of gigabytes', lambda value: 0.0 <= value < 1e6),
         default=DEFAULT_KEEP,
         metavar='GB',
-        help='delete the oldest recordings beyond this size (default: %(default)g)',
+        help='delete the oldest recordings when all together exceed this (default: %(default)g)',
     )
     group.add_argument(
         '--resume',
         nargs='?',
         const='',
         metavar='RUN',
-        help='go on with this run (default: the last one), its record, ontology and levels; done '
-        'by itself where that had not come to its end',
+        help='continue this run (default: the last one) with its record, ontology and battery; '
+        'automatic when the last run was killed',
     )
     group.add_argument(
         '--fresh',
         action='store_true',
-        help='begin anew also where the last run had not come to its end',
+        help='begin a new run even if the last one was killed',
     )
 
 
 def _add_page_options(group: argparse._ArgumentGroup) -> None:
     group.add_argument(
-        '--web', action='store_true', help='show the mission in browsers, see the printed address'
+        '--web', action='store_true', help='serve a live page; its address is printed'
     )
     group.add_argument(
-        '--web-control', action='store_true', help='as --web, and let whoever has the token act'
+        '--web-control',
+        action='store_true',
+        help='like --web, with controls for whoever has the printed token',
     )
     group.add_argument(
         '--web-address',
         metavar='HOST:PORT',
-        help='as --web, and where: beyond 127.0.0.1 it needs the token (default: 127.0.0.1:8080)',
+        help='address of the page; implies --web; other addresses than 127.0.0.1 need the printed '
+        'token even to look (default: 127.0.0.1:8080)',
     )

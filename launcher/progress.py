@@ -69,7 +69,8 @@ class Step:
             self._draw(f'{now - self._start:4.0f} s  {self._detail}')
         elif now - self._shown >= _PLAIN_EVERY:
             self._shown = now
-            self._print(f'{self._head}: {now - self._start:.0f} s, {self._detail}')
+            detail = f', {self._detail}' if self._detail else ''
+            self._print(f'{self._head}: {now - self._start:.0f} s{detail}')
 
     def __exit__(
         self,

@@ -84,15 +84,15 @@ def run_mission(run: Run, config: Path, runs: Path, resume: Path | None = None) 
 def chosen_folder(run: Run, runs: Path, resume: Path | None) -> tuple[Path, str]:
     """Return the folder to work in, and what there is to say about it."""
     if resume is not None:
-        return resume, f'going on with {_short(resume)}'
+        return resume, f'continuing {_short(resume)}'
     found = run_folder.latest(runs) if not run.fresh else None
     if found is not None and not found.ended and not found.running:
         same = {**found.options, 'seconds': None} == {**options_of(run), 'seconds': None}
         if same:
-            how = 'which had not come to its end; --fresh begins anew'
-            return found.folder, f'going on with {_short(found.folder)}, {how}'
-        left = f'{_short(found.folder)} was begun with other options and has not come to its end'
-        return run_folder.make_folder(runs), f'{left}; --resume goes on with it'
+            how = 'which was not finished; --fresh begins a new one'
+            return found.folder, f'continuing {_short(found.folder)}, {how}'
+        left = f'{_short(found.folder)} was started with other options and is not finished'
+        return run_folder.make_folder(runs), f'{left}; --resume continues it'
     return run_folder.make_folder(runs), ''
 
 

@@ -333,7 +333,7 @@ class Supervisor:
             self._log.say(f'{name} has ended by itself')
             return
         if code in (EXIT_CANNOT_START, EXIT_NOT_NOW) and child.starts == 1:
-            self._log.error(f'{name} cannot start as it is configured: stopping')
+            self._log.error(f'{name} cannot start with this configuration: stopping')
             self.stop(code)
             return
         now = time.monotonic()
@@ -345,7 +345,7 @@ class Supervisor:
         self._log.warn(f'{name} died ({why}): starting it again{when}')
         if trouble := child.restarts.trouble(now):
             text = f'{name} {trouble}, last: {why}'
-            self._log.error(f'{text}: somebody should have a look')
+            self._log.error(f'{text}: a person should look at it')
             self._on_trouble(text)
 
     def _watch(self, now: float) -> None:

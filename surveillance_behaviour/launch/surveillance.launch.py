@@ -117,7 +117,7 @@ def stop_if_unusable(event: ProcessExited, _context: LaunchContext) -> list[Shut
     """End the launch when a node says that its configuration does not let it start."""
     if event.returncode not in (EXIT_CANNOT_START, EXIT_NOT_NOW):
         return None
-    return [Shutdown(reason=f'{event.process_name} cannot start as it is configured')]
+    return [Shutdown(reason=f'{event.process_name} cannot start with this configuration')]
 
 
 def generate_launch_description() -> LaunchDescription:

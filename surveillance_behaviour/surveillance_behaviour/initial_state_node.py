@@ -186,7 +186,7 @@ class InitialState(PatrolNode):
             self._reference.call(ReferenceName.Request(), _BUILD_SECONDS, self.stopping)
         except CallError as error:
             if not self.stopping.is_set():
-                self.get_logger().warn(f'the map is sent, but not known to be built: {error}')
+                self.get_logger().warn(f'the map was sent, but it is not confirmed: {error}')
 
 
 def main(args: Sequence[str] | None = None) -> int:

@@ -152,7 +152,7 @@ class RobotBehavior(PatrolNode):
         try:
             return cut_off(read(path))
         except FileError as error:
-            self.get_logger().warn(f'what was begun before is begun anew: {error}')
+            self.get_logger().warn(f'the earlier run is not continued, a new one begins: {error}')
             return None
 
 

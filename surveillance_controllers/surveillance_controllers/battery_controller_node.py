@@ -91,7 +91,9 @@ class BatteryController(PatrolNode):
             if before is None or said[1] != before[1]:
                 self._low_topic.publish(Bool(data=said[1]))
                 word = 'low' if said[1] else 'not low'
-                self.get_logger().info(f'battery {word}: {said[0]} %, low below {self._low_below}')
+                self.get_logger().info(
+                    f'battery {word}: {said[0]} % (low below {self._low_below} %)'
+                )
 
     def _set_low_below(self, percent: int) -> None:
         self._low_below = percent

@@ -139,7 +139,7 @@ class CollisionMonitor(PatrolNode):
                 self.get_logger().warn(
                     f'scan: lidars with the frames {" and ".join(map(repr, self._lidars))} '
                     'share the topic and hide each other: expected one; merge their scans, or '
-                    'remap one away'
+                    'remap one of them'
                 )
 
     def _allowed(self) -> Velocity:
@@ -152,7 +152,7 @@ class CollisionMonitor(PatrolNode):
             velocity = allowed(velocity, self._scan.points, self._settings)
         held_back = abs(velocity.speed) < 0.5 * abs(self._wanted.speed)
         if held_back and not self._is_held_back:
-            self.get_logger().warn('something is in the way: the robot is held back')
+            self.get_logger().warn('an obstacle is in the way: the robot is slowed down or stopped')
         self._is_held_back = held_back
         return velocity
 
@@ -165,8 +165,8 @@ class CollisionMonitor(PatrolNode):
         if self._wanted != Velocity() and not self.count_subscribers(MONITORED):
             self._unguarded.cancel()
             self.get_logger().warn(
-                f'the base is not guarded: nobody listens to {MONITORED}, expected the base to '
-                'take its commands from there instead of cmd_vel'
+                f'the base is not protected: nobody subscribes to {MONITORED}; let the base '
+                'take its commands from there instead of from cmd_vel'
             )
 
 

@@ -240,8 +240,8 @@ def _service(node: PatrolNode, keep: bool) -> ArmorService:
     stored = node.parameter(
         'store',
         'auto' if keep else 'none',
-        'Directory in which references and their changes are kept over a restart; auto: one for '
-        "this domain and name in the user's state folder; none: nothing is kept.",
+        'Directory that keeps references and their changes over a restart; auto: one for '
+        "this domain and name in the user's state folder; none: keep nothing.",
         read_only=True,
     )
     log = node.get_logger()
@@ -253,8 +253,8 @@ def _service(node: PatrolNode, keep: bool) -> ArmorService:
             settings, log.info, log.warn, store, lambda: clock.now().nanoseconds * 1e-9
         )
         if store:
-            kept = ', '.join(service.references.names()) or 'nothing'
-            log.info(f'store {folder}, which holds {kept}; "-p store:=none" keeps nothing')
+            kept = ', '.join(service.references.names()) or 'empty'
+            log.info(f'store {folder} ({kept}); "-p store:=none" turns it off')
         return service
     except FileError as error:
         raise NotNowParameterError(f'{node.get_name()}: parameter store: {error}') from None

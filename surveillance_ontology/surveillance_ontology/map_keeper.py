@@ -165,7 +165,7 @@ class MapKeeper:
                     self._reports.failed(f'cannot build the map: {error}')
                     return
                 # It was loaded, so this is another server, or somebody dropped it.
-                self._reports.warn(f'the map is built anew: {error}')
+                self._reports.warn(f'the map is built again: {error}')
             else:
                 self.is_built = True
                 rooms, doors = len(self.place.rooms), len(self.place.doors)
@@ -217,7 +217,7 @@ class MapKeeper:
         if self.place is None or self._gave_up_mending:
             return
         self._gave_up_mending = True
-        self._reports.warn(f'the ontology contradicts itself and is built anew: {why}')
+        self._reports.warn(f'the ontology contradicts itself and is built again: {why}')
         self._ontology.forget()
         self.place = self._build(self.place)
         why = self._ontology.contradiction()
@@ -246,7 +246,7 @@ class MapKeeper:
             try:
                 self._ontology.change(before, place, self._first_visit())
             except ArmorError as error:
-                self._reports.warn(f'the map is built anew: {error}')
+                self._reports.warn(f'the map is built again: {error}')
             else:
                 return
         self.is_built = False

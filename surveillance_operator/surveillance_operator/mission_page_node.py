@@ -48,7 +48,7 @@ class MissionPage(PatrolNode):
             'port', 8080, 'Port to listen at; 0: any.', minimum=0, maximum=65535, read_only=True
         )
         control = self.parameter(
-            'control', False, 'Let whoever has the token act, not only look.', read_only=True
+            'control', False, 'Allow actions to whoever has the token.', read_only=True
         )
         token = self.parameter('token', '', 'The token; empty: a new one.', read_only=True)
         self._hub = Hub()

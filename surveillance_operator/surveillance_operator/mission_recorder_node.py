@@ -138,7 +138,7 @@ class MissionRecorder(PatrolNode):
             self._next_seal = now + SEAL_PERIOD
             if self._waits_for_disk:
                 self._waits_for_disk = False
-                self.get_logger().info('the recording goes on')
+                self.get_logger().info('the recording continues')
             self._find_topics()
             self._images.attend()
         if now >= self._next_prune and self._bag.folder.name == RECORDING:

@@ -293,7 +293,7 @@ def changes(old: Snapshot, new: Snapshot) -> Iterator[Change]:
         elif had and not has:
             yield Change('nothing stands about any more')
     if old.paused != new.paused:
-        yield Change('the state machine is paused' if new.paused else 'the state machine goes on')
+        yield Change('the state machine is paused' if new.paused else 'the state machine continues')
     yield from _node_changes(old, new)
 
 

@@ -170,7 +170,7 @@ class ArucoDetector(PatrolNode):
         except ValueError as error:
             self._described = None
             self.get_logger().warn(
-                f'camera_info refused, ids go on without poses: {error}',
+                f'camera_info refused, ids are read without poses: {error}',
                 throttle_duration_sec=60.0,
             )
 
@@ -243,7 +243,7 @@ class ArucoDetector(PatrolNode):
         if camera is None:
             size = f'{self._described.width}x{self._described.height}'
             self.get_logger().warn(
-                f'images have {width}x{height} pixels, camera_info {size}: ids go on without poses',
+                f'images have {width}x{height} pixels, camera_info {size}: ids without poses',
                 throttle_duration_sec=60.0,
             )
         return camera

@@ -28,7 +28,7 @@ class StateFile:
 
     def __init__(self, node: PatrolNode, path: str) -> None:
         self._node = node
-        self._file = KeptFile(path, 'it begins anew')
+        self._file = KeptFile(path, 'starting without it')
         self._state: State = {}
         self._complaint = ''
         self._news = Interrupt()

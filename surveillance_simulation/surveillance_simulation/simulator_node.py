@@ -89,7 +89,7 @@ class Simulator(PatrolNode):
         )
         self._kept = StateFile(self, kept)
         if self._kept.found and not self.robot.restore(self._kept.found):
-            self.get_logger().warn('parameter state_file: its state is none of this place')
+            self.get_logger().warn('parameter state_file: the saved state belongs to another place')
         self._kept_pose = self.robot.base.pose
         self._changing = threading.RLock()
         self._drives_clock = rate.speed != 1.0 or bool(self.get_parameter('use_sim_time').value)

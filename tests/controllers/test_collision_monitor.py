@@ -98,7 +98,7 @@ def test_a_base_that_goes_round_the_monitor_is_told_of_once(
 
     def warned() -> bool:
         commands.publish(command)
-        return any('the base is not guarded' in line for line in said)
+        return any('the base is not protected' in line for line in said)
 
     graph.until(warned)
 

@@ -144,7 +144,7 @@ def test_what_is_wrong_is_said_before_a_node_starts(start, tmp_path, given, erro
 def test_a_node_that_cannot_start_ends_the_launch_and_another_one_does_not(start):
     on_exit = start()[0].on_exit
     refused = types.SimpleNamespace(returncode=2, process_name='armor_server-1')
-    assert on_exit(refused, {}) == ['armor_server-1 cannot start as it is configured']
+    assert on_exit(refused, {}) == ['armor_server-1 cannot start with this configuration']
     assert on_exit(types.SimpleNamespace(returncode=-9, process_name='armor_server-1'), {}) is None
 
 

@@ -69,7 +69,7 @@ def test_a_log_file_that_cannot_be_written_any_more_costs_one_warning(stream):
     log.line('one', 'first')
     log.line('one', 'second')
     log.close()
-    warning = 'launch | WARN: /dev/full: No space left on device: the log goes on here only'
+    warning = 'launch | WARN: /dev/full: No space left on device: the log continues only here'
     assert body(stream.getvalue()) == [warning, 'one    | first', 'one    | second']
 
 

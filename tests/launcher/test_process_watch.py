@@ -115,7 +115,7 @@ def test_a_stop_from_elsewhere_is_no_stop(start, number):
 
 def test_a_child_that_dies_again_and_again_calls_somebody(start):
     launch = start(DRIVER, f'watched={ENDING}')
-    launch.until(r'ERROR: watched died 5 times in \d+ s, last: exit code 0: somebody should')
+    launch.until(r'ERROR: watched died 5 times in \d+ s, last: exit code 0: a person should')
     launch.until(r'alarm: watched died 5 times in \d+ s')
     assert launch.end(signal.SIGINT)[0] == 0
 

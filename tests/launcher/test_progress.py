@@ -55,6 +55,14 @@ def test_a_step_on_a_narrow_terminal_keeps_to_one_line(monkeypatch):
     assert all(len(line) < 40 for line in drawn)
 
 
+def test_a_step_that_printed_nothing_yet_ends_its_line_with_the_time(monkeypatch):
+    monkeypatch.setattr('launcher.progress._PLAIN_EVERY', 0.0)
+    stream = io.StringIO()
+    with Step(1, 3, 'environment', stream) as step:
+        step.tick()
+    assert stream.getvalue().splitlines()[1] == '[1/3] environment: 0 s'
+
+
 def test_a_step_elsewhere_prints_a_line_at_its_start_and_its_end():
     stream = io.StringIO()
     with contextlib.suppress(RuntimeError), Step(2, 3, 'interfaces', stream) as step:

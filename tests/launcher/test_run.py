@@ -349,7 +349,6 @@ def test_an_unfinished_run_of_other_options_is_told_at_the_start(tmp_path):
     folder, how = chosen_folder(Run(mode='MANUAL'), tmp_path, None)
     assert folder != old
     assert how.endswith(
-        f'{old.name} was begun with other options and has not come to its end; '
-        '--resume goes on with it'
+        f'{old.name} was started with other options and is not finished; --resume continues it'
     )
     assert chosen_folder(Run(mode='MANUAL', fresh=True), tmp_path, None)[1] == ''

@@ -68,7 +68,7 @@ def test_a_service_that_is_stopped_with_its_machine_goes_on_later(start, tmp_pat
             assert [listener.recv(100) for _ in range(3)] == [b'READY=1', *2 * [b'WATCHDOG=1']]
             assert service.end(signal.SIGTERM)[0] == 0
     (folder,) = runs.iterdir()
-    assert f'going on with {folder}, which had not come' in '\n'.join(service.lines)
+    assert f'continuing {folder}, which was not finished' in '\n'.join(service.lines)
 
 
 def test_systemd_is_told_where_it_listens(tmp_path, monkeypatch):

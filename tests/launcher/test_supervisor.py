@@ -204,7 +204,7 @@ def test_a_child_that_cannot_be_configured_ends_the_launch(start, code):
     assert launch.end()[0] == code
     output = '\n'.join(launch.lines)
     assert 'cannot start: level is -1' in output
-    assert 'two cannot start as it is configured' in output
+    assert 'two cannot start with this configuration' in output
     assert 'starting it again' not in output
 
 

@@ -151,7 +151,7 @@ def test_an_ontology_that_contradicts_itself_is_built_anew_once(
     assert armor.utils.sync_buffered_reasoner()
     lines = [line for line in capfd.readouterr().err.splitlines() if 'contradicts itself' in line]
     assert len(lines) == 1
-    assert 'is built anew: ' in lines[0]
+    assert 'is built again: ' in lines[0]
     assert 'DOOR' in lines[0]
     assert 'R1' in lines[0]
 

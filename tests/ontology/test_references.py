@@ -298,7 +298,7 @@ def test_what_was_loaded_meanwhile_is_not_saved_into_the_file_of_what_was_droppe
         ask('LOAD FILE', 'b.owl', IRI, 'false', '', 'false')
 
     monkeypatch.setattr(SafePaths, 'to_write', late)
-    assert ask('SAVE').error_description == 'SAVE: map was loaded anew meanwhile'
+    assert ask('SAVE').error_description == 'SAVE: map was loaded again meanwhile'
     assert (tmp_path / 'a.owl').read_bytes() == before
     assert ask('SAVE').success
 

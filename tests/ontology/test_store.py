@@ -307,7 +307,7 @@ def test_what_was_cut_from_the_journal_is_in_a_snapshot(server: Server) -> None:
     snapshot = store._snapshot
     assert snapshot is not None
     snapshot.join(60.0)
-    assert server.notes[-1].endswith('the journal was cut; all that is known is written anew')
+    assert server.notes[-1].endswith('the journal was cut; all that is known is written again')
     server.ask('ADD IND CLASS', 'C', 'DOOR')
     server.restart()
     assert names(server.ask('QUERY IND CLASS', 'DOOR')) == ['A', 'B', 'C']

@@ -80,13 +80,13 @@ def test_a_full_disk_is_waited_for(
     recorder = graph.add(MissionRecorder, parameters={'folder': str(folder)})
     graph.until(lambda: any('nothing is recorded' in line.msg for line in said))
     disk.full = False
-    graph.until(lambda: any('goes on' in line.msg for line in said))
+    graph.until(lambda: any('continues' in line.msg for line in said))
     graph.until(words.get_subscription_count)
     words.publish(String(data='after'))
     disk.full = True
     graph.until(lambda: sum('nothing is recorded' in line.msg for line in said) == 2)
     disk.full = False
-    graph.until(lambda: sum('goes on' in line.msg for line in said) == 2)
+    graph.until(lambda: sum('continues' in line.msg for line in said) == 2)
     graph.remove(recorder)
     assert recorder.failure is None
     complaint = f'nothing is recorded at present: {folder}: No space left on device'

@@ -194,10 +194,10 @@ def test_a_kept_file_that_is_damaged_is_one_line(tmp_path: Path, content: str, w
     path = tmp_path / 'kept.json'
     path.write_text(content)
     taken: list[int] = []
-    said = KeptFile(str(path), 'it begins anew').read(lambda kept: taken.append(kept['level']))
+    said = KeptFile(str(path), 'starting without it').read(lambda kept: taken.append(kept['level']))
     assert said.startswith(f'{path}: ')
     assert words in said
-    assert said.endswith('; it begins anew')
+    assert said.endswith('; starting without it')
     assert '\n' not in said
     assert taken == []
 

@@ -97,7 +97,7 @@ class Recover(MissionState):
 
 
 WORDS = {
-    Step.CHOOSE_ANEW: 'choosing anew',
+    Step.CHOOSE_ANEW: 'choosing again',
     Step.ANOTHER_PATH: 'trying another path',
     Step.ANOTHER_PLACE: 'trying another place',
     Step.GO_BACK: 'going back to the last known place',
@@ -115,10 +115,10 @@ WAY_PERIOD = 1.0
 def _what_helps(failure: Failure | None) -> str:
     """Return what ends the pause, and what a person can do."""
     if failure is not None and failure.is_over is not None:
-        return 'goes on as soon as that answers'
+        return 'continues as soon as it answers'
     if failure is not None and failure.charging:
-        return 'look at the charging place'
-    return 'open a door or take away what stands in the way'
+        return 'check the charging station'
+    return 'open a door or remove the obstacle'
 
 
 class WaitForHelp(MissionState):

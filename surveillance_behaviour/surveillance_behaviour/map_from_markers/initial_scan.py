@@ -66,7 +66,7 @@ class InitialScan:
     poses: Sequence[int] = parameter((1, 2, 3, 4), "The arm's poses for looking around.", 1, 4)
     deadline: float = parameter(
         45.0,
-        'Seconds after which what was found has to do, when the camera has looked all around.',
+        'Seconds after which the scan ends, once the camera has looked all around.',
         0.0,
     )
     dwell: float = parameter(0.5, 'Rest at each view of a scan, seconds.', 0.0)

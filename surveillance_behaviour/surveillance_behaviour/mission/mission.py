@@ -42,7 +42,7 @@ class MissionSettings:
     )
     charge_stall_seconds: float = parameter(
         300.0,
-        'How long the level may stay the same at the station before the robot docks anew, s; '
+        'How long the level may stay the same at the station before the robot docks again, s; '
         '0: for ever.',
         0.0,
         86_400.0,

@@ -156,7 +156,7 @@ class CommandConsole:
             self._node.finish()
         elif ending != 'stopped':
             self._node.get_logger().info(
-                'The console is closed (end of input); commands still come by the service '
+                'The console is closed (end of input); commands are still taken by the service '
                 f'{self._node.get_name()}/command.'
             )
 

@@ -225,7 +225,7 @@ class RobotBase:
     def _on_initial_pose(self, message: PoseWithCovarianceStamped) -> None:
         with conversions.refusing(self._node, 'initialpose'):
             pose = pose_from(message.pose.pose)
-            self._node.get_logger().info(f'told to be at ({pose[0]:.2f}, {pose[1]:.2f})')
+            self._node.get_logger().info(f'pose set to ({pose[0]:.2f}, {pose[1]:.2f})')
             with self._lock:
                 self._navigator.believe(pose)
 
@@ -285,11 +285,11 @@ class RobotBase:
         if navigator.lost != self._was_lost:
             self._was_lost = navigator.lost
             if navigator.lost:
-                self._node.get_logger().warn('lost: what is seen does not fit the map')
+                self._node.get_logger().warn('pose lost: the scans do not fit the map')
         if navigator.jumps != self._jumps:
             self._jumps = navigator.jumps
             x, y, _ = navigator.pose
-            self._node.get_logger().info(f'found itself at ({x:.2f}, {y:.2f})')
+            self._node.get_logger().info(f'pose found at ({x:.2f}, {y:.2f})')
         if navigator.obstacles_changed:
             navigator.obstacles_changed = False
             cloud = cloud_from_points(navigator.obstacles, stays=navigator.obstacles_stay)

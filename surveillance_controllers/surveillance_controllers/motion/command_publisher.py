@@ -73,8 +73,8 @@ class CommandPublisher:
         if speed <= top + 1e-6:
             return velocity
         self._logger.warn(
-            f'{speed:.2f} m/s is commanded, driven is {top:.2f} m/s: from there a robot that '
-            'brakes with robot_deceleration stands in time when its sensors fall silent',
+            f'{speed:.2f} m/s is commanded, {top:.2f} m/s is driven: at a higher speed the robot '
+            'could not stop in time with robot_deceleration if its sensors went silent',
             once=True,
         )
         return Velocity(velocity.speed * top / speed, velocity.turn * top / speed)

@@ -61,7 +61,7 @@ class DoorWatch:
         try:
             return self._knowledge.doors(interrupt)
         except OntologyNotReadyError as error:
-            self._node.get_logger().warn(f'doors as their contacts report them: {error}')
+            self._node.get_logger().warn(f'door contacts are not passed on: {error}')
             return {}
 
     def closed(self, rooms_of: Mapping[str, set[str]]) -> frozenset[str]:

@@ -540,7 +540,7 @@ class Store:
                     if journal.is_incomplete:
                         self.warn(
                             f'{self.directory}: the journal was cut; '
-                            'all that is known is written anew'
+                            'all that is known is written again'
                         )
                     number = journal.begin_snapshot()
                     states = [_state(ref) for ref in kept]

@@ -104,7 +104,7 @@ def read_ontology(
             with collected():
                 path = _imported(name, place)
                 if path is None:
-                    missing[name] = 'no file beside it'
+                    missing[name] = 'no such file beside the document'
                 elif not may_read(path):
                     missing[name] = f'{path} may not be read'
                 elif path.resolve() not in seen:

@@ -414,7 +414,7 @@ def show_moving(see: See, stopping: Interrupt, console: Console) -> None:
     ):
         while not stopping.is_set() and not chosen.ended:
             seen = chosen.held or see()
-            shown = 'HELD: p goes on' if chosen.held else KEY_NOTE
+            shown = 'HELD: p continues' if chosen.held else KEY_NOTE
             live.update(MissionView(seen, page=chosen.page, note=shown), refresh=True)
             for key in read_keys(PERIOD, stopping):
                 chosen.press(key, seen)

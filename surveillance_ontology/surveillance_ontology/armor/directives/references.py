@@ -221,7 +221,7 @@ def _save(session: Session, request: DirectiveRequest, path: str) -> DirectiveRe
                 session.check_free(ref, request.client_name)
                 if ref is not first and not path:
                     # Its own file is another one.
-                    raise DirectiveError(f'SAVE: {ref.name} was loaded anew meanwhile')
+                    raise DirectiveError(f'SAVE: {ref.name} was loaded again meanwhile')
                 # Whose turn it is waits for no reference: a list may hold it, and wait for a turn.
                 if saving.acquire(blocking=False):
                     turn.callback(saving.release)
