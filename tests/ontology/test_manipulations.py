@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from .seven_rooms import Ask, iri, names
+from .seven_rooms import IRI, ONTOLOGY, Ask, iri, names
 
 
 def test_individuals(ask: Ask) -> None:
@@ -50,6 +50,25 @@ def test_data_properties(ask: Ask) -> None:
     ask('REPLACE DATAPROP IND', 'size', 'X', 'LONG', '7', '99')
     assert values() == ['"6"^^xsd:long', '"7"^^xsd:long'], 'a wrong old value leaves both'
     assert ask('QUERY IND DATAPROP', 'X').queried_objects == [iri('size')]
+
+
+def test_set_leaves_one_value_whatever_waits(ask: Ask) -> None:
+    ask('LOAD FILE', ONTOLOGY, IRI, 'true', 'PELLET', 'false')  # buffers from now on
+    for directive in (
+        ('ADD OBJECTPROP IND', 'isIn', 'Robot1', 'A'),
+        ('SET OBJECTPROP IND', 'isIn', 'Robot1', 'B'),
+        ('SET OBJECTPROP IND', 'isIn', 'Robot1', 'C'),
+        ('SET DATAPROP IND', 'now', 'Robot1', 'LONG', '1'),
+        ('RENAME IND', 'Robot1', 'Robot2'),
+        ('SET DATAPROP IND', 'now', 'Robot2', 'LONG', '2'),
+    ):
+        assert ask(*directive).success
+    waits = ask('MAKE EQUIVALENT CLASS', 'KITCHEN').error_description
+    assert waits == 'MAKE EQUIVALENT CLASS: nothing to change; 6 changes wait for APPLY'
+    assert names(ask('QUERY OBJECTPROP IND', 'isIn', 'Robot1')) == []
+    ask('APPLY')
+    assert names(ask('QUERY OBJECTPROP IND', 'isIn', 'Robot2')) == ['C']
+    assert ask('QUERY DATAPROP IND', 'now', 'Robot2').queried_objects == ['"2"^^xsd:long']
 
 
 def test_a_value_is_retracted_however_it_is_written(ask: Ask) -> None:

@@ -17,7 +17,11 @@ from surveillance_ontology.armor.protocol import DirectiveError
 from surveillance_ontology.armor.rendering import render_entity, shown
 from surveillance_ontology.knowledge_base import KnowledgeBase
 from surveillance_ontology.owl.axiom_text import axiom_text
-from surveillance_ontology.owl.axioms import Axiom
+from surveillance_ontology.owl.axioms import (
+    Axiom,
+    DataPropertyAssertion,
+    ObjectPropertyAssertion,
+)
 from surveillance_ontology.reasoner.java_reasoning import JavaKnowledgeBase
 
 LONG_BACKLOG = 500
@@ -55,6 +59,25 @@ class RemoveAxiom:
 
 
 @dataclass(frozen=True, slots=True)
+class SetAssertion:
+    """Assert a value as the only one that the individual has for the property."""
+
+    axiom: ObjectPropertyAssertion | DataPropertyAssertion
+
+    def others(self, kb: KnowledgeBase) -> list[Axiom]:
+        """Return the assertions of other values."""
+        axiom = self.axiom
+        found = kb.axioms_about(axiom.subject)
+        return [
+            other
+            for other in found
+            if type(other) is type(axiom)
+            and (other.prop, other.subject) == (axiom.prop, axiom.subject)
+            and other != axiom
+        ]
+
+
+@dataclass(frozen=True, slots=True)
 class RenameEntity:
     """Give an entity another IRI everywhere; merges with an entity that has it already."""
 
@@ -71,7 +94,7 @@ class RemoveEntity:
     iri: str
 
 
-Change = AddAxiom | RemoveAxiom | RenameEntity | RemoveEntity
+Change = AddAxiom | RemoveAxiom | SetAssertion | RenameEntity | RemoveEntity
 
 
 def apply_all(kb: KnowledgeBase, changes: Iterable[Change]) -> None:
@@ -87,6 +110,8 @@ def apply_all(kb: KnowledgeBase, changes: Iterable[Change]) -> None:
             added, removed = [], []
         if isinstance(change, RemoveAxiom):
             removed.append(change.axiom)
+        elif isinstance(change, SetAssertion):
+            added, removed = [change.axiom], change.others(kb)
         elif isinstance(change, RenameEntity):
             kb.rename(change.kind, change.old, change.new)
         else:

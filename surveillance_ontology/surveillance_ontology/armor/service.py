@@ -169,12 +169,11 @@ class ArmorService:
             _check_name(request.reference_name)
             values = directive.read(request.args, '')
             return _response(directive.run(self.session, request, *values))
+        ref = self.references.find(request.reference_name)
         if directive.slow:
-            ref = self.references.find(request.reference_name)
             return _response(
                 directive.run(self.session, ref, *self._values(directive, request, ref))
             )
-        ref = self.references.find(request.reference_name)
         with ref.lock:
             if ref.dropped:
                 return self._execute(request)
@@ -197,7 +196,10 @@ class ArmorService:
         if self._store and changes:
             self._store.changed(ref.name, changes, self.session.clock())
         ref.heavy |= directive.schema
-        remark = ref.missing(changes) if changes else f'{request.words}: nothing to change'
+        remark = ref.missing(changes)
+        if not changes:
+            waiting = f'; {len(ref.queue)} changes wait for APPLY' if ref.queue else ''
+            remark = f'{request.words}: nothing to change{waiting}'
         ref.submit(changes)
         return remark
 

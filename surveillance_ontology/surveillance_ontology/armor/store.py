@@ -27,17 +27,13 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import fields, is_dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 from surveillance_ontology.armor.history import History, PastChange
 from surveillance_ontology.armor.reference import (
-    AddAxiom,
     Change,
     Origin,
     Reference,
-    RemoveAxiom,
-    RemoveEntity,
-    RenameEntity,
     apply_all,
     knowledge_base,
 )
@@ -374,7 +370,7 @@ _RECORDS: dict[str, type] = {
     for module in (axioms, expressions)
     for name, member in vars(module).items()
     if isinstance(member, type) and is_dataclass(member) and member is not Literal
-} | {change.__name__: change for change in (AddAxiom, RemoveAxiom, RenameEntity, RemoveEntity)}
+} | {change.__name__: change for change in get_args(Change)}
 _FIELDS = {name: tuple(f.name for f in fields(record)) for name, record in _RECORDS.items()}
 
 

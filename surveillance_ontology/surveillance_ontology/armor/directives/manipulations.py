@@ -30,6 +30,7 @@ from surveillance_ontology.armor.reference import (
     RemoveAxiom,
     RemoveEntity,
     RenameEntity,
+    SetAssertion,
 )
 from surveillance_ontology.owl.axioms import (
     ClassAssertion,
@@ -292,12 +293,8 @@ def _replace_objectprop(_: Reference, prop: str, ind: str, new: str, old: str) -
     type_error_succeeds=False,
     verb='set for',
 )
-def _set_dataprop(ref: Reference, prop: str, ind: str, value: Literal) -> list[Change]:
-    old = [one for one in ref.kb.asserted_values(prop, ind) if one != value]
-    return [
-        *(RemoveAxiom(DataPropertyAssertion(prop, ind, one)) for one in old),
-        AddAxiom(DataPropertyAssertion(prop, ind, value)),
-    ]
+def _set_dataprop(_: Reference, prop: str, ind: str, value: Literal) -> list[Change]:
+    return [SetAssertion(DataPropertyAssertion(prop, ind, value))]
 
 
 @manipulation(
@@ -307,12 +304,8 @@ def _set_dataprop(ref: Reference, prop: str, ind: str, value: Literal) -> list[C
     summary='Makes a relation the only one asserted for an object property of an individual, '
     'whatever it had.',
 )
-def _set_objectprop(ref: Reference, prop: str, ind: str, other: str) -> list[Change]:
-    old = [one for one in ref.kb.asserted_objects(prop, ind) if one != other]
-    return [
-        *(RemoveAxiom(ObjectPropertyAssertion(prop, ind, one)) for one in old),
-        AddAxiom(ObjectPropertyAssertion(prop, ind, other)),
-    ]
+def _set_objectprop(_: Reference, prop: str, ind: str, other: str) -> list[Change]:
+    return [SetAssertion(ObjectPropertyAssertion(prop, ind, other))]
 
 
 def _rename(kind: str, _: Reference, old: str, new: str) -> list[Change]:
