@@ -93,10 +93,13 @@ def test_what_waits_in_the_buffer_waits_again(tmp_path: Path) -> None:
     server.ask('ADD IND CLASS', 'X', 'DOOR')
     server.ask('APPLY')
     server.ask('ADD IND CLASS', 'Y', 'DOOR')
+    for place in ('A', 'B'):
+        server.ask('SET OBJECTPROP IND', 'isIn', 'Robot1', place)
     server.restart()
     assert names(server.ask('QUERY IND CLASS', 'DOOR')) == ['X']
     server.ask('APPLY')
     assert names(server.ask('QUERY IND CLASS', 'DOOR')) == ['X', 'Y']
+    assert names(server.ask('QUERY OBJECTPROP IND', 'isIn', 'Robot1')) == ['B']
     server.ask(*LOAD, 'false', '', 'true')
     server.ask('ADD IND CLASS', 'Z', 'DOOR')
     server.restart()
