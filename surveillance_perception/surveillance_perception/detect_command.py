@@ -8,6 +8,7 @@ from pathlib import Path
 
 import cv2
 
+from surveillance_fsm.files import replace_file
 from surveillance_perception.detection.annotation import annotated
 from surveillance_perception.detection.detector import DetectorSettings, MarkerDetector
 from surveillance_perception.stream.image_files import read_image
@@ -60,7 +61,7 @@ def _detect(detector: MarkerDetector, path: Path, folder: Path | None, written: 
     if folder is not None:
         target = _target(path, folder, written)
         encoded = cv2.imencode('.png', annotated(image, detections))[1]
-        target.write_bytes(encoded.tobytes())
+        replace_file(target, encoded.tobytes())
         said += f', drawn in {target}'
     print(said)
     for detection in sorted(detections, key=lambda each: each.marker_id):

@@ -38,6 +38,16 @@ def test_distortion_that_cannot_be_taken_back_gives_no_rays():
     assert CameraModel(640, 480, K, np.array([-90.0, 5.0, 0.0, 0.0, 0.0])).rays(PIXELS) is None
 
 
+def test_every_camera_that_is_taken_has_images_of_other_sizes():
+    for exponent in range(12):
+        matrix = np.diag([10.0**exponent, 10.0**exponent, 1.0])
+        try:
+            camera = CameraModel(640, 480, matrix)
+        except ValueError:
+            continue
+        assert camera.scaled_to(6400, 4800).width == 6400
+
+
 @pytest.mark.parametrize(('model', 'numbers'), MODELS.items())
 def test_zeros_beyond_the_coefficients_of_a_model_say_nothing(model, numbers):
     # ros_gz copies as many numbers as come, whatever the model

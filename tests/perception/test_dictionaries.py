@@ -41,6 +41,10 @@ def test_own_dictionary_in_opencvs_file_is_read_and_detected(own):
         ('nmarkers: 1\nmarkersize: 3\nmaxCorrectionBits: 1\nmarker_0: "01"', '9 digits 0 or 1'),
         ('nmarkers: 1\nmarkersize: 300\nmaxCorrectionBits: 1\nmarker_0: "01"', '300x300'),
         ('nmarkers: .inf\nmarkersize: 3\nmaxCorrectionBits: 1', 'cannot be read'),
+        (
+            'nmarkers: 1\nmarkersize: 3\nmaxCorrectionBits: 9999999999\nmarker_0: "010101010"',
+            'maxCorrectionBits must be 0 to 9, got 9999999999',
+        ),
     ],
 )
 def test_file_that_is_no_dictionary_is_refused_in_one_line(tmp_path, text, reason):

@@ -107,6 +107,15 @@ def test_detect_never_writes_over_an_image_it_was_given(tmp_path, capsys, image)
     assert other.read_bytes() == given
 
 
+def test_detect_leaves_an_image_alone_that_has_the_copys_name_too(tmp_path, image):
+    path = tmp_path / 'room.png'
+    cv2.imwrite(str(path), image)
+    given = path.read_bytes()
+    (tmp_path / 'room_markers.png').hardlink_to(path)
+    assert main([str(path), '--out', str(tmp_path)]) == 0
+    assert path.read_bytes() == given
+
+
 def test_png_whose_length_was_damaged_is_refused_before_memory_is_taken(image):
     data = bytearray(cv2.imencode('.png', image)[1].tobytes())
     data[data.index(b'IDAT') - 4] = 0x70

@@ -25,7 +25,8 @@ DISTORTION_MODELS: tuple[str, ...] = tuple(_COEFFICIENTS)
 """The models of sensor_msgs/distortion_models.hpp that are understood."""
 
 _SAME_SHAPE = 0.02
-_LARGEST = 1e7
+# of the larger side of the image: a lens that sees a hundredth of a degree
+_LARGEST = 1e4
 _CORRECTIONS = 40
 _EXACT = 0.02
 _WIDEST = 1e3
@@ -64,8 +65,9 @@ class CameraModel:
                 f'focal lengths must be positive, got {matrix[0, 0]:g} and '
                 f'{matrix[1, 1]:g}: the camera is not calibrated'
             )
-        if np.abs(matrix).max() > _LARGEST:
-            raise ValueError(f'the camera matrix must have no number above {_LARGEST:g}')
+        largest = _LARGEST * max(self.width, self.height)
+        if np.abs(matrix).max() > largest:
+            raise ValueError(f'the camera matrix must have no number above {largest:g}')
         if matrix[2].tolist() != [0.0, 0.0, 1.0] or matrix[1, 0] or matrix[0, 1]:
             raise ValueError(
                 'the camera matrix must have the form [fx 0 cx, 0 fy cy, 0 0 1], '

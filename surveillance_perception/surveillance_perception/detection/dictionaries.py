@@ -79,6 +79,8 @@ def _dictionary_in(path: Path) -> cv2.aruco.Dictionary:
         raise ValueError(f'{what} cannot be read, {expected}') from error
     if not 1 <= count == len(codes) or not _SMALLEST_SIDE <= side <= _LARGEST_SIDE:
         raise ValueError(f'{what} has {count} markers of {side}x{side} cells, {expected}')
+    if not 0 <= correction <= side * side:
+        raise ValueError(f'{what}: maxCorrectionBits must be 0 to {side * side}, got {correction}')
     for index, code in enumerate(codes):
         if len(code) != side * side or set(code) - {'0', '1'}:
             raise ValueError(f'{what}: marker_{index} must be {side * side} digits 0 or 1')
