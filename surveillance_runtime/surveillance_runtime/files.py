@@ -37,7 +37,9 @@ def in_one_line(error: OSError) -> str:
 
 def like_file(path: Path) -> str:
     """Return the path that is most like one that is not there; empty where none is like it."""
-    missing = next((each for each in reversed([path, *path.parents]) if not each.exists()), path)
+    missing = next((each for each in reversed([path, *path.parents]) if not each.exists()), None)
+    if missing is None:
+        return ''
     with contextlib.suppress(OSError):
         # A link that leads nowhere is listed, too.
         there = set(os.listdir(missing.parent)) - {missing.name}

@@ -205,7 +205,7 @@ def test_an_ontology_that_hangs_makes_no_pause_longer(machine: str) -> None:
     Run(machine, world).until(1000.0)
     pauses = [end - begin for (begin, reason), (end, _) in pairwise(cries) if reason]
     assert 60.0 <= max(pauses) <= 66.0
-    assert 'open a door or remove the obstacle, else' in max(text for _, text in cries)
+    assert 'open a door or remove the obstacle; next try' in max(text for _, text in cries)
 
 
 def test_an_ontology_that_lost_the_robot_is_waited_for(machine: str) -> None:

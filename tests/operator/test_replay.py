@@ -187,6 +187,11 @@ def test_the_commands_find_runs_and_say_what_is_wrong(
         assert error.startswith(f'{name}: nowhere: expected the folder of a run')
         assert '20260101-000000' in error
         assert error.count('\n') == 1
+        other = run.parent / 'notes.txt'
+        other.touch()
+        (run.parent / 'notes2.txt').touch()
+        assert main([str(other), '--runs', runs]) == 2
+        assert 'notes2' not in capsys.readouterr().err, 'a file beside it is no run'
 
 
 def test_a_recording_that_cannot_be_repaired_keeps_no_report_back(

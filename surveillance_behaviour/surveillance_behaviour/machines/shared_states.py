@@ -138,7 +138,7 @@ class WaitForHelp(MissionState):
         seconds = mission.recovery.pause()
         mission.ports.announcer.waiting_for_help(
             f'{reason} (in {mission.place or "an unknown place"}, {mission.battery.level_text()}); '
-            f'{_what_helps(failure)}, else trying again in {seconds:g} s'
+            f'{_what_helps(failure)}; next try in {seconds:g} s'
         )
         is_over, period = mission.watch_ways(interrupt), WAY_PERIOD
         if failure is not None and failure.is_over is not None:

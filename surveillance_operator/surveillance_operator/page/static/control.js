@@ -50,7 +50,7 @@ export class Control {
     this.arm = this.form('Arm', [select('pose', 'Pose', ...POSES)], [['Move', 'arm', (g) => g]]);
     this.obstacle = this.form('Obstacle', [input('name', 'name', 'box', {class: 'short'}), number('radius', 'radius [m]', '0.3')],
       [['Place', 'obstacle', (g) => ({...g, ...this.at()}), this.point],
-        ['Take away', 'remove_obstacle', (g) => ({name: g.name})]]);
+        ['Remove', 'remove_obstacle', (g) => ({name: g.name})]]);
     $('control-body').append(
       this.form('Robot', [this.place], [['Go there', 'go', (g) => g], ['Call it home', 'go', () => ({place: ''})]]),
       this.form('Door', [this.door], [['Open', 'door', (g) => ({...g, is_open: true})], ['Close', 'door', (g) => ({...g, is_open: false})]]),
