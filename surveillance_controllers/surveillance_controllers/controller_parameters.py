@@ -181,7 +181,7 @@ class MotionSettings(PeerSettings, StationSettings):
     feedback_period: float = parameter(0.2, 'Time between two feedbacks on the way, s.', 0.01, 60.0)
     place_reach: float = parameter(
         2.0,
-        'MANUAL, RANDOM and Nav2: the robot is in the nearest place within this distance, m.',
+        'MANUAL and RANDOM: the robot is in the nearest place within this distance, m.',
         0.0,
         1000.0,
     )

@@ -28,6 +28,8 @@ from surveillance_runtime.qos import STATE_QOS
 
 RETRY_PERIOD = 0.1
 """Pause before the ontology is asked again where the robot is, seconds."""
+CATCH_UP_PERIOD = 0.3
+"""Pause before map and ontology are asked again after they did not answer, seconds."""
 
 
 class MapKnowledge:
@@ -130,6 +132,19 @@ class MapKnowledge:
         self.connect(interrupt)
         self._on_doors.append(on_change)
 
+    def follow_places(self, take: Callable[[Mapping[str, Points]], None]) -> None:
+        """Have a function take the places, on a thread of its own, now and when they change."""
+        stopping, watched = self._node.stopping, False
+
+        def catch_up() -> None:
+            nonlocal watched
+            if not watched:
+                self.watch_doors(stopping, lambda: news.set())
+                watched = True
+            take(self.places(stopping))
+
+        news = keep_up(self._node, 'map follower', catch_up)
+
     def watch_robot_place(
         self, interrupt: Interrupt, on_change: Callable[[], None]
     ) -> FactSubscription:
@@ -231,7 +246,10 @@ def answered() -> Iterator[None]:
 
 
 def keep_up(
-    node: PatrolNode, name: str, catch_up: Callable[[], float | None], retry: float
+    node: PatrolNode,
+    name: str,
+    catch_up: Callable[[], float | None],
+    retry: float = CATCH_UP_PERIOD,
 ) -> Interrupt:
     """Have a worker thread catch up with what the map's peers say, as long as the node lives.
 

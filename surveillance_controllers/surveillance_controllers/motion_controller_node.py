@@ -52,7 +52,6 @@ class MotionController(PatrolNode):
         reach = self._settings.place_reach
         state_file = self._settings.state_file
         self._recorder = PlaceRecorder(self, self._knowledge, reach, start, state_file)
-        self._tells_ends = not localises
         self._robot: Motion | None = None
         if self._mode == 'SIMULATED':
             self._robot = self._make_robot()
@@ -96,7 +95,7 @@ class MotionController(PatrolNode):
         except MotionFailedError as failure:
             position = point_message(path[0] if failure.end is None else failure.end)
             raise GoalAbortedError(str(failure), FollowPath.Result(position=position)) from failure
-        if self._tells_ends:
+        if self._robot is None:
             self._recorder.tell_point(end)
         return FollowPath.Result(position=point_message(end))
 

@@ -1,8 +1,7 @@
 """Moving by Nav2 and docking by a docking server, with both servers scripted.
 
-Their messages, nav2_msgs, come with them and are no wheel, so classes with the fields and constants
-that Jazzy's definitions have (docs.ros.org, nav2_msgs: Jazzy, action definitions) stand in for the
-types here. As rosidl's do, they refuse a field that they do not have.
+Their messages, nav2_msgs, come with them and are no wheel, so classes stand in for the types here;
+`tests/mission/test_nav2_mission.py` has the types themselves.
 """
 
 from __future__ import annotations
@@ -13,7 +12,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from builtin_interfaces.msg import Time
 from geometry_msgs.msg import PoseWithCovarianceStamped
+from nav_msgs.msg import OccupancyGrid
 
 from surveillance_controllers.controller_parameters import MotionSettings
 from surveillance_controllers.motion import docking
@@ -24,54 +25,14 @@ from surveillance_fsm import Interrupt
 from surveillance_fsm.ros import CallInterruptedError, GoalCaller, GoalEnd, UnavailableError
 from surveillance_interfaces.action import FollowPath
 from surveillance_runtime.conversions import point_messages
+from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.parameters import ParameterError
 from surveillance_runtime.qos import STATE_QOS
+from surveillance_simulation.conversions import grid_to_ros
+from tests.nav2_definitions import ACTIONS, stand_in
 
 PATH = np.array([[0.0, 0, 0], [3, 0, 0], [3, 4, 0]])
-ACTIONS: dict[str, tuple[dict[str, Any], dict[str, Any], dict[str, int]]] = {
-    'NavigateThroughPoses': (
-        {'poses': [], 'behavior_tree': ''},
-        {'error_code': 0, 'error_msg': ''},
-        {'NONE': 0},
-    ),
-    'FollowPath': (
-        {'path': None, 'controller_id': '', 'goal_checker_id': '', 'progress_checker_id': ''},
-        {'result': None, 'error_code': 0, 'error_msg': ''},
-        {'NONE': 0, 'UNKNOWN': 100, 'FAILED_TO_MAKE_PROGRESS': 105, 'NO_VALID_CONTROL': 106},
-    ),
-    'DockRobot': (
-        {
-            'use_dock_id': True,
-            'dock_id': '',
-            'dock_pose': None,
-            'dock_type': '',
-            'max_staging_time': 1000.0,
-            'navigate_to_staging_pose': True,
-        },
-        {'success': True, 'error_code': 0, 'num_retries': 0, 'error_msg': ''},
-        {'NONE': 0, 'DOCK_NOT_IN_DB': 901, 'FAILED_TO_STAGE': 903, 'FAILED_TO_CHARGE': 906},
-    ),
-    'UndockRobot': (
-        {'dock_type': '', 'max_undocking_time': 30.0},
-        {'success': True, 'error_code': 0, 'error_msg': ''},
-        {'NONE': 0, 'DOCK_NOT_VALID': 902, 'FAILED_TO_CONTROL': 905, 'UNKNOWN': 999},
-    ),
-}
-"""The fields of goal and result with their defaults, and the constants of the result."""
-
-
-def message_type(fields: dict[str, Any], constants: dict[str, int] | None = None) -> Any:
-    def fill(self: Any, **given: Any) -> None:
-        for name, value in (fields | given).items():
-            setattr(self, name, value)
-
-    return type('Message', (), {'__slots__': tuple(fields), '__init__': fill, **(constants or {})})
-
-
-TYPES = {
-    name: SimpleNamespace(Goal=message_type(goal), Result=message_type(result, constants))
-    for name, (goal, result, constants) in ACTIONS.items()
-}
+TYPES = {name: stand_in(name) for name in ACTIONS}
 
 
 def result(action: str, **fields: Any) -> Any:
@@ -118,20 +79,34 @@ def run() -> Any:
 
 
 class Recorder:
-    """Keeps the points that it is told."""
+    """Keeps the places that it is told."""
 
     def __init__(self) -> None:
-        self.points: list[Any] = []
+        self.places: list[Any] = []
 
-    def tell_point(self, point: Any, *, passing: bool) -> None:
-        assert passing
-        self.points.append(tuple(point))
+    def tell(self, place: str) -> None:
+        self.places.append(place)
 
 
-def nav2(graph: Any, recorder: Any = None) -> nav2_motion.Nav2Motion:
-    settings: Any = SimpleNamespace(place_reach=2.0, peer_timeout=1.0)
-    knowledge: Any = None
-    return nav2_motion.Nav2Motion(graph.node, knowledge, recorder, settings)
+class Knowledge:
+    """Knows where the places are at once."""
+
+    def __init__(self, positions: dict[str, Any]) -> None:
+        self._positions = positions
+
+    def assume(self, positions: dict[str, Any]) -> None:
+        pass
+
+    def follow_places(self, take: Any) -> None:
+        take(self._positions)
+
+
+def nav2(graph: Any, recorder: Any = None, flat: Any = None) -> nav2_motion.Nav2Motion:
+    settings: Any = SimpleNamespace(peer_timeout=1.0)
+    knowledge: Any = Knowledge({} if flat is None else flat.POSITIONS)
+    doors = {} if flat is None else {'doors.D': [4.05, 1.5, np.pi / 2, 1.0]}
+    node = graph.add(PatrolNode, doors, name='motion_controller')
+    return nav2_motion.Nav2Motion(node, knowledge, recorder or Recorder(), settings)
 
 
 def at(x: float, y: float) -> Any:
@@ -189,21 +164,33 @@ def test_a_goal_that_was_cancelled_is_no_failure(graph: Any, servers: Servers, r
     assert tuple(nav2(graph).follow(PATH, run, lambda _: None)) == (1, 0, 0)
 
 
-def test_the_place_is_tracked_on_the_way(graph: Any, servers: Servers) -> None:
+def test_the_place_follows_the_pose_by_the_rooms_of_the_map(
+    graph: Any, servers: Servers, run: Any, flat: Any
+) -> None:
     recorder = Recorder()
-    motion = nav2(graph, recorder)
+    motion = nav2(graph, recorder, flat)
     poses = graph.node.create_publisher(PoseWithCovarianceStamped, 'amcl_pose', STATE_QOS)
+    maps = graph.node.create_publisher(OccupancyGrid, 'map', STATE_QOS)
     message = PoseWithCovarianceStamped()
-    message.pose.pose.position.x = 2.5
 
-    def told() -> bool:
+    def come_to(x: float) -> None:
+        message.pose.pose.position.x, message.pose.pose.position.y = x, 2.7
         poses.publish(message)
-        return bool(recorder.points)
 
-    graph.until(told)
-    assert recorder.points[-1] == (2.5, 0.0, 0.0)
-    message.pose.pose.position.x = float('nan')
-    motion._on_pose(message)
+    # The map may come after the pose. Both points are nearer to A's than to B's.
+    come_to(3.6)
+    maps.publish(grid_to_ros(flat.grid, 'map', Time()))
+    graph.until(lambda: recorder.places[-1:] == ['A'])
+    come_to(4.3)
+    graph.until(lambda: recorder.places[-1] == 'B')
+    come_to(float('nan'))
+    come_to(3.6)
+    graph.until(lambda: recorder.places[-1] == 'A')
+    end = motion.follow(PATH, run, lambda _: None)
+    assert tuple(end) == (3.6, 2.7, 0.0)
+    assert motion.place_reached(np.array([2.0, 1.5, 0.0]), end, run) == 'A'
+    with pytest.raises(MotionFailedError, match='stopped in A: expected B'):
+        motion.place_reached(np.array([5.5, 1.5, 0.0]), end, run)
 
 
 @pytest.mark.parametrize(

@@ -44,6 +44,17 @@ class MotionFailedError(Exception):
         self.end = end
 
 
+def expect_place(place: str | None, wanted: str | None, end: Points) -> str:
+    """Return the place in which a motion ended.
+
+    Raises:
+        MotionFailedError: It is not the wanted one, or not known.
+    """
+    if place is None or place != wanted:
+        raise MotionFailedError(f'the robot stopped in {place}: expected {wanted}', end)
+    return place
+
+
 def nearest_place(places: Mapping[str, Points], point: Points) -> tuple[str | None, float]:
     """Return the place whose point is nearest, and its distance in metres.
 

@@ -8,19 +8,23 @@ this way to move cannot start and says so.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+import threading
+from collections.abc import Callable, Mapping
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped
+from nav_msgs.msg import OccupancyGrid
 
 from surveillance_controllers import conversions
 from surveillance_controllers.controller_parameters import MotionSettings
 from surveillance_controllers.geometry import Points, equally_spaced, length, point_of
 from surveillance_controllers.map_knowledge import MapKnowledge
-from surveillance_controllers.motion.arrival import MotionFailedError, place_reached
+from surveillance_controllers.motion.arrival import MotionFailedError, expect_place
 from surveillance_controllers.motion.place_recording import PlaceRecorder
+from surveillance_controllers.motion.place_regions import PlaceMap
+from surveillance_controllers.motion.robot_parameters import door_segments, place_positions
 from surveillance_fsm.ros import CallError, CallInterruptedError, GoalCaller, GoalRun
 from surveillance_runtime.conversions import pose_from, pose_message
 from surveillance_runtime.node import PatrolNode
@@ -31,8 +35,6 @@ SPACING = 1.5
 """The largest distance of the poses that Nav2 is led through, metres."""
 MOST_POSES = 10_000
 """A path that would need more poses is led through poses farther apart."""
-TRACK_PERIOD = 0.5
-"""Least time between two looks at the place that the robot passes, seconds."""
 
 
 def navigate_through_poses() -> Any:
@@ -57,8 +59,8 @@ class Nav2Motion:
     Args:
         node: The motion controller's node.
         knowledge: Map and ontology.
-        recorder: Is told where the robot is on its way, from the topic `amcl_pose`.
-        settings: How long Nav2 may take to appear and accept a goal, and how near a place is.
+        recorder: Is told the place that the robot is in, by the topics `amcl_pose` and `map`.
+        settings: How long Nav2 may take to appear and accept a goal.
 
     Raises:
         ParameterError: nav2_msgs is not installed.
@@ -72,20 +74,25 @@ class Nav2Motion:
         settings: MotionSettings,
     ) -> None:
         self._node = node
-        self._knowledge = knowledge
         self._recorder = recorder
-        self._place_reach = settings.place_reach
         self._type = navigate_through_poses()
         self._timeout = settings.peer_timeout
         self._navigator = GoalCaller(node, self._type, 'navigate_through_poses')
-        self._tracked = -math.inf
+        self._lock = threading.Lock()
+        self._places = PlaceMap(door_segments(node).values())
+        self._point: Points | None = None
+        positions = place_positions(node)
+        self._places.set_positions(positions)
+        knowledge.assume(positions)
+        knowledge.follow_places(self._set_positions)
+        node.create_subscription(OccupancyGrid, 'map', self._on_map, STATE_QOS)
         node.create_subscription(PoseWithCovarianceStamped, 'amcl_pose', self._on_pose, STATE_QOS)
 
     def follow(self, path: Points, run: GoalRun, report: Callable[[Points], None]) -> Points:
         """Send the robot along a path of shape (n, 3).
 
         Returns:
-            Where the robot is then, as Nav2 said last, shape (3,).
+            Where the robot is then, by `amcl_pose`, else as Nav2 said last, shape (3,).
 
         Raises:
             MotionFailedError: It did not get there.
@@ -113,7 +120,12 @@ class Nav2Motion:
             raise MotionFailedError(str(error), position) from error
         if end.status != 'succeeded':
             raise MotionFailedError(f'Nav2 {end.status} the goal{reason_of(end.result)}', position)
-        return path[-1] if position is None else position
+        if self._point is not None:
+            return self._point
+        # Nobody tells amcl_pose.
+        position = path[-1] if position is None else position
+        self._tell(position)
+        return position
 
     def _poses(self, path: Points) -> list[PoseStamped]:
         """Return the poses behind the start, each facing along the path."""
@@ -131,22 +143,38 @@ class Nav2Motion:
         return poses
 
     def _on_pose(self, message: PoseWithCovarianceStamped) -> None:
-        now = float(self._node.get_clock().now().nanoseconds) / 1e9
-        if 0.0 <= now - self._tracked < TRACK_PERIOD:
-            return
         with conversions.refusing(self._node, 'amcl_pose'):
-            point = point_of(pose_from(message.pose.pose))
-            self._tracked = now
-            self._recorder.tell_point(point, passing=True)
+            self._point = point_of(pose_from(message.pose.pose))
+            self._tell(self._point)
 
-    def place_reached(self, _goal: Points, end: Points, run: GoalRun) -> str:
-        """Return the place nearest to where the robot is, shape (3,).
+    def _on_map(self, message: OccupancyGrid) -> None:
+        with conversions.refusing(self._node, 'map'):
+            grid = conversions.grid_from(message)
+            with self._lock:
+                self._places.set_map(grid)
+            self._tell(self._point)
+
+    def _set_positions(self, positions: Mapping[str, Points]) -> None:
+        with self._lock:
+            self._places.set_positions(positions)
+        self._tell(self._point)
+
+    def _tell(self, point: Points | None) -> None:
+        """Tell the place that the robot is in; where it is in none, that stays as it was."""
+        with self._lock:
+            place = None if point is None else self._places.place_at(point)
+        if place is not None:
+            self._recorder.tell(place)
+
+    def place_reached(self, goal: Points, end: Points, _run: GoalRun) -> str:
+        """Return the place that the robot is in, which is at `end`, shape (3,).
 
         Raises:
-            MotionFailedError: No place is within reach.
-            OntologyNotReadyError: Map or ontology do not answer.
+            MotionFailedError: It is not in the goal's place.
         """
-        return place_reached(self._knowledge.places(run.interrupt), end, self._place_reach)
+        with self._lock:
+            place, wanted = self._places.place_at(end), self._places.place_at(goal)
+        return expect_place(place, wanted, end)
 
     def look_around(self, _run: GoalRun) -> None:
         """Nothing: Nav2's own behaviours turn the robot where that is wanted."""

@@ -7,12 +7,12 @@ from collections.abc import Callable
 
 from surveillance_controllers import conversions
 from surveillance_controllers.geometry import Points, Pose, point_of
-from surveillance_controllers.map_knowledge import MapKnowledge, keep_up
-from surveillance_controllers.motion.arrival import MotionFailedError
+from surveillance_controllers.map_knowledge import MapKnowledge
+from surveillance_controllers.motion.arrival import MotionFailedError, expect_place
 from surveillance_controllers.motion.base_interface import RobotBase
 from surveillance_controllers.motion.driving import Drive, Spin, State
 from surveillance_controllers.motion.navigator import Navigator
-from surveillance_controllers.motion.place_recording import RETRY_PERIOD, PlaceRecorder
+from surveillance_controllers.motion.place_recording import PlaceRecorder
 from surveillance_controllers.motion.robot_parameters import RobotSettings
 from surveillance_controllers.planning.grid_planning import NoPathError
 from surveillance_fsm.ros import CallError, GoalCaller, GoalRun
@@ -38,9 +38,7 @@ class NavigationMotion:
         knowledge: MapKnowledge,
         recorder: PlaceRecorder,
     ) -> None:
-        self._node = node
         self._settings = settings
-        self._knowledge = knowledge
         self._recorder = recorder
         self._wait_for_peer = settings.motion.peer_timeout
         self._planner = GoalCaller(node, ComputePath, 'compute_path')
@@ -57,8 +55,8 @@ class NavigationMotion:
         )
         self._base.set_positions(settings.positions)
         knowledge.assume(settings.positions)
-        self._watches_doors = False
-        self._news = keep_up(node, 'map follower', self._follow_map, RETRY_PERIOD)
+        # The places that come and go change what the robot's place can be.
+        knowledge.follow_places(self._base.set_positions)
 
     def follow(self, path: Points, run: GoalRun, report: Callable[[Points], None]) -> Points:
         """Drive along a path of shape (n, 3).
@@ -97,10 +95,7 @@ class NavigationMotion:
         """
         if not self._base.is_sure:
             raise MotionFailedError('the robot does not know in which of several places it is', end)
-        wanted, place = self._base.place_at(goal), self._base.place_at(end)
-        if place is None or place != wanted:
-            raise MotionFailedError(f'the robot stopped in {place}: expected {wanted}', end)
-        return place
+        return expect_place(self._base.place_at(end), self._base.place_at(goal), end)
 
     def look_around(self, run: GoalRun) -> None:
         """Turn once on the spot, as the place's exploration asks for.
@@ -110,14 +105,6 @@ class NavigationMotion:
         """
         if self._settings.spin:
             self._base.spin(Spin(), run.interrupt)
-
-    def _follow_map(self) -> None:
-        """Take the places that come and go: they change what the robot's place can be."""
-        stopping = self._node.stopping
-        if not self._watches_doors:
-            self._knowledge.watch_doors(stopping, lambda: self._news.set())
-            self._watches_doors = True
-        self._base.set_positions(self._knowledge.places(stopping))
 
     def _ask_planner(self, start: Points, goal: Points, run: GoalRun) -> Points:
         request = ComputePath.Goal(start=point_message(start), goal=point_message(goal))

@@ -18,7 +18,7 @@ from surveillance_controllers.motion.driving import Drive, Spin
 from surveillance_controllers.motion.localisation import LocalisationParameters, Localiser
 from surveillance_controllers.motion.obstacle_memory import ObstacleMemory
 from surveillance_controllers.motion.path_following import Velocity
-from surveillance_controllers.motion.place_regions import PlaceRegions
+from surveillance_controllers.motion.place_regions import PlaceMap
 from surveillance_controllers.motion.tracking import Mover, Tracker
 from surveillance_runtime.place.floor_plan import Segment
 from surveillance_runtime.place.occupancy_grid import Grid, with_walls
@@ -65,12 +65,11 @@ class Navigator:
         self._closed: frozenset[str] = frozenset()
         self._localisation = localisation
         self._guesses = tuple(guesses)
-        self._positions: dict[str, Points] = {}
+        self._places = PlaceMap(self._doors.values())
         self._grid: Grid | None = None
         self._localiser: Localiser | None = None
         self._memory: ObstacleMemory | None = None
         self._tracker = Tracker()
-        self._regions: PlaceRegions | None = None
         self._odometry: Pose | None = None
         self._believed: Pose | None = None
         self._candidate: tuple[str | None, float] | None = None
@@ -128,7 +127,8 @@ class Navigator:
         """Take the map, or another one."""
         self._grid = grid
         self._redraw()
-        self._divide()
+        self._places.set_map(grid)
+        self._candidate = None
 
     def set_closed(self, doors: Iterable[str]) -> None:
         """Take which doors are closed: the lidar sees them as walls."""
@@ -139,8 +139,8 @@ class Navigator:
 
     def set_positions(self, positions: Mapping[str, ArrayLike]) -> None:
         """Take the places: a point in each, metres."""
-        self._positions = {name: np.asarray(at, float)[:2] for name, at in positions.items()}
-        self._divide()
+        self._places.set_positions(positions)
+        self._candidate = None
 
     def believe(self, pose: Pose) -> None:
         """Take where the robot is said to be."""
@@ -238,9 +238,9 @@ class Navigator:
                 self.task.heed(self._memory.points)
 
     def _settle_place(self, now: float) -> None:
-        if self._regions is None or self._localiser is None:
+        if not self._places.is_known or self._localiser is None:
             return
-        place = self._regions.place_at(self._localiser.pose[:2])
+        place = self._places.place_at(self._localiser.pose[:2])
         if self._candidate is None or self._candidate[0] != place:
             self._candidate = place, now
         if self.place is None or now - self._candidate[1] >= SETTLE_SECONDS:
@@ -258,13 +258,8 @@ class Navigator:
         if self._localiser is not None:
             self._localiser.set_map(self._seen_map)
 
-    def _divide(self) -> None:
-        if self._grid is not None and self._positions:
-            self._regions = PlaceRegions(self._grid, self._doors.values(), self._positions)
-            self._candidate = None
-
     def place_at(self, point: Points) -> str | None:
         """Return the place that a point belongs to; None when it is in none, or there is no map
         yet.
         """
-        return None if self._regions is None else self._regions.place_at(point)
+        return self._places.place_at(point)

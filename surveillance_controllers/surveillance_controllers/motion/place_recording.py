@@ -19,8 +19,6 @@ from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.qos import STATE_QOS
 from surveillance_runtime.state_file import StateFile
 
-RETRY_PERIOD = 0.3
-"""Pause before map and ontology are asked again after they did not answer, seconds."""
 CHANGES_DELAY = 0.5
 """How long the ontology's change messages may be behind what was written, seconds."""
 
@@ -57,14 +55,14 @@ class PlaceRecorder:
         self._kept = StateFile(node, state_file if start is not None else '')
         self._start = start if start is None else self._kept.text('place') or start
         self._lock = threading.Lock()
-        self._point: tuple[Points, Time, bool] | None = None
+        self._point: tuple[Points, Time] | None = None
         self._told: RobotPlace | None = None
         self._written: RobotPlace | None = None
         self._written_at = 0.0
         self._facts: FactSubscription | None = None
         self._topic = node.create_publisher(RobotPlace, 'robot_place', STATE_QOS)
         self._done = node.create_publisher(Time, 'robot_place_written', STATE_QOS)
-        self._news = keep_up(node, 'place recorder', self._catch_up, RETRY_PERIOD)
+        self._news = keep_up(node, 'place recorder', self._catch_up)
         if start == '':
             node.create_subscription(
                 OntologyMap, 'ontology_map/build_map', self._on_build_map, STATE_QOS
@@ -87,17 +85,14 @@ class PlaceRecorder:
                 self._kept.save({'place': place})
         self._news.set()
 
-    def tell_point(self, point: Points, *, passing: bool = False) -> None:
-        """Take where the robot is as a point; from any thread, without waiting.
+    def tell_point(self, point: Points) -> None:
+        """Take where the robot is as a point of shape (3,), metres; from any thread, without
+        waiting.
 
         The place is the nearest one within reach, as soon as the map says where the places are.
-
-        Args:
-            point: Shape (3,), metres.
-            passing: The robot is on its way: out of every place's reach its place stays as it was.
         """
         with self._lock:
-            self._point = point, self._node.get_clock().now().to_msg(), passing
+            self._point = point, self._node.get_clock().now().to_msg()
         self._news.set()
 
     def _on_build_map(self, message: OntologyMap) -> None:
@@ -146,12 +141,9 @@ class PlaceRecorder:
             found = self._point
         if found is None:
             return
-        point, stamp, passing = found
+        point, stamp = found
         place, gap = nearest_place(self._knowledge.places(self._node.stopping), point)
-        if gap <= self._reach:
-            self.tell(place, stamp)
-        elif not passing:
-            self.tell(None, stamp)
+        self.tell(place if gap <= self._reach else None, stamp)
         with self._lock:
             if self._point is found:
                 self._point = None

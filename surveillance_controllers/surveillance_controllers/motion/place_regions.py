@@ -81,6 +81,43 @@ class PlaceRegions:
         return region
 
 
+class PlaceMap:
+    """Which place a point belongs to, while the map and the places may change.
+
+    Args:
+        doors: Segments of all doors, metres.
+    """
+
+    def __init__(self, doors: Iterable[Segment]) -> None:
+        self._doors = tuple(doors)
+        self._grid: Grid | None = None
+        self._positions: Mapping[str, ArrayLike] = {}
+        self._regions: PlaceRegions | None = None
+
+    @property
+    def is_known(self) -> bool:
+        """Whether there are a map and places."""
+        return self._regions is not None
+
+    def set_map(self, grid: Grid) -> None:
+        """Take the map, or another one, with its doors open."""
+        self._grid = grid
+        self._divide()
+
+    def set_positions(self, positions: Mapping[str, ArrayLike]) -> None:
+        """Take the places: a point in each, metres."""
+        self._positions = dict(positions)
+        self._divide()
+
+    def place_at(self, point: Sequence[float] | Points) -> str | None:
+        """Return the place that a point (x, y in metres) belongs to; None: in none."""
+        return None if self._regions is None else self._regions.place_at(point)
+
+    def _divide(self) -> None:
+        if self._grid is not None and self._positions:
+            self._regions = PlaceRegions(self._grid, self._doors, self._positions)
+
+
 def _sides(door: Segment) -> tuple[np.ndarray, np.ndarray]:
     """Return a point on each side of a door, metres."""
     x1, y1, x2, y2 = door
