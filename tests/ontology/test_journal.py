@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import resource
-import zlib
 from functools import partial
 from pathlib import Path
 
@@ -107,13 +106,6 @@ def test_zeros_behind_the_records_are_put_aside(tmp_path: Path) -> None:
     assert list(journal.records()) == [1]
     assert len(journal.notes) == 1
     journal.close()
-
-
-def test_a_journal_of_before_is_read(tmp_path: Path) -> None:
-    text = b'[["a",1],["b",2]]'
-    line = b'%08x %s\n' % (zlib.crc32(text), text)
-    (tmp_path / 'journal-0.log').write_bytes(line + line[:-5])
-    assert reopened(tmp_path) == [['a', 1], ['b', 2]]
 
 
 def test_a_snapshot_stands_for_what_was_before_it(tmp_path: Path) -> None:

@@ -308,7 +308,7 @@ class _Contents:
             entry = _entry(data, start)
             if entry is not None:
                 found, more, start = entry
-                batch += found
+                batch.append(found)
                 if not more:
                     self.records += batch
                     batch, begin = [], start
@@ -328,7 +328,7 @@ class _Contents:
 
 _TO_JSON = json.JSONEncoder(separators=(',', ':'))
 _HEAD = re.compile(rb'([0-9a-f]{8}) (\d{1,10})(\+?) ')
-_CUT_OFF = re.compile(rb'[0-9a-f]{1,8}|[0-9a-f]{8} (\d{0,10}\+?|\d+\+? [ -~]*|\[[ -~]*)')
+_CUT_OFF = re.compile(rb'[0-9a-f]{1,8}|[0-9a-f]{8} (\d{0,10}\+?|\d+\+? [ -~]*)')
 
 
 def _line(record: Any, *, more: bool = False) -> bytes:
@@ -348,20 +348,14 @@ def _written(path: Path, records: Iterable[Any]) -> Path:
     return temporary
 
 
-def _entry(data: bytes, start: int) -> tuple[list[Any], bool, int] | None:
-    """Return the records of a line, whether the batch goes on, and where the next line begins."""
+def _entry(data: bytes, start: int) -> tuple[Any, bool, int] | None:
+    """Return the record of a line, whether the batch goes on, and where the next line begins."""
     head = _HEAD.match(data, start)
     if head is not None:
         end = head.end() + int(head[2])
         if end <= len(data) and b'%08x' % zlib.crc32(data[start + 9 : end]) == head[1]:
             # Not looked for: the line's end may be what is damaged.
-            return [json.loads(data[head.end() : end])], bool(head[3]), end + 1
-        return None
-    # Before version 0.3 a line was a whole batch and had no length.
-    end = data.find(b'\n', start)
-    line = data[start:end] if end >= 0 else b''
-    if line[8:10] == b' [' and line[:8] == b'%08x' % zlib.crc32(line[9:]):
-        return json.loads(line[9:]), False, end + 1
+            return json.loads(data[head.end() : end]), bool(head[3]), end + 1
     return None
 
 
