@@ -40,12 +40,12 @@ def mission_domain() -> int:
 
 
 @pytest.fixture(scope='module')
-def mission(mission_domain: int, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Started]:
-    """Provide a patrol at four times real time, with a page that may control it."""
+def mission(mission_domain: int) -> Iterator[Started]:
+    """Provide a patrol at twice real time, with a page that may control it."""
     port = free_port(mission_domain)  # a page that is started again keeps its address
     words = ['--composed', '--web-control', '--web-address', f'127.0.0.1:{port}']
-    words += ['--domain', str(mission_domain), '--record', str(tmp_path_factory.mktemp('runs'))]
-    words += ['-p', 'speed:=4.0', '--params', str(ROOT / 'config/fast.yaml')]
+    words += ['--domain', str(mission_domain), '--record', 'off']
+    words += ['-p', 'speed:=2.0', '--params', str(ROOT / 'config/fast.yaml')]
     started = Started([*LAUNCH, *words])
     started.until('decision 1')
     yield started
@@ -72,7 +72,7 @@ def test_arm_and_battery_are_set_from_the_terminal_of_mode_manual(
 ) -> None:
     words = ('--mode', 'MANUAL', '--behaviour', 'patrol', '--namespace', 'manual')
     nodes = ('console', 'simulator', 'arm_controller', 'battery_controller')
-    words += ('--only', ','.join(nodes), '--record', str(tmp_path))
+    words += ('--composed', '--only', ','.join(nodes), '--record', str(tmp_path))
     manual = terminal(*words, columns=120, rows=60)
     manual.until(*(f'{name:<18} | ready' for name in nodes))
     manual.type('arm up\r')
@@ -287,8 +287,10 @@ def test_without_the_token_nobody_can_act(viewer: Viewer) -> None:
     assert not viewer.js("return document.querySelector('#control').hidden")
 
 
-@pytest.mark.parametrize('size', [PHONE, DESK], ids=['phone', 'desk'])
-@pytest.mark.parametrize('dark', [False, True], ids=['light', 'dark'])
+# test_page_states.py has dark phones and light desks.
+@pytest.mark.parametrize(
+    ('size', 'dark'), [(PHONE, False), (DESK, True)], ids=['light phone', 'dark desk']
+)
 def test_axe_finds_nothing(viewer: Viewer, size: tuple[int, int], dark: bool) -> None:
     viewer.size(*size, dark=dark)
     assert viewer.js('return document.documentElement.scrollWidth') <= size[0]
