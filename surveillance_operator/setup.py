@@ -14,7 +14,7 @@ setup(
     zip_safe=True,
     maintainer='Surveillance robot maintainers',
     maintainer_email='surveillance@example.com',
-    description='What a person looks at and types: watching, console, drawing places.',
+    description='Terminal view, live page, console, recordings and reports of the robot.',
     license='Apache-2.0',
     entry_points={
         'console_scripts': [

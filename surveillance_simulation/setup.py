@@ -14,7 +14,7 @@ setup(
     zip_safe=True,
     maintainer='Surveillance robot maintainers',
     maintainer_email='surveillance@example.com',
-    description='Stand-in for robot hardware and Gazebo: camera, arm, base, lidar and time.',
+    description='Simulated robot and place: camera, arm, base, lidar and time.',
     license='Apache-2.0',
     entry_points={
         'console_scripts': [

@@ -1,4 +1,4 @@
-"""Stand-in for robot hardware and Gazebo: camera, arm, base, lidar and time.
+"""Simulated robot and place: camera, arm, base, lidar and time.
 
     from surveillance_simulation import Robot, read_world
 
