@@ -331,8 +331,7 @@ def _count(layer: str, low: _End, high: _End) -> float:
         last = math.floor(high.key) - (high.side < 0 and math.floor(high.key) == high.key)
         return int(max(0, last - first + 1))
     if layer in _MOMENTS:
-        same_instant = low.key[0] == high.key[0]
-        return sum(1 for _ in _between_moments(layer, low, high)) if same_instant else math.inf
+        return len(_zones(layer, low, high)) if low.key[0] == high.key[0] else math.inf
     if low.key != high.key:
         return math.inf
     return int(_layer_of(low.key) == layer)
@@ -351,21 +350,21 @@ def _between(layer: str, low: _End, high: _End) -> Iterator[Value]:
         for _ in range(number):
             yield layer, key
             key = _next_float(layer, key)
-    elif layer in _MOMENTS:
-        yield from _between_moments(layer, low, high)
+    elif layer == 'utc':
+        for offset in _zones(layer, low, high):
+            yield 'dateTime', layer, low.key[0], offset
+    elif number and layer == 'local':
+        yield 'dateTime', layer, low.key[0]
     elif number:
         yield low.key
 
 
-def _between_moments(layer: str, low: _End, high: _End) -> Iterator[Value]:
-    """Return the moments of the first end's instant, in all zones, that lie between two ends."""
-    seconds, parts = low.key[0], ((low, high),)
-    if layer == 'utc':
-        for offset in range(-LARGEST_OFFSET, LARGEST_OFFSET + 1, 60):
-            if _is_in((seconds, offset), parts):
-                yield ('dateTime', 'utc', seconds, offset)
-    elif _is_in((seconds, 0), parts):
-        yield ('dateTime', 'local', seconds)
+def _zones(layer: str, low: _End, high: _End) -> range:
+    """Return the offsets of the zones in which one instant lies between two ends; 0 without one."""
+    most = LARGEST_OFFSET if layer == 'utc' else 0
+    first = max(low.key[1] + 60 * (low.side > 0), -most)
+    last = min(high.key[1] - 60 * (high.side < 0), most)
+    return range(first, last + 1, 60) if first <= last else range(0)
 
 
 def _next_float(layer: str, key: float) -> float:
