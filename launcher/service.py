@@ -65,7 +65,7 @@ def unit_path() -> Path:
 
 
 def is_service() -> bool:
-    """Tell whether systemd keeps this process running, and wants to be told of it."""
+    """Tell whether this process is the service that systemd started and takes messages from."""
     started = os.environ.get(_PROCESS, str(os.getpid()))
     return os.environ.get(_SOCKET, '')[:1] in ('/', '@') and started == str(os.getpid())
 

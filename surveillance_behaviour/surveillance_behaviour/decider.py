@@ -37,7 +37,7 @@ from surveillance_runtime.suggestions import nearest
 
 @dataclass(frozen=True)
 class MemorySettings:
-    """What a node that decides is told of what it keeps, and of chance."""
+    """Parameters of a node that decides: its record and its random seed."""
 
     record: str = parameter(
         '',

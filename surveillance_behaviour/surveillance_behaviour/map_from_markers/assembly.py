@@ -1,9 +1,9 @@
-"""Putting a map together from notes about single places, and saying what does not fit.
+"""Assembles a map from notes about single places, and says what does not fit.
 
-Each marker tells of one place: a point inside it, its doors, and the place behind each door. In a
-whole map every door is told of from both its sides. While markers are missing, or tell what cannot
-be, `Survey.report` gives the part that can be relied on: places reached from the robot's own over
-doors on which both sides agree.
+Each marker describes one place: a point inside it, its doors, and the place behind each door. In a
+complete map every door is described from both sides. While markers are missing or contradict each
+other, `Survey.report` gives the reliable part: the places that can be reached from the robot's own
+through doors on which both sides agree.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ _SAME_POSITION = 0.05
 
 @dataclass(frozen=True)
 class PlaceNote:
-    """What one marker tells.
+    """What one marker says about a place.
 
     Attributes:
         room: Name of the place.
@@ -38,15 +38,15 @@ class PlaceNote:
 
 @dataclass(frozen=True)
 class SurveyReport:
-    """What the notes make together.
+    """The map that the notes describe together, and what is missing or wrong.
 
     Attributes:
         places: The places that can be patrolled, with the doors that lead to one another.
-        robot_room: Where the robot is; empty when no note tells of it.
-        missing: Places that are named but of which no marker tells, each with the doors that lead
-            there.
-        cut_off: Places that are told of but cannot be reached from the robot's.
-        contradictions: One sentence for each thing that cannot be.
+        robot_room: Where the robot is; empty when no note describes it.
+        missing: Places that are named but that no marker describes, each with the doors that
+            lead there.
+        cut_off: Places that a marker describes but that cannot be reached from the robot's.
+        contradictions: One sentence for each contradiction.
     """
 
     places: tuple[PlaceNote, ...]
@@ -57,7 +57,7 @@ class SurveyReport:
 
     @property
     def complete(self) -> bool:
-        """Whether every place that is named is told of, and everything fits."""
+        """Whether every place that is named is described, and everything fits."""
         return bool(
             self.places and not self.missing and not self.cut_off and not self.contradictions
         )

@@ -90,7 +90,7 @@ class IntrospectionServer:
         self._feed: TransitionFeed | None = None
         self._sequence = 0
         self._containers: dict[str, Structure] = {}
-        # A command is told of on another thread: the newer message goes out last.
+        # Another thread reports commands: the newer message goes out last.
         self._smach_turn = threading.Lock()
 
         def publisher(kind: Any, name: str, depth: int) -> Any:

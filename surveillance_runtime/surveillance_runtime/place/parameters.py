@@ -11,7 +11,7 @@ from surveillance_runtime.place import Place, PlaceError, make_place
 
 @dataclass(frozen=True)
 class PlaceSettings:
-    """What a node is told of the place beside its rooms."""
+    """Parameters of the place that describe no room."""
 
     map_source: str = parameter(
         'configuration',
