@@ -14,7 +14,7 @@ setup(
     zip_safe=True,
     maintainer='Surveillance robot maintainers',
     maintainer_email='surveillance@example.com',
-    description='Rclpy ground of the nodes: parameters, waits, calls, actions, life cycle.',
+    description='Shared code of the nodes: parameters, node base class, processes, place description.',
     license='Apache-2.0',
     entry_points={
         'console_scripts': [],

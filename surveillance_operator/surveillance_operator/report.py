@@ -181,7 +181,7 @@ def _page(folder: Path, events: Sequence[Event], drawn: str, bound: float | None
         '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">'
         '<meta name="viewport" content="width=device-width, initial-scale=1">'
         f'<title>Mission {escape(folder.name)}</title><style>{_STYLE}</style></head>'
-        f'<body><main>{"".join(body)}<p>Made {made}.</p></main></body></html>\n'
+        f'<body><main>{"".join(body)}<p>Written {made}.</p></main></body></html>\n'
     )
 
 
