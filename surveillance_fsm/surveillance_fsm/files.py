@@ -99,10 +99,11 @@ def replace_file(path: str | Path, data: bytes, *, durable: bool = False) -> Non
         # Not by tempfile: to give its file the usual rights, all threads' umask would change.
         handle = os.open(draft, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o666)
         with open(handle, 'wb') as file:
+            if mode is not None:
+                with suppress(OSError):  # There are file systems without rights.
+                    os.fchmod(handle, stat.S_IMODE(mode))
             file.write(data)
             file.flush()
-            if mode is not None:
-                os.fchmod(handle, stat.S_IMODE(mode))
             if durable:
                 os.fsync(handle)
         os.replace(draft, target)
