@@ -155,7 +155,7 @@ def test_directives_are_answered_when_the_log_file_takes_no_more(tmp_path: Path)
     assert ask('LOG FILE ON', 'armor.log').success
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
     # A file at its size limit takes what fits, as a disk does that is almost full.
-    resource.setrlimit(resource.RLIMIT_FSIZE, (150, before[1]))
+    resource.setrlimit(resource.RLIMIT_FSIZE, (170, before[1]))
     try:
         assert all(ask('GET ALL REFS').success for _ in range(9))
         assert ask('LOG FILE OFF').success

@@ -351,6 +351,7 @@ def test_logging_to_a_file_and_the_console(service: ArmorService, ask: Ask, tmp_
     asker(noisy)('QUERY IND', 'x')
     asker(noisy)('LOG SCREEN OFF')
     assert any('exit code 205' in line for line in shown)
+    assert not any('inconsistent' in line for line in shown), 'of no ontology'
     noisy.close()
 
 

@@ -70,8 +70,16 @@ class DirectiveLog:
                 self._file.close()
             self._file = file
 
-    def write(self, request: DirectiveRequest, response: DirectiveResponse) -> None:
-        """Write a directive with its answer, as one line whatever they hold."""
+    def write(
+        self, request: DirectiveRequest, response: DirectiveResponse, *, is_loaded: bool = True
+    ) -> None:
+        """Write a directive with its answer, as one line whatever they hold.
+
+        Args:
+            request: The directive.
+            response: Its answer.
+            is_loaded: There is an ontology that may be consistent or not.
+        """
         shown = ', '.join(one_line(arg, MAX_SHOWN) for arg in request.args[:20])
         if len(request.args) > 20:
             shown += f', ... ({len(request.args)} arguments)'
@@ -87,7 +95,7 @@ class DirectiveLog:
         )
         line = one_line(
             f'{client!r} on {name!r}: {words} [{shown}] '
-            f'-> {answer}{"" if response.is_consistent else " (inconsistent)"}',
+            f'-> {answer}{" (inconsistent)" if is_loaded and not response.is_consistent else ""}',
             limit=20_000,
         )
         if self.on_screen:

@@ -102,7 +102,7 @@ class ArmorService:
         if ref is not None:
             response.is_consistent = ref.kb.consistent
         if self.session.log.enabled:
-            self.session.log.write(request, response)
+            self.session.log.write(request, response, is_loaded=ref is not None)
         return response
 
     def execute_at_once(self, request: DirectiveRequest) -> DirectiveResponse | None:

@@ -200,7 +200,8 @@ def _release(session: Session, ref: Reference) -> None:
     'ontologies folder that ends as ontologies do.',
     differs='Without a path it is refused unless the parameter overwrite_loaded is set: ARMOR '
     'writes over the file that was loaded. Refused with 102 while another client is mounted. '
-    'Written beside the file and renamed, so that a crash leaves the old file whole. '
+    'Written beside the file and renamed, so that a crash leaves the old file whole; it keeps its '
+    'rights, and a read-only one is refused. '
     'Turtle and JSON-LD are written as N-Triples, OWL/XML and functional syntax as RDF/XML; a path '
     'that ends in .nt gets N-Triples, which hold names that RDF/XML cannot.',
     slow=True,
