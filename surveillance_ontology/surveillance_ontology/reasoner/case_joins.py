@@ -12,6 +12,8 @@ from collections.abc import Iterable, Iterator
 from fractions import Fraction
 from typing import Any, NamedTuple, TypeAlias
 
+from surveillance_ontology.owl.axiom_text import axiom_text
+from surveillance_ontology.owl.axioms import Axiom
 from surveillance_ontology.owl.expressions import DatatypeRestriction, Literal
 from surveillance_ontology.owl.vocabulary import OWL, XSD, is_anonymous
 from surveillance_ontology.reasoner.case_model import (
@@ -92,6 +94,7 @@ class CaseJoins:
     def __init__(self, model: CaseModel, either: Either) -> None:
         self._model, self._either = model, either
         self.gaps: dict[str, None] = {}
+        self._origin: Axiom
         self._of_concept: dict[int, list[_Plan]] = {}
         self._of_role: dict[int, list[_Plan]] = {}
         self._of_prop: dict[str, list[_Plan]] = {}
@@ -164,6 +167,7 @@ class CaseJoins:
         """Apply a rule wherever the atom that the plan begins with stands for certain nodes."""
         if any(map(self._model.is_gone, nodes)):
             return
+        self._origin = plan.rule.origin
         found = [_Match({}, choices, ())]
         for term, node in zip(plan.atom.terms, nodes, strict=True):
             found = [more for match in found for more in self._bind(match, term, node)]
@@ -334,7 +338,8 @@ class CaseJoins:
         """Try each value of a set; the rule is looked at again then."""
         values, choices = self._model.sets[v]
         if values.size > MOST_TRIED:
-            self.gaps['whether unknown values are those that a rule or key asks for'] = None
+            what = 'whether unknown values are those that it asks for is not decided'
+            self.gaps[f'{axiom_text(self._origin)}: {what}'] = None
             return
         self._either([In(v, point(value)) for value in values.members()], choices)
 
@@ -386,6 +391,7 @@ class CaseJoins:
     # --- what follows ---
 
     def _fire(self, rule: NamedRule, match: _Match) -> None:
+        self._origin = rule.origin
         head = rule.head
         alternatives = list(match.against)
         choices = match.choices

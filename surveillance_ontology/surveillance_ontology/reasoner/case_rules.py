@@ -17,7 +17,7 @@ from typing import Any, NamedTuple, TypeAlias, TypeVar
 
 from surveillance_ontology.owl import axioms as ax
 from surveillance_ontology.owl import expressions as ex
-from surveillance_ontology.owl.axiom_text import axiom_text
+from surveillance_ontology.owl.axiom_text import axiom_text, expression_text
 from surveillance_ontology.owl.axioms import Axiom
 from surveillance_ontology.owl.entities import entities_of
 from surveillance_ontology.owl.expressions import ClassExpression, PropertyExpression
@@ -156,6 +156,7 @@ class NamedRule:
 
     body: tuple[NamedAtom, ...]
     head: OfConcept | OfRole | OfProp | SameAtom | DifferentAtom | None
+    origin: Axiom
     is_key: bool = False
     """Whether anonymous individuals take no part (OWL 2 Structural Specification, 9.5)."""
 
@@ -180,6 +181,7 @@ class CaseRules:
         disjoint, disjoint_props: Roles (data properties) that exclude each other.
         named: Rules about named individuals: those of SWRL, and keys.
         gaps: One sentence for each axiom that is not fully covered.
+        tested: One for each with a range that single values alone can be tested for.
         has_inverse: Whether any role is used backwards.
     """
 
@@ -219,6 +221,8 @@ class CaseRules:
             iri for axiom in axioms for kind, iri in entities_of(axiom) if kind == 'individual'
         ]
         self.gaps: dict[str, None] = {}
+        self.tested: dict[str, None] = {}
+        self._origin: Axiom | None = None
         self.has_inverse = False
         self._positive: dict[ClassExpression, int] = {}
         self._recognised: dict[ClassExpression, int] = {}
@@ -236,8 +240,10 @@ class CaseRules:
         for axiom in tbox:
             self._attempt(axiom, self._check_chains)
             self._attempt(axiom, self._axiom)
+        self._origin = None
 
     def _attempt(self, axiom: Axiom, take: Callable[[Axiom], None]) -> None:
+        self._origin = axiom
         try:
             take(axiom)
         except UnsupportedError as reason:
@@ -387,6 +393,12 @@ class CaseRules:
             raise UnsupportedError(str(error)) from None
         if found is None:
             raise UnsupportedError('a data range is not supported')
+        if not found.decided:
+            subject = f'assertions with {expression_text(data_range)}'
+            if self._origin is not None:
+                subject = axiom_text(self._origin)
+            what = 'whether values suit a pattern or a type of strings is not decided'
+            self.tested[f'{subject}: {what}'] = None
         return found
 
     # --- inclusions ---
@@ -571,7 +583,7 @@ class CaseRules:
                 pair = (one, place)
                 body.append(OfProp(str(prop), pair) if is_data else self._link(prop, *pair))
         if len(body) > 2:
-            self.named.append(NamedRule(tuple(body), SameAtom((x, y)), is_key=True))
+            self.named.append(NamedRule(tuple(body), SameAtom((x, y)), key, is_key=True))
 
     def _link(self, prop: PropertyExpression, x: Term, y: Term) -> FactAtom:
         """Return the atom that relates two individuals."""
@@ -623,7 +635,7 @@ class CaseRules:
         if not any(isinstance(atom, FactAtom) for atom in body):
             raise UnsupportedError('it is about no individual')
         self._check_values(body, terms.values)
-        self.named += [NamedRule(tuple(body), head) for head in heads or (None,)]
+        self.named += [NamedRule(tuple(body), head, rule) for head in heads or (None,)]
 
     def _check_values(self, body: list[NamedAtom], terms: Iterable[Term]) -> None:
         """Raise UnsupportedError where a variable has no value by facts or computation."""

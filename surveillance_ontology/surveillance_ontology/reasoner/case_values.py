@@ -108,7 +108,7 @@ class CaseValues:
             if values.is_empty:
                 raise ClashError(choices)
             if not values.decided:
-                self.gaps['whether values suit a pattern or a type of strings'] = None
+                self.gaps.update(self._rules.tested)
             only = values.only
             if only is None:
                 continue

@@ -12,6 +12,7 @@ from functools import partial
 
 from surveillance_ontology.owl import axioms as ax
 from surveillance_ontology.owl import expressions as ex
+from surveillance_ontology.owl.axiom_text import expression_text
 from surveillance_ontology.owl.axioms import Axiom
 from surveillance_ontology.owl.expressions import Literal
 from surveillance_ontology.owl.vocabulary import NOTHING, THING, TOP
@@ -91,7 +92,7 @@ class CaseReasoner:
         try:
             return self._rules.positive(expression)
         except UnsupportedError as reason:
-            self.gaps[f'an assertion: {reason}'] = None
+            self.gaps[f'assertions of {expression_text(expression)}: {reason}'] = None
             return ANYBODY
 
     def _state(self, axiom: Axiom, concept: int) -> None:
