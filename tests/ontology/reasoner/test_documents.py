@@ -142,7 +142,7 @@ def test_imports_of_files_beside_the_document_are_followed(tmp_path: Path) -> No
     main = written('main.ofn', 'Import(<http://x/upper>) Import(<http://y/away>) SubClassOf(:A :B)')
     document = read_ontology(main, IRI)
     assert document.unsupported == [
-        'owl:imports <http://y/away> is not followed: no file beside it'
+        'owl:imports <http://y/away> is not followed: no such file beside the document'
     ]
     kb = KnowledgeBase(IRI, document.axioms)
     kb.reason()
