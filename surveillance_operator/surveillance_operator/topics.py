@@ -12,6 +12,7 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
+from action_msgs.msg import GoalStatus, GoalStatusArray
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseWithCovarianceStamped
 from nav_msgs.msg import OccupancyGrid
@@ -249,6 +250,11 @@ def _sets(name: str, value: Callable[[Any], Any]) -> Callable[[Any, Snapshot], F
     return lambda message, _: {name: value(message)}
 
 
+def _on_scan_goals(message: GoalStatusArray, _: Snapshot) -> Fields:
+    running = any(each.status <= GoalStatus.STATUS_CANCELING for each in message.status_list)
+    return {} if running else {'scan_progress': None}
+
+
 def _feedback(action: str, kind: Any, read: Callable[[Any, Snapshot], Fields]) -> Topic:
     """Return the topic of an action's feedback, read without its envelope."""
     name, message = f'{action}/_action/feedback', kind.Impl.FeedbackMessage
@@ -271,6 +277,7 @@ TOPICS: tuple[Topic, ...] = (
     _feedback(
         'scan_surroundings', ScanSurroundings, lambda m, _: {'scan_progress': (m.view, m.views)}
     ),
+    Topic('scan_surroundings/_action/status', GoalStatusArray, _on_scan_goals),
     Topic(DETECTIONS_TOPIC, MarkerDetectionArray, _on_detections, _NEWEST),
     Topic('joint_states', JointState, _on_joints, _STREAM, beside=DETECTIONS_TOPIC),
     Topic(f'{FSM}/structure', FsmStructure, _sets('containers', conversions.containers_from)),

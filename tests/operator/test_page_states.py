@@ -132,7 +132,7 @@ def test_a_connection_that_falls_silent_is_said_to_and_made_anew(
     viewer.js('mission.real = performance.now.bind(performance)')
     try:
         viewer.js('performance.now = () => mission.real() + 10000')
-        viewer.until(lambda: viewer.text('#connection') == 'nothing comes from the mission')
+        viewer.until(lambda: viewer.text('#connection') == 'no data from the mission')
         viewer.js('performance.now = () => mission.real() + 50000')
         viewer.until(lambda: viewer.text('#connection') == 'live')
     finally:

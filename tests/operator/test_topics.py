@@ -7,10 +7,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from action_msgs.msg import GoalStatus, GoalStatusArray
 from builtin_interfaces.msg import Time
 from geometry_msgs.msg import PoseWithCovarianceStamped
 from sensor_msgs.msg import JointState
 
+from surveillance_interfaces.action import ScanSurroundings
 from surveillance_interfaces.msg import MarkerDetection, MarkerDetectionArray
 from surveillance_ontology.armor.facts import parse_fact
 from surveillance_operator import mission_feed
@@ -125,3 +127,15 @@ def test_robots_of_other_namespaces_appear_and_go(
     graph.until(lambda: watcher.feed.snapshot.pose == (0.0, 0.0, 0.0))
     graph.node.destroy_publisher(publishers['two'])
     graph.until(lambda: watcher.feed.snapshot.others.keys() == {'a/b'})
+
+
+def test_the_progress_of_a_scan_ends_with_its_goal() -> None:
+    """The page said `view 4 of 7` for the rest of the mission."""
+    feedback = ScanSurroundings.Impl.FeedbackMessage()
+    feedback.feedback.view, feedback.feedback.views = 4, 7
+    goals = TOPIC['scan_surroundings/_action/status']
+    running = GoalStatusArray(status_list=[GoalStatus(status=GoalStatus.STATUS_EXECUTING)])
+    ended = GoalStatusArray(status_list=[GoalStatus(status=GoalStatus.STATUS_CANCELED)])
+    snapshot = read_message(Snapshot(), TOPIC['scan_surroundings/_action/feedback'], feedback)
+    assert read_message(snapshot, goals, running).scan_progress == (4, 7)
+    assert read_message(snapshot, goals, ended).scan_progress is None

@@ -139,7 +139,7 @@ function connect() {
 function listen() {
   const silent = performance.now() - heard;
   if (silent > DEAD) connect();
-  else if (silent > SILENT) connection('off', 'nothing comes from the mission');
+  else if (silent > SILENT) connection('off', 'no data from the mission');
 }
 
 function camera() {
