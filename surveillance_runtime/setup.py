@@ -14,7 +14,7 @@ setup(
     zip_safe=True,
     maintainer='Surveillance robot maintainers',
     maintainer_email='surveillance@example.com',
-    description='Shared code of the nodes: parameters, node base class, processes, place description.',
+    description='Shared code of the nodes: parameters, node base class, process life.',
     license='Apache-2.0',
     entry_points={
         'console_scripts': [],
