@@ -22,7 +22,7 @@ from surveillance_perception.arm.trajectory import ArmTrajectory
 from surveillance_perception.arm.view_coverage import View
 from surveillance_perception.detection.camera_model import DISTORTION_MODELS, Array, CameraModel
 from surveillance_perception.detection.detector import Detection
-from surveillance_perception.detection.fusion import FusedPosition, FusedPositions
+from surveillance_perception.detection.fusion import FusedPosition, FusedPositions, is_measured
 from surveillance_perception.detection.marker_stream import Sighting
 from surveillance_perception.detection.pose import MarkerPose
 from surveillance_perception.marker_registry import MarkedPlace
@@ -189,11 +189,7 @@ def fused_from_ros(message: MarkerDetection) -> FusedPosition | None:
     place = message.pose.position
     position = np.array([place.x, place.y, place.z])
     covariance = np.array(message.pose_covariance).reshape(6, 6)[:3, :3]
-    if not np.isfinite(position).all() or not np.isfinite(covariance).all():
-        return None
-    if np.linalg.eigvalsh((covariance + covariance.T) / 2.0)[0] <= 0.0:
-        return None
-    return FusedPosition(position, covariance, 1)
+    return FusedPosition(position, covariance, 1) if is_measured(position, covariance) else None
 
 
 def poses_to_ros(header: Header, sightings: Iterable[Sighting]) -> PoseArray:

@@ -43,6 +43,8 @@ def test_views_from_two_sides_are_surer_than_each() -> None:
         ([0.0, 0.0, np.nan], LONG_SIGHT, 0.0),
         ([0.0, 0.0, 3.0], np.full((3, 3), np.inf), 0.0),
         ([0.0, 0.0, 3.0], LONG_SIGHT, 0.99),
+        ([0.0, 0.0, 3.0], -np.eye(3), 0.0),
+        ([0.0, 0.0, 3.0], -4e-4 * np.eye(3), 0.0),
     ],
 )
 def test_views_that_say_nothing_do_not_count(

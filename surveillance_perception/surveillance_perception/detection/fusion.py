@@ -42,6 +42,13 @@ class FusedPosition(NamedTuple):
         return float(np.sqrt(apart @ np.linalg.solve(self.covariance, apart)))
 
 
+def is_measured(position: Array, covariance: Array) -> bool:
+    """Return whether a position (3,) and its covariance (3, 3) are such as a measurement gives."""
+    if not np.isfinite(position).all() or not np.isfinite(covariance).all():
+        return False
+    return bool(np.linalg.eigvalsh((covariance + covariance.T) / 2.0)[0] > 0.0)
+
+
 @dataclass
 class _Sum:
     information: Array
@@ -75,13 +82,12 @@ class FusedPositions:
         Returns:
             Whether it counts: it is a finite view, not too ambiguous, of where the marker was.
         """
-        if ambiguity > _MOST_AMBIGUOUS:
-            return False
-        if not np.isfinite(position).all() or not np.isfinite(covariance).all():
+        # the arm and its base are not exact either
+        covariance = covariance + np.eye(3) * _CARRIER_DEVIATION**2
+        if ambiguity > _MOST_AMBIGUOUS or not is_measured(position, covariance):
             return False
         turn = camera[:3, :3]
-        # the arm and its base are not exact either
-        seen = turn @ covariance @ turn.T + np.eye(3) * _CARRIER_DEVIATION**2
+        seen = turn @ covariance @ turn.T
         place = turn @ position + camera[:3, 3]
         fused = self.position_of(marker_id)
         if fused is not None:
