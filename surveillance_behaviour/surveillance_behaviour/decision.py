@@ -18,6 +18,7 @@ from dataclasses import dataclass, replace
 from surveillance_behaviour.policy.battery_reserve import Battery, BatteryLimits, reserve
 from surveillance_behaviour.policy.policies import DEFAULT_POLICY, POLICIES, Scores, make_policy
 from surveillance_behaviour.policy.world import Decision, World
+from surveillance_ontology.patrol_ontology import LONGEST_THRESHOLD
 from surveillance_runtime import parameter_checks
 from surveillance_runtime.parameters import converted, parameter, parameters
 from surveillance_runtime.suggestions import nearest
@@ -110,7 +111,7 @@ class DecisionSettings:
         choices=tuple(POLICIES),
     )
     urgency_threshold: float = parameter(
-        7, 'Seconds without a visit after which a place is URGENT.', 0, 10**9
+        7, 'Seconds without a visit after which a place is URGENT.', 0, LONGEST_THRESHOLD
     )
     recharge_rooms: tuple[str, ...] = parameter(
         ('E',), 'Places with a charging station.', of=str, check=parameter_checks.not_empty

@@ -16,7 +16,12 @@ from surveillance_ontology.armor.client import (
     ArmorServiceInternalError,
 )
 from surveillance_ontology.map_building import RoomNote, extended
-from surveillance_ontology.patrol_ontology import NEVER, PatrolOntology, checked_names, is_gone
+from surveillance_ontology.patrol_ontology import (
+    PatrolOntology,
+    checked_names,
+    is_gone,
+    never_visited,
+)
 from surveillance_runtime.files import KeptFile
 from surveillance_runtime.parameters import parameter
 from surveillance_runtime.place import (
@@ -192,7 +197,9 @@ class MapKeeper:
         return built
 
     def _first_visit(self) -> int:
-        return NEVER if self._source.urgent_at_start or self._began is None else self._began
+        if self._source.urgent_at_start or self._began is None:
+            return never_visited(self._now())
+        return self._began
 
     def end_contradiction(self) -> None:
         """Build an ontology that contradicts itself anew from what is known.

@@ -39,7 +39,9 @@ from surveillance_runtime.place import Place, PlaceError
 ROBOT = 'Robot1'
 """The robot's name where nobody gives another one."""
 NEVER = 0
-"""The time of visit of a place that nobody has visited yet, seconds."""
+"""The time of visit of a place that nobody has visited yet, seconds, or any time before."""
+LONGEST_THRESHOLD = 10**9
+"""The longest time without a visit after which a place may become URGENT, seconds."""
 PLACES = 'LOCATION(?)'
 """The places, as a pattern of facts for a query or a subscription."""
 URGENT_PLACES = 'URGENT(?)'
@@ -490,7 +492,7 @@ class PatrolOntology:
                 place: frozenset(name for name in classes if place in found.members[name])
                 for place in found.connections
             },
-            visited_at={place: float(at) for place, at in found.visited.items() if at != NEVER},
+            visited_at={place: float(at) for place, at in found.visited.items() if at > NEVER},
             connections=found.connections,
         )
 
@@ -592,6 +594,18 @@ def is_gone(error: ArmorServiceInternalError) -> bool:
 
 def _names(answer: DirectiveResponse) -> tuple[str, ...]:
     return tuple(sorted(name_in(text) for text in answer.queried_objects))
+
+
+def never_visited(now: int) -> int:
+    """Return a time of visit that stands for none, so that the place is URGENT from the start.
+
+    By the machine's clock that is `NEVER`. A simulated clock may begin at 0, where even `NEVER` is
+    no longer ago than any threshold.
+
+    Args:
+        now: The present time, seconds.
+    """
+    return min(NEVER, now - LONGEST_THRESHOLD - 1)
 
 
 def _time(what: str, answer: DirectiveResponse) -> int:

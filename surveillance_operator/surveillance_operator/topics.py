@@ -225,7 +225,8 @@ def with_fact(snapshot: Snapshot, fact: ShortFact, came: bool) -> Snapshot:
         pair = frozenset({(fact.arguments[0], fact.arguments[1])})
         return replace(snapshot, links=snapshot.links | pair if came else snapshot.links - pair)
     if _VISITED.matches(fact):
-        name, seconds = fact.arguments[0], float(value_in(fact.arguments[1]))
+        # A time of 0 or before stands for never.
+        name, seconds = fact.arguments[0], max(0.0, float(value_in(fact.arguments[1])))
         if came:
             return replace(snapshot, visited_at={**snapshot.visited_at, name: seconds})
         if snapshot.visited_at.get(name) == seconds:

@@ -130,6 +130,18 @@ def test_places_that_nobody_visited_are_urgent_at_the_start_or_not(
     assert armor.query.ind_b2_class('URGENT') == (sorted(SEVEN_ROOMS) if urgent_at_start else [])
 
 
+def test_places_that_nobody_visited_are_urgent_where_simulated_time_begins(
+    graph: Any, call: Caller, armor: ArmorClient
+) -> None:
+    graph.add(ArmorServer)
+    graph.add(OntologyMapBuilder, {**PLACE, 'use_sim_time': True})
+    assert call('reference_name').name == 'surveillance'
+    assert armor.query.ind_b2_class('URGENT') == sorted(SEVEN_ROOMS)
+    ontology = PatrolOntology(armor)
+    ontology.record_place('E', 1)
+    assert ontology.snapshot(0.0, ['URGENT']).visited_at == {}
+
+
 def test_a_server_that_comes_back_empty_gets_the_map_again(
     graph: Any, call: Caller, armor: ArmorClient, built: OntologyMapBuilder
 ) -> None:
