@@ -714,7 +714,7 @@ def legs_of(record: Path) -> list[Leg]:
         kinds = [each['event'] for each in (decision, visit, after)]
         if kinds != ['decision', 'visit', 'decision'] or visit['place'] != decision['place']:
             continue
-        promised = re.search(r'no place longer than ([0-9.]+) s', after['reason'])
+        promised = re.search(r'longest wait on this round is ([0-9.]+) s', after['reason'])
         legs.append(
             Leg(
                 at,
