@@ -163,8 +163,8 @@ class CellDifferences:
 
     def _correlation(self, seen: Patches, room: Patches) -> Patches:
         """Return correlations (m, codes) of differences (m, n) that show in so much room."""
-        seen = seen / np.maximum(np.linalg.norm(seen, axis=1, keepdims=True), 1e-6)
-        correlation = ((seen * room) @ self._inside.T) @ self._inner.T
+        size = np.maximum(np.linalg.norm(seen, axis=1, keepdims=True), 1e-6)
+        correlation = ((seen / size * room) @ self._inside.T) @ self._inner.T
         short = np.flatnonzero(room.min(axis=1) < 1.0)
         if len(short):
             share = np.square(room[short]) @ self._shares.T
