@@ -125,7 +125,7 @@ def test_the_time_asked_for_is_the_querys_own(monkeypatch: pytest.MonkeyPatch) -
     engine = SparqlEngine()
     try:
         rows = engine.select(Version(0, True, 0), update, QUERY, 20.0, 1000.0, 10)
-        assert [[bound.value for bound in row] for row in rows] == [['urn:c']]
+        assert [[item.value for item in row] for row in rows] == [['urn:c']]
         with pytest.raises(TimeoutError):
             engine.select(Version(0, True, 1), update, QUERY, 20.0, 50.0, 10)
     finally:

@@ -1,4 +1,4 @@
-"""SPARQL SELECT with a time limit that holds: queries run in processes that can be killed.
+"""SPARQL SELECT with a time limit that holds: queries run in processes that end at their time.
 
 The engine is Oxigraph (https://pyoxigraph.readthedocs.io), the fastest of those that were tried; a
 query in it cannot be interrupted, hence the processes. A process keeps its graph: further queries
@@ -9,18 +9,15 @@ from __future__ import annotations
 
 import contextlib
 import json
-import os
-import select
 import signal
 import subprocess
 import sys
 import threading
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, TypeAlias
 
-from surveillance_ontology.armor.protocol import DirectiveError
+from surveillance_ontology.armor.protocol import DirectiveError, QueryItem
 from surveillance_ontology.memory import uncollected
 
 if TYPE_CHECKING:
@@ -29,8 +26,6 @@ if TYPE_CHECKING:
 
 MEMORY = 2 * 1024**3
 """Bytes that a query's process may use."""
-GRACE = 1.0
-"""Seconds that a process outlives its time limit when nobody kills it."""
 OUT_OF_MEMORY = 3
 """Exit code of a process that needed more memory."""
 IDLE = 2
@@ -38,23 +33,6 @@ IDLE = 2
 
 Update: TypeAlias = 'Callable[[Version | None], GraphUpdate | None]'
 """Gives what brings a process with a graph of a version, or none, up to date; None: it is."""
-
-
-@dataclass(frozen=True)
-class Binding:
-    """A variable's value in one row.
-
-    Attributes:
-        variable: Without the question mark.
-        value: An IRI, a blank node's label, or a literal's lexical form.
-        datatype: A literal's datatype; empty for anything else.
-        language: A literal's language tag, or empty.
-    """
-
-    variable: str
-    value: str
-    datatype: str
-    language: str
 
 
 class SparqlEngine:
@@ -74,7 +52,7 @@ class SparqlEngine:
         seconds: float,
         limit: float,
         rows: int,
-    ) -> list[list[Binding]]:
+    ) -> list[list[QueryItem]]:
         """Run a query.
 
         Args:
@@ -84,6 +62,10 @@ class SparqlEngine:
             seconds: Time limit of the query itself.
             limit: Time limit of all, starting a process and the transfer of the graph included.
             rows: Most rows.
+
+        Returns:
+            The variables that each row binds, and their values: IRIs, labels of blank nodes,
+            ``lexical^^datatype`` or ``text@language``; of a plain text the text alone.
 
         Raises:
             TimeoutError: Stopped at the time limit.
@@ -112,7 +94,7 @@ class SparqlEngine:
             other.kill()
         if 'error' in answer:
             raise DirectiveError(f'QUERY SPARQL: {" ".join(str(answer["error"]).split())}')
-        return [[Binding(*bound) for bound in row] for row in answer['rows']]
+        return [[QueryItem(*bound) for bound in row] for row in answer['rows']]
 
     def is_busy(self) -> bool:
         """Tell whether a query runs."""
@@ -166,13 +148,7 @@ class _Worker:
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
-            bufsize=0,
         )
-        assert self._process.stdin is not None
-        assert self._process.stdout is not None
-        self._in = self._process.stdin.fileno()
-        self._out = self._process.stdout.fileno()
-        os.set_blocking(self._in, False)
 
     def prepare(self, update: Update, deadline: float) -> None:
         """Have the process hold the graph as it is now."""
@@ -192,56 +168,41 @@ class _Worker:
 
     def ask(self, query: str, deadline: float, rows: int) -> Any:
         """Return the process's answer to a query on the graph that it holds."""
-        seconds = max(deadline - time.monotonic(), 0.0) + GRACE
-        return self._exchange({'query': query, 'rows': rows, 'seconds': seconds}, deadline)
+        return self._exchange({'query': query, 'rows': rows}, deadline)
 
     def _exchange(self, request: dict[str, Any], deadline: float, payload: bytes = b'') -> Any:
-        self._send(json.dumps(request).encode() + b'\n' + payload, deadline)
-        return json.loads(self._receive(deadline))
+        """Return the answer to a request; the process ends itself when its time is over."""
+        seconds = deadline - time.monotonic()
+        if seconds <= 0:
+            raise TimeoutError('the query ran into its time limit')
+        assert self._process.stdin is not None
+        assert self._process.stdout is not None
+        answer = b''
+        with contextlib.suppress(BrokenPipeError):
+            line = json.dumps({**request, 'seconds': seconds}).encode() + b'\n'
+            self._process.stdin.write(line + payload)
+            self._process.stdin.flush()
+            answer = self._process.stdout.readline()
+        if answer.endswith(b'\n'):
+            return json.loads(answer)
+        code = self._process.wait()
+        if code == -signal.SIGALRM:
+            raise TimeoutError('the query ran into its time limit')
+        raise DirectiveError(f'QUERY SPARQL: {_why_ended(code)}')
 
     def interrupt(self) -> None:
         """End the process; whoever waits for it finds out."""
         self._process.kill()
 
     def kill(self) -> None:
-        """End the process at once."""
+        """End the process, which nobody waits for."""
         self._process.kill()
-        self._process.wait()
-        for pipe in (self._process.stdin, self._process.stdout):
-            with contextlib.suppress(OSError):
-                if pipe is not None:
-                    pipe.close()
+        self._process.communicate()
 
-    def _send(self, data: bytes, deadline: float) -> None:
-        view = memoryview(data)
-        while view:
-            self._await(deadline, writing=True)
-            try:
-                view = view[os.write(self._in, view) :]
-            except BrokenPipeError:
-                raise DirectiveError(f'QUERY SPARQL: {self._why_ended()}') from None
 
-    def _receive(self, deadline: float) -> bytes:
-        parts: list[bytes] = []
-        while not parts or not parts[-1].endswith(b'\n'):
-            self._await(deadline, writing=False)
-            part = os.read(self._out, 1 << 20)
-            if not part:
-                raise DirectiveError(f'QUERY SPARQL: {self._why_ended()}')
-            parts.append(part)
-        return b''.join(parts)
-
-    def _why_ended(self) -> str:
-        code = self._process.wait()
-        if code > 0 and code != OUT_OF_MEMORY:
-            return 'the query process could not start; pyoxigraph is needed'
-        if code == -signal.SIGSEGV:
-            return 'the query nests too deeply'  # Oxigraph's stack ended.
-        return 'the query needs too much memory'
-
-    def _await(self, deadline: float, *, writing: bool) -> None:
-        remaining = deadline - time.monotonic()
-        descriptor = self._in if writing else self._out
-        reading, to_write = ([], [descriptor]) if writing else ([descriptor], [])
-        if remaining <= 0 or not any(select.select(reading, to_write, [], remaining)):
-            raise TimeoutError('the query ran into its time limit')
+def _why_ended(code: int) -> str:
+    if code > 0 and code != OUT_OF_MEMORY:
+        return 'the query process could not start; pyoxigraph is needed'
+    if code == -signal.SIGSEGV:
+        return 'the query nests too deeply'  # Oxigraph's stack ended.
+    return 'the query needs too much memory'

@@ -1,8 +1,8 @@
-"""The process that runs SPARQL queries, so that one that takes too long can be killed.
+"""The process that runs SPARQL queries, so that one that takes too long ends with it.
 
 It reads requests from standard input and writes answers to standard output, each a line of JSON. A
 request is a query, or has a graph, or triples that go and come in the graph that is there: they
-follow it as N-Triples.
+follow it as N-Triples. Each has the seconds after which the kernel ends this process.
 
 Oxigraph keeps numbers and times by value and forgets how they were written: ``"7"^^xsd:long`` comes
 back as ``"7"^^xsd:integer``. Answers have to show what was asserted. Where a value is written in
@@ -45,6 +45,7 @@ def serve(requests: BinaryIO, answers: BinaryIO) -> None:
     store, forms = pyoxigraph.Store(), WrittenForms()
     for line in requests:
         request = json.loads(line)
+        signal.setitimer(signal.ITIMER_REAL, request['seconds'])
         if 'whole' in request:
             if request['whole']:
                 store, forms = pyoxigraph.Store(), WrittenForms()
@@ -59,10 +60,8 @@ def serve(requests: BinaryIO, answers: BinaryIO) -> None:
             except SyntaxError as error:
                 answer = {'error': f'the ontology is no graph: {str(error)[:MOST_SHOWN]}'}
         else:
-            # The kernel ends this process if the one that asked is not there to do it.
-            signal.setitimer(signal.ITIMER_REAL, request['seconds'])
             answer = _answer(store, forms, request['query'], request['rows'])
-            signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.setitimer(signal.ITIMER_REAL, 0)
         answers.write(json.dumps(answer).encode() + b'\n')
         answers.flush()
 
@@ -75,7 +74,7 @@ def _quads(triples: bytes) -> list[Any]:
 def _rewritten(triples: bytes) -> list[Any]:
     """Return the quads whose values a store may give back in another form."""
     lines = triples.splitlines(keepends=True)
-    return _quads(b''.join(line for line in lines if _VALUE in line and not line.endswith(_TEXT)))
+    return _quads(b''.join(line for line in lines if _VALUE in line and not line.endswith(_PLAIN)))
 
 
 def _answer(store: pyoxigraph.Store, forms: WrittenForms, query: str, most: int) -> dict[str, Any]:
@@ -90,13 +89,13 @@ def _answer(store: pyoxigraph.Store, forms: WrittenForms, query: str, most: int)
             return {'error': 'expected a SELECT query'}
         names = [variable.value for variable in found.variables]
         reader = forms.reader(query)
-        rows: list[list[list[str]]] = []
+        rows: list[list[tuple[str, str]]] = []
         for solution in found:
             if len(rows) == most:
                 return {'error': f'more than {most} rows'}
             bound = zip(names, solution, strict=True)
             row = {name: term for name, term in bound if term is not None}
-            rows.append([[name, *_term(reader.written(name, row))] for name in row])
+            rows.append([(name, _text(reader.written(name, row))) for name in row])
             characters += sum(len(text) for bound in rows[-1] for text in bound)
             if characters > MOST_CHARACTERS:
                 return {'error': f'more than {MOST_CHARACTERS} characters'}
@@ -107,19 +106,20 @@ def _answer(store: pyoxigraph.Store, forms: WrittenForms, query: str, most: int)
     return {'rows': rows}
 
 
-def _term(term: Any) -> tuple[str, str, str]:
+def _text(term: Any) -> str:
     if isinstance(term, pyoxigraph.Literal):
-        return term.value, term.datatype.value, term.language or ''
+        if term.language:
+            return f'{term.value}@{term.language}'
+        datatype = term.datatype.value
+        return term.value if datatype == _XSD + 'string' else f'{term.value}^^{datatype}'
     if isinstance(term, pyoxigraph.BlankNode):
-        return f'_:{term.value}', '', ''
-    if isinstance(term, pyoxigraph.NamedNode):
-        return term.value, '', ''
-    return str(term), '', ''
+        return f'_:{term.value}'
+    return term.value if isinstance(term, pyoxigraph.NamedNode) else str(term)
 
 
 _XSD = 'http://www.w3.org/2001/XMLSchema#'
 _VALUE = f'"^^<{_XSD}'.encode()
-_TEXT = f'"^^<{_XSD}string> .\n'.encode()
+_PLAIN = f'"^^<{_XSD}string> .\n'.encode()
 _INTEGER = pyoxigraph.NamedNode(_XSD + 'integer')
 _WHOLE = {_XSD + name for name in ('integer', 'long', 'int', 'short', 'byte')}
 """Datatypes whose values are all kept as integers, where they are written as those are."""

@@ -8,7 +8,6 @@ from surveillance_ontology.armor.directives import (  # noqa: F401 - the modules
     manipulations,
     queries,
     references,
-    sparql,
 )
 from surveillance_ontology.armor.directives.table import TABLE, Directive, Kind, look_up
 
