@@ -21,9 +21,9 @@ from surveillance_fsm.ros.waiting import reported
 from surveillance_interfaces.msg import ArmorDirectiveRes, FactChanges
 from surveillance_interfaces.srv import ArmorDirective, ArmorDirectiveList
 from surveillance_ontology.armor.access import Settings, state_folder
+from surveillance_ontology.armor.changes import ChangeFeed, NumberedChange
 from surveillance_ontology.armor.protocol import DirectiveRequest
 from surveillance_ontology.armor.service import ArmorService
-from surveillance_ontology.armor.session import ChangeFeed, NumberedChange
 from surveillance_ontology.armor.store import Store
 from surveillance_ontology.armor.turns import Backlog, Turns
 from surveillance_ontology.armor_client import CHANGES_TOPIC
@@ -62,7 +62,8 @@ class ArmorServer(PatrolNode):
     def __init__(self, *, keep: bool = False, **node_options: Any) -> None:
         super().__init__('armor_server', **node_options)
         self._service = _service(self, keep)
-        self._feed = ChangeFeed(self._service.session, self._soon)
+        self._feed = ChangeFeed(self._soon)
+        self._service.watch(self._feed.note)
         self._subscribers = 0
         self._untold: list[NumberedChange] = []
         self._publisher = self.create_publisher(
@@ -95,7 +96,7 @@ class ArmorServer(PatrolNode):
         """End the workers and queries that run."""
         for threads in self._pools:
             threads.stop()
-        self._service.session.sparql.close()
+        self._service.sparql.close()
 
     def destroy_node(self) -> None:
         """Close the store as well: nothing is answered any more."""

@@ -21,7 +21,7 @@ from surveillance_ontology.map_building import RoomNote
 from surveillance_runtime.conversions import point_from
 
 if TYPE_CHECKING:
-    from surveillance_ontology.armor.session import NumberedChange  # A client needs none of it.
+    from surveillance_ontology.armor.changes import NumberedChange  # A client needs none of it.
 
 
 def request_from_ros(msg: ArmorDirectiveReq) -> DirectiveRequest:

@@ -8,10 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from surveillance_interfaces.msg import ArmorDirectiveRes
+from surveillance_ontology.armor.changes import LARGE, ChangeFeed
 from surveillance_ontology.armor.client import ArmorClient, InProcessTransport
 from surveillance_ontology.armor.facts import FactSet, ShortFact, parse_fact
 from surveillance_ontology.armor.service import ArmorService
-from surveillance_ontology.armor.session import LARGE, ChangeFeed
 from surveillance_ontology.armor.store import decode, encode
 from surveillance_ontology.conversions import (
     changes_from_ros,
@@ -29,7 +29,8 @@ def test_changes_are_numbered_and_say_what_is_derived(
     service: ArmorService, client: ArmorClient
 ) -> None:
     announced: list[int] = []
-    feed = ChangeFeed(service.session, lambda: announced.append(1))
+    feed = ChangeFeed(lambda: announced.append(1))
+    service.watch(feed.note)
     build_seven_rooms(client, False, True)
     loaded, *changes = feed.take()
     assert (loaded.reference_name, loaded.sequence) == ('map', 0)
@@ -54,7 +55,8 @@ def test_a_change_too_large_for_a_message_leaves_a_gap(
     service: ArmorService, client: ArmorClient
 ) -> None:
     client.utils.load_ref_from_file(ONTOLOGY, IRI, True)
-    feed = ChangeFeed(service.session, lambda: None)
+    feed = ChangeFeed(lambda: None)
+    service.watch(feed.note)
     for number in range(LARGE + 1):
         client.manipulation.add_ind_to_class(f'X{number}', 'THING')
     client.utils.apply_buffered_changes()
@@ -166,7 +168,8 @@ def test_followed_facts_are_those_that_the_server_has(
     service = ArmorService(warn=lambda _: None)
     client = ArmorClient('test', 'map', InProcessTransport(service))
     build_seven_rooms(client, False, True)
-    feed = ChangeFeed(service.session, lambda: None)
+    feed = ChangeFeed(lambda: None)
+    service.watch(feed.note)
     sets = [FactSet(pattern) for pattern in PATTERNS]
     for facts in sets:
         facts.follow(0, [])

@@ -242,6 +242,6 @@ def test_a_client_imports_no_reasoner_and_no_documents() -> None:
     run = subprocess.run([sys.executable, '-c', script], capture_output=True, text=True, check=True)
     loaded = run.stdout.split()
     assert 'surveillance_ontology.armor_client' in loaded
-    for needless in ('reasoner', 'documents', 'owl.axioms', 'knowledge_base', 'armor.session'):
+    for needless in ('reasoner', 'documents', 'owl.axioms', 'knowledge_base', 'armor.service'):
         prefix = f'surveillance_ontology.{needless}'
         assert not [name for name in loaded if name.startswith(prefix)]

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from surveillance_ontology.armor.access import DATA, Settings
+from surveillance_ontology.armor.changes import ChangeFeed
 from surveillance_ontology.armor.service import ArmorService
-from surveillance_ontology.armor.session import ChangeFeed
 from surveillance_ontology.armor.store import Store
 from surveillance_ontology.knowledge_base import KnowledgeBase
 from surveillance_ontology.owl.axioms import ClassAssertion, Rule, SubClassOf
@@ -76,7 +76,8 @@ def test_a_reference_reasons_with_hermit(tmp_path: Path) -> None:
         return ArmorService(limits, store=Store(tmp_path / 'store'))
 
     service = start()
-    feed = ChangeFeed(service.session, lambda: None)
+    feed = ChangeFeed(lambda: None)
+    service.watch(feed.note)
     ask = asker(service)
     ask('LOAD FILE', 'u.owl', IRI, 'false', 'hermit', 'true')
     ask('ADD IND CLASS', 'x', 'A')

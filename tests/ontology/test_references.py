@@ -212,13 +212,13 @@ def test_a_list_that_saves_waits_for_no_save_that_waits_for_it(
     assert asker(service)('LOAD FILE', ONTOLOGY, IRI, 'false', 'PELLET', 'false').success
     request = DirectiveRequest('me', 'map', 'SAVE', args=('map.owl',))
     waiting, answers = threading.Semaphore(0), queue.SimpleQueue[Any]()
-    saving = service.session.saving
+    saving = service.saving
 
     def told(path: Path) -> threading.Lock:
         waiting.release()
         return saving(path)
 
-    monkeypatch.setattr(service.session, 'saving', told)
+    monkeypatch.setattr(service, 'saving', told)
 
     def save(execute: Callable[[Any], Any], argument: Any) -> None:
         answers.put(execute(argument))

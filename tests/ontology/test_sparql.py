@@ -240,9 +240,9 @@ def test_a_service_that_closes_stops_its_queries(service: ArmorService, built: A
         target=lambda: answers.append(asker(service)('QUERY SPARQL', ENDLESS).error_description)
     )
     thread.start()
-    while not service.session.sparql.is_busy():
+    while not service.sparql.is_busy():
         thread.join(0.01)
-    service.session.sparql.close()
+    service.sparql.close()
     thread.join(60.0)
     assert answers == ['QUERY SPARQL: the server stops']
     assert not asker(service)('QUERY SPARQL', 'SELECT * { ?a ?b ?c }').success
@@ -296,7 +296,7 @@ def test_a_graph_that_is_kept_up_to_date_is_the_one_that_a_new_process_gets(
             ]
         )()
         kept = graph_of(client)
-        service.session.graphs.note('map', None)
+        service.graphs.note('map', None)
         assert kept == graph_of(client), step
     assert wholes.count(False) > 20, 'most changes were told as a difference'
     service.close()

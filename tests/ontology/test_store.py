@@ -303,7 +303,7 @@ def test_a_journal_that_somebody_cut_costs_nothing_that_is_known(tmp_path: Path,
 
 def test_what_was_cut_from_the_journal_is_in_a_snapshot(server: Server) -> None:
     server.ask('ADD IND CLASS', 'A', 'DOOR')
-    store = server.service.session.store
+    store = server.service.store
     assert store is not None
     os.truncate(store.directory / 'journal-0.log', 0)
     server.ask('ADD IND CLASS', 'B', 'DOOR')

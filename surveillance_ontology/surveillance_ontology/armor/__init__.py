@@ -8,9 +8,9 @@
 stand outside: `surveillance_ontology.armor_server_node`, `surveillance_ontology.armor_client`.
 
 Modules, from the bottom: `protocol` (requests, answers), `rendering` and `facts` (texts),
-`reference` (a loaded ontology), `store` (what outlives the process), `access` (limits and files),
-`session` (all of these together), `directives` (what each directive does), `service` (dispatch and
-locks) and `client`.
+`changes` (of an ontology), `reference` (a loaded ontology), `store` (what outlives the process),
+`access` (limits and files), `directives` (what each directive does), `service` (all of these
+together, dispatch and locks) and `client`.
 """
 
 from __future__ import annotations

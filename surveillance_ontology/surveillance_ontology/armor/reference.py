@@ -1,7 +1,4 @@
-"""Loaded ontologies under their reference names: changes, buffers, who is mounted, locks.
-
-A change is a value: it waits in a buffer, is applied, and goes into the journal.
-"""
+"""Loaded ontologies under their reference names: buffers, who is mounted, locks."""
 
 from __future__ import annotations
 
@@ -12,16 +9,19 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from surveillance_ontology.armor.history import History
+from surveillance_ontology.armor.changes import (
+    Change,
+    History,
+    RemoveAxiom,
+    RemoveEntity,
+    RenameEntity,
+    apply_all,
+)
 from surveillance_ontology.armor.protocol import DirectiveError
 from surveillance_ontology.armor.rendering import render_entity, shown
 from surveillance_ontology.knowledge_base import KnowledgeBase
 from surveillance_ontology.owl.axiom_text import axiom_text
-from surveillance_ontology.owl.axioms import (
-    Axiom,
-    DataPropertyAssertion,
-    ObjectPropertyAssertion,
-)
+from surveillance_ontology.owl.axioms import Axiom
 from surveillance_ontology.reasoner.java_reasoning import JavaKnowledgeBase
 
 LONG_BACKLOG = 500
@@ -42,81 +42,6 @@ NATIVE = ('', 'PELLET', 'NATIVE')
 """Names of the reasoner of this package; PELLET is what ARMOR's clients send."""
 JAVA = {'HERMIT': 'hermit', 'OPENLLET': 'pellet', 'PELLET_JAVA': 'pellet'}
 """Names of the Java reasoners, see `java_reasoning`."""
-
-
-@dataclass(frozen=True, slots=True)
-class AddAxiom:
-    """Assert an axiom; nothing happens when it is asserted already."""
-
-    axiom: Axiom
-
-
-@dataclass(frozen=True, slots=True)
-class RemoveAxiom:
-    """Retract an axiom; nothing happens when it is not asserted."""
-
-    axiom: Axiom
-
-
-@dataclass(frozen=True, slots=True)
-class SetAssertion:
-    """Assert a value as the only one that the individual has for the property."""
-
-    axiom: ObjectPropertyAssertion | DataPropertyAssertion
-
-    def others(self, kb: KnowledgeBase) -> list[Axiom]:
-        """Return the assertions of other values."""
-        axiom = self.axiom
-        found = kb.axioms_about(axiom.subject)
-        return [
-            other
-            for other in found
-            if type(other) is type(axiom)
-            and (other.prop, other.subject) == (axiom.prop, axiom.subject)
-            and other != axiom
-        ]
-
-
-@dataclass(frozen=True, slots=True)
-class RenameEntity:
-    """Give an entity another IRI everywhere; merges with an entity that has it already."""
-
-    kind: str
-    old: str
-    new: str
-
-
-@dataclass(frozen=True, slots=True)
-class RemoveEntity:
-    """Retract whatever is asserted of an entity."""
-
-    kind: str
-    iri: str
-
-
-Change = AddAxiom | RemoveAxiom | SetAssertion | RenameEntity | RemoveEntity
-
-
-def apply_all(kb: KnowledgeBase, changes: Iterable[Change]) -> None:
-    """Carry out changes in order; retractions and the assertions behind them are one batch."""
-    removed: list[Axiom] = []
-    added: list[Axiom] = []
-    for change in changes:
-        if isinstance(change, AddAxiom):
-            added.append(change.axiom)
-            continue
-        if added or not isinstance(change, RemoveAxiom):
-            kb.change(added, removed)
-            added, removed = [], []
-        if isinstance(change, RemoveAxiom):
-            removed.append(change.axiom)
-        elif isinstance(change, SetAssertion):
-            added, removed = [change.axiom], change.others(kb)
-        elif isinstance(change, RenameEntity):
-            kb.rename(change.kind, change.old, change.new)
-        else:
-            kb.remove_entity(change.kind, change.iri)
-    kb.change(added, removed)
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,12 +11,16 @@ Nothing that a client sends makes it raise.
 from __future__ import annotations
 
 import contextlib
+import threading
 import time
 from collections.abc import Callable, Sequence
-from typing import Any
+from pathlib import Path
+from typing import Any, TypeAlias
 
 from surveillance_ontology import memory
-from surveillance_ontology.armor.access import Settings
+from surveillance_ontology.armor.access import SafePaths, Settings
+from surveillance_ontology.armor.changes import Change
+from surveillance_ontology.armor.directive_log import DirectiveLog
 from surveillance_ontology.armor.directives import Directive, Kind, look_up
 from surveillance_ontology.armor.protocol import (
     DirectiveError,
@@ -25,10 +29,12 @@ from surveillance_ontology.armor.protocol import (
     ExitCode,
     ListResponse,
 )
-from surveillance_ontology.armor.reference import Change, Reference, Registry
+from surveillance_ontology.armor.reference import Reference, Registry
 from surveillance_ontology.armor.rendering import one_line, shown
-from surveillance_ontology.armor.session import Session
+from surveillance_ontology.armor.sparql_engine import SparqlEngine
+from surveillance_ontology.armor.sparql_graph import GraphChanges
 from surveillance_ontology.armor.store import Store
+from surveillance_ontology.knowledge_base import Changes
 from surveillance_ontology.reasoner.java_reasoning import JavaReasonerError
 from surveillance_runtime.files import FileError
 
@@ -37,9 +43,12 @@ LONG_ARGUMENTS = 1000
 LARGE = 1000
 """Axioms from which on a query that gathers from all of them is not quick."""
 
+Watcher: TypeAlias = Callable[[str, Changes | None], None]
+"""Told of a reference's name and what changed in it; None: it was loaded or dropped."""
+
 
 class ArmorService:
-    """Carries out directives.
+    """Carries out directives, and is what they act on.
 
     Args:
         settings: What is allowed.
@@ -50,6 +59,17 @@ class ArmorService:
 
     Raises:
         FileError: What is in the store cannot be read.
+
+    Attributes:
+        settings: What is allowed.
+        clock: Seconds since the epoch.
+        paths: Which files may be read and written.
+        log: The log of directives.
+        sparql: Runs SPARQL queries.
+        graphs: What changed in the graphs that they see.
+        references: What is loaded.
+        entering: Held while what was loaded gets its name.
+        store: Makes references durable; None: they end with the process.
     """
 
     def __init__(
@@ -60,22 +80,70 @@ class ArmorService:
         store: Store | None = None,
         clock: Callable[[], float] = time.time,
     ) -> None:
-        self._settings = settings or Settings()
-        self.session = Session(self._settings, screen, warn, store, clock)
-        self._store = store
+        self.settings = settings or Settings()
+        readable = (*self.settings.directories, *self.settings.read_only_directories)
+        self.paths = SafePaths(self.settings.writable, readable)
+        self.log = DirectiveLog(screen, self.settings.max_file_bytes)
+        self.sparql = SparqlEngine()
+        self.graphs = GraphChanges()
+        self.references = Registry()
+        self.entering = threading.Lock()
+        self.clock = clock
+        self.store = store
+        self._saving: dict[str, threading.Lock] = {}
+        self._warn = warn
+        self._watchers: list[Watcher] = [self.graphs.note]
         if store:
-            store.warn = self.session.warn
+            store.warn = self.warn
             with memory.uncollected():
-                for ref in store.recover(self._settings.history):
-                    self.session.register(ref)
+                for ref in store.recover(self.settings.history):
+                    self.register(ref)
                     memory.settle(len(ref.kb))
             for note in store.notes:
                 warn(note)
 
-    @property
-    def references(self) -> Registry:
-        """What is loaded."""
-        return self.session.references
+    def warn(self, text: str) -> None:
+        """Write a line for the operator."""
+        self._warn(one_line(text))
+
+    def watch(self, watcher: Watcher) -> None:
+        """Tell a watcher of every change of asserted and derived facts.
+
+        It is called inside the directive that caused the change and must be quick.
+        """
+        self._watchers.append(watcher)
+
+    def tell(self, name: str, changes: Changes | None) -> None:
+        """Tell the watchers of a change."""
+        for watcher in self._watchers:
+            watcher(name, changes)
+
+    def register(self, ref: Reference) -> None:
+        """Make a reference known under its name, and its changes to the watchers."""
+
+        def on_changes(changes: Changes) -> None:
+            ref.history.note(self.clock(), changes)
+            self.tell(ref.name, changes)
+
+        ref.kb.subscribe(on_changes)
+        self.references.add(ref)
+        self.tell(ref.name, None)
+
+    def saving(self, path: Path) -> threading.Lock:
+        """Return what is held from taking a state to its being in a file: the newest stays."""
+        return self._saving.setdefault(str(path), threading.Lock())
+
+    def check_free(self, ref: Reference, client: str) -> None:
+        """Check that no other client is mounted on a reference.
+
+        Raises:
+            DirectiveError: 102, there is one.
+        """
+        if self.settings.enforce_mount and not ref.is_free_for(client):
+            raise DirectiveError(
+                f'{client} cannot connect to {ref.name}. Another client is already mounted on it.',
+                ExitCode.REFERENCE_BUSY,
+            )
 
     def execute(self, request: DirectiveRequest) -> DirectiveResponse:
         """Carry out one directive; never raises for what a client sent."""
@@ -94,15 +162,15 @@ class ArmorService:
             response = _refusal(f'{request.words}: {error}; native derivations only')
         except Exception as error:
             problem = f'{request.words}: internal error, {type(error).__name__}: {error}'
-            self.session.warn(problem)
+            self.warn(problem)
             response = _refusal(problem)
         if not response.error_description.isprintable():
             response.error_description = one_line(response.error_description)
         ref = self.references.get(request.reference_name)
         if ref is not None:
             response.is_consistent = ref.kb.consistent
-        if self.session.log.enabled:
-            self.session.log.write(request, response, is_loaded=ref is not None)
+        if self.log.enabled:
+            self.log.write(request, response, is_loaded=ref is not None)
         return response
 
     def execute_at_once(self, request: DirectiveRequest) -> DirectiveResponse | None:
@@ -116,7 +184,7 @@ class ArmorService:
             directive = look_up(request)
         except DirectiveError:
             return self.execute(request)
-        writes = self._store is not None and directive.kind.may_reason
+        writes = self.store is not None and directive.kind.may_reason
         if writes or directive.slow or directive.schema or len(request.args) > LONG_ARGUMENTS:
             return None
         ref = self.references.get(request.reference_name)
@@ -137,13 +205,13 @@ class ArmorService:
 
         A failure does not end the batch: each directive has its own answer.
         """
-        if len(requests) > self._settings.max_batch:
-            problem = f'{len(requests)} directives in a list, at most {self._settings.max_batch}'
+        if len(requests) > self.settings.max_batch:
+            problem = f'{len(requests)} directives in a list, at most {self.settings.max_batch}'
             return ListResponse(False, False, [_refusal(problem)])
         names = {request.reference_name for request in requests}
         with self.references.held(names):
             try:
-                with self._store.batch() if self._store else contextlib.nullcontext():
+                with self.store.batch() if self.store else contextlib.nullcontext():
                     responses = [self.execute(request) for request in requests]
             except FileError as error:
                 problem = f'lost at the next start: {error}'
@@ -156,7 +224,10 @@ class ArmorService:
 
     def close(self) -> None:
         """End helper processes and close files."""
-        self.session.close()
+        self.sparql.close()
+        if self.store:
+            self.store.close()
+        self.log.close()
 
     def _execute(self, request: DirectiveRequest) -> DirectiveResponse:
         if not request.reference_name:
@@ -168,33 +239,31 @@ class ArmorService:
         if directive.kind is Kind.UTILITY:
             _check_name(request.reference_name)
             values = directive.read(request.args, '')
-            return _response(directive.run(self.session, request, *values))
+            return _response(directive.run(self, request, *values))
         ref = self.references.find(request.reference_name)
         if directive.slow:
-            return _response(
-                directive.run(self.session, ref, *self._values(directive, request, ref))
-            )
+            return _response(directive.run(self, ref, *self._values(directive, request, ref)))
         with ref.lock:
             if ref.dropped:
                 return self._execute(request)
             if directive.kind is Kind.QUERY:
                 return _response(directive.run(ref, *self._values(directive, request, ref)))
             remark = self._change(directive, request, ref)
-        if self._store:
-            self._store.compact_if_large(self.references.held_briefly)
+        if self.store:
+            self.store.compact_if_large(self.references.held_briefly)
         return DirectiveResponse(error_description=remark)
 
     def _change(self, directive: Directive, request: DirectiveRequest, ref: Reference) -> str:
         """Carry out a manipulation; return what a client should know of it."""
-        self.session.check_free(ref, request.client_name)
+        self.check_free(ref, request.client_name)
         if directive.kind is Kind.CONTROL:
-            if self._store and ref.queue:
-                self._store.flushed(ref.name, self.session.clock())
+            if self.store and ref.queue:
+                self.store.flushed(ref.name, self.clock())
             directive.run(ref)
             return ''
         changes: list[Change] = directive.run(ref, *self._values(directive, request, ref))
-        if self._store and changes:
-            self._store.changed(ref.name, changes, self.session.clock())
+        if self.store and changes:
+            self.store.changed(ref.name, changes, self.clock())
         ref.heavy |= directive.schema
         remark = ref.missing(changes)
         if not changes:
@@ -204,18 +273,16 @@ class ArmorService:
         return remark
 
     def _values(self, directive: Directive, request: DirectiveRequest, ref: Reference) -> list[Any]:
-        return directive.read(
-            request.args, ref.kb.iri, narrow_doubles=self._settings.narrow_doubles
-        )
+        return directive.read(request.args, ref.kb.iri, narrow_doubles=self.settings.narrow_doubles)
 
     def _check_size(self, request: DirectiveRequest) -> None:
         args = request.args
-        if len(args) > self._settings.max_arguments:
-            raise DirectiveError(f'{len(args)} arguments, at most {self._settings.max_arguments}')
+        if len(args) > self.settings.max_arguments:
+            raise DirectiveError(f'{len(args)} arguments, at most {self.settings.max_arguments}')
         characters = sum(map(len, args))
-        if characters > self._settings.max_characters:
+        if characters > self.settings.max_characters:
             raise DirectiveError(
-                f'{characters} characters of arguments, at most {self._settings.max_characters}'
+                f'{characters} characters of arguments, at most {self.settings.max_characters}'
             )
 
 

@@ -29,14 +29,8 @@ from dataclasses import fields, is_dataclass
 from pathlib import Path
 from typing import Any, get_args
 
-from surveillance_ontology.armor.history import History, PastChange
-from surveillance_ontology.armor.reference import (
-    Change,
-    Origin,
-    Reference,
-    apply_all,
-    knowledge_base,
-)
+from surveillance_ontology.armor.changes import Change, History, PastChange, apply_all
+from surveillance_ontology.armor.reference import Origin, Reference, knowledge_base
 from surveillance_ontology.owl import axioms, expressions
 from surveillance_ontology.owl.axioms import Axiom
 from surveillance_ontology.owl.expressions import Literal

@@ -1,7 +1,7 @@
 """The directives: a table, and one module for each kind of directive that fills it.
 
 A directive is one decorated function. Manipulations and queries get the `Reference` that they
-mean, the others the `Session` as well; none of them knows the service that dispatches them.
+mean, the others the `ArmorService`.
 """
 
 from surveillance_ontology.armor.directives import (  # noqa: F401 - the modules fill the table

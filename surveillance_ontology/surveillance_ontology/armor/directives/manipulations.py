@@ -8,6 +8,14 @@ from __future__ import annotations
 
 from functools import partial
 
+from surveillance_ontology.armor.changes import (
+    AddAxiom,
+    Change,
+    RemoveAxiom,
+    RemoveEntity,
+    RenameEntity,
+    SetAssertion,
+)
 from surveillance_ontology.armor.directives.table import (
     CLS,
     DAT,
@@ -23,15 +31,7 @@ from surveillance_ontology.armor.directives.table import (
     Read,
     manipulation,
 )
-from surveillance_ontology.armor.reference import (
-    AddAxiom,
-    Change,
-    Reference,
-    RemoveAxiom,
-    RemoveEntity,
-    RenameEntity,
-    SetAssertion,
-)
+from surveillance_ontology.armor.reference import Reference
 from surveillance_ontology.owl.axioms import (
     ClassAssertion,
     DataPropertyAssertion,

@@ -11,7 +11,7 @@ import json
 import re
 from collections.abc import Callable, Iterable, Iterator
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from surveillance_ontology.armor.directives.table import (
     CLS,
@@ -41,7 +41,6 @@ from surveillance_ontology.armor.rendering import (
     shown,
 )
 from surveillance_ontology.armor.rendering import render_literal as _literal
-from surveillance_ontology.armor.session import Session
 from surveillance_ontology.armor.sparql_graph import GraphUpdate, Version
 from surveillance_ontology.knowledge_base import Fact, KnowledgeBase
 from surveillance_ontology.owl.axioms import (
@@ -65,6 +64,9 @@ from surveillance_ontology.owl.expressions import (
     PropertyExpression,
 )
 from surveillance_ontology.owl.vocabulary import NOTHING, OWL, THING, local_name
+
+if TYPE_CHECKING:
+    from surveillance_ontology.armor.service import ArmorService
 
 
 def _entities(iris: Iterable[str]) -> list[str]:
@@ -184,7 +186,7 @@ def _object_properties(ref: Reference, ind: str) -> DirectiveResponse:
     summary='Why a fact holds, written as `URGENT(R3)`, `connectedTo(R1, C1)` or '
     '`owl:sameAs(a, b)`: first an English sentence, then the derivation as a tree.',
 )
-def _explain(_: Session, ref: Reference, fact: str) -> DirectiveResponse:
+def _explain(_: ArmorService, ref: Reference, fact: str) -> DirectiveResponse:
     with ref.held() as kb:
         asked = _full_fact('QUERY EXPLAIN', ref, fact)
         explanation = kb.explain(asked)
@@ -226,7 +228,7 @@ def _explain_absence(ref: Reference, fact: str) -> DirectiveResponse:
     slow=True,
     summary='Why the ontology contradicts itself, in the form of QUERY EXPLAIN; else nothing.',
 )
-def _explain_inconsistency(_: Session, ref: Reference) -> DirectiveResponse:
+def _explain_inconsistency(_: ArmorService, ref: Reference) -> DirectiveResponse:
     with ref.held() as kb:
         explanation = kb.explain_inconsistency()
     if explanation is None:
@@ -278,7 +280,7 @@ def _matching(words: str, ref: Reference, pattern: str, asserted: bool) -> Direc
     'what was asserted then, and what followed from it. As far back as the parameter history goes.',
 )
 def _at(
-    session: Session, ref: Reference, time: str, pattern: str, asserted: bool
+    service: ArmorService, ref: Reference, time: str, pattern: str, asserted: bool
 ) -> DirectiveResponse:
     try:
         seconds = float(time)
@@ -287,7 +289,7 @@ def _at(
         raise DirectiveError(f'QUERY AT: argument time {problem}') from None
     try:
         with ref.held() as kb:
-            axioms = ref.history.at(seconds, kb.axioms(), session.clock())
+            axioms = ref.history.at(seconds, kb.axioms(), service.clock())
     except ValueError as error:
         raise DirectiveError(f'QUERY AT: argument time {error}') from None
     past = Reference(ref.name, KnowledgeBase(ref.kb.iri, axioms), ref.origin)
@@ -427,8 +429,8 @@ def _sparql(words: str, form: str, **properties: Any) -> Enter:
     'All rows in one text: `{x=iri, v=5^^datatype}, {...}`.',
     differs=_SPARQL_DIFFERS,
 )
-def _rows_as_text(session: Session, ref: Reference, *parts: str) -> DirectiveResponse:
-    rows = _select(session, ref, parts)
+def _rows_as_text(service: ArmorService, ref: Reference, *parts: str) -> DirectiveResponse:
+    rows = _select(service, ref, parts)
     texts = [', '.join(f'{name}={value}' for name, value in row) for row in rows]
     return DirectiveResponse(queried_objects=[', '.join(f'{{{text}}}' for text in texts)])
 
@@ -438,8 +440,8 @@ def _rows_as_text(session: Session, ref: Reference, *parts: str) -> DirectiveRes
     'The rows one after the other as pairs of variable and value.',
     differs=_SPARQL_DIFFERS,
 )
-def _rows_as_pairs(session: Session, ref: Reference, *parts: str) -> DirectiveResponse:
-    rows = _select(session, ref, parts)
+def _rows_as_pairs(service: ArmorService, ref: Reference, *parts: str) -> DirectiveResponse:
+    rows = _select(service, ref, parts)
     return DirectiveResponse(sparql_queried_objects=[item for row in rows for item in row])
 
 
@@ -449,37 +451,37 @@ def _rows_as_pairs(session: Session, ref: Reference, *parts: str) -> DirectiveRe
     'left out, which the other two forms cannot show.',
     native=False,
 )
-def _rows_as_json(session: Session, ref: Reference, *parts: str) -> DirectiveResponse:
-    rows = _select(session, ref, parts)
+def _rows_as_json(service: ArmorService, ref: Reference, *parts: str) -> DirectiveResponse:
+    rows = _select(service, ref, parts)
     objects = [json.dumps(dict(row), ensure_ascii=False) for row in rows]
     return DirectiveResponse(queried_objects=objects)
 
 
-def _select(session: Session, ref: Reference, parts: tuple[str, ...]) -> list[list[QueryItem]]:
+def _select(service: ArmorService, ref: Reference, parts: tuple[str, ...]) -> list[list[QueryItem]]:
     if len(parts) > 4:
         raise DirectiveError(f'QUERY SPARQL: expected 1 to 4 arguments, got {len(parts)}')
     *texts, last = parts if len(parts) in (2, 4) else (*parts, '0')
-    limit = session.settings.sparql_timeout
+    limit = service.settings.sparql_timeout
     asked = _milliseconds(last) / 1000
     seconds = min(asked, limit) if asked > 0 else limit
-    derived = session.settings.sparql_derived
+    derived = service.settings.sparql_derived
 
     def update(known: Version | None) -> GraphUpdate | None:
         with ref.held():
-            if known == session.graphs.version(ref, derived):
+            if known == service.graphs.version(ref, derived):
                 return None
-            return session.graphs.update(ref, derived, known)
+            return service.graphs.update(ref, derived, known)
 
     with ref.held():
-        version = session.graphs.version(ref, derived)
+        version = service.graphs.version(ref, derived)
     try:
-        return session.sparql.select(
+        return service.sparql.select(
             version,
             update,
             ''.join(texts),
             seconds,
             limit,
-            session.settings.sparql_rows,
+            service.settings.sparql_rows,
         )
     except TimeoutError:
         raise DirectiveError(

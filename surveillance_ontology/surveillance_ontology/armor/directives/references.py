@@ -7,6 +7,7 @@ import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from surveillance_ontology import memory
 from surveillance_ontology.armor.access import (
@@ -15,8 +16,8 @@ from surveillance_ontology.armor.access import (
     SafePaths,
     Settings,
 )
+from surveillance_ontology.armor.changes import History
 from surveillance_ontology.armor.directives.table import control, flag, text, utility
-from surveillance_ontology.armor.history import History
 from surveillance_ontology.armor.protocol import (
     DirectiveError,
     DirectiveRequest,
@@ -31,12 +32,14 @@ from surveillance_ontology.armor.reference import (
     knowledge_base,
 )
 from surveillance_ontology.armor.rendering import parse_entity, shown
-from surveillance_ontology.armor.session import Session
 from surveillance_ontology.documents.reading import read_ontology
 from surveillance_ontology.documents.xml_reading import OntologyFileError
 from surveillance_ontology.knowledge_base import KnowledgeBase
 from surveillance_ontology.owl.axioms import Axiom
 from surveillance_ontology.reasoner.java_reasoning import JavaKnowledgeBase, JavaReasonerError
+
+if TYPE_CHECKING:
+    from surveillance_ontology.armor.service import ArmorService
 
 RELEASE_AFTER = 0.2
 WRITTEN = {
@@ -94,7 +97,7 @@ _WEB_DIFFERS = 'Refused unless the parameter allow_web is set.'
 )
 @utility('LOAD FILE', text('path'), *_LOAD, summary=_LOAD_SUMMARY, differs=_LOAD_DIFFERS, slow=True)
 def _load(
-    session: Session,
+    service: ArmorService,
     request: DirectiveRequest,
     source: str,
     iri: str,
@@ -104,51 +107,51 @@ def _load(
 ) -> DirectiveResponse:
     name = request.reference_name
     notes = [f'{name} is loaded already']
-    if not _rebuffer(session, request, buffered):
+    if not _rebuffer(service, request, buffered):
         with memory.uncollected():
             web = request.primary.upper() == 'WEB'
             ref, found = _read_document(
-                name, source, iri, reasoner, session.paths, session.settings, web=web
+                name, source, iri, reasoner, service.paths, service.settings, web=web
             )
             memory.settle(len(ref.kb))
         ref.buffered_manipulation, ref.buffered_reasoner = buffered, lazy
-        ref.history = History(session.clock(), session.settings.history)
-        with session.entering:
-            entered = name not in session.references
+        ref.history = History(service.clock(), service.settings.history)
+        with service.entering:
+            entered = name not in service.references
             if entered:
-                if session.store:
-                    session.store.loaded(ref)
-                session.register(ref)
+                if service.store:
+                    service.store.loaded(ref)
+                service.register(ref)
         if entered:
             notes = found
             for note in notes:
-                session.warn(f'{name}: {note}')
+                service.warn(f'{name}: {note}')
         else:
-            _rebuffer(session, request, buffered)
+            _rebuffer(service, request, buffered)
     if request.secondary:
-        _mount(session, request)
+        _mount(service, request)
     return DirectiveResponse(error_description='; '.join(notes))
 
 
-def _rebuffer(session: Session, request: DirectiveRequest, buffered: bool) -> bool:
+def _rebuffer(service: ArmorService, request: DirectiveRequest, buffered: bool) -> bool:
     """Give a loaded reference the buffering of a further LOAD; False when there is none."""
-    with _if_loaded(session, request.reference_name) as ref:
+    with _if_loaded(service, request.reference_name) as ref:
         if ref is None:
             return False
         if ref.buffered_manipulation != buffered:
-            session.check_free(ref, request.client_name)
-            if session.store:
-                session.store.buffered(ref.name, buffered, session.clock())
+            service.check_free(ref, request.client_name)
+            if service.store:
+                service.store.buffered(ref.name, buffered, service.clock())
             ref.buffer(buffered)
     return True
 
 
 @contextlib.contextmanager
-def _if_loaded(session: Session, name: str) -> Iterator[Reference | None]:
+def _if_loaded(service: ArmorService, name: str) -> Iterator[Reference | None]:
     """Hold a reference's lock; None when there is no such reference."""
     with contextlib.ExitStack() as held:
         try:
-            ref = held.enter_context(session.references.locked(name))
+            ref = held.enter_context(service.references.locked(name))
         except DirectiveError:
             yield None
             return
@@ -161,29 +164,29 @@ def _if_loaded(session: Session, name: str) -> Iterator[Reference | None]:
     differs='Refused with 102 while another client is mounted.',
     slow=True,
 )
-def _drop(session: Session, request: DirectiveRequest) -> DirectiveResponse:
-    with _if_loaded(session, request.reference_name) as ref:
+def _drop(service: ArmorService, request: DirectiveRequest) -> DirectiveResponse:
+    with _if_loaded(service, request.reference_name) as ref:
         if ref is not None:
-            session.check_free(ref, request.client_name)
-            if session.store:
-                session.store.dropped(ref.name)
-            session.references.remove(ref)
-            session.tell(ref.name, None)
+            service.check_free(ref, request.client_name)
+            if service.store:
+                service.store.dropped(ref.name)
+            service.references.remove(ref)
+            service.tell(ref.name, None)
             # Not yet: this directive and those that wait for the lock still refer to it.
-            release = threading.Timer(RELEASE_AFTER, _release, args=(session, ref))
+            release = threading.Timer(RELEASE_AFTER, _release, args=(service, ref))
             release.daemon = True
             release.start()
     return DirectiveResponse()
 
 
-def _release(session: Session, ref: Reference) -> None:
+def _release(service: ArmorService, ref: Reference) -> None:
     """Give back an ontology's memory; of a large one also that of those who know its graph."""
     if len(ref.kb) > memory.LARGE:
-        session.sparql.forget()
+        service.sparql.forget()
     with ref.lock:  # The last of those who found it before it was dropped.
         parts = ref.kb.give_up()
         ref.kb, ref.history = KnowledgeBase(ref.kb.iri), History()
-    memory.release(parts, session.references.hold_more_than(memory.LARGE))
+    memory.release(parts, service.references.hold_more_than(memory.LARGE))
 
 
 @utility(
@@ -206,20 +209,20 @@ def _release(session: Session, ref: Reference) -> None:
     'that ends in .nt gets N-Triples, which hold names that RDF/XML cannot.',
     slow=True,
 )
-def _save(session: Session, request: DirectiveRequest, path: str) -> DirectiveResponse:
+def _save(service: ArmorService, request: DirectiveRequest, path: str) -> DirectiveResponse:
     # Late, as what LOAD WEB needs: a server that starts again is to be back at once.
     from surveillance_ontology.documents.writing import write_ontology
 
-    with session.references.locked(request.reference_name) as first:
-        session.check_free(first, request.client_name)
-        chosen = path or _loaded_file(session, first)
+    with service.references.locked(request.reference_name) as first:
+        service.check_free(first, request.client_name)
+        chosen = path or _loaded_file(service, first)
     # While nobody waits for the reference: the disk may not answer.
-    target = session.paths.to_write(chosen, ONTOLOGY_ENDINGS)
-    saving = session.saving(target)
+    target = service.paths.to_write(chosen, ONTOLOGY_ENDINGS)
+    saving = service.saving(target)
     with contextlib.ExitStack() as turn:
         while True:
-            with session.references.locked(request.reference_name) as ref:
-                session.check_free(ref, request.client_name)
+            with service.references.locked(request.reference_name) as ref:
+                service.check_free(ref, request.client_name)
                 if ref is not first and not path:
                     # Its own file is another one.
                     raise DirectiveError(f'SAVE: {ref.name} was loaded again meanwhile')
@@ -242,10 +245,10 @@ def _save(session: Session, request: DirectiveRequest, path: str) -> DirectiveRe
     return DirectiveResponse()
 
 
-def _loaded_file(session: Session, ref: Reference) -> str:
+def _loaded_file(service: ArmorService, ref: Reference) -> str:
     if not ref.origin.file:
         raise DirectiveError(f'SAVE: {ref.name} was loaded from {ref.origin.path}; expected a path')
-    if not session.settings.overwrite_loaded:
+    if not service.settings.overwrite_loaded:
         raise DirectiveError(
             f'SAVE: expected a path; the parameter overwrite_loaded permits writing over '
             f'{ref.origin.file}, which was loaded'
@@ -261,18 +264,18 @@ def _loaded_file(session: Session, ref: Reference) -> str:
     'the manipulation out.',
     slow=True,
 )
-def _mount(session: Session, request: DirectiveRequest) -> DirectiveResponse:
+def _mount(service: ArmorService, request: DirectiveRequest) -> DirectiveResponse:
     client, name = request.client_name, request.reference_name
     refusal = f'{client} cannot be mounted on {name}.'
-    with _if_loaded(session, name) as ref:
+    with _if_loaded(service, name) as ref:
         if ref is None:
             raise DirectiveError(f'{refusal} Unknown reference.', ExitCode.MOUNT_REFUSED)
         if not ref.is_free_for(client):
             problem = f'{refusal} Another client is already mounted on it.'
             raise DirectiveError(problem, ExitCode.MOUNT_REFUSED)
         note = f'{client} is mounted already' if ref.mounted == client != NOBODY else ''
-        if session.store and ref.mounted != client:
-            session.store.mounted(name, client)
+        if service.store and ref.mounted != client:
+            service.store.mounted(name, client)
         ref.mounted = client
     return DirectiveResponse(error_description=note)
 
@@ -282,20 +285,20 @@ def _mount(session: Session, request: DirectiveRequest) -> DirectiveResponse:
     summary='Ends MOUNT; a client that is not mounted changes nothing by it.',
     slow=True,
 )
-def _unmount(session: Session, request: DirectiveRequest) -> DirectiveResponse:
-    with session.references.locked(request.reference_name) as ref:
+def _unmount(service: ArmorService, request: DirectiveRequest) -> DirectiveResponse:
+    with service.references.locked(request.reference_name) as ref:
         if ref.mounted != request.client_name:
             note = f'{request.client_name} is not mounted on {ref.name}'
             return DirectiveResponse(error_description=note)
-        if session.store:
-            session.store.mounted(ref.name, NOBODY)
+        if service.store:
+            service.store.mounted(ref.name, NOBODY)
         ref.mounted = NOBODY
     return DirectiveResponse()
 
 
 @utility('GET ALL REFS', summary='The names of all references.')
-def _get_all(session: Session, _: DirectiveRequest) -> DirectiveResponse:
-    return DirectiveResponse(queried_objects=session.references.names())
+def _get_all(service: ArmorService, _: DirectiveRequest) -> DirectiveResponse:
+    return DirectiveResponse(queried_objects=service.references.names())
 
 
 @utility(
@@ -304,8 +307,8 @@ def _get_all(session: Session, _: DirectiveRequest) -> DirectiveResponse:
     summary='The client mounted on a reference, `none` when there is none.',
     differs='An unknown reference is answered with 205.',
 )
-def _get_client(session: Session, _: DirectiveRequest, name: str) -> DirectiveResponse:
-    return DirectiveResponse(queried_objects=[session.references.find(name).mounted])
+def _get_client(service: ArmorService, _: DirectiveRequest, name: str) -> DirectiveResponse:
+    return DirectiveResponse(queried_objects=[service.references.find(name).mounted])
 
 
 @utility(
@@ -315,31 +318,31 @@ def _get_client(session: Session, _: DirectiveRequest, name: str) -> DirectiveRe
     differs='Only to .log and .txt files below the ontologies folder; closed at 64 MiB.',
     slow=True,
 )
-def _log_file_on(session: Session, _: DirectiveRequest, path: str) -> DirectiveResponse:
-    session.log.open(session.paths.to_write(path, LOG_ENDINGS))
+def _log_file_on(service: ArmorService, _: DirectiveRequest, path: str) -> DirectiveResponse:
+    service.log.open(service.paths.to_write(path, LOG_ENDINGS))
     return DirectiveResponse()
 
 
 @utility('LOG FILE OFF', summary='Ends LOG FILE ON.', slow=True)
-def _log_file_off(session: Session, _: DirectiveRequest) -> DirectiveResponse:
-    session.log.close()
+def _log_file_off(service: ArmorService, _: DirectiveRequest) -> DirectiveResponse:
+    service.log.close()
     return DirectiveResponse()
 
 
 @utility('LOG SCREEN ON', summary='Writes each directive with its answer to the console.')
-def _log_screen_on(session: Session, _: DirectiveRequest) -> DirectiveResponse:
-    session.log.on_screen = True
+def _log_screen_on(service: ArmorService, _: DirectiveRequest) -> DirectiveResponse:
+    service.log.on_screen = True
     return DirectiveResponse()
 
 
 @utility('LOG SCREEN OFF', summary='Ends LOG SCREEN ON.')
-def _log_screen_off(session: Session, _: DirectiveRequest) -> DirectiveResponse:
-    session.log.on_screen = False
+def _log_screen_off(service: ArmorService, _: DirectiveRequest) -> DirectiveResponse:
+    service.log.on_screen = False
     return DirectiveResponse()
 
 
 @utility('INVALID COMMAND', summary='Always answered with 205; for tests of clients.')
-def _invalid(_: Session, __: DirectiveRequest) -> DirectiveResponse:
+def _invalid(_: ArmorService, __: DirectiveRequest) -> DirectiveResponse:
     raise DirectiveError('Invalid command.', ExitCode.INVALID_COMMAND)
 
 

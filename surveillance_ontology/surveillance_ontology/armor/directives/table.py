@@ -315,7 +315,7 @@ def query(words: str, *arguments: Argument, **properties: Any) -> Enter:
     """Enter a query: ``run(reference, *values) -> response``; see `manipulation`.
 
     ``is_consistent`` is filled in afterwards. A slow query is run without the reference's lock,
-    which it takes itself for as short as it can: ``run(session, reference, *values)``.
+    which it takes itself for as short as it can: ``run(service, reference, *values)``.
     """
     return _enter(Kind.QUERY, words, arguments, **properties)
 
@@ -326,7 +326,7 @@ def control(words: str, **properties: Any) -> Enter:
 
 
 def utility(words: str, *arguments: Argument, **properties: Any) -> Enter:
-    """Enter a utility: ``run(session, request, *values) -> response``; see `manipulation`."""
+    """Enter a utility: ``run(service, request, *values) -> response``; see `manipulation`."""
     return _enter(Kind.UTILITY, words, arguments, **properties)
 
 
