@@ -9,19 +9,22 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from functools import partial
+from itertools import combinations, permutations
+from typing import TypeAlias
 
 from surveillance_ontology.owl import axioms as ax
 from surveillance_ontology.owl import expressions as ex
 from surveillance_ontology.owl.axiom_text import expression_text
 from surveillance_ontology.owl.axioms import Axiom
-from surveillance_ontology.owl.expressions import Literal
-from surveillance_ontology.owl.vocabulary import NOTHING, THING, TOP
+from surveillance_ontology.owl.expressions import ClassExpression, Literal
+from surveillance_ontology.owl.vocabulary import NOTHING, THING, TOP, TOP_LITERAL
 from surveillance_ontology.reasoner.case_model import Choices
-from surveillance_ontology.reasoner.case_rules import ANYBODY, CaseRules
+from surveillance_ontology.reasoner.case_rules import ANYBODY, FRESH, CaseRules
 from surveillance_ontology.reasoner.case_search import CaseSearch
-from surveillance_ontology.reasoner.clauses import StoppedError, UnsupportedError
+from surveillance_ontology.reasoner.clauses import StoppedError, UnsupportedError, turned
 from surveillance_ontology.reasoner.datatypes import literal_of, value_of
-from surveillance_ontology.reasoner.denials import Denial, denials
+from surveillance_ontology.reasoner.property_chains import AnyRole
+from surveillance_ontology.reasoner.translation import directed, inclusions
 from surveillance_ontology.reasoner.value_sets import point
 
 MOST_STEPS = 1_000_000
@@ -32,6 +35,14 @@ _UNSURE = ~0
 """All choices: those of a fact that a model only hints at, so that it is asked for."""
 _MOST_KEPT = 200
 """Individuals in models of classes that stay while other classes are looked at."""
+_A, _B = FRESH + 'someone', FRESH + 'another'
+_Denial: TypeAlias = tuple[Axiom, ...]
+_INCLUSIONS = (
+    ax.SubObjectPropertyOf,
+    ax.EquivalentObjectProperties,
+    ax.InverseObjectProperties,
+    ax.SymmetricObjectProperty,
+)
 
 
 class CaseReasoner:
@@ -59,9 +70,8 @@ class CaseReasoner:
         ]
         self._most_steps = most_steps
         self.names_individuals = bool(self._rules.nominals)
-        assertions = [axiom for axiom in axioms if isinstance(axiom, ax.Assertion)]
         # What makes concepts comes before the search.
-        self._assertions = [(axiom, self._concept_of(axiom)) for axiom in assertions]
+        self._assertions = [self._prepared(a) for a in axioms if isinstance(a, ax.Assertion)]
         self._search = CaseSearch(self._rules, most_steps)
         self._base = self._search.mark()
         self._consistent: bool | None = None
@@ -78,32 +88,27 @@ class CaseReasoner:
         for assertion in self._assertions:
             self._state(*assertion)
 
-    def _concept_of(self, axiom: Axiom) -> int:
-        """Return the concept that an assertion about one individual gives it."""
-        if isinstance(axiom, ax.ClassAssertion):
-            expression = axiom.cls
-        elif isinstance(axiom, ax.NegativeObjectPropertyAssertion):
+    def _prepared(self, axiom: Axiom) -> tuple[Axiom, int]:
+        """Return an assertion, a negative one as that of a class, and the concept it gives."""
+        if isinstance(axiom, ax.NegativeObjectPropertyAssertion):
             other = ex.ObjectComplementOf(ex.ObjectOneOf((axiom.object,)))
-            expression = ex.ObjectAllValuesFrom(axiom.prop, other)
+            axiom = ax.ClassAssertion(ex.ObjectAllValuesFrom(axiom.prop, other), axiom.subject)
         elif isinstance(axiom, ax.NegativeDataPropertyAssertion):
-            expression = ex.ObjectComplementOf(ex.DataHasValue(axiom.prop, axiom.literal))
-        else:
-            return ANYBODY
+            having = ex.DataHasValue(axiom.prop, axiom.literal)
+            axiom = ax.ClassAssertion(ex.ObjectComplementOf(having), axiom.subject)
+        if not isinstance(axiom, ax.ClassAssertion):
+            return axiom, ANYBODY
         try:
-            return self._rules.positive(expression)
+            return axiom, self._rules.positive(axiom.cls)
         except UnsupportedError as reason:
-            self.gaps[f'assertions of {expression_text(expression)}: {reason}'] = None
-            return ANYBODY
+            self.gaps[f'assertions of {expression_text(axiom.cls)}: {reason}'] = None
+            return axiom, ANYBODY
 
     def _state(self, axiom: Axiom, concept: int) -> None:
         """State an assertion, whose concept is made."""
         model = self._search.model
         if isinstance(axiom, ax.ClassAssertion):
             model.concept(model.individual(axiom.individual)[0], concept, 0)
-        elif isinstance(
-            axiom, ax.NegativeObjectPropertyAssertion | ax.NegativeDataPropertyAssertion
-        ):
-            model.concept(model.individual(axiom.subject)[0], concept, 0)
         elif isinstance(axiom, ax.ObjectPropertyAssertion):
             x, y = (model.individual(name)[0] for name in (axiom.subject, axiom.object))
             model.relate(x, self._rules.role(axiom.prop), y, 0)
@@ -166,8 +171,8 @@ class CaseReasoner:
         while candidates and not self.stopped:
             fact = next(iter(candidates))
             del candidates[fact]
-            ((denial,),) = denials(fact)
-            if self._is_possible(partial(self._state, denial, self._concept_of(denial))):
+            ((denial,),) = _denials(fact)
+            if self._is_possible(partial(self._state, *self._prepared(denial))):
                 held = {other for other, _ in self._held()}
                 candidates = {other: None for other in candidates if other in held}
                 search.undo(self._base)
@@ -178,9 +183,9 @@ class CaseReasoner:
 
     def _keep(self, fact: Axiom) -> None:
         """Let further searches begin with a fact that follows."""
-        concept = self._concept_of(fact)
+        stated = self._prepared(fact)
         try:
-            self._search.attempt(lambda: self._state(fact, concept))
+            self._search.attempt(lambda: self._state(*stated))
             self._search.settle()
         except StoppedError:
             self.stopped = True
@@ -384,6 +389,109 @@ class _ClassModels:
         return [(cls, sup) for cls, above in self._above.items() for sup in sorted(above)]
 
 
+# --- what must hold where an axiom does not ---
+
+
+def _denials(goal: Axiom) -> Iterator[_Denial]:
+    """Yield sets of assertions, all of one of which hold where an axiom does not.
+
+    Raises:
+        UnsupportedError: The axiom is a key, a rule or a datatype definition, or compares data
+            properties.
+    """
+    if isinstance(goal, ax.SubClassOf):
+        yield (_member(goal.sub, ex.ObjectComplementOf(goal.sup)),)
+    elif isinstance(goal, ax.EquivalentClasses):
+        for sub, sup in permutations(goal.classes, 2):
+            yield (_member(sub, ex.ObjectComplementOf(sup)),)
+    elif isinstance(goal, ax.DisjointClasses):
+        yield from ((_member(*pair),) for pair in ax.pairs_of(goal.classes))
+    elif isinstance(goal, ax.DisjointUnion):
+        whole, parts = goal.cls, ex.ObjectUnionOf(goal.classes)
+        yield from _denials(ax.EquivalentClasses((whole, parts)))
+        yield from _denials(ax.DisjointClasses(goal.classes))
+    elif isinstance(goal, ax.ClassAssertion):
+        yield (ax.ClassAssertion(ex.ObjectComplementOf(goal.cls), goal.individual),)
+    elif isinstance(goal, ax.SameIndividual):
+        for pair in combinations(sorted(goal.individuals), 2):
+            yield (ax.DifferentIndividuals(frozenset(pair)),)
+    elif isinstance(goal, ax.DifferentIndividuals):
+        for pair in combinations(sorted(goal.individuals), 2):
+            yield (ax.SameIndividual(frozenset(pair)),)
+    elif isinstance(goal, ax.ObjectPropertyAssertion):
+        yield (ax.NegativeObjectPropertyAssertion(goal.prop, goal.subject, goal.object),)
+    elif isinstance(goal, ax.NegativeObjectPropertyAssertion):
+        yield (ax.ObjectPropertyAssertion(goal.prop, goal.subject, goal.object),)
+    elif isinstance(goal, ax.DataPropertyAssertion):
+        yield (ax.NegativeDataPropertyAssertion(goal.prop, goal.subject, goal.literal),)
+    elif isinstance(goal, ax.NegativeDataPropertyAssertion):
+        yield (ax.DataPropertyAssertion(goal.prop, goal.subject, goal.literal),)
+    else:
+        yield from _property_denials(goal)
+
+
+def _property_denials(goal: Axiom) -> Iterator[_Denial]:
+    if isinstance(goal, _INCLUSIONS):
+        for sub, sup in inclusions(goal):
+            yield _holds(sub), _fails(sup)
+    elif isinstance(goal, ax.AsymmetricObjectProperty):
+        role = directed(goal.prop)
+        yield _holds(role), _holds(turned(role))
+    elif isinstance(goal, ax.TransitiveObjectProperty):
+        yield from _property_denials(ax.SubPropertyChainOf((goal.prop, goal.prop), goal.prop))
+    elif isinstance(goal, ax.SubPropertyChainOf):
+        places = [f'{_A}{place}' for place in range(len(goal.chain) + 1)]
+        steps = zip(map(directed, goal.chain), places, places[1:], strict=False)
+        links = (_holds(role, one, other) for role, one, other in steps)
+        yield (*links, _fails(directed(goal.sup), places[0], places[-1]))
+    elif isinstance(goal, ax.DisjointObjectProperties):
+        for one, other in ax.pairs_of(goal.props):
+            yield _holds(directed(one)), _holds(directed(other))
+    elif isinstance(goal, ax.FunctionalObjectProperty):
+        yield (_member(ex.ObjectMinCardinality(2, goal.prop)),)
+    elif isinstance(goal, ax.InverseFunctionalObjectProperty):
+        prop = goal.prop
+        back = ex.ObjectInverseOf(prop) if isinstance(prop, str) else prop.prop
+        yield (_member(ex.ObjectMinCardinality(2, back)),)
+    elif isinstance(goal, ax.ReflexiveObjectProperty):
+        yield (_member(ex.ObjectComplementOf(ex.ObjectHasSelf(goal.prop))),)
+    elif isinstance(goal, ax.IrreflexiveObjectProperty):
+        yield (_member(ex.ObjectHasSelf(goal.prop)),)
+    elif isinstance(goal, ax.ObjectPropertyDomain):
+        some = ex.ObjectSomeValuesFrom(goal.prop, THING)
+        yield (_member(some, ex.ObjectComplementOf(goal.domain)),)
+    elif isinstance(goal, ax.ObjectPropertyRange):
+        yield (_member(ex.ObjectSomeValuesFrom(goal.prop, ex.ObjectComplementOf(goal.range))),)
+    elif isinstance(goal, ax.FunctionalDataProperty):
+        yield (_member(ex.DataMinCardinality(2, goal.prop)),)
+    elif isinstance(goal, ax.DataPropertyDomain):
+        value = ex.DataSomeValuesFrom(goal.prop, TOP_LITERAL)
+        yield (_member(value, ex.ObjectComplementOf(goal.domain)),)
+    elif isinstance(goal, ax.DataPropertyRange):
+        outside = ex.DataComplementOf(goal.range)
+        yield (_member(ex.DataSomeValuesFrom(goal.prop, outside)),)
+    else:
+        raise UnsupportedError(f'an axiom of the kind {type(goal).__name__}')
+
+
+def _member(*classes: ClassExpression) -> ax.ClassAssertion:
+    """Somebody is in all classes."""
+    cls = classes[0] if len(classes) == 1 else ex.ObjectIntersectionOf(classes)
+    return ax.ClassAssertion(cls, _A)
+
+
+def _holds(role: AnyRole, one: str = _A, other: str = _B) -> Axiom:
+    iri, inverted = role
+    pair = (other, one) if inverted else (one, other)
+    return ax.ObjectPropertyAssertion(iri, *pair)
+
+
+def _fails(role: AnyRole, one: str = _A, other: str = _B) -> Axiom:
+    iri, inverted = role
+    pair = (other, one) if inverted else (one, other)
+    return ax.NegativeObjectPropertyAssertion(iri, *pair)
+
+
 def entails(axioms: Iterable[Axiom], goal: Axiom | None) -> bool | None:
     """Tell whether an axiom (None: a contradiction) follows: its denial contradicts the others.
 
@@ -398,7 +506,7 @@ def entails(axioms: Iterable[Axiom], goal: Axiom | None) -> bool | None:
     if '_:' in repr(goal):
         raise UnsupportedError('an axiom about anonymous individuals')
     axioms = list(axioms)
-    against: list[Denial] = [()] if goal is None else list(denials(goal))
+    against: list[_Denial] = [()] if goal is None else list(_denials(goal))
     certain = True
     for denial in against:
         reasoner = CaseReasoner([*axioms, *denial], _QUESTION_STEPS)
