@@ -348,12 +348,9 @@ class KnowledgeBase:
         individuals are the same that are neither known to be the same nor to be different. None
         after a contradiction, from which everything follows.
         """
-        if self._classification is None or self._engine is None or not self._consistent:
+        if self._completion is None or not self._consistent:
             return ()
-        if self._completion is not None and self._completion.unsupported is not None:
-            return self._completion.unsupported
-        native = self._classification.program.unsupported
-        return tuple(dict.fromkeys([*native, *self._engine.open_cases()]))
+        return self._completion.unsupported
 
     # --- queries ---
 

@@ -31,7 +31,6 @@ from surveillance_ontology.reasoner.datatypes import Value, literal_of, value_of
 from surveillance_ontology.reasoner.difference import Difference
 from surveillance_ontology.reasoner.equality import Conflicts, Equality, Merge, individuals_in
 from surveillance_ontology.reasoner.network import Network
-from surveillance_ontology.reasoner.open_cases import OpenCases
 from surveillance_ontology.reasoner.program_change import ProgramChange
 from surveillance_ontology.reasoner.proofs import ProofSearch
 
@@ -91,7 +90,6 @@ class Engine:
         self._cases = Predicate('class', 'found by cases')
         self.changed: dict[Fact, bool] | None = None
         self.renamed = False
-        self._open: OpenCases | None = None
         self._network = Network(
             program,
             self.equality.representative,
@@ -234,22 +232,10 @@ class Engine:
         fact = self.fact_of(axiom)
         return fact is not None and bool(fact[0].holds(fact))
 
-    def open_cases(self) -> Iterator[str]:
-        """Yield sentences about what is not derived because it would need reasoning by cases."""
-        yield from self._open_cases().sentences()
-
-    def unknowns_matter(self) -> bool:
-        """Tell whether reasoning by cases is needed for a rule or key that could apply by a value
-        which must exist and is not known, or because somebody who must exist is one of those known.
-        """
-        return self._open_cases().unknowns_matter()
-
-    def _open_cases(self) -> OpenCases:
-        known, program, network = self._open, self.program, self._network
-        if known is None or known.clauses is not program.clauses:
-            known = OpenCases(program, network.context, network.lower, network.counters)
-            self._open = known
-        return known
+    @property
+    def network(self) -> Network:
+        """What runs the program."""
+        return self._network
 
     # --- touching ---
 

@@ -124,7 +124,7 @@ class _JavaCompletion(Completion):
         except JavaReasonerError as error:
             self.failure = str(error)
             return
-        self.unsupported = ()
+        self._left_out = ()
         if found is None:
             self._engine.take_from_cases(None)
         else:
