@@ -27,7 +27,7 @@ from surveillance_controllers.motion.path_following import (
     speed_to_stop,
 )
 from surveillance_controllers.motion.sensor_age import STANDSTILL
-from surveillance_controllers.motion.transforms import Transforms, lidar_mount
+from surveillance_controllers.motion.transforms import ScanReader
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.parameters import parameter
 from surveillance_runtime.process import run_node
@@ -93,8 +93,7 @@ class CollisionMonitor(PatrolNode):
     def __init__(self, **node_options: Any) -> None:
         super().__init__('collision_monitor', **node_options)
         self._settings = self.declare_fields(MonitorSettings())
-        self._mount = lidar_mount(self)
-        self._frames = Transforms(self)
+        self._lidar = ScanReader(self, self._settings.radius)
         self._wanted = Velocity()
         self._scan: Scan | None = None
         self._lidars: list[str] = []
@@ -122,8 +121,7 @@ class CollisionMonitor(PatrolNode):
 
     def _on_scan(self, message: LaserScan) -> None:
         with conversions.refusing(self, 'scan'):
-            mount = self._mount or self._frames.mount_of(message.header.frame_id)
-            self._scan = conversions.scan_from(message, mount, self._settings.radius)
+            self._scan = self._lidar.read(message)
             self._note_lidar(message.header.frame_id)
             self._base.hear('scan')
             allowed_now = self._allowed()

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+
+import numpy as np
 
 from surveillance_controllers.battery.model import BatteryParameters
 from surveillance_controllers.geometry import Points, Pose
 from surveillance_runtime import parameter_checks
 from surveillance_runtime.node import PatrolNode
-from surveillance_runtime.parameters import converted, parameter
+from surveillance_runtime.parameters import ParameterError, converted, parameter
+from surveillance_runtime.place.floor_plan import Door, Segment
 
 EXECUTION_MODES = ('MANUAL', 'RANDOM', 'SIMULATED')
 
@@ -189,4 +193,57 @@ class MotionSettings(PeerSettings, StationSettings):
         '',
         'MANUAL, RANDOM and Nav2: the room in which the robot starts; empty: as the map says that '
         'is built from a message.',
+    )
+
+
+@dataclass(frozen=True)
+class NavigationSettings:
+    """What `motion_controller` is told of its own navigation in SIMULATED mode."""
+
+    sensor_timeout: float = parameter(
+        5.0, 'how long map, odom and scan may be silent, s of real time.', 0.1, 3600.0
+    )
+    track_place: bool = parameter(
+        True, 'robot_place follows the robot on its way, not at its end alone.'
+    )
+    spin: bool = parameter(
+        True, 'motion/controller ends with one turn on the spot.', name='spin_on_arrival'
+    )
+
+
+def door_segments(node: PatrolNode) -> dict[str, Segment]:
+    """Declare and read the doors of the place, `doors.NAME: [x, y, yaw, width]`.
+
+    Raises:
+        ParameterError: A door is not four numbers.
+    """
+    segments = {}
+    for name, values in node.parameters_under('doors').items():
+        if not _are_numbers(values, 4):
+            raise ParameterError(
+                f'parameter doors.{name}: got {values}, expected [x, y, yaw, width]'
+            )
+        segments[name] = Door(name, *values).segment
+    return segments
+
+
+def place_positions(node: PatrolNode) -> dict[str, Points]:
+    """Declare and read the places' points, `room_positions.NAME: [x, y]`.
+
+    Raises:
+        ParameterError: A position is not two or three numbers.
+    """
+    positions = {}
+    for name, values in node.parameters_under('room_positions').items():
+        if not (_are_numbers(values, 2) or _are_numbers(values, 3)):
+            raise ParameterError(f'parameter room_positions.{name}: got {values}, expected [x, y]')
+        positions[name] = np.array([*values, 0.0][:3], dtype=float)
+    return positions
+
+
+def _are_numbers(values: object, count: int) -> bool:
+    return (
+        isinstance(values, list)
+        and len(values) == count
+        and all(isinstance(v, int | float) and math.isfinite(v) for v in values)
     )

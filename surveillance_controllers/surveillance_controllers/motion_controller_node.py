@@ -67,15 +67,10 @@ class MotionController(PatrolNode):
         from surveillance_controllers.motion.docking import DockingMotion
         from surveillance_controllers.motion.nav2 import Nav2Motion
         from surveillance_controllers.motion.navigation_motion import NavigationMotion
-        from surveillance_controllers.motion.robot_parameters import robot_settings
 
         settings = self._settings
-        motion: Motion
-        if settings.navigator == 'nav2':
-            motion = Nav2Motion(self, self._knowledge, self._recorder, settings)
-        else:
-            robot = robot_settings(self, settings)
-            motion = NavigationMotion(self, robot, self._knowledge, self._recorder)
+        kind = Nav2Motion if settings.navigator == 'nav2' else NavigationMotion
+        motion: Motion = kind(self, self._knowledge, self._recorder, settings)
         return motion if settings.docking == 'none' else DockingMotion(self, motion, settings)
 
     def _carry_out(self, command: ParsedCommand) -> str:

@@ -18,13 +18,16 @@ from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped
 from nav_msgs.msg import OccupancyGrid
 
 from surveillance_controllers import conversions
-from surveillance_controllers.controller_parameters import MotionSettings
+from surveillance_controllers.controller_parameters import (
+    MotionSettings,
+    door_segments,
+    place_positions,
+)
 from surveillance_controllers.geometry import Points, equally_spaced, length, point_of
 from surveillance_controllers.map_knowledge import MapKnowledge
 from surveillance_controllers.motion.arrival import MotionFailedError, expect_place
 from surveillance_controllers.motion.place_recording import PlaceRecorder
 from surveillance_controllers.motion.place_regions import PlaceMap
-from surveillance_controllers.motion.robot_parameters import door_segments, place_positions
 from surveillance_fsm.ros import CallError, CallInterruptedError, GoalCaller, GoalRun
 from surveillance_runtime.conversions import pose_from, pose_message
 from surveillance_runtime.node import PatrolNode

@@ -1,65 +1,119 @@
-"""Motion for `motion_controller` in SIMULATED mode: the base drives, and `robot_place` follows
-it."""
+"""Motion for `motion_controller` by its own navigation (SIMULATED mode): sensors, navigator, base.
+
+Reads `map`, `door_states`, `odom`, `scan` and `initialpose`; commands `cmd_vel`; publishes where
+the robot is (`amcl_pose`) and what stands about that the map does not have (`obstacles`). Asks
+`compute_path` for another path when a drive does not go on.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import threading
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from typing import Any
+
+from builtin_interfaces.msg import Time
+from geometry_msgs.msg import PoseWithCovarianceStamped
+from nav_msgs.msg import OccupancyGrid, Odometry
+from sensor_msgs.msg import LaserScan, PointCloud2
 
 from surveillance_controllers import conversions
-from surveillance_controllers.geometry import Points, Pose, point_of
+from surveillance_controllers.controller_parameters import (
+    MotionSettings,
+    NavigationSettings,
+    door_segments,
+    place_positions,
+)
+from surveillance_controllers.geometry import Points, Pose, Scan, point_of
 from surveillance_controllers.map_knowledge import MapKnowledge
 from surveillance_controllers.motion.arrival import MotionFailedError, expect_place
-from surveillance_controllers.motion.base_interface import RobotBase
+from surveillance_controllers.motion.command_publisher import CommandPublisher
 from surveillance_controllers.motion.driving import Drive, Spin, State
 from surveillance_controllers.motion.navigator import Navigator
+from surveillance_controllers.motion.path_following import DriveParameters, Velocity
 from surveillance_controllers.motion.place_recording import PlaceRecorder
-from surveillance_controllers.motion.robot_parameters import RobotSettings
+from surveillance_controllers.motion.transforms import MapFrame, ScanReader
 from surveillance_controllers.planning.grid_planning import NoPathError
+from surveillance_fsm import Interrupt
 from surveillance_fsm.ros import CallError, GoalCaller, GoalRun
 from surveillance_interfaces.action import ComputePath
-from surveillance_runtime.conversions import point_message
+from surveillance_interfaces.msg import DoorStates
+from surveillance_runtime.conversions import (
+    cloud_from_points,
+    point_message,
+    pose_estimate,
+    pose_from,
+    seconds_of,
+)
 from surveillance_runtime.node import PatrolNode
+from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
+from surveillance_runtime.serialized import pose_of_serialized
+
+POSE_PERIOD = 0.19
+"""Least time between two messages on amcl_pose, seconds: with every second scan at 10 Hz."""
 
 
 class NavigationMotion:
-    """Drives the base along paths.
+    """Drives the base along paths, and follows with `robot_place` where it is.
 
     Args:
         node: The motion controller's node.
-        settings: The robot, and how long to wait for its sensors and peers.
         knowledge: Map and ontology.
         recorder: Is told the place that the robot is in.
+        settings: The station, and how long the planner may take to answer.
+        navigator: What steers; unless given, one for the doors of the parameters.
     """
 
     def __init__(
         self,
         node: PatrolNode,
-        settings: RobotSettings,
         knowledge: MapKnowledge,
         recorder: PlaceRecorder,
+        settings: MotionSettings,
+        navigator: Navigator | None = None,
     ) -> None:
-        self._settings = settings
+        self._node = node
         self._recorder = recorder
-        self._wait_for_peer = settings.motion.peer_timeout
+        self._wait_for_peer = settings.peer_timeout
+        self._robot = node.declare_fields(DriveParameters(), prefix='drive.', mode='SIMULATED')
+        self._settings = node.declare_fields(NavigationSettings(), mode='SIMULATED')
+        self._lidar = ScanReader(node, self._robot.radius)
+        self._navigator = navigator or Navigator(door_segments(node), guesses=[settings.station])
+        self._navigator.before_search = self._stand_for_search
+        self._stands_for_search = False
+        self._lock = threading.RLock()
+        self._stepped = threading.Condition(self._lock)
+        self._steps = 0
+        self._awaited: Callable[[], bool] = lambda: False
+        self._on_step: Callable[[Pose], None] = lambda _pose: None
+        self._pose_sent = float('-inf')
+        self._was_lost = False
+        self._jumps = 0
         self._planner = GoalCaller(node, ComputePath, 'compute_path')
-        navigator = Navigator(settings.doors, guesses=[settings.motion.station])
-        tell = recorder.tell if settings.track_place else lambda _place, _stamp: None
-        self._base = RobotBase(
-            node,
-            navigator,
-            settings.sensor_timeout,
-            tell,
-            settings.lidar_mount,
-            settings.drive.deceleration,
-            settings.drive.radius,
+        self._base = CommandPublisher(
+            node, 'cmd_vel', ('scan', 'odom'), self._robot.deceleration, self._warn_of_silence
         )
-        self._base.set_positions(settings.positions)
-        knowledge.assume(settings.positions)
+        self._poses = node.create_publisher(PoseWithCovarianceStamped, 'amcl_pose', STATE_QOS)
+        self._obstacles = node.create_publisher(PointCloud2, 'obstacles', STATE_QOS)
+        self._map_frame = MapFrame(node)
+        positions = place_positions(node)
+        self._set_positions(positions)
+        knowledge.assume(positions)
         # The places that come and go change what the robot's place can be.
-        knowledge.follow_places(self._base.set_positions)
+        knowledge.follow_places(self._set_positions)
+        node.create_subscription(OccupancyGrid, 'map', self._on_map, STATE_QOS)
+        node.create_subscription(DoorStates, 'door_states', self._on_doors, STATE_QOS)
+        node.create_subscription(Odometry, 'odom', self._on_odometry, SENSOR_QOS, raw=True)
+        node.create_subscription(LaserScan, 'scan', self._on_scan, SENSOR_QOS)
+        node.create_subscription(PoseWithCovarianceStamped, 'initialpose', self._on_initial_pose, 1)
 
     def follow(self, path: Points, run: GoalRun, report: Callable[[Points], None]) -> Points:
         """Drive along a path of shape (n, 3).
+
+        Args:
+            path: The path.
+            run: The goal that is carried out; its interrupt ends the drive early.
+            report: Told the position with each scan, in the executor's thread; must not block.
 
         Returns:
             Where the robot is then, shape (3,).
@@ -67,19 +121,17 @@ class NavigationMotion:
         Raises:
             MotionFailedError: It did not get there.
         """
-        drive = Drive(path[:, :2], self._settings.drive)
-        goal = path[-1]
-
-        def on_step(pose: Pose) -> None:
-            report(point_of(pose))
-
-        def another_path(pose: Pose) -> Points:
-            return self._ask_planner(point_of(pose), goal, run)
-
-        end = point_of(self._base.drive(drive, run.interrupt, on_step, another_path))
+        drive = Drive(path[:, :2], self._robot)
+        interrupt = run.interrupt
+        with self._carrying_out(drive, interrupt, lambda pose: report(point_of(pose))):
+            while not drive.state.ended and not interrupt.is_set():
+                self._await(lambda: drive.state.ended or drive.state is State.ASKING, interrupt)
+                if drive.state is State.ASKING and not interrupt.is_set():
+                    self._find_another_path(drive, path[-1], run)
+        end = point_of(self._navigator.pose or (float('nan'),) * 3)
         if drive.state is State.FAILED:
             raise MotionFailedError(drive.reason, end)
-        self._recorder.tell(self._base.place_at(end) if self._base.is_sure else None)
+        self._recorder.tell(self._navigator.place_at(end) if self._is_sure else None)
         return end
 
     def place_reached(self, goal: Points, end: Points, _run: GoalRun) -> str:
@@ -93,9 +145,9 @@ class NavigationMotion:
         Raises:
             MotionFailedError: It is not in the goal's place.
         """
-        if not self._base.is_sure:
+        if not self._is_sure:
             raise MotionFailedError('the robot does not know in which of several places it is', end)
-        return expect_place(self._base.place_at(end), self._base.place_at(goal), end)
+        return expect_place(self._navigator.place_at(end), self._navigator.place_at(goal), end)
 
     def look_around(self, run: GoalRun) -> None:
         """Turn once on the spot, as the place's exploration asks for.
@@ -104,7 +156,38 @@ class NavigationMotion:
             MotionFailedError: The robot's sensors are silent.
         """
         if self._settings.spin:
-            self._base.spin(Spin(), run.interrupt)
+            spin = Spin()
+            with self._carrying_out(spin, run.interrupt):
+                self._await(lambda: spin.done, run.interrupt)
+
+    @property
+    def _is_sure(self) -> bool:
+        """Whether the robot knows where it is: not lost, and nowhere else as likely."""
+        return not (self._navigator.lost or self._navigator.ambiguous)
+
+    @property
+    def _place(self) -> str | None:
+        """The place the robot is in; None while that is not known."""
+        return self._navigator.place if self._is_sure else None
+
+    def _set_positions(self, positions: Mapping[str, Points]) -> None:
+        """Take the places: a point in each."""
+        with self._lock:
+            self._navigator.set_positions(positions)
+
+    def _find_another_path(self, drive: Drive, goal: Points, run: GoalRun) -> None:
+        """Ask the planner, and give the drive what it answers."""
+        self._node.get_logger().info(f'{drive.reason}: looking for another path')
+        pose = self._navigator.pose
+        assert pose is not None
+        try:
+            path = self._ask_planner(point_of(pose), goal, run)
+        except NoPathError as error:
+            with self._lock:
+                drive.no_path(str(error))
+        else:
+            with self._lock:
+                drive.new_path(path)
 
     def _ask_planner(self, start: Points, goal: Points, run: GoalRun) -> Points:
         request = ComputePath.Goal(start=point_message(start), goal=point_message(goal))
@@ -120,3 +203,140 @@ class NavigationMotion:
         if end.status != 'succeeded':
             raise NoPathError('the planner finds no other path')
         return conversions.array_from_points(end.result.path)[:, :2]
+
+    @contextmanager
+    def _carrying_out(
+        self,
+        task: Drive | Spin,
+        interrupt: Interrupt,
+        on_step: Callable[[Pose], None] = lambda _pose: None,
+    ) -> Iterator[None]:
+        """Hands a task to the navigator; before and afterwards the robot stands."""
+        with self._lock:
+            self._navigator.task, self._on_step = task, on_step
+            # A simulator in lockstep waits for a command from the moment the goal is executed on,
+            # and the scan of that moment may have come before the task.
+            self._base.command(Velocity())
+        unsubscribe = interrupt.subscribe(self._wake)
+        try:
+            yield
+        finally:
+            unsubscribe()
+            with self._lock:
+                self._navigator.task = None
+                self._base.command(Velocity())
+
+    def _await(self, condition: Callable[[], bool], interrupt: Interrupt) -> None:
+        """Wait until a condition holds after a scan, or for the interrupt.
+
+        Raises:
+            MotionFailedError: The sensors gave nothing for too long.
+        """
+        with self._stepped:
+            # The worker is woken when there is something to do, not with each scan.
+            self._awaited = condition
+            while not (condition() or interrupt.is_set()):
+                before = self._steps
+                woken = self._stepped.wait(self._settings.sensor_timeout)
+                if not woken and self._steps == before:
+                    topic, pose = self._navigator.missing or 'scan', self._navigator.pose
+                    raise MotionFailedError(
+                        f'nothing of use came on the topic {topic} for '
+                        f'{self._settings.sensor_timeout:g} s',
+                        None if pose is None else point_of(pose),
+                    )
+
+    def _wake(self) -> None:
+        with self._stepped:
+            self._stepped.notify_all()
+
+    def _on_map(self, message: OccupancyGrid) -> None:
+        with conversions.refusing(self._node, 'map'):
+            grid = conversions.grid_from(message)
+            with self._lock:
+                self._navigator.set_map(grid)
+
+    def _on_doors(self, message: DoorStates) -> None:
+        with self._lock:
+            self._navigator.set_closed(message.closed)
+
+    def _on_odometry(self, serialized: bytes) -> None:
+        with conversions.refusing(self._node, 'odom'):
+            pose = pose_of_serialized(serialized, texts=1)
+            with self._lock:
+                self._base.hear('odom')
+                self._navigator.move(pose)
+
+    def _on_initial_pose(self, message: PoseWithCovarianceStamped) -> None:
+        with conversions.refusing(self._node, 'initialpose'):
+            pose = pose_from(message.pose.pose)
+            self._node.get_logger().info(f'pose set to ({pose[0]:.2f}, {pose[1]:.2f})')
+            with self._lock:
+                self._navigator.believe(pose)
+
+    def _on_scan(self, message: LaserScan) -> None:
+        with conversions.refusing(self._node, 'scan'):
+            stamp = message.header.stamp
+            if stamp == Time():
+                # A lidar without a clock; a drive needs the time that passes.
+                stamp = self._node.get_clock().now().to_msg()
+            self._see(self._lidar.read(message), stamp)
+
+    def _see(self, scan: Scan, stamp: Any) -> None:
+        measured = seconds_of(stamp)
+        with self._stepped:
+            before = self._place
+            self._base.hear('scan')
+            self._stands_for_search = False
+            velocity = self._navigator.see(scan, measured)
+            if velocity is not None and self._navigator.task is not None:
+                if not self._stands_for_search:
+                    self._base.command(velocity)
+                if self._navigator.pose is not None:
+                    self._on_step(self._navigator.pose)
+            self._publish_pose(measured, stamp)
+            if self._settings.track_place and self._place != before:
+                self._recorder.tell(self._place, stamp)
+            self._steps += 1
+            if self._navigator.task is not None and self._awaited():
+                self._stepped.notify_all()
+        self._tell(stamp)
+
+    def _stand_for_search(self) -> None:
+        """Brake for as long as a search takes: until the next scan is seen."""
+        if self._base.wanted.speed != 0.0:
+            self._base.command(Velocity())
+            self._stands_for_search = True
+
+    def _warn_of_silence(self, topic: str) -> None:
+        self._node.get_logger().warn(f'nothing on the topic {topic}: the robot stands')
+
+    def _publish_pose(self, measured: float, stamp: Any) -> None:
+        navigator = self._navigator
+        if navigator.pose is None or 0 <= measured - self._pose_sent < POSE_PERIOD:
+            return
+        deviation = (0.03, 0.02) if self._is_sure else (5.0, 3.0)
+        estimate = PoseWithCovarianceStamped(pose=pose_estimate(navigator.pose, *deviation))
+        estimate.header.frame_id, estimate.header.stamp = 'map', stamp
+        self._pose_sent = measured
+        self._poses.publish(estimate)
+
+    def _tell(self, stamp: Any) -> None:
+        navigator = self._navigator
+        if navigator.pose is None:
+            return
+        if navigator.lost != self._was_lost:
+            self._was_lost = navigator.lost
+            if navigator.lost:
+                self._node.get_logger().warn('pose lost: the scans do not fit the map')
+        if navigator.jumps != self._jumps:
+            self._jumps = navigator.jumps
+            x, y, _ = navigator.pose
+            self._node.get_logger().info(f'pose found at ({x:.2f}, {y:.2f})')
+        if navigator.obstacles_changed:
+            navigator.obstacles_changed = False
+            cloud = cloud_from_points(navigator.obstacles, stays=navigator.obstacles_stay)
+            cloud.header.stamp = stamp
+            self._obstacles.publish(cloud)
+        if navigator.odometry is not None:
+            self._map_frame.publish(navigator.pose, navigator.odometry, stamp)

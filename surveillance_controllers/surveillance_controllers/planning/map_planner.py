@@ -15,9 +15,9 @@ from numpy.typing import ArrayLike, NDArray
 from sensor_msgs.msg import PointCloud2
 
 from surveillance_controllers import conversions
+from surveillance_controllers.controller_parameters import door_segments
 from surveillance_controllers.geometry import Points, Pose, point_of
 from surveillance_controllers.map_knowledge import MapKnowledge
-from surveillance_controllers.motion.robot_parameters import door_segments
 from surveillance_controllers.planning.door_watch import DoorWatch
 from surveillance_controllers.planning.grid_planning import (
     GridPlanner,

@@ -1,9 +1,10 @@
-"""The bridge between sensors and base: unsound messages are refused, who sees nothing stands."""
+"""What navigation reads and commands: unsound messages are refused, who sees nothing stands."""
 
 from __future__ import annotations
 
 import math
 import threading
+from collections.abc import Callable
 from types import SimpleNamespace
 from typing import Any
 
@@ -14,16 +15,15 @@ from geometry_msgs.msg import PoseWithCovarianceStamped, Quaternion, TransformSt
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import LaserScan
 
+from surveillance_controllers.controller_parameters import MotionSettings
 from surveillance_controllers.geometry import Mount, Scan, composed
-from surveillance_controllers.motion.base_interface import (
-    RobotBase,
-    Transforms,
-)
+from surveillance_controllers.motion.arrival import MotionFailedError
 from surveillance_controllers.motion.driving import Drive, Spin
 from surveillance_controllers.motion.localisation import Localiser
+from surveillance_controllers.motion.navigation_motion import NavigationMotion
 from surveillance_controllers.motion.navigator import Navigator
 from surveillance_controllers.motion.path_following import Velocity
-from surveillance_controllers.motion.transforms import lidar_mount
+from surveillance_controllers.motion.transforms import ScanReader
 from surveillance_fsm import Interrupt
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.parameters import ParameterError
@@ -52,10 +52,27 @@ class Steersman:
     def set_closed(self, _doors: Any) -> None:
         pass
 
+    def set_positions(self, _positions: Any) -> None:
+        pass
+
+    def place_at(self, _point: Any) -> None:
+        pass
+
 
 @pytest.fixture
 def steersman() -> Steersman:
     return Steersman()
+
+
+def motion_of(
+    node: Any,
+    navigator: Any,
+    on_place: Callable[[str | None], object] = lambda _place: None,
+) -> NavigationMotion:
+    """Return a motion that a navigator steers, in a place that nobody describes."""
+    knowledge: Any = SimpleNamespace(assume=lambda _: None, follow_places=lambda _: None)
+    recorder: Any = SimpleNamespace(tell=lambda place, _stamp=None: on_place(place))
+    return NavigationMotion(node, knowledge, recorder, MotionSettings(), navigator)
 
 
 def scan(**fields: Any) -> LaserScan:
@@ -69,7 +86,7 @@ def test_without_scans_or_odometry_the_robot_is_told_to_stand(
 ) -> None:
     said = graph.said()
     navigator: Any = steersman
-    RobotBase(graph.node, navigator, 5.0, lambda _place, _stamp: None)
+    motion_of(graph.node, navigator)
     steersman.task = Spin()
     told = graph.listen(Twist, 'cmd_vel', 1)
     scans = graph.node.create_publisher(LaserScan, 'scan', SENSOR_QOS)
@@ -92,10 +109,12 @@ def test_a_drive_begins_and_ends_with_a_command_whether_a_scan_comes_or_not(
     graph: Any, steersman: Steersman
 ) -> None:
     navigator: Any = steersman
-    base = RobotBase(graph.node, navigator, 60.0, lambda _place, _stamp: None)
+    node = graph.add(PatrolNode, {'sensor_timeout': 60.0}, name='moving')
+    motion = motion_of(node, navigator)
     told = graph.listen(Twist, 'cmd_vel', 10)
     interrupt = Interrupt()
-    driving = threading.Thread(target=lambda: base.spin(Spin(), interrupt))
+    run: Any = SimpleNamespace(interrupt=interrupt)
+    driving = threading.Thread(target=lambda: motion.look_around(run))
     driving.start()
     graph.until(lambda: told)  # which a simulator in lockstep waits for
     interrupt.set()
@@ -110,7 +129,7 @@ def test_a_robot_that_does_not_know_where_it_is_tells_no_place(
 ) -> None:
     navigator: Any = steersman
     told: list[str | None] = []
-    base = RobotBase(graph.node, navigator, 5.0, lambda place, _stamp: told.append(place))
+    motion = motion_of(graph.node, navigator, told.append)
     scans = graph.node.create_publisher(LaserScan, 'scan', SENSOR_QOS)
     navigator.see = lambda _scan, _now: setattr(navigator, 'place', 'R1')
 
@@ -122,8 +141,9 @@ def test_a_robot_that_does_not_know_where_it_is_tells_no_place(
     # It finds out with the next scan: the simulated navigator changes its mind there.
     navigator.see = lambda _scan, _now: setattr(navigator, doubt, True)
     graph.until(lambda: last(None))
-    assert base.place is None
-    assert not base.is_sure
+    run: Any = SimpleNamespace(interrupt=Interrupt())
+    with pytest.raises(MotionFailedError, match='does not know in which'):
+        motion.place_reached(np.zeros(3), np.zeros(3), run)
     navigator.place = 'R2'
     navigator.see = lambda _scan, _now: setattr(navigator, doubt, False)
     graph.until(lambda: last('R2'))
@@ -133,7 +153,7 @@ def test_a_robot_that_does_not_know_where_it_is_tells_no_place(
 def test_messages_that_are_not_sound_end_nothing(graph: Any, steersman: Steersman) -> None:
     said = graph.said()
     navigator: Any = steersman
-    RobotBase(graph.node, navigator, 5.0, lambda _place, _stamp: None)
+    motion_of(graph.node, navigator)
     scans = graph.node.create_publisher(LaserScan, 'scan', SENSOR_QOS)
     poses = graph.node.create_publisher(PoseWithCovarianceStamped, 'initialpose', 1)
     bad = PoseWithCovarianceStamped()
@@ -153,7 +173,7 @@ def test_messages_that_are_not_sound_end_nothing(graph: Any, steersman: Steersma
 
 
 def test_a_lidar_s_mount_comes_from_the_static_transforms(graph: Any, capfd: Any) -> None:
-    frames = Transforms(graph.node)
+    frames = ScanReader(graph.node, 0.2)
     transforms = []
     for parent, child, x in (('base_link', 'mast', 0.1), ('mast', 'laser', 0.2), ('b', 'a', 1.0)):
         step = TransformStamped(child_frame_id=child)
@@ -175,7 +195,7 @@ def test_a_lidar_s_mount_comes_from_the_static_transforms(graph: Any, capfd: Any
 
 
 def test_a_lidar_below_tilted_frames_is_looked_up_in_space(graph: Any, capfd: Any) -> None:
-    frames = Transforms(graph.node)
+    frames = ScanReader(graph.node, 0.2)
     over, forward = Quaternion(x=1.0, w=0.0), Quaternion(y=0.5, w=0.75**0.5)
     transforms = []
     for parent, child, x, turn in (
@@ -215,13 +235,13 @@ def test_a_lidar_s_mount_may_be_given_upside_down_too(graph: Any, given: Any, mo
     node = graph.add(PatrolNode, {'lidar_mount': given}, name='mounted')
     if mount is ParameterError:
         with pytest.raises(ParameterError, match=r'lidar_mount.*hangs upside down'):
-            lidar_mount(node)
+            ScanReader(node, 0.2)
     else:
-        assert lidar_mount(node) == mount
+        assert ScanReader(node, 0.2).mount_of('laser') == mount
 
 
 def test_scans_without_a_stamp_count_from_when_they_came(graph: Any, steersman: Any) -> None:
-    RobotBase(graph.node, steersman, 5.0, lambda _place, _stamp: None)
+    motion_of(graph.node, steersman)
     scans = graph.node.create_publisher(LaserScan, 'scan', SENSOR_QOS)
     unstamped = scan()
     unstamped.header.stamp = Time()
@@ -239,21 +259,21 @@ def test_a_robot_that_drives_stands_while_it_looks_for_itself(
 ) -> None:
     navigator = Navigator()
     navigator.set_map(flat.grid)
-    base = RobotBase(graph.node, navigator, 5.0, lambda _place, _stamp: None)
+    motion = motion_of(graph.node, navigator)
     true = (2.0, 1.5, 0.0)
     navigator.move(true)
     navigator.task = Drive([[2.0, 1.5], [5.5, 1.5]])
     for step in range(10):
-        base._see(flat.scan(true), Time(sec=1, nanosec=step * 10**8))
-    assert base._base.wanted.speed > 0.2
+        motion._see(flat.scan(true), Time(sec=1, nanosec=step * 10**8))
+    assert motion._base.wanted.speed > 0.2
     during = []
     monkeypatch.setattr(
-        Localiser, 'search', lambda _self, _scan: during.append(base._base.wanted) or []
+        Localiser, 'search', lambda _self, _scan: during.append(motion._base.wanted) or []
     )
     nonsense = np.random.default_rng(2).uniform(0.3, 7.0, len(flat.scan(true).angles))
-    base._see(Scan(flat.scan(true).angles, nonsense, 8.0), Time(sec=3))
+    motion._see(Scan(flat.scan(true).angles, nonsense, 8.0), Time(sec=3))
     assert during == [Velocity()]
-    assert base._base.wanted == Velocity()
+    assert motion._base.wanted == Velocity()
 
 
 @pytest.mark.parametrize('mount', [(0.3, -0.2, 0.0), (0.1, 0.0, math.pi), (-0.25, 0.1, 2.0)])
