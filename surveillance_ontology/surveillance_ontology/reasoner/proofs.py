@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Container
 from dataclasses import dataclass
 
-from surveillance_ontology.reasoner.clauses import Fact
+from surveillance_ontology.reasoner.clauses import Fact, Premises
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,8 @@ class ProofSearch:
 
     def __init__(self, asserted: Container[Fact]) -> None:
         self._asserted = asserted
-        self._proved: set[Fact] = set()
+        # By which step each fact was proved, and to which depth others were searched in vain.
+        self._proved: dict[Fact, tuple[object, Premises]] = {}
         self._failed: dict[Fact, int] = {}
         self._budget = 0
 
@@ -49,60 +50,42 @@ class ProofSearch:
         self._budget = budget
         return self._prove(fact, depth)
 
+    def find(self, fact: Fact, deepest: int = 64, budget: int = 100_000) -> Proof | None:
+        """Return a shallowest proof; None where there is none within the bounds."""
+        self.reset()
+        self._budget = budget
+        for depth in range(deepest + 1):
+            if self._prove(fact, depth):
+                return self._proof(fact, {})
+            if self._budget <= 0:
+                return None
+        return None
+
     def _prove(self, fact: Fact, depth: int) -> bool:
         if fact in self._asserted or fact in self._proved:
             return True
         if depth <= 0 or self._failed.get(fact, -1) >= depth:
             return False
         arguments = fact[1:]
-        for support, _ in fact[0].supports:
+        for support, origin in fact[0].supports:
             for premises in support(*arguments):
                 self._budget -= 1
                 for premise in premises:
                     if not self._prove(premise, depth - 1):
                         break
                 else:
-                    self._proved.add(fact)
+                    self._proved[fact] = origin, premises
                     return True
                 if self._budget <= 0:
                     return False
         self._failed[fact] = depth
         return False
 
-    def find(self, fact: Fact, deepest: int = 64, budget: int = 100_000) -> Proof | None:
-        """Return a shallowest proof; None where there is none within the bounds."""
-        self._budget = budget
-        for depth in range(deepest + 1):
-            failed: dict[Fact, int] = {}
-            proof = self._find(fact, depth, failed, {})
-            if proof is not None or self._budget <= 0:
-                return proof
-        return None
-
-    def _find(
-        self, fact: Fact, depth: int, failed: dict[Fact, int], found: dict[Fact, Proof]
-    ) -> Proof | None:
+    def _proof(self, fact: Fact, made: dict[Fact, Proof]) -> Proof:
         if fact in self._asserted:
             return Proof(fact, asserted=True)
-        known = found.get(fact)
-        if known is not None:
-            return known
-        if depth <= 0 or failed.get(fact, -1) >= depth:
-            return None
-        for support, origin in fact[0].supports:
-            for premises in support(*fact[1:]):
-                self._budget -= 1
-                if self._budget <= 0:
-                    return None
-                proofs: list[Proof] = []
-                for premise in premises:
-                    proof = self._find(premise, depth - 1, failed, found)
-                    if proof is None:
-                        break
-                    proofs.append(proof)
-                else:
-                    made = Proof(fact, origin, tuple(proofs))
-                    found[fact] = made
-                    return made
-        failed[fact] = depth
-        return None
+        if fact not in made:
+            origin, premises = self._proved[fact]
+            parts = tuple(self._proof(premise, made) for premise in premises)
+            made[fact] = Proof(fact, origin, parts)
+        return made[fact]
