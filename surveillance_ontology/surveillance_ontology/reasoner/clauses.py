@@ -80,12 +80,6 @@ class Predicate:
     def __repr__(self) -> str:
         return f'<{self.kind} {self.name}>'
 
-    def clear(self) -> None:
-        """Empty the extension, in place: compiled joins hold on to the containers."""
-        self.members.clear()
-        self.succ.clear()
-        self.pred.clear()
-
     def holds(self, fact: Fact) -> bool:
         """Tell whether a fact of this predicate is in its extension."""
         if len(fact) == 2:

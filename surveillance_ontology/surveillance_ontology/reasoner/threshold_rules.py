@@ -183,7 +183,6 @@ class ThresholdIndex:
     ) -> None:
         head = clause.head
         assert isinstance(head, PredicateAtom)
-        self.clause, self._split = clause, split
         self._predicate, self._terms = head.predicate, head.terms
         self._enqueue, self._overdelete = enqueue, overdelete
         self._strict = split.strict
@@ -218,18 +217,10 @@ class ThresholdIndex:
         self._key_support = compile_support(context, split.keyed, head.terms, self._key_terms)
         self._key_exists = compile_support(context, split.keyed, self._key_terms)
         self._reach_exists = compile_support(context, split.reaching, self._reach_terms)
+        both = (*self._key_terms, *self._reach_terms)
+        self._comparisons = compile_support(context, split.computed, both)
         self.proves: Callable[[Fact], bool] = lambda fact: True
         head.predicate.supports.append((self.supports, clause.origin))
-
-    def clear(self) -> None:
-        """Forget every row."""
-        for container in (self._keyed, self._reaching, self._odd_keys, self._odd_reaches):
-            container.clear()
-        self._keys.clear()
-        self._reaches.clear()
-        self._unsorted.clear()
-        self._lost.clear()
-        self._emitted = None
 
     # --- rows come ---
 
@@ -394,30 +385,7 @@ class ThresholdIndex:
         """Return the comparison as the built-ins define it, for values that are not exact
         numbers.
         """
-        values: dict[Term, Any] = dict(zip(self._key_terms, key_row, strict=True))
-        values.update(zip(self._reach_terms, reach_row, strict=True))
-        pending = list(self._split.computed)
-
-        def value(term: Term) -> Any:
-            return term.value if isinstance(term, Constant) else values[term]
-
-        while pending:
-            for atom in tuple(pending):
-                rest = atom.terms[1:]
-                if not all(isinstance(term, Constant) or term in values for term in rest):
-                    continue
-                pending.remove(atom)
-                first = atom.terms[0]
-                if isinstance(first, Constant) or first in values:
-                    if not atom.holds(*map(value, atom.terms)):
-                        return False
-                    continue
-                assert atom.solve is not None
-                results = tuple(atom.solve(*map(value, rest)))
-                if not results:
-                    return False
-                values[first] = results[0]
-        return True
+        return any(True for _ in self._comparisons(*key_row, *reach_row))
 
 
 def _variables(form: Linear) -> tuple[int, ...]:
