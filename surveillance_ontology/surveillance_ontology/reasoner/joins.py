@@ -9,6 +9,7 @@ so compiled code is shared.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
 from functools import lru_cache
 from types import CodeType
 from typing import Any
@@ -35,24 +36,19 @@ def _code(source: str) -> CodeType:
     return compile(source, '<join>', 'exec')
 
 
+@dataclass(frozen=True)
 class JoinContext:
     """What compiled joins need from the engine.
 
-    Args:
+    Attributes:
         representative: From an individual to the one that stands for it, where that is another.
         different: Whether two individuals are known to be different.
         different_predicate: Names difference in premises.
     """
 
-    def __init__(
-        self,
-        representative: dict[str, str],
-        different: Callable[[str, str], bool],
-        different_predicate: Predicate,
-    ) -> None:
-        self.representative = representative
-        self.different = different
-        self.different_predicate = different_predicate
+    representative: dict[str, str]
+    different: Callable[[str, str], bool]
+    different_predicate: Predicate
 
 
 class _Writer:

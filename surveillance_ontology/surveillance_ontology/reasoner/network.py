@@ -5,6 +5,7 @@ them.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from typing import Any
 
 from surveillance_ontology.owl.axioms import Axiom
@@ -70,9 +71,7 @@ class Network:
         self._program = program
         self._difference = difference
         self._enqueue, self._overdelete, self._merge = enqueue, overdelete, merge
-        self.context = self._context = JoinContext(
-            representative, difference.different, program.different
-        )
+        self.context = JoinContext(representative, difference.different, program.different)
         self.initial: list[Callable[[], None]] = []
         self.naming: list[Callable[[], None]] = []
         self.merging: list[Callable[[str, str], None]] = []
@@ -106,45 +105,47 @@ class Network:
 
     def attach(self, clause: Clause) -> None:
         """Have a clause run from now on; what follows already is not looked for."""
-        head = clause.head
-        if isinstance(head, SameAtom):
-            self._attach_same(clause, head)
-            return
         split = split_rule(clause)
         if split is not None:
-            index = ThresholdIndex(clause, split, self._context, self._enqueue, self._overdelete)
+            index = ThresholdIndex(clause, split, self.context, self._enqueue, self._overdelete)
             self.thresholds.append(index)
             return
-        context, body = self._context, clause.body
         hooks = self._hooks[clause] = []
 
         def hook(place: list[Any], what: Any) -> None:
             place.append(what)
             hooks.append((place, what))
 
-        def trigger(
-            given: BodyAtom | None, terms: Sequence[Term], emit: Emit, present: bool
-        ) -> Callable[..., None]:
-            return compile_trigger(context, body, given, terms, head, emit, present)
-
+        context, body, head = self.context, clause.body, clause.head
+        support = compile_support(context, body, head.terms)
+        gain: Callable[[BodyAtom | None, Sequence[Term]], Callable[..., None]]
+        if isinstance(head, SameAtom):
+            request = self._request_of(clause, head, support)
+            hook(self.merging, request)
+            gain = partial(compile_call, context, body, outputs=head.terms, call=request)
+            lose = None  # Who is the same is split by what its merges rest on.
+        else:
+            hook(head.predicate.supports, (support, clause.origin))
+            trigger = partial(compile_trigger, context, body, head=head)
+            gain = partial(trigger, emit=self._enqueue, present=False)
+            lose = partial(trigger, emit=self._overdelete, present=True)
         triggered = False
         for atom in body:
             if isinstance(atom, PredicateAtom):
                 triggered = True
-                predicate = atom.predicate
-                hook(predicate.on_insert, trigger(atom, atom.terms, self._enqueue, False))
-                hook(predicate.on_delete, trigger(atom, atom.terms, self._overdelete, True))
+                hook(atom.predicate.on_insert, gain(atom, atom.terms))
+                if lose is not None:
+                    hook(atom.predicate.on_delete, lose(atom, atom.terms))
             elif isinstance(atom, DifferentAtom):
                 for term in atom.terms:
-                    hook(self.touch_insert, trigger(None, (term,), self._enqueue, False))
-                    hook(self.touch_delete, trigger(None, (term,), self._overdelete, True))
+                    hook(self.touch_insert, gain(None, (term,)))
+                    if lose is not None:
+                        hook(self.touch_delete, lose(None, (term,)))
         if not triggered or _names_individual(clause):
-            run = trigger(None, (), self._enqueue, False)
+            run = gain(None, ())
             hook(self.naming, run)
             if not triggered:
                 self.initial.append(run)
-        support = compile_support(context, body, head.terms)
-        hook(head.predicate.supports, (support, clause.origin))
 
     def detach(self, clause: Clause) -> None:
         """End a clause, which is no rule of a sorted index; what it derived stays."""
@@ -161,15 +162,17 @@ class Network:
         head = clause.head
         assert isinstance(head, PredicateAtom)
         emit = self._overdelete if holding else self._enqueue
-        compile_trigger(self._context, clause.body, None, (), head, emit, holding)()
+        compile_trigger(self.context, clause.body, None, (), head, emit, holding)()
 
-    def _attach_same(self, clause: Clause, head: SameAtom) -> None:
-        context, body, merge = self._context, clause.body, self._merge
-        support = compile_support(context, body, head.terms)
-        origin = clause.origin
+    def _request_of(
+        self, clause: Clause, head: SameAtom, support: Callable[..., Iterator[Premises]]
+    ) -> Callable[[str, str], None]:
+        """Return what asks for the merge of two individuals where a clause makes them the same.
 
-        # An individual that the clause names is merged under its own name: the individual that
-        # represents it now may cease to.
+        An individual that the clause names is merged under its own name: the individual that
+        represents it now may cease to.
+        """
+        merge, origin = self._merge, clause.origin
         first, second = (
             str(term.value) if isinstance(term, Constant) else None for term in head.terms
         )
@@ -180,24 +183,7 @@ class Network:
                     merge(first or x, second or y, origin, premises)
                     return
 
-        self.merging.append(request)
-        triggered = False
-        for atom in body:
-            if isinstance(atom, PredicateAtom):
-                triggered = True
-                atom.predicate.on_insert.append(
-                    compile_call(context, body, atom, atom.terms, head.terms, request)
-                )
-            elif isinstance(atom, DifferentAtom):
-                for term in atom.terms:
-                    self.touch_insert.append(
-                        compile_call(context, body, None, (term,), head.terms, request)
-                    )
-        if not triggered or _names_individual(clause):
-            run = compile_call(context, body, None, (), head.terms, request)
-            self.naming.append(run)
-            if not triggered:
-                self.initial.append(run)
+        return request
 
     # --- bounds ---
 
