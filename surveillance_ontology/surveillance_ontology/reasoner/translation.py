@@ -247,10 +247,13 @@ class Translation:
 
     def report(self, reason: str) -> None:
         """Note a part of the axiom at hand that is not used."""
-        subject = self._context if self._origin is None else axiom_text(self._origin)
-        text = f'{subject}: {reason}'
+        text = self._sentence(reason)
         if text not in self.program.unsupported:
             self.program.unsupported.append(text)
+
+    def _sentence(self, reason: str) -> str:
+        subject = self._context if self._origin is None else axiom_text(self._origin)
+        return f'{subject}: {reason}'
 
     def _attempt(self, add: Callable[..., object], *parts: Any) -> None:
         """Add what can be added of an axiom; the rest is reported."""
@@ -329,30 +332,35 @@ class Translation:
     def bodies(self, expression: ClassExpression, x: Term) -> list[Body]:
         """Return the bodies each of which makes `x` a member."""
         expression = normal_form(expression)
-        if isinstance(expression, str):
-            if expression == THING:
-                return [()]
-            if expression == NOTHING:
-                return [(PredicateAtom(self.program.nothing, (x,)),)]
-            return [(PredicateAtom(self.program.cls(expression), (x,)),)]
+        if expression == THING:
+            return [()]
+        fact = self._fact(expression, x)
+        if fact is not None:
+            return [(fact,)]
         if isinstance(expression, ex.ObjectIntersectionOf):
             return self._intersection(expression.operands, x)
         if isinstance(expression, ex.ObjectUnionOf):
             return [body for operand in expression.operands for body in self.bodies(operand, x)]
         if isinstance(expression, ex.ObjectOneOf):
             return [(SameAtom((x, Constant(name))),) for name in expression.individuals]
-        if isinstance(expression, ex.ObjectHasValue):
-            return [(self.property(expression.prop, x, Constant(expression.individual)),)]
-        if isinstance(expression, ex.ObjectHasSelf):
-            return [(self.property(expression.prop, x, x),)]
-        if isinstance(expression, ex.DataHasValue):
-            value = Constant(value_of(expression.literal), True)
-            return [(PredicateAtom(self.program.data(expression.prop), (x, value)),)]
         if isinstance(expression, ex.ObjectSomeValuesFrom):
             return self._related(expression.prop, expression.filler, x)
         if isinstance(expression, ex.DataSomeValuesFrom):
             return [self._valued(expression.prop, expression.range, x)]
         return self._labelled_bodies(expression, x)
+
+    def _fact(self, expression: ClassExpression, x: Term) -> PredicateAtom | None:
+        """Return the atom that says as much of `x` as the expression; None where no one does."""
+        if isinstance(expression, str):
+            return PredicateAtom(self._label(expression), (x,))
+        if isinstance(expression, ex.ObjectHasValue):
+            return self.property(expression.prop, x, Constant(expression.individual))
+        if isinstance(expression, ex.ObjectHasSelf):
+            return self.property(expression.prop, x, x)
+        if isinstance(expression, ex.DataHasValue):
+            value = Constant(value_of(expression.literal), True)
+            return PredicateAtom(self.program.data(expression.prop), (x, value))
+        return None
 
     def property(self, prop: ex.PropertyExpression, x: Term, y: Term) -> PredicateAtom:
         return property_atom(self.program, prop, x, y)
@@ -384,14 +392,10 @@ class Translation:
         """Return the bodies for what is in every operand, at most one of which is spelt out as a
         relation.
         """
-        relating = [operand for operand in operands if isinstance(operand, _RELATING)]
-        unions = [operand for operand in operands if isinstance(operand, ex.ObjectUnionOf)]
+        spelt_out = [one for one in operands if isinstance(one, (*_RELATING, ex.ObjectUnionOf))]
         parts: list[list[Body]] = []
         for operand in operands:
-            labelled = (operand in relating and len(relating) + len(unions) > 1) or (
-                operand in unions and len(relating) + len(unions) > 1
-            )
-            if labelled:
+            if len(spelt_out) > 1 and operand in spelt_out:
                 parts.append([(PredicateAtom(self._recognise(operand), (x,)),)])
             else:
                 parts.append(self.bodies(operand, x))
@@ -427,8 +431,9 @@ class Translation:
         elif isinstance(expression, ex.ObjectComplementOf) and isinstance(expression.operand, str):
             self._complements[expression.operand] = label
         if isinstance(expression, _NEGATIVE):
-            subject = self._context if self._origin is None else axiom_text(self._origin)
-            text = f'{subject}: not all members of {expression_text(expression)} are recognised'
+            text = self._sentence(
+                f'not all members of {expression_text(expression)} are recognised'
+            )
             self.program.partial.append(Partial(label, text, decided_by))
         return bodies
 
@@ -439,26 +444,35 @@ class Translation:
         if label in self._counted:
             return
         self._counted.add(label)
-        if isinstance(expression, ex.ObjectMinCardinality):
-            prop, inverse = self._direction(expression.prop)
-            filler = self._filler(expression.filler)
-            condition = AtLeast(label, expression.n, prop, inverse, filler, self._origin)
-        else:
-            prop = self.program.data(expression.prop)
-            test, values = self.test(expression.range) or (None, None)
-            condition = AtLeast(label, expression.n, prop, False, test, self._origin, values)
+        prop, inverse, filler, values = self._counts(expression)
+        condition = AtLeast(label, expression.n, prop, inverse, filler, self._origin, values)
         self.program.at_least.append(condition)
+
+    def _counts(
+        self,
+        expression: ex.ObjectMinCardinality
+        | ex.DataMinCardinality
+        | ex.ObjectMaxCardinality
+        | ex.DataMaxCardinality,
+    ) -> tuple[Predicate, bool, Predicate | Test | None, ValueSet | None]:
+        """Return what is counted: by which property, whether backwards, the filler, and what it
+        admits where it is a test.
+        """
+        if isinstance(expression, (ex.ObjectMinCardinality, ex.ObjectMaxCardinality)):
+            return *self._direction(expression.prop), self._filler(expression.filler), None
+        test, values = self.test(expression.range) or (None, None)
+        return self.program.data(expression.prop), False, test, values
 
     # --- consequents ---
 
     def imply(self, body: Body, expression: ClassExpression, x: Term) -> None:
         """Add the clauses by which the body makes `x` a member."""
         expression = normal_form(expression)
-        if isinstance(expression, str):
-            if expression == NOTHING:
-                self.contradict(body, x)
-            elif expression != THING:
-                self.clause(body, PredicateAtom(self.program.cls(expression), (x,)))
+        if expression == THING:
+            return
+        fact = self._fact(expression, x)
+        if fact is not None:
+            self.clause(body, fact)
         elif isinstance(expression, ex.ObjectIntersectionOf):
             for operand in expression.operands:
                 self._attempt(self.imply, body, operand, x)
@@ -466,13 +480,6 @@ class Translation:
             self._imply_union(body, expression, x)
         elif isinstance(expression, ex.ObjectOneOf):
             self.clause(body, SameAtom((x, Constant(expression.individuals[0]))))
-        elif isinstance(expression, ex.ObjectHasValue):
-            self.clause(body, self.property(expression.prop, x, Constant(expression.individual)))
-        elif isinstance(expression, ex.ObjectHasSelf):
-            self.clause(body, self.property(expression.prop, x, x))
-        elif isinstance(expression, ex.DataHasValue):
-            value = Constant(value_of(expression.literal), True)
-            self.clause(body, PredicateAtom(self.program.data(expression.prop), (x, value)))
         else:
             label = self._label(expression)
             if body != (PredicateAtom(label, (x,)),):
@@ -515,7 +522,9 @@ class Translation:
         elif isinstance(expression, ex.DataAllValuesFrom):
             self.only(body, expression.prop, expression.range)
         elif isinstance(expression, (ex.ObjectMaxCardinality, ex.DataMaxCardinality)):
-            self._describe_most(label, expression)
+            prop, inverse, counted, values = self._counts(expression)
+            most = AtMost(label, expression.n, prop, inverse, counted, self._origin, values)
+            self.program.at_most.append(most)
         elif isinstance(expression, ex.ObjectComplementOf):
             self._describe_complement(label, expression.operand)
 
@@ -528,19 +537,6 @@ class Translation:
     ) -> None:
         existential = Existential(label, n, *direction, filler, self._origin)
         self.program.existentials.append(existential)
-
-    def _describe_most(
-        self, label: Predicate, expression: ex.ObjectMaxCardinality | ex.DataMaxCardinality
-    ) -> None:
-        n, origin = expression.n, self._origin
-        if isinstance(expression, ex.DataMaxCardinality):
-            test, values = self.test(expression.range) or (None, None)
-            data = self.program.data(expression.prop)
-            most = AtMost(label, n, data, False, test, origin, values)
-        else:
-            filler = self._filler(expression.filler)
-            most = AtMost(label, n, *self._direction(expression.prop), filler, origin)
-        self.program.at_most.append(most)
 
     def _describe_complement(self, label: Predicate, operand: ClassExpression) -> None:
         if isinstance(operand, str):
@@ -733,7 +729,7 @@ class Translation:
 
     def _rule(self, rule: ax.Rule) -> None:
         """Add the clauses of one rule to the self's program."""
-        program, terms = self.program, RuleTerms(self.fresh)
+        terms = RuleTerms(self.fresh)
         alternatives: list[list[tuple[BodyAtom, ...]]] = []
         for atom in rule.body:
             if isinstance(atom, ex.ClassAtom):
@@ -744,24 +740,27 @@ class Translation:
                 term, admitted = terms.value(atom.argument), self.test(atom.range)
                 if admitted is not None:
                     alternatives.append([(_range_atom(admitted, term),)])
-            elif isinstance(atom, ex.ObjectPropertyAtom):
-                pair = terms.individual(atom.first), terms.individual(atom.second)
-                alternatives.append([(self.property(atom.prop, *pair),)])
-            elif isinstance(atom, ex.DataPropertyAtom):
-                data = program.data(atom.prop)
-                both = (terms.individual(atom.first), terms.value(atom.second))
-                alternatives.append([(PredicateAtom(data, both),)])
-            elif isinstance(atom, ex.SameIndividualAtom):
-                pair = terms.individual(atom.first), terms.individual(atom.second)
-                alternatives.append([(SameAtom(pair),)])
-            elif isinstance(atom, ex.DifferentIndividualsAtom):
-                pair = terms.individual(atom.first), terms.individual(atom.second)
-                alternatives.append([(DifferentAtom(pair),)])
             else:
-                alternatives.append([(computed_atom(atom, terms),)])
+                alternatives.append([(self._rule_atom(atom, terms),)])
         for parts in product(*alternatives):
             body = tuple(atom for part in parts for atom in part)
             self._heads(rule, self._bound(body, terms), terms)
+
+    def _rule_atom(
+        self, atom: ex.Atom, terms: RuleTerms
+    ) -> PredicateAtom | SameAtom | DifferentAtom | ComputedAtom:
+        """Return an atom that is not about a class or a data range."""
+        if isinstance(atom, ex.BuiltinAtom):
+            return computed_atom(atom, terms)
+        assert not isinstance(atom, (ex.ClassAtom, ex.DataRangeAtom))
+        first = terms.individual(atom.first)
+        if isinstance(atom, ex.DataPropertyAtom):
+            return PredicateAtom(self.program.data(atom.prop), (first, terms.value(atom.second)))
+        second = terms.individual(atom.second)
+        if isinstance(atom, ex.ObjectPropertyAtom):
+            return self.property(atom.prop, first, second)
+        kind = SameAtom if isinstance(atom, ex.SameIndividualAtom) else DifferentAtom
+        return kind((first, second))
 
     def _bound(self, body: tuple[BodyAtom, ...], terms: RuleTerms) -> tuple[BodyAtom, ...]:
         """Return the body, in which what stands in no fact is found by other means.
@@ -815,32 +814,26 @@ class Translation:
         )
 
     def _heads(self, rule: ax.Rule, body: tuple[BodyAtom, ...], terms: RuleTerms) -> None:
-        program = self.program
         bound = {term for atom in body for term in atom.terms if isinstance(term, int)}
-
-        def known(term: Term) -> Term:
-            if isinstance(term, int) and term not in bound:
-                raise UnsupportedError('a variable of the head does not stand in the body')
-            return term
-
         if not rule.head:
             subject = next((term for term in sorted(bound) if term in terms.individuals), None)
-            term: Term = Constant(NOTHING) if subject is None else subject
-            self.contradict(body, term)
+            self.contradict(body, Constant(NOTHING) if subject is None else subject)
+
+        def check(*arguments: Term) -> None:
+            if any(isinstance(term, int) and term not in bound for term in arguments):
+                raise UnsupportedError('a variable of the head does not stand in the body')
+
         for atom in rule.head:
             if isinstance(atom, ex.ClassAtom):
-                self.imply(body, atom.cls, known(terms.individual(atom.argument)))
-            elif isinstance(atom, ex.ObjectPropertyAtom):
-                pair = known(terms.individual(atom.first)), known(terms.individual(atom.second))
-                self.clause(body, self.property(atom.prop, *pair))
-            elif isinstance(atom, ex.DataPropertyAtom):
-                both = (known(terms.individual(atom.first)), known(terms.value(atom.second)))
-                self.clause(body, PredicateAtom(program.data(atom.prop), both))
-            elif isinstance(atom, (ex.SameIndividualAtom, ex.DifferentIndividualsAtom)):
-                pair = known(terms.individual(atom.first)), known(terms.individual(atom.second))
-                if isinstance(atom, ex.SameIndividualAtom):
-                    self.clause(body, SameAtom(pair))
-                else:
-                    self.clause(body, PredicateAtom(program.apart, pair))
-            else:
+                argument = terms.individual(atom.argument)
+                check(argument)
+                self.imply(body, atom.cls, argument)
+            elif isinstance(atom, (ex.DataRangeAtom, ex.BuiltinAtom)):
                 raise UnsupportedError('a built-in or data range in the head has no meaning here')
+            else:
+                head = self._rule_atom(atom, terms)
+                assert not isinstance(head, ComputedAtom)
+                check(*head.terms)
+                if isinstance(head, DifferentAtom):
+                    head = self._differs(*head.terms)
+                self.clause(body, head)
