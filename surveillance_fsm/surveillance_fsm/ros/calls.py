@@ -16,12 +16,12 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 from action_msgs.msg import GoalStatus
 from rclpy.action import ActionClient
 from rclpy.callback_groups import ReentrantCallbackGroup
-from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rclpy.task import Future
 
@@ -32,7 +32,13 @@ from surveillance_fsm.exceptions import (
     CallTimeoutError,
     UnavailableError,
 )
-from surveillance_fsm.ros.waiting import ACTION_CLIENT_QOS, CLIENT_QOS, own
+from surveillance_fsm.ros.waiting import (
+    ACTION_CLIENT_QOS,
+    CLIENT_QOS,
+    own,
+    stopping_of,
+    work_aside,
+)
 
 DISCOVERY_PERIOD = 0.02
 """Seconds between two looks for a server; rclpy offers no event for its appearance."""
@@ -171,7 +177,6 @@ class ServiceCaller:
         self._client = node.create_client(
             srv_type, name, callback_group=ReentrantCallbackGroup(), qos_profile=CLIENT_QOS
         )
-        self._checks: _PeriodicChecks | None = None
         self._what = f'service {name}'
         self._servers = _Servers(node, self._client.service_name, self.is_ready, self._what)
         self.name = name
@@ -227,86 +232,18 @@ class ServiceCaller:
         return answer
 
     async def call_async(self, request: Any, timeout: float) -> Any:
-        """Call from a callback with `await`; otherwise as `call`.
+        """Call from a callback with `await`, on a thread of its own; otherwise as `call`.
 
         Raises:
             UnavailableError: The server is not there when the call is made, or went away before it
                 answered.
             CallTimeoutError: No answer within the time.
+            CallInterruptedError: The node stops.
         """
         if not self.is_ready():
             raise UnavailableError(f'{self._what}: no server', self.is_ready)
-        timeout = self.round_trips.deadline(timeout)
-        deadline = time.monotonic() + timeout
-        look, failure = self._servers.look_for_loss(DOUBTFUL_SECONDS), []
-        future = self._client.call_async(request)
-
-        def check() -> None:
-            try:
-                if time.monotonic() > deadline:
-                    raise CallTimeoutError(f'{self._what}: no answer within {timeout:g} s')
-                look()
-            except CallError as error:
-                if not future.done():
-                    failure.append(error)
-                    future.cancel()
-
-        if self._checks is None:
-            self._checks = _PeriodicChecks(self._node)
-        self._checks.add(check)
-        with self.round_trips.measured():
-            try:
-                response = await future
-            finally:
-                self._checks.remove(check)
-            if failure:
-                self._client.remove_pending_request(future)
-                raise failure[0]
-        _show(self._node, self.name, self.round_trips)
-        return response
-
-
-class _PeriodicChecks:
-    """Functions that the executor calls every `SERVER_PERIOD` while there are any.
-
-    Args:
-        node: A node that an executor spins.
-    """
-
-    def __init__(self, node: Node) -> None:
-        self._node = node
-        self._checks: set[Callable[[], None]] = set()
-        self._lock = threading.Lock()
-        self._timer = node.create_timer(
-            SERVER_PERIOD,
-            self._on_timer,
-            callback_group=ReentrantCallbackGroup(),
-            clock=Clock(clock_type=ClockType.STEADY_TIME),
-            autostart=False,
-        )
-
-    def add(self, check: Callable[[], None]) -> None:
-        """Have a function called from now on."""
-        with self._lock:
-            self._checks.add(check)
-            if not self._timer.is_canceled():
-                return
-            self._timer.reset()
-        self._node.executor.wake()
-
-    def remove(self, check: Callable[[], None]) -> None:
-        """Have it called no more."""
-        with self._lock:
-            self._checks.discard(check)
-
-    def _on_timer(self) -> None:
-        with self._lock:
-            if not self._checks:
-                # Cancelled nowhere else: rclpy fails on one that was due when it was cancelled.
-                self._timer.cancel()
-            checks = tuple(self._checks)
-        for check in checks:
-            check()
+        work = partial(self.call, request, timeout, stopping_of(self._node))
+        return await work_aside(self._node, work, f'call of {self.name}')
 
 
 def await_ready(
@@ -352,7 +289,7 @@ def block_on(
         CallTimeoutError: Nothing came by the deadline.
         CallInterruptedError: The interrupt was raised.
     """
-    woken = threading.Event()
+    begun, woken = time.monotonic(), threading.Event()
     future.add_done_callback(lambda _future: woken.set())
     remove = interrupt.subscribe(woken.set) if interrupt is not None else None
     try:
@@ -367,7 +304,7 @@ def block_on(
         return future.result()
     if interrupt is not None and interrupt.is_set():
         raise CallInterruptedError(f'{what}: interrupted')
-    raise CallTimeoutError(f'{what}: no answer in time')
+    raise CallTimeoutError(f'{what}: no answer within {deadline - begun:.1f} s')
 
 
 def _show(node: Node, name: str, round_trips: RoundTrips) -> None:

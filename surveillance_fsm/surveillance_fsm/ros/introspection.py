@@ -26,7 +26,7 @@ from surveillance_fsm.ros.conversions import (
     userdata_from,
     userdata_text,
 )
-from surveillance_fsm.ros.exchange import seconds
+from surveillance_fsm.ros.waiting import seconds
 from surveillance_fsm.structure import Structure, state_at
 from surveillance_interfaces.msg import (
     FsmStatus,

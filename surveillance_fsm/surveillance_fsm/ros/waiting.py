@@ -82,6 +82,13 @@ def set_preempt_handler(node: Node, container: Container, timeout: float = 5.0) 
     node.context.on_shutdown(ended)
 
 
+def seconds(duration: Any) -> float | None:
+    """Return a duration in seconds: a number, an rclpy ``Duration``, or None."""
+    if duration is None or isinstance(duration, int | float):
+        return duration
+    return float(duration.nanoseconds) / 1e9
+
+
 class ClockWait:
     """Sleeps on a node's clock that an `Interrupt` ends early.
 
