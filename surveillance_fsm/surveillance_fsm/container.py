@@ -79,7 +79,8 @@ class Container(State):
         userdata: What the states inside share.
         fsm_states: The states by label.
         fsm_branches: The interrupts by label.
-        fsm_remappings: From the states' userdata keys to the container's, by label.
+        fsm_remappings: From the userdata keys of states and interrupts to the container's, by
+            label.
         fsm_constants: Values of the states' input keys that come from no userdata, by label.
         fsm_limits: The states' time limits and retries, by label.
         fsm_transition_cbs: The registered callbacks, and likewise the others.
@@ -203,7 +204,7 @@ class Container(State):
         control = self._control
         if control is None:
             with _entry_lock:
-                control = self._control = self._control or Control(self)
+                control = self._control = self._control or Control(self.get_name)
         return control
 
     @property
@@ -459,22 +460,17 @@ class Container(State):
 
     # Nodes.
 
-    def fsm_view(self, node: Node) -> Remapper:
-        """Make a state's view of the container's userdata."""
-        branch = self.fsm_branches.get(node.label)
-        remapping = self.fsm_remappings.get(node.label) if branch is None else branch.remapping
-        return Remapper(
-            self.userdata,
-            node.state.get_registered_input_keys(),
-            node.state.get_registered_output_keys(),
-            remapping or (),
-            self.fsm_constants.get(node.label),
-            node,
-        )
-
     def fsm_node(self, label: str, state: State, priority: float = LOWEST) -> Node:
         """Make the node of one state; its targets are left to the container's kind."""
-        node = Node(self, label, state, priority)
+        view = Remapper(
+            self.userdata,
+            state.get_registered_input_keys(),
+            state.get_registered_output_keys(),
+            self.fsm_remappings.get(label, ()),
+            self.fsm_constants.get(label),
+            self.fsm_path_of(label),
+        )
+        node = Node(self.fsm_path, label, state, view, priority)
         clock = self.fsm_clock
         if state.fsm_clock is not clock:
             state.fsm_clock = clock
@@ -653,7 +649,9 @@ class Container(State):
         for outcome in state.get_registered_outcomes():
             ends = outcome == 'preempted' and outcome in self._outcomes
             bound.setdefault(outcome, outcome if ends else RESUME)
-        self.fsm_branches[label] = Branch(label, state, priority, bound, dict(remapping or {}))
+        self.fsm_branches[label] = Branch(label, state, priority, bound)
+        if remapping:
+            self.fsm_remappings[label] = dict(remapping)
         structure_version.changed()
         return state
 
@@ -672,7 +670,9 @@ class Container(State):
                 f"'{self.fsm_path}' has no interrupt '{label}': its interrupts are "
                 f'{sorted(self.fsm_branches)}'
             )
-        self.fsm_raise(branch)
+        with _raise_lock:
+            if branch not in self.fsm_raised:
+                self.fsm_raised = (*self.fsm_raised, branch)
         # A run that begins from here on finds it by itself.
         frame = self.fsm_frame
         if frame is not None:
@@ -688,12 +688,6 @@ class Container(State):
             there, self.fsm_raised = len(left) < len(self.fsm_raised), left
         return there
 
-    def fsm_raise(self, branch: Branch) -> None:
-        """Note an interrupt as raised, once."""
-        with _raise_lock:
-            if branch not in self.fsm_raised:
-                self.fsm_raised = (*self.fsm_raised, branch)
-
     def fsm_take_raised(self, above: float = LOWEST) -> Branch | None:
         """Take the most urgent raised interrupt, if it is more urgent than `above`."""
         with _raise_lock:
@@ -704,10 +698,6 @@ class Container(State):
                 return None
             self.fsm_raised = tuple(each for each in self.fsm_raised if each is not urgent)
             return urgent
-
-    def fsm_urgent(self, priority: float) -> bool:
-        """Tell whether an interrupt was raised that is more urgent than `priority`."""
-        return any(branch.priority > priority for branch in self.fsm_raised)
 
     def fsm_children(self) -> dict[str, State]:
         """Return the states and interrupts inside by label."""

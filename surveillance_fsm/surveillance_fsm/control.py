@@ -21,7 +21,6 @@ from surveillance_fsm.execution import (
 from surveillance_fsm.log import logerr
 
 if TYPE_CHECKING:
-    from surveillance_fsm.container import Container
     from surveillance_fsm.frame import Frame
 
 shutdown_check: Callable[[], bool] | None = None
@@ -48,6 +47,9 @@ def set_shutdown_check(cb: Callable[[], bool] | None) -> None:
 class Control:
     """What may be done to a root container from other threads, between runs too.
 
+    Args:
+        name: Tells the root's name.
+
     Attributes:
         condition: The one condition of the machine.
         paused: No further state is entered; see `pause`.
@@ -55,12 +57,12 @@ class Control:
         trace: Where transitions are reported, if anywhere.
     """
 
-    def __init__(self, container: Container) -> None:
+    def __init__(self, name: Callable[[], str]) -> None:
         self.condition = threading.Condition()
         self.paused = False
         self.steps = 0
         self.trace: Trace | None = None
-        self._container = container
+        self._name = name
         self._traces: list[Trace] = []
         # The last one, which may have ended.
         self._run: Run | None = None
@@ -123,8 +125,7 @@ class Control:
             running = self._run is not None and not self._run.ended
             if not running or not self.paused:
                 raise InvalidStateError(
-                    f"'{self._container.get_name()}' cannot step: it is not "
-                    f'{"paused" if running else "running"}'
+                    f"'{self._name()}' cannot step: it is not {'paused' if running else 'running'}"
                 )
             self.steps += 1
             self._call_attention()
@@ -203,7 +204,7 @@ class Control:
         """
         with self.condition:
             if self._run is not None and not self._run.ended:
-                raise InvalidStateError(f"'{self._container.get_name()}' is running already")
+                raise InvalidStateError(f"'{self._name()}' is running already")
             self._run, self.steps = run, 0
 
     def fsm_end(self, run: Run) -> None:
@@ -214,4 +215,4 @@ class Control:
         # Others may end their reports in this moment.
         trace = self.trace
         if trace is not None:
-            trace(Noted(self._container.get_name(), '', '', '', run.now(), {}, 'end'))
+            trace(Noted(self._name(), '', '', '', run.now(), {}, 'end'))

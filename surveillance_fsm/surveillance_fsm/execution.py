@@ -32,7 +32,6 @@ from surveillance_fsm.state import State, this_thread
 from surveillance_fsm.userdata import Remapper
 
 if TYPE_CHECKING:
-    from surveillance_fsm.container import Container
     from surveillance_fsm.control import Control
     from surveillance_fsm.frame import Frame
 
@@ -105,8 +104,9 @@ class Node:
     """One state of a container as the loop needs it.
 
     Attributes:
-        container: Whose state it is.
-        label: The state's label in its container.
+        within: The container's path.
+        label: The state's label in its container; empty for all states of a concurrence together.
+        path: The state's path from the root.
         state: The state.
         is_container: The state is one of the engine's containers.
         enter: What runs it; the state's own `execute` as a rule.
@@ -118,48 +118,36 @@ class Node:
     """
 
     __slots__ = (
-        '_path',
-        'container',
         'enter',
         'execute',
         'is_container',
         'label',
         'limits',
+        'path',
         'priority',
         'state',
         'targets',
         'view',
+        'within',
     )
 
     is_exit = False
     kind = 'transition'
 
     def __init__(
-        self, container: Container, label: str, state: State, priority: float = LOWEST
+        self, within: str, label: str, state: State, view: Remapper, priority: float = LOWEST
     ) -> None:
-        self.container = container
+        self.within = within
         self.label = label
+        self.path = f'{within}/{label}' if label else within
         self.state = state
         self.is_container = hasattr(state, 'fsm_frame')
         self.enter: Callable[[Any], Any] = state.execute
         self.execute: Callable[[Any], Any] = self.enter
-        self.view: Remapper = container.fsm_view(self)
+        self.view = view
         self.targets: dict[Any, Node | Exit] = {}
         self.limits: Limits | None = None
         self.priority = priority
-        self._path: str | None = None
-
-    @property
-    def path(self) -> str:
-        """The state's path from the root."""
-        if self._path is None:
-            # That of all states of a concurrence together has no label.
-            name = self.container.get_name()
-            self._path = f'{name}/{self.label}' if self.label else name
-        return self._path
-
-    def __str__(self) -> str:
-        return self.path
 
     def target(self, outcome: Any) -> Node | Exit:
         """Return where `outcome` leads.
@@ -172,7 +160,13 @@ class Node:
         try:
             return self.targets[outcome]
         except (KeyError, TypeError):
-            raise self.wrong_outcome(outcome) from None
+            returned = (
+                'None instead of an outcome' if outcome is None else f'outcome {shown(outcome)}'
+            )
+            raise InvalidTransitionError(
+                f"State '{self.path}' of type {type(self.state).__name__} returned {returned}: its "
+                f'outcomes are {sorted(self.state.get_registered_outcomes())}'
+            ) from None
 
     def release(self) -> None:
         """Drop the frame of a container that has ended, now that its parent has noted that."""
@@ -181,21 +175,12 @@ class Node:
 
     def revoke(self) -> None:
         """Cut the view in use off the userdata, and make a new one for the next execution."""
-        self.view.fsm_revoke()
-        self.view = self.container.fsm_view(self)
+        self.view = self.view.fsm_revoke()
 
     def user_fault(self, error: Exception) -> SmachError:
         """Return the engine's error for what the state's code raised; to be raised from that."""
         return self.view.fsm_explain(error) or InvalidUserCodeError(
             f"State '{self.path}' of type {type(self.state).__name__} raised {describe(error)}"
-        )
-
-    def wrong_outcome(self, outcome: object) -> InvalidTransitionError:
-        """Return the error for an outcome that the state did not declare."""
-        returned = 'None instead of an outcome' if outcome is None else f'outcome {shown(outcome)}'
-        return InvalidTransitionError(
-            f"State '{self.path}' of type {type(self.state).__name__} returned {returned}: its "
-            f'outcomes are {sorted(self.state.get_registered_outcomes())}'
         )
 
 
@@ -208,14 +193,12 @@ class Branch:
         state: What runs when it is raised.
         priority: It cuts work of lower priority short.
         transitions: From the state's outcomes to `RESUME`, labels or outcomes of the container.
-        remapping: From the state's userdata keys to the container's.
     """
 
     label: str
     state: State
     priority: float
     transitions: dict[str, str]
-    remapping: dict[str, str]
 
 
 # What is told to a trace.
@@ -259,8 +242,8 @@ def unfold(raw: RawTransition) -> Noted:
     if isinstance(raw, Noted):
         return raw
     left, outcome, time, userdata = raw
-    path, target = left.container.get_name(), left.targets[outcome]
-    return Noted(path, left.label, str(outcome), target.label, time, userdata, target.kind)
+    target = left.targets[outcome]
+    return Noted(left.within, left.label, str(outcome), target.label, time, userdata, target.kind)
 
 
 Trace = Callable[[RawTransition], object]

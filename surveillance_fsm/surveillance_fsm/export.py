@@ -230,7 +230,7 @@ def _container_data(container: Container, path: str) -> dict[str, Any]:
                 **_what(branch.state, f'{path}/{branch.label}'),
                 'priority': branch.priority,
                 'transitions': dict(branch.transitions),
-                **({'remapping': dict(branch.remapping)} if branch.remapping else {}),
+                **_remapping(container, branch.label),
             }
             for branch in container.fsm_branches.values()
         }
@@ -274,8 +274,7 @@ def _state_data(container: Container, label: str, state: State, path: str) -> di
         data['loop_outcomes'] = sorted(container.loop_outcomes)
         if container.final_outcome_map:
             data['final_outcome_map'] = dict(container.final_outcome_map)
-    if container.fsm_remappings.get(label):
-        data['remapping'] = dict(container.fsm_remappings[label])
+    data |= _remapping(container, label)
     if container.fsm_constants.get(label):
         data['constants'] = {
             key: _plain(f'constant {key!r} of {path!r}', value)
@@ -289,6 +288,11 @@ def _state_data(container: Container, label: str, state: State, path: str) -> di
         if limits.retry:
             data['retry_on'] = sorted(limits.failures - {limits.late_outcome}) or ['aborted']
     return data
+
+
+def _remapping(container: Container, label: str) -> dict[str, Any]:
+    remapping = container.fsm_remappings.get(label)
+    return {'remapping': dict(remapping)} if remapping else {}
 
 
 def _what(state: State, path: str) -> dict[str, Any]:

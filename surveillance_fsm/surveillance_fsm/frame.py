@@ -564,7 +564,8 @@ class Frame:
     def interrupted(self) -> None:
         """Make way for the container's raised interrupts."""
         self.attention = True
-        if self.container.fsm_urgent(self.current.priority):
+        priority = self.current.priority
+        if any(branch.priority > priority for branch in self.container.fsm_raised):
             self.cut_short()
         if self.run.control.paused:
             self.run.condition.notify_all()

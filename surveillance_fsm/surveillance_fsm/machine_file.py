@@ -64,12 +64,6 @@ _OF_KIND = {
 }
 """Further keys of a container, and the arguments of its class that they stand for."""
 _NEEDED = {'connector_outcome', 'default_outcome', 'items'}
-_IN_KIND = {
-    'StateMachine': {'transitions', 'remapping', 'constants', *_LIMITS},
-    'Sequence': {'transitions', 'remapping', 'constants', *_LIMITS},
-    'Concurrence': {'remapping', *_LIMITS},
-    'Iterator': {'loop_outcomes', 'break_outcomes', 'final_outcome_map', *_LIMITS},
-}
 _INTERRUPT = {'priority', 'transitions', 'remapping'}
 
 
@@ -190,7 +184,11 @@ class _Builder:
             machine.userdata[key] = value
         states = _mapping(f'{place}.states', entry.get('states', {}))
         for label, inside in states.items():
-            self._add(machine, kind, label, inside, f'{place}.states.{label}')
+            where = f'{place}.states.{label}'
+            state, options = self._state(inside, where, {*machine.fsm_arguments, *_LIMITS})
+            # Every kind but the iterator, which has one state only, has `add_state`.
+            add = machine.set_state if isinstance(machine, Iterator) else machine.add_state  # type: ignore[attr-defined]
+            _guarded(where, add, label, state, **options)
         interrupts = _mapping(f'{place}.interrupts', entry.get('interrupts', {}))
         for label, inside in interrupts.items():
             where = f'{place}.interrupts.{label}'
@@ -219,25 +217,12 @@ class _Builder:
             arguments[argument] = value
         return arguments
 
-    def _add(self, machine: Container, kind: str, label: str, data: Any, place: str) -> None:
-        state, options = self._state(data, place, _IN_KIND[kind])
-        # Every kind but the iterator, which has one state only, has `add_state`.
-        add = machine.set_state if isinstance(machine, Iterator) else machine.add_state  # type: ignore[attr-defined]
-        _guarded(place, add, label, state, **options)
-
     def _state(self, data: Any, place: str, further: set[str]) -> tuple[State, dict[str, Any]]:
         """Build a state; it, and what says how it stands in its container."""
         entry = _mapping(place, data)
-        options = {key: entry[key] for key in further if key in entry}
-        for key in options:
-            if key == 'constants':
-                options[key] = dict(_mapping(f'{place}.{key}', options[key]))
-            elif key in ('transitions', 'remapping', 'final_outcome_map'):
-                options[key] = _renaming(f'{place}.{key}', options[key])
-            elif key in ('retry_on', 'loop_outcomes', 'break_outcomes'):
-                options[key] = _names(f'{place}.{key}', options[key])
-            else:
-                _number(f'{place}.{key}', options[key])
+        options = {
+            key: _OPTIONS[key](f'{place}.{key}', entry[key]) for key in further if key in entry
+        }
         if 'states' in entry or 'machine' in entry:
             return self.container(entry, place, further), options
         if 'function' in entry:
@@ -309,9 +294,26 @@ def _renaming(place: str, data: Any) -> dict[str, str]:
     return renaming
 
 
-def _number(place: str, value: Any) -> None:
+def _number(place: str, value: Any) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise MachineFileError(f'{place}: expected a number, not {shown(value)[:80]}')
+    return value
+
+
+_OPTIONS: dict[str, Callable[[str, Any], Any]] = {
+    'constants': _mapping,
+    'transitions': _renaming,
+    'remapping': _renaming,
+    'final_outcome_map': _renaming,
+    'retry_on': _names,
+    'loop_outcomes': _names,
+    'break_outcomes': _names,
+    'timeout': _number,
+    'deadline': _number,
+    'retry': _number,
+    'priority': _number,
+}
+"""What reads a key that says how a state stands in its container."""
 
 
 def _needed(place: str, entry: Mapping[str, Any], key: str) -> Any:

@@ -99,7 +99,7 @@ class Remapper:
         output_keys: The state's names of the keys it writes.
         remapping: From the state's names to those in `ud`.
         constants: Values of input keys that come from no userdata.
-        where: What shows the state's path, for error messages.
+        where: The state's path, for error messages.
     """
 
     __slots__ = ('_constants', '_data', '_ud', '_where')
@@ -107,7 +107,7 @@ class Remapper:
     _constants: Mapping[str, Any]
     _data: Any
     _ud: Any
-    _where: object
+    _where: str
     # Of the class that is made for a combination of keys: from the state's names to those outside.
     _input: ClassVar[Mapping[str, str]] = {}
     _output: ClassVar[Mapping[str, str]] = {}
@@ -119,7 +119,7 @@ class Remapper:
         output_keys: Iterable[str] = (),
         remapping: Mapping[str, str] | Iterable[Any] = (),
         constants: Mapping[str, Any] | None = None,
-        where: object = '',
+        where: str = '',
     ) -> Remapper:
         fixed = constants or _NO_CONSTANTS
         view_class = _view_class(
@@ -129,12 +129,7 @@ class Remapper:
             frozenset(dict(remapping).items()),
             frozenset(fixed),
         )
-        view = object.__new__(view_class)
-        view._constants = fixed
-        view._data = ud._data if isinstance(ud, UserData) else ud
-        view._ud = ud
-        view._where = where
-        return view
+        return _made(view_class, ud, fixed, where)
 
     def update(self, other_userdata: UserData) -> None:
         """Take over every key of `other_userdata` into the scope behind the view."""
@@ -204,9 +199,11 @@ class Remapper:
             raise AttributeError(name)
         raise self._undeclared('read', name)
 
-    def fsm_revoke(self) -> None:
-        """Cut the view off its userdata, for a state that was left behind."""
+    def fsm_revoke(self) -> Remapper:
+        """Cut the view off its userdata, for a state that was left behind; return another one."""
+        view = _made(type(self), self._ud, self._constants, self._where)
         self._data = self._ud = _Revoked(self._where)
+        return view
 
     def fsm_explain(self, error: BaseException) -> InvalidUserCodeError | None:
         """Tell which undeclared key an ``AttributeError`` out of a state was about.
@@ -236,17 +233,27 @@ class Remapper:
         )
 
     def _state(self) -> str:
-        where = str(self._where)
-        return f"State '{where}'" if where else 'A state'
+        return f"State '{self._where}'" if self._where else 'A state'
 
 
 _NO_CONSTANTS: Mapping[str, Any] = {}
 
 
+def _made(
+    view_class: type[Remapper], ud: Any, constants: Mapping[str, Any], where: str
+) -> Remapper:
+    view = object.__new__(view_class)
+    view._constants = constants
+    view._data = ud._data if isinstance(ud, UserData) else ud
+    view._ud = ud
+    view._where = where
+    return view
+
+
 class _Revoked:
     """What a state that was left behind finds in place of userdata."""
 
-    def __init__(self, where: object) -> None:
+    def __init__(self, where: str) -> None:
         self._where = where
 
     def _refuse(self, *_: Any) -> Any:

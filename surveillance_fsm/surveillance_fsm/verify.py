@@ -14,7 +14,7 @@ from __future__ import annotations
 import ast
 import inspect
 import textwrap
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import lru_cache, reduce
 from typing import Any
@@ -122,11 +122,9 @@ class _View:
             bits |= 1 << numbers.setdefault(key, len(numbers))
         return bits
 
-    def remapping(self, label: str) -> dict[str, str]:
+    def remapping(self, label: str) -> Mapping[str, str]:
         """Return the remapping of a state or an interrupt."""
-        container = self.structure.container
-        branch = container.fsm_branches.get(label)
-        return dict(container.fsm_remappings.get(label, {}) if branch is None else branch.remapping)
+        return self.structure.container.fsm_remappings.get(label, {})
 
     def error(self, check: str, message: str, label: str = '') -> Finding:
         """Return an error of the container, or of the state with a label."""
