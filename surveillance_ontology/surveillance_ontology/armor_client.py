@@ -93,18 +93,11 @@ class RosTransport:
         """Tell whether the server is there now."""
         return self._single.is_ready() and self._serial.is_ready()
 
-    def call(self, request: DirectiveRequest) -> DirectiveResponse:
-        """Carry out one directive and block until the answer."""
-        answer = self._blocking(self._single, _one(request))
-        return response_from_ros(answer.armor_response)
-
-    def call_list(self, requests: Batch) -> ListResponse:
-        """Carry out a batch and block until the answer."""
-        return _list_from_ros(self._blocking(self._serial, _many(requests)))
-
-    def _blocking(self, caller: ServiceCaller, request: Any) -> Any:
+    def call(self, request: DirectiveRequest | Batch) -> DirectiveResponse | ListResponse:
+        """Carry out a directive or a batch and block until the answer."""
+        caller, message = self._written(request)
         try:
-            return caller.call(request, self.timeout, self._interrupt)
+            return _read(caller.call(message, self.timeout, self._interrupt))
         except CallTimeoutError as error:
             if self._is_spun():
                 raise ArmorServiceCallError(str(error)) from error
@@ -117,6 +110,24 @@ class RosTransport:
         except CallError as error:
             raise ArmorServiceCallError(str(error)) from error
 
+    async def call_async(
+        self, request: DirectiveRequest | Batch
+    ) -> DirectiveResponse | ListResponse:
+        """Carry out a directive or a batch."""
+        caller, message = self._written(request)
+        try:
+            return _read(await caller.call_async(message, self.timeout))
+        except CallError as error:
+            raise ArmorServiceCallError(str(error)) from error
+
+    def _written(self, request: DirectiveRequest | Batch) -> tuple[ServiceCaller, Any]:
+        """Return which service carries it out, and the message."""
+        if isinstance(request, DirectiveRequest):
+            message = ArmorDirective.Request(armor_request=request_to_ros(request))
+            return self._single, message
+        rows = [request_to_ros(row) for row in request]
+        return self._serial, ArmorDirectiveList.Request(armor_requests=rows)
+
     def _is_spun(self) -> bool:
         if self._node.executor is None:
             return False
@@ -124,20 +135,12 @@ class RosTransport:
         self._node.executor.create_task(spun.set)
         return spun.wait(SPUN_WITHIN)
 
-    async def call_async(self, request: DirectiveRequest) -> DirectiveResponse:
-        """Carry out one directive."""
-        answer = await self._awaited(self._single, _one(request))
+
+def _read(answer: Any) -> DirectiveResponse | ListResponse:
+    if isinstance(answer, ArmorDirective.Response):
         return response_from_ros(answer.armor_response)
-
-    async def call_list_async(self, requests: Batch) -> ListResponse:
-        """Carry out a batch."""
-        return _list_from_ros(await self._awaited(self._serial, _many(requests)))
-
-    async def _awaited(self, caller: ServiceCaller, request: Any) -> Any:
-        try:
-            return await caller.call_async(request, self.timeout)
-        except CallError as error:
-            raise ArmorServiceCallError(str(error)) from error
+    responses = [response_from_ros(response) for response in answer.armor_responses]
+    return ListResponse(answer.success, answer.is_consistent, responses)
 
 
 class ArmorClient(client.ArmorClient):
@@ -269,16 +272,3 @@ class FactSubscription:
     def _tell(self, changes: list[tuple[ShortFact, bool]]) -> None:
         for fact, came in changes:
             self._callback(fact, came)
-
-
-def _one(request: DirectiveRequest) -> Any:
-    return ArmorDirective.Request(armor_request=request_to_ros(request))
-
-
-def _many(requests: Batch) -> Any:
-    return ArmorDirectiveList.Request(armor_requests=[request_to_ros(r) for r in requests])
-
-
-def _list_from_ros(answer: Any) -> ListResponse:
-    responses = [response_from_ros(response) for response in answer.armor_responses]
-    return ListResponse(answer.success, answer.is_consistent, responses)

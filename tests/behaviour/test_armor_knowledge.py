@@ -123,7 +123,7 @@ def test_an_interrupted_call_is_no_fault_of_the_server(transport: InProcessTrans
         raised.set()
         raise ArmorServiceCallError('interrupted')
 
-    transport.call_list = cut_off  # type: ignore[method-assign, assignment]
+    transport.call = cut_off  # type: ignore[method-assign, assignment]
     knowledge = ArmorKnowledge('test', transport, Interrupt(), lambda _interrupt: 'map')
     with pytest.raises(CallInterruptedError):
         knowledge.snapshot(110.0, RULES, {}, raised)

@@ -153,7 +153,7 @@ def test_an_ontology_that_is_used_for_long_keeps_nobody_waiting_for_another(
         ended.append((await armor.transport.call_async(request)).success)
 
     async def ask_all() -> None:
-        ended.append((await armor.transport.call_list_async(asked)).success)
+        ended.append((await armor.transport.call_async(asked)).success)
 
     other = ArmorClient(graph.node, 'test', 'other', timeout=60.0)
     other.utils.get_all_refs()

@@ -32,19 +32,14 @@ class Recorder:
         self.sent: list[tuple[str, tuple[str, ...]]] = []
         self.answer = DirectiveResponse(is_consistent=True)
 
-    def call(self, request: DirectiveRequest) -> DirectiveResponse:
+    def call(self, request: Any) -> Any:
+        if not isinstance(request, DirectiveRequest):
+            return ListResponse(True, True, [self.call(row) for row in request])
         self.sent.append((request.words, tuple(request.args)))
         return self.answer
 
-    def call_list(self, requests: Any) -> ListResponse:
-        answers = [self.call(request) for request in requests]
-        return ListResponse(True, True, answers)
-
-    async def call_async(self, request: DirectiveRequest) -> DirectiveResponse:
+    async def call_async(self, request: Any) -> Any:
         return self.call(request)
-
-    async def call_list_async(self, requests: Any) -> ListResponse:
-        return self.call_list(requests)
 
 
 @pytest.mark.parametrize('buffered', [False, True])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import given, settings
@@ -18,8 +19,6 @@ from surveillance_ontology.armor.client import (
 )
 from surveillance_ontology.armor.protocol import (
     DirectiveRequest,
-    DirectiveResponse,
-    ListResponse,
 )
 from surveillance_ontology.armor.service import ArmorService
 from surveillance_ontology.map_building import (
@@ -131,13 +130,9 @@ class Flaky(InProcessTransport):
         super().__init__(service)
         self.away = away
 
-    def call(self, request: DirectiveRequest) -> DirectiveResponse:
+    def call(self, request: DirectiveRequest | Batch) -> Any:
         self._reach()
         return super().call(request)
-
-    def call_list(self, requests: Batch) -> ListResponse:
-        self._reach()
-        return super().call_list(requests)
 
     def _reach(self) -> None:
         if self.away > 0:
@@ -152,9 +147,10 @@ class Replaced(InProcessTransport):
         super().__init__(ArmorService(warn=lambda _: None))
         self.times = times
 
-    def call(self, request: DirectiveRequest) -> DirectiveResponse:
+    def call(self, request: DirectiveRequest | Batch) -> Any:
         answer = super().call(request)
-        if request.command == 'LOAD' and self.times > 0:
+        is_load = isinstance(request, DirectiveRequest) and request.command == 'LOAD'
+        if is_load and self.times > 0:
             self.times -= 1
             super().__init__(ArmorService(warn=lambda _: None))
         return answer
@@ -255,10 +251,10 @@ class Dies(InProcessTransport):
 
     dies = ''
 
-    def call_list(self, requests: Batch) -> ListResponse:
-        if any(self.dies in request.args for request in requests):
+    def call(self, request: DirectiveRequest | Batch) -> Any:
+        if not isinstance(request, DirectiveRequest) and any(self.dies in r.args for r in request):
             raise KeyboardInterrupt
-        return super().call_list(requests)
+        return super().call(request)
 
 
 def kept(service: ArmorService, path: str, place: Place | None) -> tuple[MapKeeper, list[str]]:

@@ -10,7 +10,7 @@ Each method can be called in two ways: blocking, or with ``await``:
     client.query.ind_b2_class('ROOM')                    # blocks; from a thread
     await client.query.ind_b2_class.call_async('ROOM')   # in a callback of a node
 
-A method decorated with `operation` is a generator: it yields the directives it wants carried out
+A method decorated with `operation` makes a generator: it yields the directives it wants carried out
 and receives their responses, and what it returns is the result. How the directives travel is the
 business of the client's `Transport`. The client for ROS is
 `surveillance_ontology.armor_client.ArmorClient`; this module knows no ROS.
@@ -92,20 +92,15 @@ class ArmorServiceInternalError(ArmorError):
 class Transport(Protocol):
     """Brings directives to a server.
 
-    Every method raises `ArmorServiceCallError` when no answer comes.
+    A directive is answered with a `DirectiveResponse`, a batch with a `ListResponse`. Both methods
+    raise `ArmorServiceCallError` when no answer comes.
     """
 
-    def call(self, request: DirectiveRequest) -> DirectiveResponse:
-        """Carry out one directive and block until the answer."""
+    def call(self, request: DirectiveRequest | Batch) -> Any:
+        """Carry out a directive or a batch and block until the answer."""
 
-    def call_list(self, requests: Batch) -> ListResponse:
-        """Carry out a batch and block until the answer."""
-
-    async def call_async(self, request: DirectiveRequest) -> DirectiveResponse:
-        """Carry out one directive."""
-
-    async def call_list_async(self, requests: Batch) -> ListResponse:
-        """Carry out a batch."""
+    async def call_async(self, request: DirectiveRequest | Batch) -> Any:
+        """Carry out a directive or a batch."""
 
 
 class HasTransport(Protocol):
@@ -129,16 +124,13 @@ class BoundOperation(Generic[P, R]):
         steps = self._steps(self._owner, *args, **kwargs)
         transport = self._owner.transport
         answer: Any = None
-        try:
-            while True:
+        while True:
+            try:
                 wanted = steps.send(answer)
-                if isinstance(wanted, DirectiveRequest):
-                    answer = transport.call(wanted)
-                else:
-                    answer = transport.call_list(wanted)
-        except StopIteration as end:
-            result: R = end.value
-            return result
+            except StopIteration as end:
+                result: R = end.value
+                return result
+            answer = transport.call(wanted)
 
     async def call_async(self, *args: P.args, **kwargs: P.kwargs) -> R:
         """Give the result to ``await``."""
@@ -151,10 +143,7 @@ class BoundOperation(Generic[P, R]):
             except StopIteration as end:
                 result: R = end.value
                 return result
-            if isinstance(wanted, DirectiveRequest):
-                answer = await transport.call_async(wanted)
-            else:
-                answer = await transport.call_list_async(wanted)
+            answer = await transport.call_async(wanted)
 
 
 class Operation(Generic[S, P, R]):
@@ -232,44 +221,44 @@ class Manipulation(ClientPart):
     @operation
     def add_ind(self, ind_name: str) -> Steps[bool]:
         """Make an individual known."""
-        return (yield from self._change('ADD IND', ind_name))
+        return self._change('ADD IND', ind_name)
 
     @operation
     def add_ind_to_class(self, ind_name: str, class_name: str) -> Steps[bool]:
         """Assert that an individual is of a class."""
-        return (yield from self._change('ADD IND CLASS', ind_name, class_name))
+        return self._change('ADD IND CLASS', ind_name, class_name)
 
     @operation
     def add_class(self, class_name: str, super_class_name: str = '') -> Steps[bool]:
         """Make a class known, below another if one is given."""
         if super_class_name:
-            return (yield from self._change('ADD CLASS CLASS', class_name, super_class_name))
-        return (yield from self._change('ADD CLASS', class_name))
+            return self._change('ADD CLASS CLASS', class_name, super_class_name)
+        return self._change('ADD CLASS', class_name)
 
     @operation
     def disj_inds(self, ind_names: Iterable[str]) -> Steps[bool]:
         """State that individuals are different."""
-        return (yield from self._change('DISJOINT IND', *ind_names))
+        return self._change('DISJOINT IND', *ind_names)
 
     @operation
     def disj_inds_of_class(self, class_name: str) -> Steps[bool]:
         """State that the instances of a class, as of the last reasoning, are different."""
-        return (yield from self._change('DISJOINT IND CLASS', class_name))
+        return self._change('DISJOINT IND CLASS', class_name)
 
     @operation
     def disj_classes(self, class_names: Iterable[str]) -> Steps[bool]:
         """State that no two classes share an instance."""
-        return (yield from self._change('DISJOINT CLASS', *class_names))
+        return self._change('DISJOINT CLASS', *class_names)
 
     @operation
     def disj_subclasses(self, class_name: str) -> Steps[bool]:
         """State that no two subclasses of a class share an instance."""
-        return (yield from self._change('DISJOINT CLASS CLASS', class_name))
+        return self._change('DISJOINT CLASS CLASS', class_name)
 
     @operation
     def make_equivalent(self, class_name: str) -> Steps[bool]:
         """Turn what a class is a subclass of into its definition."""
-        return (yield from self._change('MAKE EQUIVALENT CLASS', class_name))
+        return self._change('MAKE EQUIVALENT CLASS', class_name)
 
     @operation
     def add_min_cardinality(
@@ -277,30 +266,28 @@ class Manipulation(ClientPart):
     ) -> Steps[bool]:
         """State that instances of a class have so many values of a property at least."""
         args = (class_name, objectprop_name, str(cardinality), value_class_name)
-        return (yield from self._change('ADD CARDINALITY MIN', *args))
+        return self._change('ADD CARDINALITY MIN', *args)
 
     @operation
     def add_objectprop_to_ind(
         self, objectprop_name: str, ind_name: str, value_obj_name: str
     ) -> Steps[bool]:
         """Relate an individual to another."""
-        args = (objectprop_name, ind_name, value_obj_name)
-        return (yield from self._change('ADD OBJECTPROP IND', *args))
+        return self._change('ADD OBJECTPROP IND', objectprop_name, ind_name, value_obj_name)
 
     @operation
     def add_dataprop_to_ind(
         self, dataprop_name: str, ind_name: str, value_type: str, value: str
     ) -> Steps[bool]:
         """Add a value to a data property of an individual; ``value_type`` as LONG, STRING, ..."""
-        args = (dataprop_name, ind_name, value_type, value)
-        return (yield from self._change('ADD DATAPROP IND', *args))
+        return self._change('ADD DATAPROP IND', dataprop_name, ind_name, value_type, value)
 
     @operation
     def add_batch_dataprop_to_ind(
         self, ind_name: str, properties: Iterable[Sequence[str]]
     ) -> Steps[bool]:
         """Add values, each ``[property, type, value]``, in one batch."""
-        return (yield from self._change_all(self._dataprops('ADD', ind_name, properties)))
+        return self._change_all(self._dataprops('ADD', ind_name, properties))
 
     @operation
     def replace_objectprop_b2_ind(
@@ -308,7 +295,7 @@ class Manipulation(ClientPart):
     ) -> Steps[bool]:
         """Relate an individual to a new one instead of an old one."""
         args = (objectprop_name, ind_name, new_value, old_value)
-        return (yield from self._change('REPLACE OBJECTPROP IND', *args))
+        return self._change('REPLACE OBJECTPROP IND', *args)
 
     @operation
     def replace_dataprop_b2_ind(
@@ -316,7 +303,7 @@ class Manipulation(ClientPart):
     ) -> Steps[bool]:
         """Put a new value in the place of an old one; both bare or as queries return them."""
         args = (dataprop_name, ind_name, value_type, new_value, old_value)
-        return (yield from self._change('REPLACE DATAPROP IND', *args))
+        return self._change('REPLACE DATAPROP IND', *args)
 
     @operation
     def replace_one_dataprop_b2_ind(
@@ -327,8 +314,7 @@ class Manipulation(ClientPart):
         Raises:
             ArmorServiceInternalError: 206, there are several values.
         """
-        args = (dataprop_name, ind_name, value_type, new_value)
-        return (yield from self._replace_one('DATAPROP IND', *args))
+        return self._replace_one('DATAPROP IND', dataprop_name, ind_name, value_type, new_value)
 
     @operation
     def replace_one_objectprop_b2_ind(
@@ -339,8 +325,7 @@ class Manipulation(ClientPart):
         Raises:
             ArmorServiceInternalError: 206, there are several.
         """
-        args = (objectprop_name, ind_name, new_value)
-        return (yield from self._replace_one('OBJECTPROP IND', *args))
+        return self._replace_one('OBJECTPROP IND', objectprop_name, ind_name, new_value)
 
     def _replace_one(self, words: str, prop: str, ind: str, *new: str) -> Steps[bool]:
         old = (yield from self._carry_out(f'QUERY {words}', prop, ind)).queried_objects
@@ -355,62 +340,60 @@ class Manipulation(ClientPart):
     @operation
     def remove_ind(self, ind_name: str) -> Steps[bool]:
         """Remove an individual with all that is asserted of it."""
-        return (yield from self._change('REMOVE IND', ind_name))
+        return self._change('REMOVE IND', ind_name)
 
     @operation
     def remove_ind_from_class(self, ind_name: str, class_name: str) -> Steps[bool]:
         """Retract that an individual is of a class."""
-        return (yield from self._change('REMOVE IND CLASS', ind_name, class_name))
+        return self._change('REMOVE IND CLASS', ind_name, class_name)
 
     @operation
     def remove_class(self, class_name: str, super_class_name: str = '') -> Steps[bool]:
         """Remove a class, or only that it is below another."""
         if super_class_name:
-            return (yield from self._change('REMOVE CLASS CLASS', class_name, super_class_name))
-        return (yield from self._change('REMOVE CLASS', class_name))
+            return self._change('REMOVE CLASS CLASS', class_name, super_class_name)
+        return self._change('REMOVE CLASS', class_name)
 
     @operation
     def remove_dataprop_from_ind(
         self, dataprop_name: str, ind_name: str, value_type: str, value: str
     ) -> Steps[bool]:
         """Retract a value of a data property."""
-        args = (dataprop_name, ind_name, value_type, value)
-        return (yield from self._change('REMOVE DATAPROP IND', *args))
+        return self._change('REMOVE DATAPROP IND', dataprop_name, ind_name, value_type, value)
 
     @operation
     def remove_batch_dataprop_to_ind(
         self, ind_name: str, properties: Iterable[Sequence[str]]
     ) -> Steps[bool]:
         """Retract values, each ``[property, type, value]``, in one batch."""
-        return (yield from self._change_all(self._dataprops('REMOVE', ind_name, properties)))
+        return self._change_all(self._dataprops('REMOVE', ind_name, properties))
 
     @operation
     def remove_objectprop_from_ind(
         self, objectprop_name: str, ind_name: str, value_obj_name: str
     ) -> Steps[bool]:
         """Retract a relation."""
-        args = (objectprop_name, ind_name, value_obj_name)
-        return (yield from self._change('REMOVE OBJECTPROP IND', *args))
+        return self._change('REMOVE OBJECTPROP IND', objectprop_name, ind_name, value_obj_name)
 
     @operation
     def rename_ind(self, old_name: str, new_name: str) -> Steps[bool]:
         """Give an individual another name."""
-        return (yield from self._change('RENAME IND', old_name, new_name))
+        return self._change('RENAME IND', old_name, new_name)
 
     @operation
     def rename_class(self, old_name: str, new_name: str) -> Steps[bool]:
         """Give a class another name."""
-        return (yield from self._change('RENAME CLASS', old_name, new_name))
+        return self._change('RENAME CLASS', old_name, new_name)
 
     @operation
     def rename_dataprop(self, old_name: str, new_name: str) -> Steps[bool]:
         """Give a data property another name."""
-        return (yield from self._change('RENAME DATAPROP', old_name, new_name))
+        return self._change('RENAME DATAPROP', old_name, new_name)
 
     @operation
     def rename_objectprop(self, old_name: str, new_name: str) -> Steps[bool]:
         """Give an object property another name."""
-        return (yield from self._change('RENAME OBJECTPROP', old_name, new_name))
+        return self._change('RENAME OBJECTPROP', old_name, new_name)
 
     def _dataprops(
         self, command: str, ind_name: str, properties: Iterable[Sequence[str]]
@@ -434,7 +417,7 @@ class Query(ClientPart):
     @operation
     def ind_b2_class(self, class_name: str, with_URI: bool = False) -> Steps[list[str]]:  # noqa: N803
         """Yield individuals of a class: names, or ``<iri#name>`` when asked for."""
-        return (yield from self._names(with_URI, 'QUERY IND CLASS', class_name))
+        return self._names(with_URI, 'QUERY IND CLASS', class_name)
 
     @operation
     def objectprop_b2_ind(
@@ -444,13 +427,12 @@ class Query(ClientPart):
         with_URI: bool = False,  # noqa: N803
     ) -> Steps[list[str]]:
         """Yield individuals that an individual is related to: names, or ``<iri#name>``."""
-        args = (objectprop_name, ind_name)
-        return (yield from self._names(with_URI, 'QUERY OBJECTPROP IND', *args))
+        return self._names(with_URI, 'QUERY OBJECTPROP IND', objectprop_name, ind_name)
 
     @operation
     def dataprop_b2_ind(self, dataprop_name: str, ind_name: str) -> Steps[list[str]]:
         """Yield values of a data property, as ``"1665579740"^^xsd:long``; see `value_in`."""
-        return (yield from self._objects('QUERY DATAPROP IND', dataprop_name, ind_name))
+        return self._objects('QUERY DATAPROP IND', dataprop_name, ind_name)
 
     @operation
     def check_ind_exists(self, ind_name: str) -> Steps[bool]:
@@ -463,7 +445,7 @@ class Query(ClientPart):
     @operation
     def class_of_ind(self, ind_name: str, with_URI: bool = False) -> Steps[list[str]]:  # noqa: N803
         """Yield all classes of an individual: names, or ``<iri#name>``."""
-        return (yield from self._names(with_URI, 'QUERY CLASS IND', ind_name, 'false'))
+        return self._names(with_URI, 'QUERY CLASS IND', ind_name, 'false')
 
     @operation
     def bottom_class_of_ind(self, ind_name: str) -> Steps[str | None]:
@@ -481,17 +463,17 @@ class Query(ClientPart):
     @operation
     def restrictions(self, class_name: str) -> Steps[list[str]]:
         """Definitions of a class as text."""
-        return (yield from self._objects('QUERY CLASS RESTRICTIONS', class_name))
+        return self._objects('QUERY CLASS RESTRICTIONS', class_name)
 
     @operation
     def dataprops_of_ind(self, ind_name: str, with_URI: bool = False) -> Steps[list[str]]:  # noqa: N803
         """Yield data properties that have a value for an individual."""
-        return (yield from self._names(with_URI, 'QUERY IND DATAPROP', ind_name))
+        return self._names(with_URI, 'QUERY IND DATAPROP', ind_name)
 
     @operation
     def objectprops_of_ind(self, ind_name: str, with_URI: bool = False) -> Steps[list[str]]:  # noqa: N803
         """Yield object properties that have a value for an individual."""
-        return (yield from self._names(with_URI, 'QUERY IND OBJECTPROP', ind_name))
+        return self._names(with_URI, 'QUERY IND OBJECTPROP', ind_name)
 
     @operation
     def sparql(self, query: str, timeout_ms: int = 0) -> Steps[list[dict[str, str]]]:
@@ -556,7 +538,7 @@ class Query(ClientPart):
         nothing where it holds.
         """
         parse_fact(fact)
-        return (yield from self._objects('QUERY EXPLAIN ABSENCE', fact))
+        return self._objects('QUERY EXPLAIN ABSENCE', fact)
 
     @operation
     def explain_inconsistency(self) -> Steps[tuple[str, str] | None]:
@@ -700,18 +682,14 @@ class InProcessTransport:
     def __init__(self, service: ArmorService) -> None:
         self._service = service
 
-    def call(self, request: DirectiveRequest) -> DirectiveResponse:
-        """Carry out one directive."""
-        return self._service.execute(request)
+    def call(self, request: DirectiveRequest | Batch) -> DirectiveResponse | ListResponse:
+        """Carry out a directive or a batch."""
+        if isinstance(request, DirectiveRequest):
+            return self._service.execute(request)
+        return self._service.execute_list(request)
 
-    def call_list(self, requests: Batch) -> ListResponse:
-        """Carry out a batch."""
-        return self._service.execute_list(requests)
-
-    async def call_async(self, request: DirectiveRequest) -> DirectiveResponse:
-        """Carry out one directive."""
-        return self._service.execute(request)
-
-    async def call_list_async(self, requests: Batch) -> ListResponse:
-        """Carry out a batch."""
-        return self._service.execute_list(requests)
+    async def call_async(
+        self, request: DirectiveRequest | Batch
+    ) -> DirectiveResponse | ListResponse:
+        """Carry out a directive or a batch."""
+        return self.call(request)
