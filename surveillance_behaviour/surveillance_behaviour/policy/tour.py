@@ -28,9 +28,9 @@ NEIGHBOURS = 12
 """How many nearest places each place is tried beside when a tour is improved."""
 ASCENT_STEPS = 150
 """Steps of the subgradient ascent that raises the lower bound."""
-KICKS = 300_000
+KICKS = 600_000
 """How often a good tour is disturbed and improved again, times its places; at most `MOST_KICKS`."""
-MOST_KICKS = 2000
+MOST_KICKS = 4000
 
 
 @dataclass(frozen=True)
@@ -147,33 +147,15 @@ def _exact_order(distances: Matrix) -> tuple[int, ...]:
 
 
 def _good_order(distances: Matrix) -> tuple[int, ...]:
-    """Return the better of two first tours, each improved until no single change shortens it."""
+    """Return a tour that begins with the nearest places, improved by iterated local search."""
     # The place itself, which is the nearest one, is left out.
     near = np.argpartition(distances, NEIGHBOURS, axis=1)[:, : NEIGHBOURS + 1]
     order = np.argsort(np.take_along_axis(distances, near, axis=1), axis=1, kind='stable')
     ranked = np.take_along_axis(near, order, axis=1)[:, 1:].tolist()
-    rows = distances.tolist()
-    tours = [_Improvement(rows, ranked, start(distances)) for start in (_preorder, _nearest)]
-    for tour in tours:
-        tour.improve(list(tour.order))
-    best = min(tours, key=lambda tour: tour_length(distances, tuple(tour.order)))
-    best.kick(min(MOST_KICKS, KICKS // len(distances)), random.Random(0))
-    return tuple(best.order)
-
-
-def _preorder(distances: Matrix) -> list[int]:
-    """Depth-first order of a minimum spanning tree: already the best tour of a ring."""
-    parents = _spanning_tree(distances)
-    children: list[list[int]] = [[] for _ in distances]
-    for child, parent in enumerate(parents):
-        if parent >= 0:
-            children[parent].append(child)
-    order, stack = [], [0]
-    while stack:
-        place = stack.pop()
-        order.append(place)
-        stack.extend(sorted(children[place], key=lambda child: -distances[place, child]))
-    return order
+    tour = _Improvement(distances.tolist(), ranked, _nearest(distances))
+    tour.improve(list(tour.order))
+    tour.kick(min(MOST_KICKS, KICKS // len(distances)), random.Random(0))
+    return tuple(tour.order)
 
 
 def _nearest(distances: Matrix) -> list[int]:
@@ -206,7 +188,7 @@ def _spanning_tree(distances: Matrix) -> list[int]:
 
 
 class _Improvement:
-    """2-opt and Or-opt with neighbour lists: takes changes until none shortens the tour.
+    """2-opt with neighbour lists: takes changes until none shortens the tour.
 
     Places whose surroundings did not change since they were last looked at are skipped
     (Bentley's don't-look bits), which makes it near linear in the number of places.
@@ -231,8 +213,6 @@ class _Improvement:
             place = waiting.pop()
             listed.discard(place)
             gain, touched = self._two_opt(place)
-            if not touched:
-                gain, touched = self._or_opt(place)
             saved += gain
             for other in touched:
                 if other not in listed:
@@ -300,49 +280,6 @@ class _Improvement:
             low, high = (first + offset) % count, (last - offset) % count
             order[low], order[high] = order[high], order[low]
             self._at[order[low]], self._at[order[high]] = low, high
-
-    def _or_opt(self, place: int) -> tuple[float, tuple[int, ...]]:
-        """Move a stretch of up to three places that begins with ``place`` beside a near one."""
-        order, rows, count = self.order, self._rows, len(self.order)
-        for length in (1, 2, 3):
-            first = self._at[place]
-            if first + length > count - 1 or first == 0:
-                continue
-            stretch = order[first : first + length]
-            before, after = order[first - 1], order[first + length]
-            head, tail = stretch[0], stretch[-1]
-            freed = rows[before][head] + rows[tail][after] - rows[before][after]
-            if freed <= 1e-9:
-                continue
-            for near in self._near[place]:
-                if rows[place][near] >= freed:
-                    break
-                if near in stretch:
-                    continue
-                for outer in (self._neighbour(near, 1), self._neighbour(near, -1)):
-                    if outer in stretch:
-                        continue
-                    added = rows[near][head] + rows[tail][outer] - rows[near][outer]
-                    if freed - added > 1e-9:
-                        self._move(first, length, near, outer)
-                        return freed - added, (before, after, head, tail, near, outer)
-        return 0.0, ()
-
-    def _neighbour(self, place: int, step: int) -> int:
-        return self.order[(self._at[place] + step) % len(self.order)]
-
-    def _move(self, first: int, length: int, near: int, outer: int) -> None:
-        """Put the stretch between ``near`` and ``outer``, its head at ``near``."""
-        order = self.order
-        stretch = order[first : first + length]
-        forward = self._neighbour(near, 1) == outer
-        del order[first : first + length]
-        where = order.index(near)
-        if forward:
-            order[where + 1 : where + 1] = stretch
-        else:
-            order[where:where] = stretch[::-1]
-        self._note(min(first, where), min(len(order), max(first, where) + length + 1))
 
 
 def _one_tree_bound(distances: Matrix, upper: float) -> float:
