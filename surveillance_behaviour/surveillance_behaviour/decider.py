@@ -1,15 +1,21 @@
 """Decides for one robot: looks at the world, asks `decide`, and remembers what came of it.
 
+The ontology says where the robot is, what it can reach, which classes each place has and when it
+was visited: one snapshot for each choice. The decider adds what the robot itself knows better:
+where the places are, when it was where, and how long each leg takes.
+
 One process of a robot decides: `robot_behavior` in the behaviour `surveillance`, `reasoner` in
 `patrol`. Each has one `Decider`, which holds all that is remembered between two decisions.
 """
 
 from __future__ import annotations
 
+import contextlib
+import math
 import random
 import threading
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from surveillance_behaviour.charging import BatteryMonitor
 from surveillance_behaviour.decision import (
@@ -24,29 +30,16 @@ from surveillance_behaviour.decision import (
     why_charge,
     why_not,
 )
-from surveillance_behaviour.peers.ports import Ontology, Places
+from surveillance_behaviour.experience import Experience
+from surveillance_behaviour.peers.ports import Ontology, Places, Point, UnknownPlaceError
 from surveillance_behaviour.policy.battery_reserve import Battery
-from surveillance_behaviour.policy.graph import GraphError
+from surveillance_behaviour.policy.graph import GraphError, PatrolGraph
 from surveillance_behaviour.policy.plan import LEG_CHANGE
-from surveillance_behaviour.policy.world import Decision, World
-from surveillance_behaviour.world_model import Experience, WorldModel
+from surveillance_behaviour.policy.world import Decision, PolicyMemory, World
 from surveillance_fsm import Interrupt
-from surveillance_runtime.parameters import parameter
+from surveillance_fsm.exceptions import CallError
+from surveillance_ontology.patrol_ontology import Snapshot
 from surveillance_runtime.suggestions import nearest
-
-
-@dataclass(frozen=True)
-class MemorySettings:
-    """Parameters of a node that decides: its record and its random seed."""
-
-    record: str = parameter(
-        '',
-        'File that the mission is recorded in, and beside which `FILE.experience.json` keeps what '
-        'was learned (visits, leg times, battery); empty: none.',
-    )
-    random_seed: int = parameter(
-        -1, 'Makes the policies that draw repeatable; -1 takes another course each time.', -1
-    )
 
 
 class Decider:
@@ -61,6 +54,15 @@ class Decider:
         generator: Chance, for the policies that need it.
         warn: Told once when no robot can keep to the threshold on this map, and when the rules
             name a class that the ontology does not have.
+        announce: Told each decision.
+
+    Attributes:
+        settings: Those.
+        experience: That.
+        place: Where the robot is, as far as was heard.
+        places: All places of the map when it was last looked at, within reach or not.
+        graph: The part of the map that can be reached.
+        world: What was known at the last look; None: there was none.
     """
 
     def __init__(
@@ -72,61 +74,33 @@ class Decider:
         experience: Experience | None = None,
         generator: random.Random | None = None,
         warn: Callable[[str], None] = lambda sentence: None,
+        announce: Callable[[Decision], None] = lambda decision: None,
     ) -> None:
         self.settings = settings
+        self.experience = experience or Experience()
+        self.place = ''
+        self.places: frozenset[str] = frozenset()
+        self.graph = PatrolGraph({})
+        self.world: World | None = None
         self._ontology = ontology
-        self.model = WorldModel(settings, ontology, places, experience, generator)
+        self._places = places
+        self._positions: dict[str, Point] = {}
         self._battery = battery
+        self._memory = PolicyMemory(generator or random.Random())
+        self._target: str | None = None
+        self._leg: Decision | None = None
+        self._graph_key: object = None
+        self._since: float | None = None
         self._looking = threading.Lock()
         # A request is taken in the executor's thread, which brings the answers that a look waits
         # for: it must not wait for the look.
         self._saving = threading.Lock()
-        self._leg: Decision | None = None
         self._warn = warn
+        self._announce = announce
         self._warned = False
         self._checked_threshold: object = None
         self._checked_seconds = 0.0
         self._checked_rules: tuple[str, ...] = ()
-
-    @classmethod
-    def of_mission(
-        cls,
-        settings: DecisionSettings,
-        ontology: Ontology,
-        places: Places,
-        battery: BatteryMonitor,
-        now: Callable[[], float],
-        warn: Callable[[str], None],
-        memory: MemorySettings,
-    ) -> Decider:
-        """Return a decider that knows what was learned before and learns the battery's draw.
-
-        Args:
-            settings: Shared with whoever changes them.
-            ontology: The ontology.
-            places: Where the places are.
-            battery: The battery.
-            now: Seconds on the mission's clock.
-            warn: See `Decider`; also told when what was learned cannot be read.
-            memory: Where what was learned is, see `Experience.of_record`.
-        """
-        experience = Experience.of_record(memory.record)
-        if experience.problem:
-            warn(experience.problem)
-        generator = random.Random(memory.random_seed if memory.random_seed >= 0 else None)
-        decider = cls(settings, ontology, places, battery, experience, generator, warn)
-        battery.watch(lambda: decider.learn_draw(now()))
-        return decider
-
-    @property
-    def experience(self) -> Experience:
-        """What the robot has learned."""
-        return self.model.experience
-
-    @property
-    def places(self) -> frozenset[str]:
-        """All places of the map when it was last looked at."""
-        return self.model.places
 
     def battery(self) -> Battery:
         """Return what a decision knows of the battery now."""
@@ -161,10 +135,85 @@ class Decider:
             CallError: The ontology cannot be asked.
         """
         with self._looking:
-            world = self.model.refresh(now, interrupt, avoided)
+            world = self.world = self._refreshed(now, interrupt, avoided)
         self._check_threshold(world)
         self._check_rules(interrupt)
         return world
+
+    def _refreshed(self, now: float, interrupt: Interrupt, avoided: frozenset[str]) -> World:
+        """Take one snapshot of the ontology and bring the map up to date.
+
+        The ontology is told in the same batch which visits it does not know: one that was built
+        anew has them from here.
+        """
+        experience, settings = self.experience, self.settings
+        experience.tell_time(now)
+        self._since = now if self._since is None else min(self._since, now)
+        threshold, classes = settings.urgency_threshold, settings.rules.classes
+        visits = experience.visits
+        found = self._ontology.snapshot(now, classes, visits, interrupt, threshold)
+        self.graph = graph = self._map_of(found, interrupt)
+        self.place = found.place
+        return World(
+            place=found.place,
+            now=now,
+            reachable=tuple(place for place in found.reachable if place in graph.index),
+            classes=found.classes,
+            # The ontology counts whole seconds; another robot's visit may be later.
+            visited_at={
+                place: max(seconds, visits.get(place, -1.0))
+                for place, seconds in found.visited_at.items()
+            },
+            graph=graph,
+            time_spread=experience.leg_times.spread,
+            since=self._since,
+            threshold=threshold,
+            target=self._target,
+            avoided=avoided,
+            rules=classes,
+            requested=experience.requested,
+            contradiction=found.contradiction,
+            memory=self._memory,
+        )
+
+    def _map_of(self, found: Snapshot, interrupt: Interrupt) -> PatrolGraph:
+        # A place that went may come back elsewhere.
+        positions = {p: at for p, at in self._positions.items() if p in found.connections}
+        self._positions = positions
+        for place in found.connections:
+            # One that was removed from the map a moment ago is unknown; the ontology will follow.
+            with contextlib.suppress(UnknownPlaceError):
+                if place not in positions:
+                    positions[place] = self._places.position(place, interrupt)
+        self.places = frozenset(positions)
+        if found.place not in positions:
+            raise CallError(f'ontology: the robot is in {found.place}, which is not on the map')
+        times, dwell = self.experience.leg_times, self.settings.exploration_seconds
+        times.forget_fit(self.settings.speed)
+        legs = {
+            place: {
+                other: times.used(place, other, self._metres(place, other))
+                for other in others
+                if other in positions
+            }
+            for place, others in found.connections.items()
+            if place in positions
+        }
+        if (found.place in self.graph.index, legs, dwell) == self._graph_key:
+            return self.graph
+        try:
+            graph = PatrolGraph(legs, dwell).connected(found.place)
+        except GraphError as error:
+            raise CallError(f'ontology: {error}') from None
+        self._graph_key = (True, legs, dwell)
+        return graph
+
+    def _metres(self, start: str, goal: str) -> float:
+        """Return the metres between two places in a straight line; 0: one is not known."""
+        positions = self._positions
+        if start not in positions or goal not in positions:
+            return 0.0
+        return math.dist(positions[start][:2], positions[goal][:2])
 
     def _check_threshold(self, world: World) -> None:
         """Warn of a threshold that no robot can keep to.
@@ -227,9 +276,12 @@ class Decider:
         """
         if self.experience.requested in avoided:
             self.experience.requested = ''  # It was tried.
-        self.model.stands(now, interrupt)
+        # Where the robot was heard of last it is now. That visit is told with the snapshot's own
+        # time, so that the ontology, too, knows until when the robot was there.
+        if here := self._ontology.await_place(self.place, 0.0, interrupt):
+            self.saw(here, now)
         world = self.look(now, interrupt, avoided)
-        self.model.saw(world.place, now)
+        self.saw(world.place, now)
         if to_charge and not self.experience.sent_to_charge:
             why = why_charge(world, self.battery(), self.settings)
             self.send_to_charge(why or 'charging was begun')
@@ -242,14 +294,14 @@ class Decider:
                 self.experience.requested = ''
             self._warn(f'{error}: continuing without it')
             decision = decide(replace(world, requested=''), battery, self.settings)
-        self.model.target = decision.target
+        self._target = decision.target
         if decision.rule == RECHARGE and not self.experience.sent_to_charge:
             self.experience.sent_to_charge = why_charge(world, battery, self.settings)
-        if self.model.contradiction:
-            reason = f'{decision.reason}; {self.model.contradiction}'
-            decision = replace(decision, reason=reason)
+        if world.contradiction:
+            decision = replace(decision, reason=f'{decision.reason}; {world.contradiction}')
         self._leg = decision
         self._save()
+        self._announce(decision)
         return decision
 
     def _save(self) -> None:
@@ -258,17 +310,21 @@ class Decider:
 
     def why_charge(self) -> str:
         """Return why the robot must charge now, as far as is known without looking; empty: no."""
-        world = self.model.world
+        world, place = self.world, self.place
         if world is None:
             return ''
-        place = self.model.place
         if place != world.place and place in world.graph.index:
             world = replace(world, place=place, reachable=tuple(world.graph.legs[place]))
         return why_charge(world, self.battery(), self.settings)
 
     def saw(self, place: str, now: float) -> None:
-        """Note that the robot is in ``place``."""
-        self.model.saw(place, now)
+        """Note that the robot is in ``place``; finer than the ontology's whole seconds."""
+        self.place = place
+        self.experience.saw(place, now)
+        if place == self._target:
+            self._target = None
+        if place == self.experience.requested:
+            self.experience.requested = ''
 
     def arrived(self, place: str, now: float, metres: float | None = None) -> None:
         """Note that the robot has come to ``place``, over a path of so many metres.
@@ -276,13 +332,12 @@ class Decider:
         What the drive took is learned if nothing came between the decision and the arrival.
         """
         leg, self._leg = self._leg, None
-        if leg is not None and leg.place == place and leg.from_place in self.model.graph.legs:
-            neighbours = self.model.graph.legs[leg.from_place]
-            if place in neighbours:
-                straight = self.model.straight(leg.from_place, place)
-                seconds = now - leg.time
-                self.experience.leg_times.observe(leg.from_place, place, seconds, straight, metres)
-        self.model.saw(place, now)
+        if leg is not None and leg.place == place:
+            start = leg.from_place
+            if place in self.graph.legs.get(start, ()):
+                straight = self._metres(start, place)
+                self.experience.leg_times.observe(start, place, now - leg.time, straight, metres)
+        self.saw(place, now)
 
     def disturbed(self) -> None:
         """Note that the present drive is no example of how long a leg takes."""
@@ -300,7 +355,7 @@ class Decider:
     def route_round(self, start: str, goal: str) -> tuple[str, ...]:
         """Return the places of another way between two neighbours; empty when there is none."""
         try:
-            return self.model.graph.without_leg(start, goal).route(start, goal)
+            return self.graph.without_leg(start, goal).route(start, goal)
         except (GraphError, KeyError):
             return ()
 
@@ -313,17 +368,17 @@ class Decider:
         Raises:
             ValueError: There is no such place.
         """
-        world = self.model.world
+        world = self.world
         if world is None:
             raise ValueError('the map is not known yet')
         if not place:
-            here = replace(world, place=self.model.place or world.place)
+            here = replace(world, place=self.place or world.place)
             within = stations_within_reach(here, self.settings.recharge_rooms)
             if not within:
                 raise ValueError('no charging place can be reached')
             place = min(within, key=lambda station: within[station])
         check_place(place, world)
-        if place == self.model.place and self._leg is None:
+        if place == self.place and self._leg is None:
             return f'the robot is in {place} already'
         self.experience.requested = place
         self._save()

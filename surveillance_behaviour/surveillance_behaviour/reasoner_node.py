@@ -18,10 +18,12 @@ from rclpy.parameter import Parameter
 from rclpy.task import Future
 
 from surveillance_behaviour.charging import BatteryMonitor
-from surveillance_behaviour.decider import Decider, MemorySettings
 from surveillance_behaviour.decision import DecisionSettings, NowhereToGoError
-from surveillance_behaviour.peers.announcing import DecisionTopic
-from surveillance_behaviour.peers.decision_services import offer_decision_services
+from surveillance_behaviour.peers.deciding import (
+    MemorySettings,
+    decider_of,
+    offer_decision_services,
+)
 from surveillance_behaviour.peers.ros_ports import Deadlines, RosPlaces, hear_battery, ros_ontology
 from surveillance_fsm.exceptions import CallError, CallInterruptedError
 from surveillance_fsm.ros import ClockWait
@@ -32,7 +34,6 @@ from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.process import run_node
 from surveillance_runtime.qos import STATE_QOS
 from surveillance_runtime.run_parameters import BEHAVIOUR_NODE
-from surveillance_runtime.waiting import AwaitedWork
 
 
 class Reasoner(PatrolNode):
@@ -48,19 +49,17 @@ class Reasoner(PatrolNode):
         )
         battery = BatteryMonitor()
         self._wait = ClockWait(self)
-        self._decider = Decider.of_mission(
+        self._decider = decider_of(
+            self,
             settings,
+            self.declare_fields(MemorySettings()),
             ros_ontology(self, deadlines),
             RosPlaces(self, deadlines),
             battery,
             self._wait.now,
-            lambda warning: self.get_logger().warn(warning),
-            self.declare_fields(MemorySettings()),
         )
-        self._decisions = DecisionTopic(self)
         self._avoided: frozenset[str] = frozenset()
         self._place = ''
-        self._work = AwaitedWork(self, 1)
         self._next: Future | None = None
         self._sharing = threading.Lock()
         hear_battery(self, battery)
@@ -70,8 +69,8 @@ class Reasoner(PatrolNode):
         self.create_service(
             Reason, 'reason', self._on_reason, callback_group=ReentrantCallbackGroup()
         )
-        offer_decision_services(
-            self, self._decider, self._wait.now, lambda: self._avoided, self._work
+        self._work = offer_decision_services(
+            self, self._decider, self._wait.now, lambda: self._avoided
         )
 
     def _on_status(self, status: MissionStatus) -> None:
@@ -101,24 +100,18 @@ class Reasoner(PatrolNode):
         response.point = await shared
         return response
 
-    def on_stop(self) -> None:
-        """End the worker."""
-        self._work.stop()
-
     def _choose(self) -> str:
         """Return the next place; empty when there is none, and the log says why."""
         with self._sharing:
             # The lock is held until the request that began this choice has noted it as the next.
             self._next = None
         try:
-            decision = self._decider.decide(self._wait.now(), self.stopping, self._avoided)
+            return self._decider.decide(self._wait.now(), self.stopping, self._avoided).place
         except CallInterruptedError:  # the node ends
             return ''
         except (CallError, NowhereToGoError) as error:
             self.get_logger().warn(f'no place to name: {error}')
             return ''
-        self._decisions.publish(decision)
-        return decision.place
 
 
 def main(args: Sequence[str] | None = None) -> int:

@@ -18,16 +18,20 @@ from sensor_msgs.msg import BatteryState
 import surveillance_fsm as fsm
 from surveillance_behaviour import conversions
 from surveillance_behaviour.charging import BatteryMonitor
-from surveillance_behaviour.decider import Decider, MemorySettings
 from surveillance_behaviour.decision import DecisionSettings
 from surveillance_behaviour.machines import MACHINES
 from surveillance_behaviour.mission.mission import Mission, MissionSettings
 from surveillance_behaviour.mission.mission_log import CutOff, MissionRecord, cut_off, read
-from surveillance_behaviour.peers.announcing import DecisionTopic, MissionClock, RosAnnouncer
-from surveillance_behaviour.peers.decision_services import offer_decision_services
+from surveillance_behaviour.peers.deciding import (
+    MemorySettings,
+    decider_of,
+    offer_decision_services,
+)
 from surveillance_behaviour.peers.ports import Ports
 from surveillance_behaviour.peers.ros_ports import (
     Deadlines,
+    MissionClock,
+    RosAnnouncer,
     RosMotion,
     RosPlaces,
     RosReasoner,
@@ -41,7 +45,6 @@ from surveillance_runtime.node import JOIN_SECONDS, PatrolNode
 from surveillance_runtime.parameters import NotNowParameterError
 from surveillance_runtime.process import run_node
 from surveillance_runtime.qos import SENSOR_QOS
-from surveillance_runtime.waiting import AwaitedWork
 
 
 class RobotBehavior(PatrolNode):
@@ -64,7 +67,7 @@ class RobotBehavior(PatrolNode):
         left_at = self._where_it_was_cut_off(memory.record)
         self._record = _open_record(memory.record)
         self._mission_clock = MissionClock(self)
-        self._work: AwaitedWork | None = None
+        self._announcer = RosAnnouncer(self)
         battery = BatteryMonitor()
         ports = self._ports(choice, deadlines, battery, memory)
         clock = self._mission_clock
@@ -95,27 +98,12 @@ class RobotBehavior(PatrolNode):
         clock = self._mission_clock
         ontology, places = ros_ontology(self, deadlines), RosPlaces(self, deadlines)
         if self._behaviour == 'patrol':
-            self._announcer = RosAnnouncer(self, None)
             reasoner = RosReasoner(self, deadlines, ontology, battery)
             routine = RosRoutine(self, deadlines, battery, clock)
             return Ports(ontology, places, self._announcer, reasoner, routine=routine)
-        self._announcer = RosAnnouncer(self, DecisionTopic(self))
-        decider = Decider.of_mission(
-            settings,
-            ontology,
-            places,
-            battery,
-            clock.now,
-            lambda warning: self.get_logger().warn(warning),
-            memory,
-        )
-        self._work = AwaitedWork(self, 1)
+        decider = decider_of(self, settings, memory, ontology, places, battery, clock.now)
         offer_decision_services(
-            self,
-            decider,
-            clock.now,
-            lambda: self.mission.recovery.avoided(self.mission.now()),
-            self._work,
+            self, decider, clock.now, lambda: self.mission.recovery.avoided(self.mission.now())
         )
         motion = RosMotion(self, deadlines)
         return Ports(ontology, places, self._announcer, decider, motion=motion)
@@ -123,8 +111,6 @@ class RobotBehavior(PatrolNode):
     def on_stop(self) -> None:
         """Preempts the machine, so that what it started is cancelled while messages flow."""
         self.machine.request_preempt()
-        if self._work is not None:
-            self._work.stop()
         # What it does last is reported, too.
         self._machine_thread.join(JOIN_SECONDS)
         self._introspection.stop()

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from surveillance_behaviour.decision import DecisionSettings
+from surveillance_behaviour.experience import Experience
 from surveillance_behaviour.machines import MACHINES
 from surveillance_behaviour.mission.mission import Mission, MissionSettings
 from surveillance_behaviour.mission.mission_log import (
@@ -13,7 +14,6 @@ from surveillance_behaviour.mission.mission_log import (
     cut_off,
     read,
 )
-from surveillance_behaviour.world_model import Experience
 from surveillance_fsm.testing import watching
 
 from .scripted_world import World

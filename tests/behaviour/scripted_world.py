@@ -14,11 +14,11 @@ from dataclasses import dataclass, field
 from surveillance_behaviour.charging import BatteryMonitor
 from surveillance_behaviour.decider import Decider
 from surveillance_behaviour.decision import NowhereToGoError
+from surveillance_behaviour.experience import Experience
 from surveillance_behaviour.mission.mission import Mission, MissionSettings
 from surveillance_behaviour.mission.mission_log import CutOff, MissionRecord
 from surveillance_behaviour.peers.ports import Point, Ports, UnknownPlaceError
 from surveillance_behaviour.policy.world import Decision
-from surveillance_behaviour.world_model import Experience
 from surveillance_fsm import Interrupt
 from surveillance_fsm.exceptions import CallError, CallInterruptedError, UnavailableError
 from surveillance_ontology.patrol_ontology import Snapshot
@@ -250,9 +250,6 @@ class World:
             if not self.clock.sleep(1.0, interrupt):
                 raise CallInterruptedError
 
-    def decision(self, decision: Decision) -> None:
-        self.decisions.append(decision)
-
     def say(self, text: str, *, warning: bool = False) -> None:
         self.said.append(text)
 
@@ -273,7 +270,13 @@ class World:
         settings = settings or MissionSettings(settle_seconds=0.0)
         kind = ScriptedReasoner if machine == 'patrol' else Decider
         self.decider = kind(
-            settings.choice, self, self, self.battery, experience, warn=self.said.append
+            settings.choice,
+            self,
+            self,
+            self.battery,
+            experience,
+            warn=self.said.append,
+            announce=self.decisions.append,
         )
         self.decider.world_of_test = self  # type: ignore[attr-defined]
         ports = Ports(

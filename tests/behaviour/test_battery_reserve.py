@@ -7,12 +7,8 @@ import random
 
 import pytest
 
-from surveillance_behaviour.policy.battery_reserve import (
-    BatteryLimits,
-    Draw,
-    DrawEstimate,
-    reserve,
-)
+from surveillance_behaviour.experience import DrawEstimate
+from surveillance_behaviour.policy.battery_reserve import BatteryLimits, Draw, reserve
 
 from .worlds import seven_rooms
 

@@ -14,8 +14,8 @@ import pytest
 
 from surveillance_behaviour.decider import Decider
 from surveillance_behaviour.decision import REQUEST, DecisionSettings, NowhereToGoError
+from surveillance_behaviour.experience import Experience
 from surveillance_behaviour.mission.mission_log import MissionRecord
-from surveillance_behaviour.world_model import Experience
 from surveillance_fsm import Interrupt
 
 from .scripted_world import World

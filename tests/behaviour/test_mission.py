@@ -9,13 +9,13 @@ from typing import Any
 import pytest
 
 from surveillance_behaviour.decision import Rules
+from surveillance_behaviour.experience import Experience
 from surveillance_behaviour.mission.mission_log import (
     MissionRecord,
     read,
     read_all,
     summarize,
 )
-from surveillance_behaviour.world_model import Experience
 from surveillance_fsm.exceptions import CallError, UnavailableError
 
 from .machine_runs import Killed, Run, settings

@@ -11,9 +11,9 @@ import pytest
 
 from benchmarks.rule_bound import RuleBound, rule_bound, simple_bound
 from surveillance_behaviour.decision import DecisionSettings, Rules, decide
+from surveillance_behaviour.experience import LegTimes
 from surveillance_behaviour.policy.battery_reserve import Battery
 from surveillance_behaviour.policy.graph import PatrolGraph, graph_of_places
-from surveillance_behaviour.policy.leg_times import LegTimes
 from surveillance_behaviour.policy.simulation import Patrol
 from surveillance_behaviour.policy.world import PolicyMemory, World
 

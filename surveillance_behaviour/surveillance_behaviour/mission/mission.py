@@ -155,7 +155,6 @@ class Mission:
         if decisions.places != self._noted_places:
             self._noted_places = decisions.places
             self.note('map', places=sorted(self._noted_places))
-        self.ports.announcer.decision(decision)
         threshold, changed = self.settings.choice.urgency_threshold, {}
         if threshold != self._noted_threshold:
             self._noted_threshold = threshold

@@ -1,6 +1,7 @@
 """Whom the machines talk to, without ROS (`ports`) and on the robot.
 
 - `ports`: what the machines need, as interfaces (`Ports`), which raise `CallError`;
-- `ros_ports`: services and actions behind them; `armor_knowledge`: the ontology behind its port;
-- `announcing`: what the mission publishes; `decision_services`: `why_not` and `go_to`.
+- `ros_ports`: services, actions and the log behind them; `armor_knowledge`: the ontology behind
+  its port;
+- `deciding`: what a node that decides has and offers (`decision`, `why_not`, `go_to`).
 """

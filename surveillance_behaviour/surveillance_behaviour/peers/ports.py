@@ -162,9 +162,6 @@ class Routine(Protocol):
 class Announcer(Protocol):
     """Where the machine says what it does."""
 
-    def decision(self, decision: Decision) -> None:
-        """Announce that a place was chosen."""
-
     def say(self, text: str, *, warning: bool = False) -> None:
         """Something worth knowing happened."""
 

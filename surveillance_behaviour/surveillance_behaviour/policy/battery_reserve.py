@@ -9,16 +9,12 @@ quantities, and the reserve is what 99 of 100 such ways need.
 from __future__ import annotations
 
 import math
-from collections import deque
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
-from statistics import fmean
+from dataclasses import dataclass
 
 from surveillance_behaviour.policy.graph import PatrolGraph
-from surveillance_behaviour.policy.leg_times import spread_of
 from surveillance_runtime.parameters import parameter
 
-FALLS_REMEMBERED = 50
 LEARNED_FALL = 2.0
 """Percent by which the level falls while one rate is learned."""
 PERCENTILE_99 = 2.326
@@ -101,48 +97,6 @@ class Battery:
     def level_text(self) -> str:
         """Return the charge in words."""
         return 'level unknown' if self.level is None else f'{self.level:g} %'
-
-
-@dataclass
-class DrawEstimate:
-    """How fast the battery falls, learned from its level whenever that is heard.
-
-    The level is known in whole percents. Between two moments at which it changes the fall is
-    exact. One that is more than twice as fast as the next fastest is not counted until it is seen
-    again: it was a jump of the level, not a draw.
-    """
-
-    _rates: deque[float] = field(default_factory=lambda: deque(maxlen=FALLS_REMEMBERED))
-    _mark: tuple[float, float] | None = None
-
-    def observe(self, time: float, level: float) -> None:
-        """Take the level at a time; charging begins anew."""
-        if self._mark is None or level > self._mark[1] or time <= self._mark[0]:
-            self._mark = (time, level)
-            return
-        fallen = self._mark[1] - level
-        if fallen >= LEARNED_FALL:
-            self._rates.append(fallen / (time - self._mark[0]))
-            self._mark = (time, level)
-
-    @property
-    def draw(self) -> Draw:
-        """The mean and the spread of the last rates; the mean is 0 while nothing is known."""
-        rates = sorted(self._rates)
-        if len(rates) >= 5 and rates[-1] > 2.0 * rates[-2]:
-            rates.pop()
-        if not rates:
-            return Draw()
-        rate = fmean(rates)
-        return Draw(rate, spread_of([each / rate for each in rates]))
-
-    def to_json(self) -> list[float]:
-        """Return the rates, to be kept in a file."""
-        return list(self._rates)
-
-    def restore(self, rates: Iterable[float]) -> None:
-        """Take rates that `to_json` gave."""
-        self._rates.extend(float(rate) for rate in rates)
 
 
 def reserve(

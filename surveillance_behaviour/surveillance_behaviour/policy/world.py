@@ -60,6 +60,7 @@ class World:
         avoided: Places that could not be reached lately.
         rules: The classes of places by priority that the ontology was asked for.
         requested: Where an operator has sent the robot; empty: nowhere.
+        contradiction: Which facts of the ontology clash, as a sentence; empty: none do.
         memory: What the policies remember.
     """
 
@@ -76,6 +77,7 @@ class World:
     avoided: frozenset[str] = frozenset()
     rules: tuple[str, ...] = ()
     requested: str = ''
+    contradiction: str = ''
     memory: PolicyMemory = field(default_factory=PolicyMemory)
 
     def unvisited(self, place: str) -> float:

@@ -1,0 +1,292 @@
+"""What the robot learns on a mission: visits, leg times, the battery's draw; kept in a small file.
+
+**Leg times.** A leg that was never driven takes ``overhead + metres / speed``; both numbers are
+fitted to all drives so far (least squares with the configured speed as prior). A leg that was
+driven takes the mean of its own drives, drawn towards that prediction while they are few. Each
+direction of a leg is learned for itself; while one was not driven, the other stands for it. The
+spread is the standard deviation of what drives took over what was predicted for them just before,
+pooled over all legs.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Collection, Iterable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from statistics import fmean
+from typing import Any
+
+from surveillance_behaviour.mission.mission_log import account_of, on_present_clock, read
+from surveillance_behaviour.policy.battery_reserve import LEARNED_FALL, Draw
+from surveillance_runtime.files import FileError, KeptFile
+
+SIMULTANEOUS = 1.0
+"""Seconds by which what several threads take for the present may differ."""
+FALLS_REMEMBERED = 50
+"""How many of the last falls of the battery's level count."""
+DRIVES_REMEMBERED = 20
+"""How many of the last drives of a leg count."""
+ERRORS_REMEMBERED = 200
+PRIOR_SPREAD = 0.15
+"""Spread before anything was learned."""
+PRIOR_WEIGHT = 5.0
+"""How many ratios the prior of the spread weighs as much as."""
+CHANGE = 0.03
+"""Expected times of the map follow what was learned once they differ by more than this part."""
+
+Leg = tuple[str, str]
+
+
+def spread_of(ratios: Collection[float]) -> float:
+    """Return the standard deviation from 1 of ratios of what was seen to what was expected.
+
+    `PRIOR_SPREAD` stands for it while they are few; none counts as further off than 2.
+    """
+    squares = sum(min(abs(ratio - 1.0), 2.0) ** 2 for ratio in ratios)
+    return math.sqrt((PRIOR_WEIGHT * PRIOR_SPREAD**2 + squares) / (PRIOR_WEIGHT + len(ratios)))
+
+
+@dataclass
+class LegTimes:
+    """Learned times of the legs of one map.
+
+    Attributes:
+        speed: Metres per second while nothing was driven.
+        metres: Lengths of the paths that were planned, by leg.
+        drives: Seconds of the last drives, by leg.
+        errors: Driven over predicted seconds of the last drives of all legs.
+    """
+
+    speed: float = 0.6
+    metres: dict[Leg, float] = field(default_factory=dict)
+    drives: dict[Leg, deque[float]] = field(default_factory=dict)
+    errors: deque[float] = field(default_factory=lambda: deque(maxlen=ERRORS_REMEMBERED))
+    _used: dict[Leg, float] = field(default_factory=dict)
+    _fit: tuple[float, float] | None = None
+
+    def observe(
+        self, start: str, goal: str, seconds: float, straight: float, metres: float | None = None
+    ) -> None:
+        """Learn from a drive from ``start`` to ``goal``.
+
+        Args:
+            start: Where it began.
+            goal: Where it ended.
+            seconds: How long it took, planning included.
+            straight: Metres between the two places in a straight line.
+            metres: Length of the planned path; None: not known.
+        """
+        if start == goal or not 0.0 < seconds < math.inf:
+            return
+        expected = self.expected(start, goal, straight)
+        if expected > 0.0:
+            self.errors.append(seconds / expected)
+        self.metres[start, goal] = metres if metres else self.metres.get((start, goal), straight)
+        self.drives.setdefault((start, goal), deque(maxlen=DRIVES_REMEMBERED)).append(seconds)
+        self._fit = None
+
+    def expected(self, start: str, goal: str, straight: float) -> float:
+        """Return the seconds that the leg is expected to take.
+
+        Args:
+            start: Where it begins.
+            goal: Where it ends.
+            straight: Metres between the two places in a straight line.
+        """
+        leg, back = (start, goal), (goal, start)
+        prediction = self._predicted(leg, straight)
+        if back in self.drives and leg not in self.drives:
+            leg = back
+        own = self.drives.get(leg)
+        if not own:
+            return prediction
+        return (prediction + sum(own)) / (1.0 + len(own))
+
+    @property
+    def spread(self) -> float:
+        """Standard deviation of driven over predicted time."""
+        return spread_of(self.errors)
+
+    def _predicted(self, leg: Leg, straight: float) -> float:
+        overhead, pace = self._line()
+        metres = self.metres.get(leg) or self.metres.get((leg[1], leg[0])) or straight
+        return max(overhead + pace * metres, 1e-3)
+
+    def _line(self) -> tuple[float, float]:
+        """Overhead in seconds and seconds per metre, fitted to all drives."""
+        if self._fit is None:
+            # The prior: no overhead, the configured speed; as sure as one drive of a usual leg.
+            usual, weight = 5.0, 1.0
+            n, sx, sxx = weight, weight * usual, 1.25 * weight * usual**2
+            sy, sxy = sx / self.speed, sxx / self.speed
+            for leg, seconds in self.drives.items():
+                x, count, total = self.metres[leg], len(seconds), sum(seconds)
+                n, sx, sxx = n + count, sx + count * x, sxx + count * x * x
+                sy, sxy = sy + total, sxy + total * x
+            determinant = n * sxx - sx * sx
+            pace = (n * sxy - sx * sy) / determinant
+            overhead = (sy - pace * sx) / n
+            if pace <= 0.0 or overhead < 0.0:
+                overhead, pace = 0.0, sxy / sxx
+            self._fit = overhead, pace
+        return self._fit
+
+    def used(self, start: str, goal: str, straight: float) -> float:
+        """Return the expected seconds as maps use them: they follow in steps of `CHANGE`."""
+        expected = self.expected(start, goal, straight)
+        used = self._used.get((start, goal), 0.0)
+        if abs(expected - used) > CHANGE * expected:
+            used = self._used[start, goal] = float(f'{expected:.3g}')
+        return used
+
+    def forget_fit(self, speed: float) -> None:
+        """Take another configured speed."""
+        if speed != self.speed:
+            self.speed, self._fit = speed, None
+
+    def to_json(self) -> dict[str, Any]:
+        """Return what was learned, to be kept in a file."""
+        legs = [[*leg, self.metres[leg], list(drives)] for leg, drives in self.drives.items()]
+        return {'legs': legs, 'errors': list(self.errors)}
+
+    def restore(self, kept: Mapping[str, Any]) -> None:
+        """Take what `to_json` gave.
+
+        Raises:
+            ValueError, KeyError, TypeError: It is something else.
+        """
+        for start, goal, metres, drives in kept['legs']:
+            leg = str(start), str(goal)
+            seconds = [float(value) for value in drives]
+            if not all(0.0 < value < math.inf for value in (*seconds, float(metres))):
+                raise ValueError(f'times of {start} to {goal}: expected finite and positive')
+            self.metres[leg] = float(metres)
+            self.drives[leg] = deque(seconds, maxlen=DRIVES_REMEMBERED)
+        self.errors.extend(float(value) for value in kept['errors'])
+        self._fit = None
+
+
+@dataclass
+class DrawEstimate:
+    """How fast the battery falls, learned from its level whenever that is heard.
+
+    The level is known in whole percents. Between two moments at which it changes the fall is
+    exact. One that is more than twice as fast as the next fastest is not counted until it is seen
+    again: it was a jump of the level, not a draw.
+    """
+
+    _rates: deque[float] = field(default_factory=lambda: deque(maxlen=FALLS_REMEMBERED))
+    _mark: tuple[float, float] | None = None
+
+    def observe(self, time: float, level: float) -> None:
+        """Take the level at a time; charging begins anew."""
+        if self._mark is None or level > self._mark[1] or time <= self._mark[0]:
+            self._mark = (time, level)
+            return
+        fallen = self._mark[1] - level
+        if fallen >= LEARNED_FALL:
+            self._rates.append(fallen / (time - self._mark[0]))
+            self._mark = (time, level)
+
+    @property
+    def draw(self) -> Draw:
+        """The mean and the spread of the last rates; the mean is 0 while nothing is known."""
+        rates = sorted(self._rates)
+        if len(rates) >= 5 and rates[-1] > 2.0 * rates[-2]:
+            rates.pop()
+        if not rates:
+            return Draw()
+        rate = fmean(rates)
+        return Draw(rate, spread_of([each / rate for each in rates]))
+
+    def to_json(self) -> list[float]:
+        """Return the rates, to be kept in a file."""
+        return list(self._rates)
+
+    def restore(self, rates: Iterable[float]) -> None:
+        """Take rates that `to_json` gave."""
+        self._rates.extend(float(rate) for rate in rates)
+
+
+@dataclass
+class Experience:
+    """What the robot has learned, kept in a file beside the mission record.
+
+    The file is ``<record>.experience.json``: `of_record` makes it from the parameter ``record``.
+    Whoever decides reads it when it starts and writes it after each decision, so that a mission
+    that goes on (``launch.py --resume``, or a node that was started again) knows the visits, the
+    leg times and the battery's draw of before. To take them to another run, copy the file with
+    the record.
+
+    Attributes:
+        file: Where it is kept.
+        visits: When the robot was in each place last, seconds on the mission's clock.
+        leg_times: How long the legs take.
+        draw: How fast the battery falls.
+        sent_to_charge: Why the robot was sent to charge and has not been charged since.
+        requested: Where an operator wants the robot, and it has not been since; empty: nowhere.
+        now: The last time that was told, seconds on the clock of the visits.
+    """
+
+    file: KeptFile = field(default_factory=KeptFile)
+    visits: dict[str, float] = field(default_factory=dict)
+    leg_times: LegTimes = field(default_factory=LegTimes)
+    draw: DrawEstimate = field(default_factory=DrawEstimate)
+    sent_to_charge: str = ''
+    requested: str = ''
+    now: float = 0.0
+    problem: str = ''
+
+    @classmethod
+    def of_record(cls, record: str) -> Experience:
+        """Return what was learned on the mission of a record; new for an empty name.
+
+        The visits in the record itself count: they are on the clock of its end. A file that cannot
+        be read counts as none; `problem` says what is wrong with it.
+        """
+        experience = cls(KeptFile.of_record(record, '.experience.json'))
+        experience.problem = experience.file.read(experience._take)
+        if record and Path(record).is_file():
+            try:
+                account = account_of(read(record))
+            except FileError as error:
+                experience.problem = str(error)
+                return experience
+            experience.visits.update(account.visits)
+            experience.now = account.now or 0.0
+        return experience
+
+    def _take(self, kept: dict[str, Any]) -> None:
+        leg_times, draw = LegTimes(), DrawEstimate()
+        visits = {str(place): float(at) for place, at in kept['visits'].items()}
+        leg_times.restore(kept['leg_times'])
+        draw.restore(kept['draw'])
+        sent_to_charge = str(kept['sent_to_charge'])
+        self.visits, self.leg_times, self.draw = visits, leg_times, draw
+        self.sent_to_charge, self.requested = sent_to_charge, str(kept.get('requested', ''))
+
+    def save(self) -> None:
+        """Write the file, if anything has changed."""
+        self.file.write(
+            {
+                'visits': {place: round(at, 3) for place, at in self.visits.copy().items()},
+                'leg_times': self.leg_times.to_json(),
+                'draw': self.draw.to_json(),
+                'sent_to_charge': self.sent_to_charge,
+                'requested': self.requested,
+            }
+        )
+
+    def saw(self, place: str, now: float) -> None:
+        """Note that the robot was in ``place``."""
+        self.tell_time(now)
+        self.visits[place] = now
+
+    def tell_time(self, now: float) -> None:
+        """Take the visits with a clock that was set back, forget those of another simulation."""
+        latest = max((self.now, *self.visits.values()))
+        if now < latest - SIMULTANEOUS:
+            self.visits = on_present_clock(self.visits, latest, now)
+        self.now = now

@@ -1,0 +1,134 @@
+"""What a node that decides has and offers: its decider, `decision`, `why_not` and `go_to`."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from rclpy.callback_groups import ReentrantCallbackGroup
+
+from surveillance_behaviour import conversions
+from surveillance_behaviour.charging import BatteryMonitor
+from surveillance_behaviour.decider import Decider
+from surveillance_behaviour.decision import DecisionSettings
+from surveillance_behaviour.experience import Experience
+from surveillance_behaviour.peers.ports import Ontology, Places
+from surveillance_behaviour.policy.world import Decision
+from surveillance_fsm.exceptions import CallError
+from surveillance_interfaces.msg import Decision as DecisionMessage
+from surveillance_interfaces.srv import GoTo, WhyNot
+from surveillance_runtime.node import PatrolNode
+from surveillance_runtime.parameters import parameter
+from surveillance_runtime.qos import STATE_QOS
+from surveillance_runtime.waiting import AwaitedWork
+
+
+@dataclass(frozen=True)
+class MemorySettings:
+    """Parameters of a node that decides: its record and its random seed."""
+
+    record: str = parameter(
+        '',
+        'File that the mission is recorded in, and beside which `FILE.experience.json` keeps what '
+        'was learned (visits, leg times, battery); empty: none.',
+    )
+    random_seed: int = parameter(
+        -1, 'Makes the policies that draw repeatable; -1 takes another course each time.', -1
+    )
+
+
+def decider_of(
+    node: PatrolNode,
+    settings: DecisionSettings,
+    memory: MemorySettings,
+    ontology: Ontology,
+    places: Places,
+    battery: BatteryMonitor,
+    now: Callable[[], float],
+) -> Decider:
+    """Return a decider that knows what was learned before, and learns how fast the battery falls.
+
+    Its decisions are published and logged, numbered from 1.
+
+    Args:
+        node: The node that decides.
+        settings: Shared with whoever changes them.
+        memory: Where what was learned is, see `Experience.of_record`.
+        ontology: The ontology.
+        places: Where the places are.
+        battery: The battery.
+        now: Seconds on the mission's clock.
+    """
+    log = node.get_logger()
+    experience = Experience.of_record(memory.record)
+    if experience.problem:
+        log.warn(experience.problem)
+    generator = random.Random(memory.random_seed if memory.random_seed >= 0 else None)
+    topic = node.create_publisher(DecisionMessage, 'decision', STATE_QOS)
+    count = 0
+
+    def announce(decision: Decision) -> None:
+        nonlocal count
+        count += 1
+        stamp = node.get_clock().now().to_msg()
+        topic.publish(conversions.decision_message(decision, count, stamp))
+        log.info(
+            f'decision {count}: {decision.from_place} -> {decision.place} '
+            f'[{decision.rule}] {decision.reason}'
+        )
+
+    decider = Decider(
+        settings, ontology, places, battery, experience, generator, lambda w: log.warn(w), announce
+    )
+    battery.watch(lambda: decider.learn_draw(now()))
+    return decider
+
+
+def offer_decision_services(
+    node: PatrolNode,
+    decider: Decider,
+    now: Callable[[], float],
+    avoided: Callable[[], frozenset[str]],
+) -> AwaitedWork:
+    """Answer why a place is not chosen, and take where an operator wants the robot.
+
+    Args:
+        node: The node that decides.
+        decider: Decides.
+        now: Seconds on the mission's clock.
+        avoided: The places that could not be reached lately.
+
+    Returns:
+        The thread on which the ontology may be asked; it ends with the node.
+    """
+    work = AwaitedWork(node, 1)
+    node.stopping.subscribe(work.stop)
+
+    async def on_why_not(request: Any, response: Any) -> Any:
+        def answer() -> None:
+            try:
+                told = decider.why_not(request.place, now(), node.stopping, avoided())
+            except (ValueError, CallError) as error:
+                response.success, response.message = False, str(error)
+                return
+            response.success, response.message = True, told.sentence
+            response.premises = list(told.premises)
+
+        await work.run(answer)
+        return response
+
+    def on_go_to(request: Any, response: Any) -> Any:
+        try:
+            response.message = decider.request(request.place)
+            response.success = True
+            node.get_logger().info(response.message)
+        except ValueError as error:
+            response.message = str(error)
+        return response
+
+    group = ReentrantCallbackGroup()
+    node.create_service(WhyNot, 'why_not', on_why_not, callback_group=group)
+    node.create_service(GoTo, 'go_to', on_go_to, callback_group=group)
+    return work
