@@ -17,7 +17,7 @@ from surveillance_interfaces.msg import (
 from surveillance_ontology.armor import protocol
 from surveillance_ontology.armor.facts import ShortFact
 from surveillance_ontology.armor.protocol import DirectiveRequest, DirectiveResponse
-from surveillance_ontology.map_building import RoomNote
+from surveillance_ontology.map_keeper import RoomNote
 from surveillance_runtime.conversions import point_from
 
 if TYPE_CHECKING:

@@ -1,5 +1,7 @@
 """Keeps a place in the ontology: builds it, builds it again when the server lost it, changes it.
 
+A place is described at the start, or by messages, a room at a time (`RoomNote`).
+
 Everything here blocks while the server answers and belongs on a worker thread.
 """
 
@@ -9,14 +11,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from surveillance_ontology.armor.access import DATA
 from surveillance_ontology.armor.client import (
     ArmorError,
     ArmorServiceCallError,
     ArmorServiceInternalError,
 )
-from surveillance_ontology.map_building import RoomNote, extended
 from surveillance_ontology.patrol_ontology import (
+    ONTOLOGY,
     PatrolOntology,
     checked_names,
     is_gone,
@@ -27,6 +28,7 @@ from surveillance_runtime.parameters import parameter
 from surveillance_runtime.place import (
     Place,
     PlaceError,
+    Position,
     description_of,
     edited_place,
     problem_in_name,
@@ -34,6 +36,61 @@ from surveillance_runtime.place import (
 
 MOST_REPLACED = 10
 """Servers in a row that may lose the ontology while the map is entered, before that is an error."""
+
+
+@dataclass(frozen=True)
+class RoomNote:
+    """A room as a message describes it.
+
+    Attributes:
+        name: Its name.
+        position: A point inside, metres, world frame.
+        connections: Pairs of the room behind a door and the door.
+    """
+
+    name: str
+    position: Position
+    connections: tuple[tuple[str, str], ...]
+
+
+def extended(place: Place | None, notes: Sequence[RoomNote], robot_room: str) -> Place:
+    """Return a place with further rooms, or with further doors of rooms it has.
+
+    A connection is entered on both its sides as far as they are known.
+
+    Args:
+        place: What is known; None at first.
+        notes: The rooms, each once.
+        robot_room: Where the robot is; empty leaves it.
+
+    Raises:
+        PlaceError: A note that cannot be used; nothing is taken of any then.
+    """
+    names = [note.name for note in notes]
+    for name in names:
+        if names.count(name) > 1:
+            raise PlaceError(('map', name), 'described twice')
+    if not notes and place is None:
+        raise PlaceError(('map',), 'no rooms described')
+    grown = place or Place({}, {}, robot_room or names[0])
+    for note in notes:
+        for other, _ in note.connections:
+            if other == note.name:
+                raise PlaceError(('map', note.name), 'is connected to itself')
+        doors = [door for _, door in note.connections]
+        known = grown.rooms.get(note.name)
+        if known is None or any(door not in known for door in doors):
+            grown = grown.with_room(note.name, note.position, doors)
+        else:
+            positions = {**grown.positions, note.name: note.position}
+            grown = replace(grown, positions=positions)
+    for note in notes:
+        for other, door in note.connections:
+            if other in grown.rooms and door not in grown.rooms[other]:
+                grown = grown.with_room(other, grown.positions[other], [door])
+    if robot_room and robot_room not in grown.rooms:
+        raise PlaceError(('robot_room',), f"no room '{robot_room}' in the map")
+    return replace(grown, start=robot_room or grown.start)
 
 
 @dataclass(frozen=True)
@@ -57,9 +114,7 @@ class Reports:
 class Source:
     """The ontology that a map is entered into."""
 
-    path: str = parameter(
-        str(DATA / 'surveillance.owl'), 'The ontology to start from.', name='ontology_path'
-    )
+    path: str = parameter(str(ONTOLOGY), 'The ontology to start from.', name='ontology_path')
     uri: str = parameter(
         'http://bnc/exp-rob-lab/2022-23', 'IRI of the ontology.', name='ontology_uri'
     )

@@ -9,6 +9,9 @@ and the robot's name. Everything is told as one batch, which the server carries 
     # By the one node that decides: when it visited what, and what follows, all of one moment.
     ontology.snapshot(130.0, ['URGENT'], visits={'C1': 120.0})
 
+A closed door is left out on one of its sides, which ends the connection: on the side that has more
+doors, so that the other stays a room and this one, mostly, a corridor.
+
 A fact is replaced by ``SET``, so the robot cannot be told to be in two places, whoever tells it.
 Every method blocks while the server answers and belongs on a worker thread; one thread at a time
 may take snapshots.
@@ -20,6 +23,7 @@ import threading
 import time
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Protocol
 
 from surveillance_ontology.armor.client import (
@@ -33,9 +37,10 @@ from surveillance_ontology.armor.protocol import (
     name_in,
     value_in,
 )
-from surveillance_ontology.map_building import closed_doors, shown_doors
 from surveillance_runtime.place import Place, PlaceError
 
+ONTOLOGY = Path(__file__).parent / 'data' / 'surveillance.owl'
+"""The ontology that a patrol starts from."""
 ROBOT = 'Robot1'
 """The robot's name where nobody gives another one."""
 NEVER = 0
@@ -74,6 +79,35 @@ def checked_names(place: Place, robot: str = ROBOT) -> Place:
         if robot in (room, *doors):
             raise PlaceError(('map', room), f"'{robot}' is the robot's name: expected another one")
     return place
+
+
+def shown_doors(place: Place) -> dict[str, tuple[str, ...]]:
+    """Return the doors of each room as the ontology has them: closed ones on one side only."""
+    doors = {room: list(found) for room, found in place.rooms.items()}
+    for door in sorted(place.closed):
+        sides = place.doors[door]
+        if len(sides) > 1:
+            hiding = max(sides, key=lambda room: (len(doors[room]), room))
+            doors[hiding].remove(door)
+    return {room: tuple(found) for room, found in doors.items()}
+
+
+def closed_doors(place: Place, shown: Mapping[str, Iterable[str]]) -> frozenset[str]:
+    """Return the closed doors of a place of which an ontology has some rooms, see `shown_doors`.
+
+    Args:
+        place: The place; what the ontology does not tell of a door is as it is here.
+        shown: The doors of each room that the ontology has.
+    """
+    present = {room: set(doors) for room, doors in shown.items()}
+    closed = set(place.closed)
+    for door, sides in place.doors.items():
+        seen = sum(door in present.get(side, ()) for side in sides)
+        if len(sides) > 1 and seen and all(side in present for side in sides):
+            closed.discard(door)
+            if seen == 1:
+                closed.add(door)
+    return frozenset(closed)
 
 
 class Waiting(Protocol):

@@ -17,18 +17,10 @@ from surveillance_ontology.armor.client import (
     Batch,
     InProcessTransport,
 )
-from surveillance_ontology.armor.protocol import (
-    DirectiveRequest,
-)
+from surveillance_ontology.armor.protocol import DirectiveRequest
 from surveillance_ontology.armor.service import ArmorService
-from surveillance_ontology.map_building import (
-    RoomNote,
-    closed_doors,
-    extended,
-    shown_doors,
-)
-from surveillance_ontology.map_keeper import MapKeeper, Reports, Source
-from surveillance_ontology.patrol_ontology import PatrolOntology
+from surveillance_ontology.map_keeper import MapKeeper, Reports, RoomNote, Source, extended
+from surveillance_ontology.patrol_ontology import PatrolOntology, closed_doors, shown_doors
 from surveillance_runtime.place import Place, PlaceError, description_of, make_place
 
 from .seven_rooms import IRI, ONTOLOGY, SEVEN_ROOMS
