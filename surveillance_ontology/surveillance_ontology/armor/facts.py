@@ -107,14 +107,13 @@ class FactSet:
 
     def __init__(self, pattern: str) -> None:
         self.pattern = parse_fact(pattern)
-        self._asserted: set[ShortFact] = set()
-        self._derived: set[ShortFact] = set()
+        self._held: set[tuple[ShortFact, bool]] = set()
         self._sequence: int | None = None
 
     @property
     def facts(self) -> frozenset[ShortFact]:
         """The facts that match, as far as is known."""
-        return frozenset(self._asserted | self._derived)
+        return frozenset(fact for fact, _ in self._held)
 
     def follow(
         self, sequence: int, changes: Sequence[FactChange]
@@ -135,11 +134,7 @@ class FactSet:
         matching = [change for change in changes if self.pattern.matches(change[0])]
         before = {fact for fact, _, _ in matching if self._holds(fact)}
         for fact, came, derived in matching:
-            kept = self._derived if derived else self._asserted
-            if came:
-                kept.add(fact)
-            else:
-                kept.discard(fact)
+            (self._held.add if came else self._held.discard)((fact, derived))
         touched = dict.fromkeys(fact for fact, _, _ in matching)
         return [
             (fact, self._holds(fact)) for fact in touched if self._holds(fact) != (fact in before)
@@ -158,12 +153,12 @@ class FactSet:
             What came (True) and went (False) by that.
         """
         before = self.facts
-        self._asserted = set(asserted)
-        self._derived = set(facts) - self._asserted
+        every, told = set(facts), set(asserted)
+        self._held = {(fact, False) for fact in told} | {(fact, True) for fact in every - told}
         gone, come = before - self.facts, self.facts - before
         return [(fact, False) for fact in sorted(gone, key=str)] + [
             (fact, True) for fact in sorted(come, key=str)
         ]
 
     def _holds(self, fact: ShortFact) -> bool:
-        return fact in self._asserted or fact in self._derived
+        return (fact, False) in self._held or (fact, True) in self._held

@@ -102,11 +102,14 @@ class ListResponse:
 class DirectiveError(Exception):
     """A directive that cannot be carried out.
 
-    Attributes:
+    Args:
         description: One line for ``error_description``.
         exit_code: See `ExitCode`.
         success: What the response says; ARMOR reports unsupported types with success.
         timeout: A time limit was the reason.
+
+    Attributes:
+        response: The answer to the directive.
     """
 
     def __init__(
@@ -118,10 +121,7 @@ class DirectiveError(Exception):
         timeout: bool = False,
     ) -> None:
         super().__init__(description)
-        self.description = description
-        self.exit_code = exit_code
-        self.success = success
-        self.timeout = timeout
+        self.response = DirectiveResponse(success, timeout, int(exit_code), description)
 
 
 _IN_BRACKETS = re.compile(r'<([^<>]*)>')

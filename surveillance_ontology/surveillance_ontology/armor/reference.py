@@ -236,18 +236,24 @@ class Registry:
         return ref
 
     @contextlib.contextmanager
+    def locked_if_there(self, name: str) -> Iterator[Reference | None]:
+        """Hold a reference's lock; None when there is no such reference."""
+        while (ref := self._references.get(name)) is not None:
+            with ref.lock:
+                if not ref.dropped:
+                    yield ref
+                    return
+        yield None
+
+    @contextlib.contextmanager
     def locked(self, name: str) -> Iterator[Reference]:
         """Hold a reference's lock.
 
         Raises:
             DirectiveError: 205, there is no such reference.
         """
-        while True:
-            ref = self.find(name)
-            with ref.lock:
-                if not ref.dropped:
-                    yield ref
-                    return
+        with self.locked_if_there(name) as ref:
+            yield ref or self.find(name)
 
     @contextlib.contextmanager
     def held(self, names: Iterable[str]) -> Iterator[list[Reference]]:

@@ -150,12 +150,7 @@ class ArmorService:
         try:
             response = self._execute(request)
         except DirectiveError as error:
-            response = DirectiveResponse(
-                success=error.success,
-                timeout=error.timeout,
-                exit_code=int(error.exit_code),
-                error_description=error.description,
-            )
+            response = error.response
         except FileError as error:
             response = _refusal(f'{request.words}: nothing was done: {error}')
         except JavaReasonerError as error:
@@ -240,12 +235,10 @@ class ArmorService:
             _check_name(request.reference_name)
             values = directive.read(request.args, '')
             return _response(directive.run(self, request, *values))
-        ref = self.references.find(request.reference_name)
         if directive.slow:
+            ref = self.references.find(request.reference_name)
             return _response(directive.run(self, ref, *self._values(directive, request, ref)))
-        with ref.lock:
-            if ref.dropped:
-                return self._execute(request)
+        with self.references.locked(request.reference_name) as ref:
             if directive.kind is Kind.QUERY:
                 return _response(directive.run(ref, *self._values(directive, request, ref)))
             remark = self._change(directive, request, ref)
@@ -287,8 +280,7 @@ class ArmorService:
 
 
 def _refusal(problem: str) -> DirectiveResponse:
-    code = int(ExitCode.INVALID_COMMAND)
-    return DirectiveResponse(False, exit_code=code, error_description=problem)
+    return DirectiveError(problem).response
 
 
 def _response(result: Any) -> DirectiveResponse:

@@ -188,12 +188,13 @@ class Reader:
             return term
         if len(several) == 1:
             return next(iter(several))
-        several = dict(sorted(several.items(), key=lambda form: str(form[0])))
         predicates = self._predicates(variable, row)
         near = self._mentioned | {_iri(value) for value in row.values()}
-        found = _narrowed(several, lambda place: place[1] in predicates)
-        found = _narrowed(found, lambda place: place[0] in near and place[1] in predicates)
-        return next(iter(_narrowed(found, lambda place: place[0] in near)))
+
+        def likeness(form: Any) -> tuple[bool, bool]:
+            return max((p in predicates, subject in near) for subject, p in several[form])
+
+        return max(sorted(several, key=str), key=likeness)
 
     def _predicates(self, variable: str, row: Mapping[str, Any]) -> set[str]:
         """Return the properties whose value the variable may be."""
@@ -208,16 +209,6 @@ class Reader:
     def _names(self, text: str) -> Iterable[str]:
         for iri, prefix, local in _NAME.findall(text):
             yield iri or self._prefixes.get(prefix, prefix + ':') + local
-
-
-def _narrowed(forms: dict[Any, _Places], fits: Any) -> dict[Any, _Places]:
-    """Return the forms that stand in a place that fits, with these places; all where none does."""
-    found = {
-        form: kept
-        for form, places in forms.items()
-        if (kept := {place: None for place in places if fits(place)})
-    }
-    return found or forms
 
 
 def _kept_forms(literals: Iterable[Any]) -> dict[Any, Any]:

@@ -5,17 +5,11 @@ from __future__ import annotations
 import contextlib
 import threading
 import time
-from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from surveillance_ontology import memory
-from surveillance_ontology.armor.access import (
-    LOG_ENDINGS,
-    ONTOLOGY_ENDINGS,
-    SafePaths,
-    Settings,
-)
+from surveillance_ontology.armor.access import LOG_ENDINGS, ONTOLOGY_ENDINGS, Settings
 from surveillance_ontology.armor.changes import History
 from surveillance_ontology.armor.directives.table import control, flag, text, utility
 from surveillance_ontology.armor.protocol import (
@@ -109,10 +103,7 @@ def _load(
     notes = [f'{name} is loaded already']
     if not _rebuffer(service, request, buffered):
         with memory.uncollected():
-            web = request.primary.upper() == 'WEB'
-            ref, found = _read_document(
-                name, source, iri, reasoner, service.paths, service.settings, web=web
-            )
+            ref, found = _read_document(service, request, source, iri, reasoner)
             memory.settle(len(ref.kb))
         ref.buffered_manipulation, ref.buffered_reasoner = buffered, lazy
         ref.history = History(service.clock(), service.settings.history)
@@ -135,7 +126,7 @@ def _load(
 
 def _rebuffer(service: ArmorService, request: DirectiveRequest, buffered: bool) -> bool:
     """Give a loaded reference the buffering of a further LOAD; False when there is none."""
-    with _if_loaded(service, request.reference_name) as ref:
+    with service.references.locked_if_there(request.reference_name) as ref:
         if ref is None:
             return False
         if ref.buffered_manipulation != buffered:
@@ -146,18 +137,6 @@ def _rebuffer(service: ArmorService, request: DirectiveRequest, buffered: bool) 
     return True
 
 
-@contextlib.contextmanager
-def _if_loaded(service: ArmorService, name: str) -> Iterator[Reference | None]:
-    """Hold a reference's lock; None when there is no such reference."""
-    with contextlib.ExitStack() as held:
-        try:
-            ref = held.enter_context(service.references.locked(name))
-        except DirectiveError:
-            yield None
-            return
-        yield ref
-
-
 @utility(
     'DROP',
     summary='Forgets the reference; success also when there is none.',
@@ -165,7 +144,7 @@ def _if_loaded(service: ArmorService, name: str) -> Iterator[Reference | None]:
     slow=True,
 )
 def _drop(service: ArmorService, request: DirectiveRequest) -> DirectiveResponse:
-    with _if_loaded(service, request.reference_name) as ref:
+    with service.references.locked_if_there(request.reference_name) as ref:
         if ref is not None:
             service.check_free(ref, request.client_name)
             if service.store:
@@ -267,7 +246,7 @@ def _loaded_file(service: ArmorService, ref: Reference) -> str:
 def _mount(service: ArmorService, request: DirectiveRequest) -> DirectiveResponse:
     client, name = request.client_name, request.reference_name
     refusal = f'{client} cannot be mounted on {name}.'
-    with _if_loaded(service, name) as ref:
+    with service.references.locked_if_there(name) as ref:
         if ref is None:
             raise DirectiveError(f'{refusal} Unknown reference.', ExitCode.MOUNT_REFUSED)
         if not ref.is_free_for(client):
@@ -362,25 +341,16 @@ def _reason(ref: Reference) -> None:
 
 
 def _read_document(
-    name: str,
-    source: str,
-    iri: str,
-    reasoner: str,
-    paths: SafePaths,
-    settings: Settings,
-    *,
-    web: bool = False,
+    service: ArmorService, request: DirectiveRequest, source: str, iri: str, reasoner: str
 ) -> tuple[Reference, list[str]]:
     """Read an ontology and reason over it.
 
     Args:
-        name: Reference name to be.
+        service: The service.
+        request: LOAD FILE or LOAD WEB.
         source: Path or URL.
         iri: What local names are completed with.
         reasoner: ARMOR's word for the reasoner, any case.
-        paths: What may be read.
-        settings: What is allowed.
-        web: ``source`` is a URL.
 
     Returns:
         The reference, and what the client should know: another reasoner than asked for, statements
@@ -396,15 +366,14 @@ def _read_document(
     notes: list[str] = []
     found: Path | bytes
     try:
-        if web:
-            path, found = source, _fetch(source, settings)
+        if request.primary.upper() == 'WEB':
+            path, found = source, _fetch(source, service.settings)
         else:
             with memory.collected():
-                found = paths.to_read(source)
+                found = service.paths.to_read(source)
             path = str(found)
-        document = read_ontology(
-            found, base, size_limit=settings.max_file_bytes, may_read=paths.may_read
-        )
+        limit = service.settings.max_file_bytes
+        document = read_ontology(found, base, size_limit=limit, may_read=service.paths.may_read)
     except OntologyFileError as error:
         raise DirectiveError(f'LOAD: {error}') from None
     if document.iri and document.iri.rstrip('#') != base:
@@ -421,7 +390,8 @@ def _read_document(
         notes.append(f'{len(unsupported)} statements not supported by the reasoner: {named}{more}')
     used = reasoner if isinstance(kb, JavaKnowledgeBase) else ''
     form = WRITTEN.get(document.format, document.format)
-    return Reference(name, kb, Origin(path, form, document.prefixes, used), took=took), notes
+    origin = Origin(path, form, document.prefixes, used)
+    return Reference(request.reference_name, kb, origin, took=took), notes
 
 
 def _reasoned(base: str, axioms: list[Axiom], reasoner: str, notes: list[str]) -> KnowledgeBase:
