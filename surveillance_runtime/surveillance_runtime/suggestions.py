@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterable
 
 _MOST = 16
-_ALIKE = 0.6
+_ALIKE = 0.65
 _SHARED_WORD = 0.8
 
 

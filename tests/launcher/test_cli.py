@@ -34,6 +34,7 @@ from tests.launcher.conftest import ROOT
         (['--behaviour', 'dance'], 'dance'),
         (['list', 'nodes'], 'nodes'),
         (['--speed', '9'], "unknown option '--speed': expected one of --help, --mode"),
+        (['--policy', 'x'], "unknown option '--policy': expected one of --help, --mode"),
         (['--behavior', 'patrol'], "unknown option '--behavior': expected '--behaviour'"),
         (['--web', '8123'], "unexpected word '8123'"),
         (['test', '-x', 'tests/fsm/test_stat.py::test_x'], "expected '"),
