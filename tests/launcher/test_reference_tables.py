@@ -13,17 +13,15 @@ from contextlib import suppress
 import pytest
 import rclpy
 
-from launcher.node_survey import survey
 from launcher.package_commands import HELP, all_helps
-from launcher.reference_tables import parameters_page
+from launcher.reference_tables import parameters_page, survey
 from surveillance_runtime.configuration import SCHEMA, read_schema
 from surveillance_runtime.discovery import LAST_DOMAIN
 from tests.launcher.conftest import ROOT
 
 SURVEY = """
 import json, sys
-from launcher.node_survey import survey
-from launcher.reference_tables import interfaces_page
+from launcher.reference_tables import interfaces_page, survey
 found = survey()
 print(json.dumps([found.parameters, interfaces_page(found)]), file=open(sys.argv[1], 'w'))
 """
@@ -32,7 +30,8 @@ print(json.dumps([found.parameters, interfaces_page(found)]), file=open(sys.argv
 def test_schema_and_interfaces_are_those_of_the_nodes(tmp_path):
     path = tmp_path / 'now.json'
     words = [sys.executable, '-c', SURVEY, str(path)]
-    subprocess.run(words, cwd=ROOT, check=True, capture_output=True)
+    done = subprocess.run(words, cwd=ROOT, check=True, capture_output=True, text=True)
+    assert (done.stdout, done.stderr) == ('', '')
     parameters, page = json.loads(path.read_text())
     hint = 'write them anew: python3 launch.py params --write'
     assert parameters == json.loads(SCHEMA.read_text()), hint
