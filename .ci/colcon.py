@@ -19,8 +19,12 @@ from pathlib import Path
 CHECKOUT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(CHECKOUT))
 
-from launcher.environment import PACKAGES, clean_environ  # noqa: E402
-from launcher.fingerprint import INTERFACES, requirements  # noqa: E402
+from launcher.environment import (  # noqa: E402
+    INTERFACES,
+    PACKAGES,
+    clean_environ,
+    requirements,
+)
 from surveillance_runtime import node_table  # noqa: E402
 
 COLCON = [

@@ -7,21 +7,26 @@ journal in the environment says which are complete, so that the next run does on
 from __future__ import annotations
 
 import fcntl
+import hashlib
+import json
 import os
 import platform
 import shutil
 import signal
 import subprocess
 import sys
+import tomllib
 from collections import deque
-from collections.abc import Iterator, MutableMapping, Sequence
+from collections.abc import Iterable, Iterator, MutableMapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
 from launcher import system
-from launcher.fingerprint import INTERFACES, Journal, complete, requirements
 from launcher.progress import Output, Step
 from launcher.system import NotNowError
+from surveillance_fsm.files import parse_json
+from surveillance_runtime.files import replace_text
 
 CHECKOUT = Path(__file__).resolve().parent.parent
 PACKAGES = (
@@ -34,6 +39,8 @@ PACKAGES = (
     'surveillance_simulation',
     'surveillance_operator',
 )
+JOURNAL = 'surveillance-setup.json'
+INTERFACES = 'surveillance_interfaces'
 SPACE = 900_000_000
 """Bytes that the environment takes, with what is needed meanwhile."""
 VENV_STEP = 'virtual environment in .venv'
@@ -46,6 +53,73 @@ _BOOTSTRAP = '_ROS_WHEELS_BOOTSTRAP_COMPLETE'
 _KEPT_IN = 'PYTHONPYCACHEPREFIX'
 _BYTECODE_SPACE = 100_000_000
 """Bytes that must be free where compiled modules are to be kept: several times what they take."""
+
+
+@dataclass
+class Journal:
+    """How far the set-up of one environment came, and what it was made for.
+
+    Attributes:
+        python: version and home of the interpreter that the environment stands on.
+        checkout: the folder whose packages the environment imports.
+        extras: groups of optional dependencies that are installed.
+        packages: hash of the dependency lists that were installed completely.
+        interfaces: hash of the interface sources that were installed completely.
+        working: the step under way, empty when none was cut off.
+    """
+
+    python: str = ''
+    checkout: str = ''
+    extras: list[str] = field(default_factory=list)
+    packages: str = ''
+    interfaces: str = ''
+    working: str = ''
+
+    @classmethod
+    def read(cls, venv: Path) -> Journal:
+        """Return the journal in `venv`; an empty one where none is, or where it cannot be read."""
+        try:
+            stored = parse_json((venv / JOURNAL).read_text(encoding='utf-8'))
+            return cls(**stored)
+        except (OSError, ValueError, TypeError):
+            return cls()
+
+    def write(self, venv: Path) -> None:
+        replace_text(venv / JOURNAL, json.dumps(asdict(self), indent=1) + '\n')
+
+
+def requirements(checkout: Path, extras: Iterable[str]) -> list[str]:
+    """Return the project's dependencies with those of the named extras, as pip takes them."""
+    project = tomllib.loads((checkout / 'pyproject.toml').read_text(encoding='utf-8'))['project']
+    wanted = list(project['dependencies'])
+    for extra in extras:
+        wanted += project['optional-dependencies'][extra]
+    return wanted
+
+
+def complete(checkout: Path, extras: Iterable[str]) -> Journal:
+    """Return the journal of a set-up that fits this checkout and this interpreter."""
+    return Journal(
+        python=f'{sys.version_info.major}.{sys.version_info.minor} {sys.base_prefix}',
+        checkout=str(checkout),
+        extras=sorted(extras),
+        packages=_hash(line.encode() for line in requirements(checkout, extras)),
+        interfaces=_hash(_sources(checkout / INTERFACES)),
+    )
+
+
+def _sources(folder: Path) -> Iterable[bytes]:
+    for path in sorted(folder.rglob('*')):
+        if path.is_file() and not {'build', '__pycache__'} & set(path.relative_to(folder).parts):
+            yield path.relative_to(folder).as_posix().encode()
+            yield path.read_bytes()
+
+
+def _hash(pieces: Iterable[bytes]) -> str:
+    digest = hashlib.sha256()
+    for piece in pieces:
+        digest.update(len(piece).to_bytes(8, 'little') + piece)
+    return digest.hexdigest()
 
 
 class Environment:

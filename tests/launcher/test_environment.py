@@ -14,8 +14,14 @@ from pathlib import Path
 import pytest
 
 from launcher import cli
-from launcher.environment import Environment, _Command, clean_environ, keep_bytecode
-from launcher.fingerprint import INTERFACES, JOURNAL
+from launcher.environment import (
+    INTERFACES,
+    JOURNAL,
+    Environment,
+    _Command,
+    clean_environ,
+    keep_bytecode,
+)
 from launcher.progress import Step
 from tests.launcher.conftest import ROOT
 

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from launcher.fingerprint import INTERFACES, Journal, complete, requirements
+from launcher.environment import INTERFACES, Journal, complete, requirements
 
 PROJECT = """
 [project]
