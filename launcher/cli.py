@@ -20,6 +20,7 @@ from launcher.options import DEFAULT_MEMORY, make_parser, shared_options
 from surveillance_runtime import node_table
 from surveillance_runtime.command_line import EXIT_BAD_INPUT, CommandParser
 from surveillance_runtime.files import in_one_line, replace_text
+from surveillance_runtime.launch_protocol import NotNowError
 from surveillance_runtime.suggestions import nearest
 
 if TYPE_CHECKING:
@@ -62,7 +63,7 @@ def main(argv: Sequence[str]) -> int:
             raise
     except ValueError as error:
         print(f'launch.py: {error}', file=sys.stderr)
-        return os.EX_TEMPFAIL if isinstance(error, system.NotNowError) else EXIT_BAD_INPUT
+        return os.EX_TEMPFAIL if isinstance(error, NotNowError) else EXIT_BAD_INPUT
     except BrokenPipeError:  # as when the output goes to `head`
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
@@ -299,7 +300,7 @@ def _environment(extras: Sequence[str]) -> Environment | None:
     if system.sourced_ros():
         if system.sourced_workspace():
             return None
-        raise system.LaunchError(
+        raise ValueError(
             'ROS 2 Jazzy is active in this shell, but this workspace is not built. Build it:\n'
             f'{system.colcon_advice(CHECKOUT)}\nor use a shell without ROS.'
         )

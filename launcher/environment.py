@@ -24,9 +24,9 @@ from pathlib import Path
 
 from launcher import system
 from launcher.progress import Output, Step
-from launcher.system import NotNowError
 from surveillance_fsm.files import parse_json
 from surveillance_runtime.files import replace_text
+from surveillance_runtime.launch_protocol import NotNowError
 
 CHECKOUT = Path(__file__).resolve().parent.parent
 PACKAGES = (
@@ -152,17 +152,17 @@ class Environment:
 
         Raises:
             NotNowError: a step failed.
-            LaunchError: the machine lacks something that only its owner can give.
+            ValueError: the machine lacks something that only its owner can give.
         """
         if self.ready():
             return
         machine = (platform.system(), platform.machine(), platform.libc_ver()[0])
         if reason := system.why_no_wheels(*machine, sys.version_info[:2]):
-            raise system.LaunchError(system.no_wheels_advice(reason, self.checkout))
+            raise ValueError(system.no_wheels_advice(reason, self.checkout))
         if missing := system.missing_packages():
             system.install_packages(missing)
             if still := system.missing_packages():
-                raise system.LaunchError(f'still missing after installing: {" ".join(still)}')
+                raise ValueError(f'still missing after installing: {" ".join(still)}')
         if note := system.note_of_unused_ros(self.checkout):
             print(note, flush=True)
         with self._alone() as lock:

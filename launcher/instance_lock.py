@@ -14,7 +14,7 @@ import socket
 import struct
 from collections.abc import Iterable
 
-from launcher.system import NotNowError
+from surveillance_runtime.launch_protocol import NotNowError
 from surveillance_runtime.node_table import RUN_NODES, Node
 
 _CREDENTIALS = struct.Struct('3i')

@@ -29,6 +29,7 @@ from surveillance_runtime.configuration import (
     file_layer,
     read_schema,
 )
+from surveillance_runtime.launch_protocol import NotNowError
 from surveillance_runtime.parameters import ParameterError, ParameterSpec
 from surveillance_runtime.place.rooms import GEOMETRY_KEYS, PLACE_KEYS
 from surveillance_runtime.testing import claim_domain
@@ -163,7 +164,7 @@ def _make(node: node_table.Node, context: Any, overrides: Sequence[Any]) -> Any:
     """Make a node; one whose parameters cannot work is as far as it came."""
     kind = getattr(importlib.import_module(node.module), node.class_name)
     made = kind.__new__(kind)
-    with suppress(ParameterError):
+    with suppress(ParameterError, NotNowError):
         made.__init__(
             context=context,
             namespace=_NAMESPACE,

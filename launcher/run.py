@@ -14,7 +14,6 @@ from urllib.parse import urlsplit
 
 from launcher import run_folder
 from launcher.options import DEFAULT_KEEP, DEFAULT_MEMORY
-from launcher.system import LaunchError
 from surveillance_runtime import node_table
 from surveillance_runtime.discovery import LAST_DOMAIN
 from surveillance_runtime.files import FileError
@@ -77,27 +76,27 @@ class Run:
         """Look at everything that can be wrong before a process is started.
 
         Raises:
-            LaunchError: a value cannot be used.
+            ValueError: a value cannot be used.
         """
         if self.namespace is not None and not _NAMESPACE.match(self.namespace):
-            raise LaunchError(
+            raise ValueError(
                 f'--namespace {self.namespace!r}: expected letters, digits and _ like robot1'
             )
         if self.domain is not None and not 0 <= self.domain <= LAST_DOMAIN:
-            raise LaunchError(f'--domain {self.domain}: expected a number from 0 to {LAST_DOMAIN}')
+            raise ValueError(f'--domain {self.domain}: expected a number from 0 to {LAST_DOMAIN}')
         if self.place is not None:
             try:
                 read_place_file(self.place)
             except FileError as error:
-                raise LaunchError(f'--map {error}') from None
+                raise ValueError(f'--map {error}') from None
         if self.web_address is not None:
             page_address(self.web_address)
         try:
             alarm = shlex.split(self.alarm)
         except ValueError as error:
-            raise LaunchError(f'--alarm {self.alarm!r}: {error}') from None
+            raise ValueError(f'--alarm {self.alarm!r}: {error}') from None
         if alarm and shutil.which(alarm[0]) is None:
-            raise LaunchError(f'--alarm {self.alarm!r}: {alarm[0]!r} cannot be run')
+            raise ValueError(f'--alarm {self.alarm!r}: {alarm[0]!r} cannot be run')
 
     def nodes(self) -> tuple[node_table.Node, ...]:
         chosen = node_table.select(
@@ -126,7 +125,7 @@ def page_address(text: str) -> tuple[str, int]:
     """Return host and port of the page's address.
 
     Raises:
-        LaunchError: It is not of the form HOST:PORT.
+        ValueError: It is not of the form HOST:PORT.
     """
     try:
         found = urlsplit(f'//{text}')
@@ -134,7 +133,7 @@ def page_address(text: str) -> tuple[str, int]:
     except ValueError:  # of the port, or of brackets that are not closed
         port = None
     if port is None or found.netloc != text or found.username is not None:
-        raise LaunchError(f'--web-address {text!r}: expected HOST:PORT like 0.0.0.0:8080')
+        raise ValueError(f'--web-address {text!r}: expected HOST:PORT like 0.0.0.0:8080')
     return found.hostname or '127.0.0.1', port
 
 
@@ -148,7 +147,7 @@ def run_from(options: Mapping[str, Any]) -> Run:
     """Return the run of options that `options_of` gave.
 
     Raises:
-        LaunchError: They are not of a run.
+        ValueError: They are not of a run.
     """
     known = {field.name for field in fields(Run)}
     try:
@@ -157,7 +156,7 @@ def run_from(options: Mapping[str, Any]) -> Run:
             values[name] = Path(values[name]) if values.get(name) else None
         return Run(**values)
     except TypeError as error:
-        raise LaunchError(f'--resume: {error}') from None
+        raise ValueError(f'--resume: {error}') from None
 
 
 def resumed(run: Run, usual: Run, runs: Path, name: str) -> tuple[Run, Path]:
@@ -170,7 +169,7 @@ def resumed(run: Run, usual: Run, runs: Path, name: str) -> tuple[Run, Path]:
         name: Of the run; empty: the last one.
 
     Raises:
-        LaunchError: There is no such run.
+        ValueError: There is no such run.
     """
     if run.record not in (None, NOT_RECORDED):
         runs = Path(run.record)

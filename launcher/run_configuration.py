@@ -9,7 +9,6 @@ from dataclasses import replace
 from pathlib import Path
 
 from launcher.run import PAGE, RECORDER, Run, page_address
-from launcher.system import LaunchError
 from surveillance_runtime import node_table
 from surveillance_runtime.configuration import (
     Configuration,
@@ -20,7 +19,6 @@ from surveillance_runtime.configuration import (
     resolved_text,
 )
 from surveillance_runtime.files import RECORD, RECORDING, FileError
-from surveillance_runtime.parameters import ParameterError
 from surveillance_runtime.run_parameters import (
     BEHAVIOUR_NODE,
     for_node,
@@ -46,7 +44,7 @@ def configuration(
         more: Further arguments in ROS's own form.
 
     Raises:
-        LaunchError: One line about the first entry that is wrong.
+        ValueError: One line about the first entry that is wrong.
     """
     try:
         merged = _merged(config, run, folder, more)
@@ -54,9 +52,7 @@ def configuration(
         merged.place('simulator', full_name(run.namespace, 'simulator'))
         _check_behaviour(merged, run)
     except FileError as error:
-        raise LaunchError(f'parameter file {error}') from None
-    except ParameterError as error:
-        raise LaunchError(str(error)) from None
+        raise ValueError(f'parameter file {error}') from None
     return merged
 
 
@@ -114,7 +110,7 @@ def _check_behaviour(merged: Configuration, run: Run) -> None:
         'behaviour'
     )
     if given is not None and given.value != run.behaviour:
-        raise LaunchError(
+        raise ValueError(
             f'{given.origin}: behaviour {given.value}, but the run is one of {run.behaviour}: '
             f'expected --behaviour {given.value}, which starts its nodes too'
         )
@@ -124,7 +120,7 @@ def check_assignments(merged: Configuration, nodes: Sequence[node_table.Node]) -
     """Make sure that each `-p` is for a node that is started.
 
     Raises:
-        LaunchError: One would be ignored.
+        ValueError: One would be ignored.
     """
     for entry in merged.layers[-1].entries:
         takers = [
@@ -135,14 +131,14 @@ def check_assignments(merged: Configuration, nodes: Sequence[node_table.Node]) -
         ]
         if not takers:
             names = ', '.join(node.name for node in nodes)
-            raise LaunchError(f'{entry.origin}: no node that is started takes it: {names}')
+            raise ValueError(f'{entry.origin}: no node that is started takes it: {names}')
 
 
 def check_clocks(merged: Configuration, run: Run, nodes: Sequence[node_table.Node]) -> None:
     """Make sure that all nodes live by the clock of a simulation that is slower or faster.
 
     Raises:
-        LaunchError: One would live by the machine's.
+        ValueError: One would live by the machine's.
     """
     given = {
         each.name: merged.resolve(each.name, full_name(run.namespace, each.name)) for each in nodes
@@ -153,7 +149,7 @@ def check_clocks(merged: Configuration, run: Run, nodes: Sequence[node_table.Nod
     for name, settings in given.items():
         follows = settings.get('use_sim_time')
         if follows is None or not follows.value:
-            raise LaunchError(
+            raise ValueError(
                 f'{speed.origin}: at speed {speed.value:g} {name} needs use_sim_time:=true, '
                 'expected for all nodes as in config/fast.yaml'
             )

@@ -18,8 +18,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from launcher.system import LaunchError, NotNowError
 from surveillance_fsm.files import parse_json
+from surveillance_runtime.launch_protocol import NotNowError
 from surveillance_runtime.suggestions import like
 
 STATE = 'run.json'
@@ -135,7 +135,7 @@ def find(runs: Path, name: str) -> Found:
     """Return the run of a name (or path), or the one that began last where the name is empty.
 
     Raises:
-        LaunchError: There is none.
+        ValueError: There is none.
         NotNowError: It is still going on.
     """
     if name:
@@ -147,7 +147,7 @@ def find(runs: Path, name: str) -> Found:
         likely = like(name, (each.name for each in _folders(runs)))
         there = f'{likely!r}' if likely else 'the name of a folder there'
         expected = there if name else 'a run that can be gone on with'
-        raise LaunchError(f'--resume: no run in {folder}: expected {expected}')
+        raise ValueError(f'--resume: no run in {folder}: expected {expected}')
     if found.running:
         raise NotNowError(f'--resume: {found.folder}: this run is still going on')
     return found

@@ -11,7 +11,6 @@ from pathlib import Path
 from launcher.log_merge import ROS_FORMAT
 from launcher.run import MARKERS, PAGE, RECORDER, Run
 from launcher.supervisor import Program
-from launcher.system import LaunchError
 from surveillance_runtime import node_table
 from surveillance_runtime.discovery import LAST_DOMAIN, launched_nodes
 from surveillance_runtime.launch_protocol import ONE_THREAD
@@ -26,13 +25,13 @@ def ros_domain(run: Run) -> str:
     """Return the ROS domain of a run: as asked for, else as the environment says.
 
     Raises:
-        LaunchError: what the environment says is no domain.
+        ValueError: what the environment says is no domain.
     """
     if run.domain is not None:
         return str(run.domain)
     given = os.environ.get('ROS_DOMAIN_ID') or '0'
     if not given.isdecimal() or int(given) > LAST_DOMAIN:
-        raise LaunchError(
+        raise ValueError(
             f'environment variable ROS_DOMAIN_ID: got {given!r}, '
             f'expected a number from 0 to {LAST_DOMAIN}'
         )

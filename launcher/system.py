@@ -16,6 +16,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from launcher.progress import Output, Step
+from surveillance_runtime.launch_protocol import NotNowError
 
 ROS_PREFIX = Path('/opt/ros/jazzy')
 WHEEL_PYTHONS = ((3, 11), (3, 12), (3, 13))
@@ -25,14 +26,6 @@ COLCON_STEPS = """\
   cd ~/surveillance_ws && source /opt/ros/jazzy/setup.bash
   colcon build && source install/setup.bash
   ros2 launch surveillance_behaviour surveillance.launch.py"""
-
-
-class LaunchError(ValueError):
-    """What was asked for cannot be done; the message says why, and what would mend it."""
-
-
-class NotNowError(LaunchError):
-    """What was asked for can be done later without a change: the machine or a run is in the way."""
 
 
 def why_no_wheels(name: str, processor: str, libc: str, python: tuple[int, int]) -> str:
@@ -117,18 +110,18 @@ def install_packages(packages: Sequence[str]) -> None:
     """Installs Debian packages with apt, where that needs no password.
 
     Raises:
-        LaunchError: There is no apt, or no right to use it.
+        ValueError: There is no apt, or no right to use it.
         NotNowError: It failed, as without network, or where another one runs.
     """
     names = ' '.join(packages)
     if shutil.which('apt-get') is None:
-        raise LaunchError(
+        raise ValueError(
             f'this machine lacks what Debian calls {names}: install them with its package manager '
             '(a C++ compiler, the headers of Python, its venv module), then start again'
         )
     prefix = _privilege()
     if prefix is None:
-        raise LaunchError(
+        raise ValueError(
             'a few system packages are missing. Type this, then start again:\n'
             f'  {_as_root(packages)}'
         )

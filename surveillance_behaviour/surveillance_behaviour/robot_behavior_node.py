@@ -41,8 +41,8 @@ from surveillance_behaviour.peers.ros_ports import (
 )
 from surveillance_fsm.ros import IntrospectionServer
 from surveillance_runtime.files import FileError
+from surveillance_runtime.launch_protocol import NotNowError
 from surveillance_runtime.node import JOIN_SECONDS, PatrolNode
-from surveillance_runtime.parameters import NotNowParameterError
 from surveillance_runtime.process import run_node
 from surveillance_runtime.qos import SENSOR_QOS
 
@@ -148,7 +148,7 @@ def _open_record(path: str) -> MissionRecord | None:
     try:
         return MissionRecord(path)
     except FileError as error:
-        raise NotNowParameterError(f'parameter record: {error}') from None
+        raise NotNowError(f'parameter record: {error}') from None
 
 
 def main(args: Sequence[str] | None = None) -> int:

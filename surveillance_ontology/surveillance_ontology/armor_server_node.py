@@ -29,8 +29,8 @@ from surveillance_ontology.armor.turns import Backlog, Turns
 from surveillance_ontology.armor_client import CHANGES_TOPIC
 from surveillance_ontology.conversions import changes_to_ros, fill_response, request_from_ros
 from surveillance_runtime.files import FileError
+from surveillance_runtime.launch_protocol import NotNowError
 from surveillance_runtime.node import PatrolNode
-from surveillance_runtime.parameters import NotNowParameterError
 from surveillance_runtime.process import run_node
 from surveillance_runtime.qos import STATE_QOS
 from surveillance_runtime.waiting import AwaitedWork
@@ -235,7 +235,7 @@ def _service(node: PatrolNode, keep: bool) -> ArmorService:
 
     Raises:
         ParameterError: A parameter is of the wrong type or out of range.
-        NotNowParameterError: The store cannot be used.
+        NotNowError: The store cannot be used.
     """
     settings = node.declare_fields(Settings())
     stored = node.parameter(
@@ -258,7 +258,7 @@ def _service(node: PatrolNode, keep: bool) -> ArmorService:
             log.info(f'store {folder} ({kept}); "-p store:=none" turns it off')
         return service
     except FileError as error:
-        raise NotNowParameterError(f'{node.get_name()}: parameter store: {error}') from None
+        raise NotNowError(f'{node.get_name()}: parameter store: {error}') from None
 
 
 def _own_folder(node: PatrolNode) -> Path:

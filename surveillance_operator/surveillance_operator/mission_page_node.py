@@ -19,8 +19,8 @@ from surveillance_operator.mission_feed import MissionFeed
 from surveillance_operator.page.hub import Hub
 from surveillance_operator.page.server import Action, Page
 from surveillance_operator.polled_subscription import PolledSubscription
+from surveillance_runtime.launch_protocol import NotNowError
 from surveillance_runtime.node import PatrolNode
-from surveillance_runtime.parameters import NotNowParameterError
 from surveillance_runtime.process import run_node
 
 POLL_PERIOD = 0.015
@@ -65,7 +65,7 @@ class MissionPage(PatrolNode):
                 token=token,
             )
         except OSError as error:
-            raise NotNowParameterError(str(error)) from error
+            raise NotNowError(str(error)) from error
         self._feed = MissionFeed(
             self, self._period, lambda new, _told: self._hub.show(new), streams=True
         )

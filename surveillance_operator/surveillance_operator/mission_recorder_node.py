@@ -34,8 +34,8 @@ from surveillance_operator.recording.bag import (
 from surveillance_operator.recording.schemas import definition, message_class
 from surveillance_operator.recording.timeline import TimelineWriter
 from surveillance_runtime.files import RECORDING, TIMELINE, in_one_line
+from surveillance_runtime.launch_protocol import NotNowError
 from surveillance_runtime.node import PatrolNode
-from surveillance_runtime.parameters import NotNowParameterError
 from surveillance_runtime.process import run_node
 
 DRAIN_PERIOD, SEAL_PERIOD, FEED_PERIOD = 0.15, 0.6, 0.4
@@ -88,7 +88,7 @@ class MissionRecorder(PatrolNode):
             self._bag.seal()
         except OSError as error:
             if error.errno not in DISK_FULL:  # else it is tried again
-                raise NotNowParameterError(f'parameter folder: {in_one_line(error)}') from error
+                raise NotNowError(f'parameter folder: {in_one_line(error)}') from error
         self._images = ImageRecorder(self, self._bag, image_period)
         self._subscriptions_by_topic: dict[str, PolledSubscription] = {}
         self._unknown: set[str] = set()

@@ -38,3 +38,7 @@ EXIT_CANNOT_START = 2
 """The exit code of a process whose configuration does not let it start."""
 EXIT_NOT_NOW = os.EX_TEMPFAIL
 """That of one which what its configuration names does not let start now, but perhaps later."""
+
+
+class NotNowError(ValueError):
+    """What is asked for cannot be had now, as an address or a file; it may be later, unchanged."""

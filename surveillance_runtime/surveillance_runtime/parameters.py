@@ -39,10 +39,6 @@ class ParameterError(ValueError):
     """A node cannot work with what a parameter says; the message is one line."""
 
 
-class NotNowParameterError(ParameterError):
-    """What a parameter names cannot be had now, as an address or a file; it may be later."""
-
-
 @dataclass(frozen=True)
 class ParameterSpec:
     """One declared parameter.

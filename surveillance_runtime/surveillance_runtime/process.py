@@ -36,6 +36,7 @@ from surveillance_runtime.launch_protocol import (
     EXIT_NOT_NOW,
     ONE_THREAD,
     SAY_WHERE,
+    NotNowError,
 )
 from surveillance_runtime.node import (
     JOIN_SECONDS,
@@ -43,7 +44,7 @@ from surveillance_runtime.node import (
     give_arguments,
     report_exception,
 )
-from surveillance_runtime.parameters import NotNowParameterError, ParameterError
+from surveillance_runtime.parameters import ParameterError
 
 STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM)
 END_SECONDS = 30.0
@@ -120,10 +121,10 @@ def _run_nodes(factories: Sequence[Callable[[], PatrolNode]], args: Sequence[str
         ending.wait()
         if any(node.finished for node in nodes):
             heartbeat.say_finished()
-    except ParameterError as error:
+    except (ParameterError, NotNowError) as error:
         who = getattr(factory, '__name__', '') + ' ' if len(factories) > 1 else ''
         print(f'{who}cannot start: {_one_line(error)}', file=sys.stderr)
-        code = EXIT_NOT_NOW if isinstance(error, NotNowParameterError) else EXIT_CANNOT_START
+        code = EXIT_NOT_NOW if isinstance(error, NotNowError) else EXIT_CANNOT_START
     finally:
         ending.ignore_signals()
         give_arguments(None)

@@ -65,11 +65,10 @@ PREPARE = """
 import sys
 from pathlib import Path
 from launcher.environment import Environment
-from launcher.system import LaunchError
 environment = Environment(Path(sys.argv[1]))
 try:
     environment.prepare()
-except LaunchError as error:
+except ValueError as error:
     sys.exit(str(error))
 print('ready', environment.ready())
 """

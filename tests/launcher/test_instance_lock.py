@@ -13,7 +13,7 @@ import pytest
 from launcher.instance_lock import claim
 from launcher.run import Run
 from launcher.run_processes import ros_domain
-from launcher.system import LaunchError
+from surveillance_runtime.launch_protocol import NotNowError
 from surveillance_runtime.node_table import select
 from tests.launcher.conftest import ROOT
 
@@ -38,7 +38,7 @@ def held():
 
 def test_the_same_nodes_are_claimed_once_and_again_after_that(held):
     first = claim(RANDOM, HERE, None)
-    with pytest.raises(LaunchError) as caught:
+    with pytest.raises(NotNowError) as caught:
         claim(select('RANDOM', only=['armor_server', 'simulator']), HERE, None)
     message = str(caught.value)
     assert message.startswith(
@@ -56,13 +56,13 @@ def test_other_domains_and_namespaces_are_free(held):
     assert held(RANDOM, HERE, None)
     assert held(RANDOM, f'{HERE}.2', None)
     assert held(RANDOM, HERE, '/robot2')
-    with pytest.raises(LaunchError, match='namespace robot2'):
+    with pytest.raises(NotNowError, match='namespace robot2'):
         claim(RANDOM, HERE, 'robot2')
 
 
 def test_a_namespace_of_any_length_is_claimed(held):
     assert held(RANDOM, HERE, 'robot' * 100)
-    with pytest.raises(LaunchError, match='already running'):
+    with pytest.raises(NotNowError, match='already running'):
         claim(RANDOM, HERE, 'robot' * 100)
 
 
@@ -77,7 +77,7 @@ def test_what_another_user_runs_is_claimed_too():
     pipe = subprocess.PIPE
     with subprocess.Popen(words, cwd=ROOT, stdin=pipe, stdout=pipe, text=True) as other:
         assert other.stdout.readline() == 'held\n'
-        with pytest.raises(LaunchError, match=f'process {other.pid}'):
+        with pytest.raises(NotNowError, match=f'process {other.pid}'):
             claim(RANDOM, HERE, None)
         other.stdin.write('\n')
 
@@ -85,9 +85,7 @@ def test_what_another_user_runs_is_claimed_too():
 @pytest.mark.parametrize('given', ['x', '-1', '102', '1.5'])
 def test_a_domain_of_the_environment_that_is_none_is_named(monkeypatch, given):
     monkeypatch.setenv('ROS_DOMAIN_ID', given)
-    with pytest.raises(
-        LaunchError, match=f"ROS_DOMAIN_ID: got '{given}', expected a number from 0"
-    ):
+    with pytest.raises(ValueError, match=f"ROS_DOMAIN_ID: got '{given}', expected a number from 0"):
         ros_domain(Run())
     assert ros_domain(Run(domain=3)) == '3'
 

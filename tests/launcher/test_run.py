@@ -27,7 +27,6 @@ from launcher.run_mission import (
     what_to_look_at,
 )
 from launcher.run_processes import command, node_environ, ros_arguments
-from launcher.system import LaunchError
 from surveillance_behaviour.mission.mission_log import MissionRecord
 from surveillance_runtime import discovery
 from surveillance_runtime.files import RECORD, TIMELINE
@@ -42,7 +41,7 @@ def look_over(run: Run) -> None:
 
 
 def error_of(run: Run) -> str:
-    with pytest.raises(LaunchError) as caught:
+    with pytest.raises(ValueError, match=r'.') as caught:
         look_over(run)
     message = str(caught.value)
     assert '\n' not in message
@@ -153,13 +152,13 @@ def test_a_mode_that_the_file_gives_to_all_controllers_is_the_modes_of_the_run(t
 def test_another_behaviour_in_a_file_is_refused_as_its_nodes_would_be_missing(tmp_path):
     file = tmp_path / 'own.yaml'
     file.write_text('robot_behavior: {ros__parameters: {behaviour: patrol}}')
-    with pytest.raises(LaunchError, match=r'own.yaml:1: behaviour patrol.*--behaviour patrol'):
+    with pytest.raises(ValueError, match=r'own.yaml:1: behaviour patrol.*--behaviour patrol'):
         configuration(CONFIG, Run(parameters=file))
 
 
 def test_an_assignment_that_no_started_node_takes_is_refused():
     run = Run(mode='RANDOM', assignments=('lidar.rays:=90',))
-    with pytest.raises(LaunchError, match=r'-p lidar.rays:=90: no node that is started takes it'):
+    with pytest.raises(ValueError, match=r'-p lidar.rays:=90: no node that is started takes it'):
         check_assignments(configuration(CONFIG, run), run.nodes())
 
 
@@ -169,7 +168,7 @@ def test_a_fast_simulation_beside_nodes_on_the_machines_clock_is_refused():
         (('speed:=2', 'use_sim_time:=true', 'mission_page:use_sim_time:=false'), 'mission_page'),
     ):
         run = Run(assignments=words, web=True)
-        with pytest.raises(LaunchError, match=rf'speed [02] {name} needs use_sim_time:=true'):
+        with pytest.raises(ValueError, match=rf'speed [02] {name} needs use_sim_time:=true'):
             check_clocks(configuration(CONFIG, run), run, (*run.nodes(), *run.observers()))
     run = Run(assignments=('speed:=0', 'use_sim_time:=true'))
     check_clocks(configuration(CONFIG, run), run, (*run.nodes(), *run.observers()))
@@ -233,7 +232,7 @@ def test_options_of_a_run_survive_its_launcher(tmp_path):
     run = Run(mode='RANDOM', place=tmp_path / 'p.yaml', assignments=['a:=1'], only=['reasoner'])
     stored = json.loads(json.dumps(options_of(run)))
     assert run_from(stored) == replace(run, without=[])
-    with pytest.raises(LaunchError, match='--resume'):
+    with pytest.raises(ValueError, match='--resume'):
         run_from({'mode': 'RANDOM', 'place': None, 'seconds': None} | {'place': 7})
 
 

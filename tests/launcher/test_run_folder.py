@@ -10,7 +10,6 @@ import pytest
 
 from launcher.run_folder import (
     STATE,
-    LaunchError,
     RunState,
     find,
     latest,
@@ -18,6 +17,7 @@ from launcher.run_folder import (
     make_folder,
     prune,
 )
+from surveillance_runtime.launch_protocol import NotNowError
 
 HOLD = (
     'import sys, signal; from pathlib import Path; from launcher.run_folder import RunState\n'
@@ -42,7 +42,7 @@ def test_each_run_has_a_folder_of_its_own(tmp_path):
 
 def test_runs_where_nothing_can_be_written(tmp_path):
     (tmp_path / 'runs').write_text('a file')
-    with pytest.raises(LaunchError, match='cannot be made'):
+    with pytest.raises(NotNowError, match='cannot be made'):
         make_folder(tmp_path / 'runs')
 
 
@@ -73,7 +73,7 @@ def test_a_killed_launcher_leaves_a_run_that_did_not_end(start, tmp_path):
     found = look_into(tmp_path)
     assert found is not None
     assert found.running
-    with pytest.raises(LaunchError, match='still going on'):
+    with pytest.raises(NotNowError, match='still going on'):
         RunState(tmp_path, {})
     launch.end(signal.SIGKILL)
     found = look_into(tmp_path)
@@ -91,9 +91,9 @@ def test_the_last_run_is_found_and_others_by_name_or_path(tmp_path):
     assert find(tmp_path, first.name).folder == first
     assert find(tmp_path, str(first)).folder == first
     for name in ('nothing', '20260103-000000'):
-        with pytest.raises(LaunchError, match='--resume: no run in'):
+        with pytest.raises(ValueError, match='--resume: no run in'):
             find(tmp_path, name)
-    with pytest.raises(LaunchError, match='a run that can be gone on with'):
+    with pytest.raises(ValueError, match='a run that can be gone on with'):
         find(tmp_path / 'none', '')
 
 

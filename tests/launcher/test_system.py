@@ -10,13 +10,12 @@ import pytest
 from launcher import system
 from launcher.environment import clean_environ
 from launcher.system import (
-    LaunchError,
-    NotNowError,
     no_wheels_advice,
     note_of_unused_ros,
     sourced_ros,
     why_no_wheels,
 )
+from surveillance_runtime.launch_protocol import NotNowError
 from tests.launcher.conftest import ROOT
 
 HERE = ('Linux', 'x86_64', 'glibc', (3, 12))
@@ -28,7 +27,7 @@ def test_who_may_not_install_is_told_what_this_machine_has(monkeypatch, sudo, ty
     there = {'apt-get'} | ({'sudo'} if sudo else set())
     monkeypatch.setattr(shutil, 'which', lambda name: name if name in there else None)
     monkeypatch.setattr(system, '_privilege', lambda: None)
-    with pytest.raises(LaunchError, match=f'  {typed} install -y g\\+\\+'):
+    with pytest.raises(ValueError, match=f'  {typed} install -y g\\+\\+'):
         system.install_packages(['g++'])
 
 

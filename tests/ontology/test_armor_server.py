@@ -20,8 +20,8 @@ from surveillance_ontology.armor_client import (
     FactSubscription,
 )
 from surveillance_ontology.armor_server_node import ArmorServer
+from surveillance_runtime.launch_protocol import NotNowError
 from surveillance_runtime.node import PatrolNode
-from surveillance_runtime.parameters import ParameterError
 
 from .seven_rooms import IRI, ONTOLOGY, build_seven_rooms, reach
 
@@ -206,7 +206,7 @@ def test_parameters_of_the_server(graph: Any, tmp_path: Path) -> None:
     two.manipulation.add_dataprop_to_ind('size', 'X', 'DOUBLE', '0.5')
     assert two.query.dataprop_b2_ind('size', 'X') == ['"0.5"^^xsd:float']
     (tmp_path / 'file').write_text('')
-    with pytest.raises(ParameterError, match='parameter store'):
+    with pytest.raises(NotNowError, match='parameter store'):
         graph.add(ArmorServer, {'store': str(tmp_path / 'file' / 'store')})
 
 
