@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import threading
-import time
 from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from typing import Any
@@ -14,10 +13,11 @@ from std_srvs.srv import Trigger
 
 import surveillance_fsm as fsm
 from surveillance_fsm.container import Container
+from surveillance_fsm.exceptions import CallError
 from surveillance_fsm.export import to_ascii
 from surveillance_fsm.history import Transition, TransitionFeed
+from surveillance_fsm.ros.calls import ServiceCaller
 from surveillance_fsm.ros.conversions import (
-    smach_path,
     smach_status_messages,
     smach_structure_messages,
     status_message,
@@ -220,10 +220,8 @@ class IntrospectionClient:
 
     def __init__(self, node: Node) -> None:
         self._node = node
-        self._changed = threading.Condition()
-        self._publishers: dict[str, Any] = {}
-        self._subscriptions: list[Any] = []
-        self._told: set[tuple[str, str, tuple[str, ...]]] = set()
+        # None of them may go while a node spins.
+        self._callers: dict[str, ServiceCaller] = {}
 
     def get_servers(self) -> list[str]:
         """Return the names of the servers that are there, fully resolved."""
@@ -257,38 +255,20 @@ class IntrospectionClient:
         Returns:
             Whether it said so.
         """
-        wanted = (server, smach_path(path.strip('/')), tuple(initial_states))
+        name = f'{server}/fsm/set_initial_state'
+        if server not in self._callers:
+            self._callers[server] = ServiceCaller(self._node, SetInitialState, name)
         userdata = initial_userdata if initial_userdata is not None else fsm.UserData()
-        command = SmachContainerInitialStatusCmd(
-            path=wanted[1], initial_states=list(wanted[2]), local_data=userdata_text(userdata)
+        request = SetInitialState.Request(
+            path=path.strip('/'),
+            initial_states=list(initial_states),
+            userdata=userdata_text(userdata),
         )
-        publisher = self._connect(server)
-        deadline = time.monotonic() + (seconds(timeout) or 0.0)
-        with self._changed:
-            self._told.discard(wanted)
-            while wanted not in self._told and time.monotonic() < deadline:
-                if publisher.get_subscription_count():
-                    publisher.publish(command)
-                self._changed.wait(0.1)
-            return wanted in self._told
-
-    def _connect(self, server: str) -> Any:
-        """Make both ends of a server's topics, once: none may go while a node spins."""
-        with self._changed:
-            if server not in self._publishers:
-
-                def told(message: SmachContainerStatus) -> None:
-                    if message.info == INITIAL_STATE_SET:
-                        with self._changed:
-                            self._told.add((server, message.path, tuple(message.initial_states)))
-                            self._changed.notify_all()
-
-                self._publishers[server] = self._node.create_publisher(
-                    SmachContainerInitialStatusCmd, f'{server}{INIT_STATUS_TOPIC}', 10
-                )
-                self._subscriptions.append(
-                    self._node.create_subscription(
-                        SmachContainerStatus, f'{server}{STATUS_TOPIC}', told, 10
-                    )
-                )
-            return self._publishers[server]
+        try:
+            answer = self._callers[server].call(request, seconds(timeout) or 0.0)
+        except CallError as error:
+            self._node.get_logger().warn(str(error))
+            return False
+        if not answer.success:
+            self._node.get_logger().warn(f'{name}: {answer.message}')
+        return bool(answer.success)
