@@ -22,7 +22,7 @@ sys.path.insert(0, str(CHECKOUT / 'surveillance_fsm'))
 PAGE = CHECKOUT / 'docs' / 'fsm_reference.md'
 MODULES = {
     'surveillance_fsm': None,
-    'surveillance_fsm.control': ['Control'],
+    'surveillance_fsm.execution': ['Control'],
     'surveillance_fsm.verify': ['verify', 'Finding'],
     'surveillance_fsm.export': [
         'to_ascii',

@@ -9,7 +9,6 @@ from __future__ import annotations
 from surveillance_fsm.clock import Clock, Interrupt, WallClock
 from surveillance_fsm.concurrence import Concurrence
 from surveillance_fsm.container import Container
-from surveillance_fsm.control import is_shutdown, set_shutdown_check
 from surveillance_fsm.exceptions import (
     InvalidConstructionError,
     InvalidStateError,
@@ -19,7 +18,7 @@ from surveillance_fsm.exceptions import (
     MissingKeyError,
     SmachError,
 )
-from surveillance_fsm.execution import RESUME
+from surveillance_fsm.execution import is_shutdown, set_shutdown_check
 from surveillance_fsm.log import (
     logdebug,
     logerr,
@@ -28,6 +27,7 @@ from surveillance_fsm.log import (
     reset_loggers,
     set_loggers,
 )
+from surveillance_fsm.nodes import RESUME, LimitOptions
 from surveillance_fsm.state import (
     CBInterface,
     CBState,
@@ -36,7 +36,6 @@ from surveillance_fsm.state import (
     has_smach_interface,
 )
 from surveillance_fsm.state_machine import Iterator, Sequence, StateMachine
-from surveillance_fsm.timeouts import LimitOptions
 from surveillance_fsm.userdata import Remapper, UserData
 
 __all__ = [

@@ -21,16 +21,11 @@ from surveillance_fsm.exceptions import (
     describe,
     shown,
 )
-from surveillance_fsm.execution import (
-    SUSPENDED,
-    ExecutionThread,
-    Exit,
-    LeftBehindError,
-    Node,
-)
+from surveillance_fsm.execution import ExecutionThread, LeftBehindError
 from surveillance_fsm.frame import Answer, Frame, History, Move, answer_of
+from surveillance_fsm.nodes import SUSPENDED, Exit, LimitOptions, Node
 from surveillance_fsm.state import State, this_thread
-from surveillance_fsm.timeouts import LimitOptions, leave_behind, supervise
+from surveillance_fsm.timeouts import leave_behind, supervise
 
 Outcomes = dict[str, str | None]
 ChildTerminationCallback = Callable[[Outcomes], bool | Iterable[str] | None]
@@ -105,7 +100,7 @@ class ChildFrame(Frame):
         self.served = answer.served and self.preempted is node
         return answer
 
-    # What others want; under the run's condition.
+    # What others want; under the machine's condition.
 
     @property
     def wanted(self) -> bool:
@@ -157,13 +152,13 @@ class _AllStates(State):
         return frame.run_states()
 
     def request_preempt(self) -> None:
-        """Ask those that run to stop; under the run's condition."""
+        """Ask those that run to stop; under the machine's condition."""
         super().request_preempt()
         if self._frame is not None:
             self._frame.preempt_states()
 
     def fsm_suspend(self) -> None:
-        """Ask those that run to make way; under the run's condition."""
+        """Ask those that run to make way; under the machine's condition."""
         if self._frame is not None:
             self._frame.cut_states()
 
@@ -216,7 +211,7 @@ class ConcurrentFrame(Frame):
     def go_on_from(self, history: History) -> None:
         """Begin where the container was put aside."""
         super().go_on_from(history)
-        with self.run.condition:
+        with self.control.condition:
             self.outcomes.update(history.outcomes)
 
     def history_before(self, target: Node | Exit) -> History:
@@ -248,7 +243,7 @@ class ConcurrentFrame(Frame):
 
     def run_states(self) -> Any:
         """Run all states that have not ended; the outcome, or `SUSPENDED` if one made way."""
-        container, control = self.container, self.run.control
+        container, control = self.container, self.control
         running = self._children_to_run()
         error: BaseException | None = None
         if any(end is not None for end in self.outcomes.values()):
@@ -259,7 +254,7 @@ class ConcurrentFrame(Frame):
             child.thread.start(child.execute)
         error = self._await_states(running, error)
         callbacks = container.fsm_transition_cbs or container.fsm_termination_cbs
-        if callbacks or control.trace is not None or self.run.chatty:
+        if callbacks or control.trace is not None or control.chatty:
             # Its end is not told as that of one state: see `tell`.
             self.attention = True
         if error is not None:
@@ -268,13 +263,13 @@ class ConcurrentFrame(Frame):
             return SUSPENDED
         # Not under the condition: it calls the user's code.
         outcome = container.fsm_outcome_of(self.outcomes)
-        with self.run.condition:
+        with self.control.condition:
             self._check()
             return self._after_preempt(outcome)
 
     def _after_preempt(self, outcome: str) -> str:
         """Return the outcome, all states having ended: a preempt that one of them served has its
-        own. Under the run's condition.
+        own. Under the machine's condition.
         """
         container = self.container
         preempted = container.preempt_requested()
@@ -313,11 +308,11 @@ class ConcurrentFrame(Frame):
         Raises:
             LeftBehindError: The machine went on without the concurrence.
         """
-        run, container = self.run, self.container
-        with run.condition:
+        control, container = self.control, self.container
+        with control.condition:
             self._check()
             children = {
-                label: ChildFrame(self, node, ExecutionThread(run, node.path, self._wakeup))
+                label: ChildFrame(self, node, ExecutionThread(control, node.path, self._wakeup))
                 for label, node in container.fsm_table.items()
                 if label in self.outcomes and self.outcomes[label] is None
             }
@@ -349,8 +344,8 @@ class ConcurrentFrame(Frame):
         self._check()
         while running:
             self._watches = True
-            supervise(self.run, [child.thread for child in running.values()], self._wakeup)
-            with self.run.condition:
+            supervise(self.control, [child.thread for child in running.values()], self._wakeup)
+            with self.control.condition:
                 self._check()
                 # From here on it is the callbacks that a preempt waits for.
                 self._watches = False
@@ -361,7 +356,7 @@ class ConcurrentFrame(Frame):
                     first_error = first_error or error
                     self._stop(running)
                     continue
-                with self.run.condition:
+                with self.control.condition:
                     ended = self._note_end(label)
                 if ended is not None:
                     self._tell_end(label, ended)
@@ -386,7 +381,7 @@ class ConcurrentFrame(Frame):
         return error
 
     def _stop(self, labels: Iterable[str]) -> None:
-        with self.run.condition:
+        with self.control.condition:
             for label in labels:
                 self._children[label].stop()
 
@@ -410,7 +405,7 @@ class ConcurrentFrame(Frame):
 
     def _tell_end(self, label: str, outcome: str) -> None:
         self.note(label, outcome, '', 'ended')
-        if self.run.chatty:
+        if self.control.chatty:
             log.loginfo(f"'{self.path}': '{label}' ended with '{outcome}'")
         self.container.call_transition_cbs()
 
@@ -422,7 +417,7 @@ class ConcurrentFrame(Frame):
         else:
             super().tell(move)
 
-    # What others want of the states; under the run's condition.
+    # What others want of the states; under the machine's condition.
 
     def replace_child(self, child: ChildFrame) -> None:
         """Take note of the frame that goes on with a state."""

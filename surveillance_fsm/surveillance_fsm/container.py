@@ -14,7 +14,6 @@ from types import TracebackType
 from typing import Any, ClassVar, Self, Unpack
 
 from surveillance_fsm.clock import Clock, Interrupt
-from surveillance_fsm.control import Control
 from surveillance_fsm.exceptions import (
     InvalidConstructionError,
     InvalidStateError,
@@ -25,28 +24,26 @@ from surveillance_fsm.exceptions import (
 )
 from surveillance_fsm.execution import (
     DEFAULT_PREEMPT_TIMEOUT,
-    LOWEST,
-    RESUME,
-    RESUMPTION,
-    Branch,
+    Control,
     ExecutionThread,
-    Exit,
     LeftBehindError,
-    Limits,
-    Node,
-    Run,
 )
 from surveillance_fsm.frame import Frame, History
 from surveillance_fsm.log import logerr, logwarn
-from surveillance_fsm.state import State, structure_version, this_thread
-from surveillance_fsm.timeouts import (
+from surveillance_fsm.nodes import (
+    LOWEST,
+    RESUME,
+    RESUMPTION,
     TIMEOUT,
+    Branch,
+    Exit,
     LimitOptions,
-    block_reentry,
-    limited,
+    Limits,
+    Node,
     make_limits,
-    supervise,
 )
+from surveillance_fsm.state import State, structure_version, this_thread
+from surveillance_fsm.timeouts import block_reentry, limited, supervise
 from surveillance_fsm.userdata import Remapper, UserData, raw
 
 
@@ -547,29 +544,28 @@ class Container(State):
     def _execute_as_root(self, parent_ud: Any) -> Any:
         """Begin a run of its own, and watch it to its end."""
         control, wakeup = self.control, Interrupt()
-        run = Run(control, self.fsm_clock, self._preempt_timeout)
-        thread = ExecutionThread(run, self.fsm_path, wakeup)
+        control.fsm_begin(self.fsm_clock, self._preempt_timeout)
+        thread = ExecutionThread(control, self.fsm_path, wakeup)
 
         def body() -> Any:
             return self._enter(thread, this_thread.stack, parent_ud)
 
-        control.fsm_begin(run)
         try:
             if self._preempt_timeout is None and not self.fsm_has_limits():
                 return thread.run_here(body)
             thread.start(body)
             try:
                 while not thread.done:
-                    supervise(run, [thread], wakeup)
+                    supervise(control, [thread], wakeup)
             except BaseException:
                 # An interrupt from the keyboard, as a rule: stop what runs before passing it on.
                 self.request_preempt()
                 while not thread.done:
-                    supervise(run, [thread], wakeup)
+                    supervise(control, [thread], wakeup)
                 raise
         finally:
             self.fsm_frame = None
-            control.fsm_end(run)
+            control.fsm_end()
         if thread.error is not None:
             raise thread.error
         return thread.outcome
@@ -583,7 +579,7 @@ class Container(State):
         before = self.fsm_frame
         if before is not None and not before.ended:
             raise InvalidStateError(f"'{self.fsm_path}' is running already")
-        self.fsm_update_table(path, thread.run.clock)
+        self.fsm_update_table(path, thread.control.clock)
         frame = self.fsm_frame_type(self, thread, path, self.fsm_first(), parent_ud)
         with _entry_lock:
             if self.fsm_frame is not before:
@@ -609,7 +605,7 @@ class Container(State):
         frame = self.fsm_frame
         if frame is None:
             return
-        with frame.run.condition:
+        with frame.control.condition:
             frame = self.fsm_frame
             if frame is not None:
                 frame.preempt()
@@ -676,7 +672,7 @@ class Container(State):
         # A run that begins from here on finds it by itself.
         frame = self.fsm_frame
         if frame is not None:
-            with frame.run.condition:
+            with frame.control.condition:
                 frame = self.fsm_frame
                 if frame is not None:
                     frame.interrupted()
@@ -706,7 +702,7 @@ class Container(State):
         }
 
     def fsm_suspend(self) -> None:
-        """Have the container put aside with its history; under the run's condition."""
+        """Have the container put aside with its history; under the machine's condition."""
         frame = self.fsm_frame
         if frame is not None:
             frame.suspend()

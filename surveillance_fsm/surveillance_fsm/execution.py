@@ -1,12 +1,15 @@
-"""An execution of a machine: its threads, the nodes that stand for states, where outcomes lead.
+"""An execution of a machine: its threads, and how it is watched and steered from outside.
 
-A root's execution is a `Run`. It consists of logical threads, `ExecutionThread`: one for the root,
-and one for each child of a concurrence. A logical thread keeps a stack of frames, one for each
-container that it is in. It runs on one thread of the interpreter after another: when a state hangs,
-that thread is left behind and another one goes on (`timeouts`).
+Each root has a `Control`, which all its executions share. An execution consists of logical threads,
+`ExecutionThread`: one for the root, and one for each child of a concurrence. A logical thread keeps
+a stack of frames, one for each container that it is in. It runs on one thread of the interpreter
+after another: when a state hangs, that thread is left behind and another one goes on (`timeouts`).
 
 Threads of the interpreter are kept for the next execution, because starting one costs more than
 most machines need for all their states.
+
+The shutdown check belongs to all machines: each asks it between two states, and ends with None when
+it is true.
 """
 
 from __future__ import annotations
@@ -17,26 +20,16 @@ import threading
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 from surveillance_fsm import log
 from surveillance_fsm.clock import WALL_CLOCK, Clock, Interrupt, elapsed_of
-from surveillance_fsm.exceptions import (
-    InvalidTransitionError,
-    InvalidUserCodeError,
-    SmachError,
-    describe,
-    shown,
-)
+from surveillance_fsm.exceptions import InvalidStateError, InvalidTransitionError, describe
+from surveillance_fsm.nodes import Node, Noted, RawTransition, Trace
 from surveillance_fsm.state import State, this_thread
-from surveillance_fsm.userdata import Remapper
 
 if TYPE_CHECKING:
-    from surveillance_fsm.control import Control
     from surveillance_fsm.frame import Frame
-
-LOWEST = float('-inf')
-"""The priority of ordinary work, below that of every interrupt."""
 
 DEFAULT_PREEMPT_TIMEOUT = 60.0
 """Seconds (steady time) that a state may ignore a preempt before the machine goes on."""
@@ -45,241 +38,225 @@ IDLE_SECONDS = 10.0
 """How long a thread waits for the next execution before it ends."""
 
 
+shutdown_check: Callable[[], bool] | None = None
+"""What was set with `set_shutdown_check`."""
+
+
+def is_shutdown() -> bool:
+    """Tell whether the check set with `set_shutdown_check` says that the program is shutting
+    down.
+    """
+    return shutdown_check is not None and bool(shutdown_check())
+
+
+def set_shutdown_check(cb: Callable[[], bool] | None) -> None:
+    """Set the function that tells of a shutdown, for example ``lambda: not rclpy.ok()``.
+
+    Args:
+        cb: Called between any two states; None takes the check away.
+    """
+    global shutdown_check
+    shutdown_check = cb
+
+
 class LeftBehindError(BaseException):
     """Unwinds a thread that the machine went on without."""
 
 
-class _Suspended:
-    """What a container returns when its parent put it aside with its history kept."""
-
-    def __repr__(self) -> str:
-        return 'SUSPENDED'
+# The machine from outside.
 
 
-SUSPENDED: Any = _Suspended()
+class Control:
+    """What may be done to a root container from other threads, between runs too.
 
-
-# Where outcomes lead.
-
-
-class Exit:
-    """Where a transition leaves the container."""
-
-    __slots__ = ('label',)
-
-    is_exit = True
-    priority = LOWEST
-    kind = 'exit'
-
-    def __init__(self, label: str) -> None:
-        self.label = label
-
-
-RESUME = 'RESUME'
-"""Target of an interrupt's outcome: go on where the interrupt came."""
-
-RESUMPTION = Exit(RESUME)
-
-
-@dataclass(frozen=True)
-class Limits:
-    """What a container holds a state to.
+    Args:
+        name: Tells the root's name.
 
     Attributes:
-        timeout: Seconds of the machine's clock after which the state is asked to stop.
-        deadline: Seconds after which the machine goes on without the state.
-        retry: How often the state is executed again after a failure.
-        failures: The outcomes that count as one.
-        late_outcome: The outcome that running out of time has.
+        condition: The one condition of the machine.
+        paused: No further state is entered; see `pause`.
+        steps: States that may be entered although paused.
+        trace: Where transitions are reported, if anywhere.
+        running: An execution has not ended.
     """
 
-    timeout: float | None
-    deadline: float | None
-    retry: int
-    failures: frozenset[str]
-    late_outcome: str
+    def __init__(self, name: Callable[[], str]) -> None:
+        self.condition = threading.Condition()
+        self.paused = False
+        self.steps = 0
+        self.trace: Trace | None = None
+        self.running = False
+        self._name = name
+        self._traces: list[Trace] = []
+        self._set_up(WALL_CLOCK, None)
 
+    def _set_up(self, clock: Clock, preempt_timeout: float | None) -> None:
+        """Set what each execution begins with, for the engine's own modules.
 
-class Node:
-    """One state of a container as the loop needs it.
-
-    Attributes:
-        within: The container's path.
-        label: The state's label in its container; empty for all states of a concurrence together.
-        path: The state's path from the root.
-        state: The state.
-        is_container: The state is one of the engine's containers.
-        enter: What runs it; the state's own `execute` as a rule.
-        execute: What the loop calls: `enter`, within the state's limits if it has any.
-        view: The state's view of the container's userdata.
-        targets: Where each outcome leads.
-        limits: Time limits and retries, if it has any.
-        priority: Of an interrupt's branch; `LOWEST` for ordinary states.
-    """
-
-    __slots__ = (
-        'enter',
-        'execute',
-        'is_container',
-        'label',
-        'limits',
-        'path',
-        'priority',
-        'state',
-        'targets',
-        'view',
-        'within',
-    )
-
-    is_exit = False
-    kind = 'transition'
-
-    def __init__(
-        self, within: str, label: str, state: State, view: Remapper, priority: float = LOWEST
-    ) -> None:
-        self.within = within
-        self.label = label
-        self.path = f'{within}/{label}' if label else within
-        self.state = state
-        self.is_container = hasattr(state, 'fsm_frame')
-        self.enter: Callable[[Any], Any] = state.execute
-        self.execute: Callable[[Any], Any] = self.enter
-        self.view = view
-        self.targets: dict[Any, Node | Exit] = {}
-        self.limits: Limits | None = None
-        self.priority = priority
-
-    def target(self, outcome: Any) -> Node | Exit:
-        """Return where `outcome` leads.
-
-        Raises:
-            InvalidTransitionError: The state has no such outcome.
+        Attributes:
+            clock: The machine's clock.
+            preempt_timeout: See `DEFAULT_PREEMPT_TIMEOUT`; None waits for ever.
+            now: The time of reports and limits.
+            chatty: Transitions are worth a line in the log.
+            sleeps_on_clock: A thread watches time limits and waits on the machine's clock.
+            hanging: Paths of the states the machine went on without, and the work that hangs.
+            threads: The logical threads that are at work.
         """
-        if outcome is SUSPENDED:
-            return self
-        try:
-            return self.targets[outcome]
-        except (KeyError, TypeError):
-            returned = (
-                'None instead of an outcome' if outcome is None else f'outcome {shown(outcome)}'
-            )
-            raise InvalidTransitionError(
-                f"State '{self.path}' of type {type(self.state).__name__} returned {returned}: its "
-                f'outcomes are {sorted(self.state.get_registered_outcomes())}'
-            ) from None
-
-    def release(self) -> None:
-        """Drop the frame of a container that has ended, now that its parent has noted that."""
-        if self.is_container:
-            self.state.fsm_frame = None  # type: ignore[attr-defined]
-
-    def revoke(self) -> None:
-        """Cut the view in use off the userdata, and make a new one for the next execution."""
-        self.view = self.view.fsm_revoke()
-
-    def user_fault(self, error: Exception) -> SmachError:
-        """Return the engine's error for what the state's code raised; to be raised from that."""
-        return self.view.fsm_explain(error) or InvalidUserCodeError(
-            f"State '{self.path}' of type {type(self.state).__name__} raised {describe(error)}"
-        )
-
-
-@dataclass(eq=False)
-class Branch:
-    """An interrupt declared on a container.
-
-    Attributes:
-        label: Its name.
-        state: What runs when it is raised.
-        priority: It cuts work of lower priority short.
-        transitions: From the state's outcomes to `RESUME`, labels or outcomes of the container.
-    """
-
-    label: str
-    state: State
-    priority: float
-    transitions: dict[str, str]
-
-
-# What is told to a trace.
-
-
-class Noted(NamedTuple):
-    """A transition as it was noted.
-
-    Attributes:
-        path: Path of the container.
-        source: Label of the state that was left; empty at the start.
-        outcome: What that ended with.
-        target: Label of the state entered, or the container's outcome.
-        time: Seconds on the machine's clock.
-        userdata: Shallow copy of the container's userdata.
-        kind: See `history.Transition`; also ``start``, when a container begins or goes on,
-            ``entered``, when a pause before `target` is over, and ``end``, when a root has ended.
-    """
-
-    path: str
-    source: str
-    outcome: str
-    target: str
-    time: float
-    userdata: dict[str, Any]
-    kind: str
-
-    @property
-    def is_transition(self) -> bool:
-        """Whether a state was left, or a child of a concurrence ended."""
-        return self.kind not in ('start', 'entered', 'end')
-
-
-RawTransition = Noted | tuple[Node, Any, float, dict[str, Any]]
-"""A transition; one that is as the table says may be told as what was left, its outcome, the time
-and a shallow copy of the container's userdata, which costs the loop least."""
-
-
-def unfold(raw: RawTransition) -> Noted:
-    """Say in full what a trace was given."""
-    if isinstance(raw, Noted):
-        return raw
-    left, outcome, time, userdata = raw
-    target = left.targets[outcome]
-    return Noted(left.within, left.label, str(outcome), target.label, time, userdata, target.kind)
-
-
-Trace = Callable[[RawTransition], object]
-"""Takes transitions as the loop notes them; see `unfold`."""
-
-
-# Threads.
-
-
-class Run:
-    """One execution of a root container: what all its threads share.
-
-    Attributes:
-        control: What others want of the machine, over all executions.
-        condition: The one condition of the machine; its lock guards everything slow.
-        clock: The machine's clock.
-        preempt_timeout: See `DEFAULT_PREEMPT_TIMEOUT`; None waits for ever.
-        now: The time of reports and limits.
-        chatty: Transitions are worth a line in the log.
-        ended: It is over.
-        sleeps_on_clock: A thread watches time limits and waits on the machine's clock.
-        left_behind: Paths of the states the machine went on without, and the work that hangs.
-        threads: The logical threads that are at work.
-    """
-
-    def __init__(self, control: Control, clock: Clock, preempt_timeout: float | None) -> None:
-        self.control = control
-        self.condition = control.condition
         self.clock = clock
         self.preempt_timeout = preempt_timeout
         self.now: Callable[[], float] = time.monotonic if clock is WALL_CLOCK else elapsed_of(clock)
         self.chatty = log.chatty()
-        self.ended = False
         self.sleeps_on_clock = False
-        self.left_behind: list[tuple[str, Work]] = []
+        self.hanging: list[tuple[str, Work]] = []
         self.threads: list[ExecutionThread] = []
+
+    def add_trace(self, trace: Trace) -> Callable[[], None]:
+        """Report every transition to `trace`, in the thread that makes it.
+
+        Args:
+            trace: Takes each transition as the loop notes it; `nodes.unfold` says it in full.
+                What it raises is logged.
+
+        Returns:
+            A function that ends the reports.
+        """
+        with self.condition:
+            self._traces.append(trace)
+            self._set_trace()
+
+        def remove() -> None:
+            with self.condition:
+                if trace in self._traces:
+                    self._traces.remove(trace)
+                    self._set_trace()
+
+        return remove
+
+    def _set_trace(self) -> None:
+        traces = tuple(self._traces)
+
+        def tell_all(raw: RawTransition) -> None:
+            for trace in traces:
+                try:
+                    trace(raw)
+                except Exception as error:
+                    log.logerr(f'Trace {trace!r} raised {describe(error)}')
+
+        self.trace = tell_all if traces else None
+        self._call_attention()
+
+    def pause(self) -> None:
+        """Enter no further state; the one that runs is not disturbed. A preempt goes through."""
+        self._set_paused(True)
+
+    def resume(self) -> None:
+        """Go on after a pause."""
+        self._set_paused(False)
+
+    def _set_paused(self, paused: bool) -> None:
+        with self.condition:
+            self.paused, self.steps = paused, 0
+            self._call_attention()
+
+    def step(self) -> None:
+        """Enter one more state of a paused machine.
+
+        Raises:
+            InvalidStateError: The machine is not paused, or does not run.
+        """
+        with self.condition:
+            if not self.running or not self.paused:
+                lacking = 'paused' if self.running else 'running'
+                raise InvalidStateError(f"'{self._name()}' cannot step: it is not {lacking}")
+            self.steps += 1
+            self._call_attention()
+
+    def _call_attention(self) -> None:
+        """Make every thread look up at its next transition, and wake those that pause."""
+        for thread in self.threads:
+            for frame in tuple(thread.stack):
+                frame.attention = True
+        self.condition.notify_all()
+
+    def force_outcome(self, path: str, outcome: str) -> None:
+        """End the state at `path` with `outcome`, whatever it returns itself.
+
+        Args:
+            path: Of a state that runs, or before which the machine is paused.
+            outcome: One of its outcomes.
+
+        Raises:
+            InvalidStateError: No such state is active.
+            InvalidTransitionError: It has no such outcome.
+        """
+        with self.condition:
+            # Attention first, then a look: what is current now is held until this is done.
+            self._call_attention()
+            active = self._active()
+            if path not in active:
+                raise InvalidStateError(
+                    f"State '{path}' is not active; the active ones are {sorted(active)}"
+                )
+            frame, node = active[path]
+            if outcome not in node.state.get_registered_outcomes():
+                raise InvalidTransitionError(
+                    f"State '{path}' cannot be forced to '{outcome}': its outcomes are "
+                    f'{sorted(node.state.get_registered_outcomes())}'
+                )
+            if frame.forced is not None and frame.forced[0] is not node:
+                raise InvalidStateError(
+                    f"State '{path}' cannot be forced yet: '{frame.forced[0].label}' has not ended "
+                    f"with '{frame.forced[1]}', as it was forced to"
+                )
+            frame.forced = (node, outcome)
+            frame.thread.asked()
+            node.state.request_preempt()
+
+    def active_paths(self) -> list[str]:
+        """Paths of all states that are active, containers included, outermost first."""
+        with self.condition:
+            return list(self._active())
+
+    def _active(self) -> dict[str, tuple[Frame, Node]]:
+        """Return the active states by path: the frames they run in, and their nodes."""
+        active: dict[str, tuple[Frame, Node]] = {}
+        for thread in self.threads:
+            for frame in tuple(thread.stack):
+                node = frame.current
+                # All states of a concurrence together have no label.
+                if isinstance(node, Node) and node.label:
+                    active[f'{frame.path}/{node.label}'] = frame, node
+        return active
+
+    def left_behind(self) -> list[str]:
+        """Paths of states that the last run went on without and that are still running."""
+        with self.condition:
+            return [path for path, work in self.hanging if work.is_going_on()]
+
+    def fsm_begin(self, clock: Clock, preempt_timeout: float | None) -> None:
+        """Begin an execution.
+
+        Raises:
+            InvalidStateError: Another one has not ended.
+        """
+        with self.condition:
+            if self.running:
+                raise InvalidStateError(f"'{self._name()}' is running already")
+            self.running, self.steps = True, 0
+            self._set_up(clock, preempt_timeout)
+
+    def fsm_end(self) -> None:
+        """Note that the execution has ended."""
+        with self.condition:
+            self.running = False
+            self.condition.notify_all()
+        # Others may end their reports in this moment.
+        trace = self.trace
+        if trace is not None:
+            trace(Noted(self._name(), '', '', '', self.now(), {}, 'end'))
+
+
+# Threads.
 
 
 @dataclass
@@ -305,7 +282,7 @@ class ExecutionThread:
     """One logical thread of execution through nested containers.
 
     Attributes:
-        run: The execution it belongs to.
+        control: The control of the machine it belongs to.
         path: Path of the state it was started for.
         stack: Frames of the containers it is in, outermost first. A thread of the interpreter is
             the present one as long as this is the list that it began with.
@@ -318,8 +295,8 @@ class ExecutionThread:
         work: What its present thread does.
     """
 
-    def __init__(self, run: Run, path: str, wakeup: Interrupt) -> None:
-        self.run = run
+    def __init__(self, control: Control, path: str, wakeup: Interrupt) -> None:
+        self.control = control
         self.path = path
         self.wakeup = wakeup
         self.stack: list[Frame] = []
@@ -329,7 +306,7 @@ class ExecutionThread:
         self.error: BaseException | None = None
         self.asked_at: float | None = None
         self.work: Work | None = None
-        run.threads.append(self)
+        control.threads.append(self)
 
     # The side of the thread that executes.
 
@@ -371,9 +348,9 @@ class ExecutionThread:
 
     def retire(self) -> None:
         """Take it from those that are at work."""
-        with self.run.condition:
-            if self in self.run.threads:
-                self.run.threads.remove(self)
+        with self.control.condition:
+            if self in self.control.threads:
+                self.control.threads.remove(self)
 
     def check(self) -> None:
         """Raise `LeftBehindError` in a thread that is not the present one any more."""
@@ -390,7 +367,7 @@ class ExecutionThread:
         """
         if self.asked_at is None:
             self.asked_at = time.monotonic()
-            if self.run.sleeps_on_clock:
+            if self.control.sleeps_on_clock:
                 self.wakeup.set()
 
     def asked_anew(self) -> None:
@@ -400,14 +377,14 @@ class ExecutionThread:
 
     def renew_request(self, node: Node) -> None:
         """Take the request of an earlier execution back from a state, but not a present one."""
-        with self.run.condition:
+        with self.control.condition:
             node.state.recall_preempt()
             if self.asked_at is not None:
                 node.state.request_preempt()
 
     def still_gone(self, node: Node) -> None:
         """Note that a state could not be entered: an earlier execution of it has not ended."""
-        with self.run.condition:
+        with self.control.condition:
             self.check()
             frame = self.stack[-1]
             frame.gone, frame.attention = node, True
@@ -473,7 +450,7 @@ class Work:
         finally:
             here.thread = here.stack = None
             self._going_on.release()
-        with thread.run.condition:
+        with thread.control.condition:
             if self.stack is not thread.stack:
                 if error is not None:
                     log.logwarn(f"'{thread.path}', left behind, ended with {type(error).__name__}")

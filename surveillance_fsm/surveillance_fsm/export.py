@@ -9,7 +9,7 @@ from typing import Any
 from surveillance_fsm.concurrence import Concurrence
 from surveillance_fsm.container import Container
 from surveillance_fsm.exceptions import MachineFileError
-from surveillance_fsm.execution import RESUME
+from surveillance_fsm.nodes import RESUME
 from surveillance_fsm.state import CBState, State
 from surveillance_fsm.state_machine import Iterator as IteratorContainer
 from surveillance_fsm.state_machine import Sequence, StateMachine

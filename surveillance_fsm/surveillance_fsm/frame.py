@@ -13,18 +13,10 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from surveillance_fsm import control, log
+from surveillance_fsm import execution, log
 from surveillance_fsm.exceptions import InvalidStateError, SmachError
-from surveillance_fsm.execution import (
-    LOWEST,
-    RESUMPTION,
-    SUSPENDED,
-    ExecutionThread,
-    Exit,
-    LeftBehindError,
-    Node,
-    Noted,
-)
+from surveillance_fsm.execution import ExecutionThread, LeftBehindError
+from surveillance_fsm.nodes import LOWEST, RESUMPTION, SUSPENDED, Exit, Node, Noted
 from surveillance_fsm.state import State, this_thread
 from surveillance_fsm.timeouts import end_watch, settle, watch_of
 from surveillance_fsm.userdata import raw
@@ -115,8 +107,8 @@ class Frame:
 
     The thread that executes writes `current` first and looks at `attention` after; a thread that
     wants something raises `attention` first and looks at `current` after. So one of the two always
-    sees the other, and the loop needs no lock. Everything else is touched under the run's condition
-    only.
+    sees the other, and the loop needs no lock. Everything else is touched under the machine's
+    condition only.
 
     Args:
         container: Whose execution it is.
@@ -126,7 +118,7 @@ class Frame:
         parent_ud: The parent's userdata.
 
     Attributes:
-        run: The execution that this belongs to.
+        control: The control of the machine it belongs to.
         current: The node that executes, or the exit that was taken.
         attention: Something beside the next state wants to be looked at.
         stale: The machine went on without the thread that runs this frame.
@@ -169,7 +161,7 @@ class Frame:
     ) -> None:
         self.container = container
         self.thread = thread
-        self.run = thread.run
+        self.control = thread.control
         self.path = path
         self.current = current
         self.parent_ud = parent_ud
@@ -178,12 +170,12 @@ class Frame:
 
     def execute(self, history: History | None) -> Any:
         """Run the container to its outcome, or to `SUSPENDED`."""
-        container, run = self.container, self.run
+        container, control = self.container, self.control
         if history is None:
             container.fsm_copy_input_keys(self.parent_ud)
         else:
             self.go_on_from(history)
-        if run.chatty:
+        if control.chatty:
             verb = 'starts in' if history is None else 'goes on in'
             place = ', '.join(map(repr, self.active_labels())) or repr(self.current.label)
             keys = sorted(container.userdata.keys())
@@ -196,12 +188,12 @@ class Frame:
             or container.fsm_raised
             or self.attention
             or self.suspending
-            or run.control.paused
+            or control.paused
             or history is not None
-            or control.shutdown_check is not None
+            or execution.shutdown_check is not None
         ):
             target = self._attend(None, None, target)
-        elif run.control.trace is not None:
+        elif control.trace is not None:
             self.tell(Move(None, None, target, 'start'))
         return self._run_from(target)
 
@@ -273,9 +265,9 @@ class Frame:
 
     def _run_from(self, target: Any) -> Any:
         """Execute states from `target` on until one leads out of the container; the outcome."""
-        container, run = self.container, self.run
-        data, now = container.fsm_data, run.now
-        trace, callbacks, chatty = run.control.trace, container.fsm_transition_cbs, run.chatty
+        container, control = self.container, self.control
+        data, now = container.fsm_data, control.now
+        trace, callbacks, chatty = control.trace, container.fsm_transition_cbs, control.chatty
         told: Node | Exit = target
         node: Any = None
         while not target.is_exit:
@@ -295,9 +287,9 @@ class Frame:
                 node.state.fsm_frame = None
             if self.attention:
                 told = target = self._attend(node, outcome, target)
-                trace, chatty = run.control.trace, run.chatty
-            elif trace is not None or callbacks or chatty or control.shutdown_check is not None:
-                if control.is_shutdown():
+                trace, chatty = control.trace, control.chatty
+            elif trace is not None or callbacks or chatty or execution.shutdown_check is not None:
+                if execution.is_shutdown():
                     self.stopped = target
                     self.current = told = target = SHUTDOWN
                     break
@@ -340,12 +332,12 @@ class Frame:
         Returns:
             Where to go.
         """
-        run, stood, still = self.run, False, False
+        control, stood, still = self.control, False, False
         while True:
-            with run.condition:
-                paused = run.control.paused and not run.control.steps
+            with control.condition:
+                paused = control.paused and not control.steps
                 if still and paused and not (self.attention or self.stale):
-                    run.condition.wait()
+                    control.condition.wait()
                 if self.stale:
                     raise LeftBehindError
                 self.thread.heeded()
@@ -368,7 +360,7 @@ class Frame:
     def _decide(
         self, left: Node | None, outcome: Any, target: Node | Exit, *, stood: bool
     ) -> tuple[Node | Exit, list[Move]]:
-        """Return where to go, and the transitions to be told; under the run's condition.
+        """Return where to go, and the transitions to be told; under the machine's condition.
 
         Args:
             left: The state that ended, or before which the machine stood; None at the start.
@@ -405,7 +397,7 @@ class Frame:
                 self.saved = (*self.saved, target)
                 target = container.fsm_table[urgent.label]
                 move = Move(left, outcome, target, 'interrupt')
-        if control.is_shutdown():
+        if execution.is_shutdown():
             self.stopped = target
             return SHUTDOWN, moves
         return target, moves if move is None else [*moves, move]
@@ -484,7 +476,7 @@ class Frame:
 
     def _stands_still(self, target: Node | Exit) -> bool:
         """Tell whether the machine is paused here; takes one step if it may."""
-        steering = self.run.control
+        steering = self.control
         if not steering.paused or self.suspending:
             return False
         if not isinstance(target, Node) or target.is_container:
@@ -505,7 +497,7 @@ class Frame:
             or self.suspending
             or self.cut
             or self.forced
-            or self.run.control.paused
+            or self.control.paused
             or (isinstance(target, Node) and target.state.fsm_progress)
         )
 
@@ -513,14 +505,14 @@ class Frame:
 
     def tell(self, move: Move) -> None:
         """Tell trace, log and callbacks of a transition."""
-        container, run = self.container, self.run
+        container, control = self.container, self.control
         left, outcome, target, kind = move
         if left is None:
             self.note('', '', target.label, kind or 'start')
             return
         kind = target.kind if target.is_exit else kind or 'transition'
         self.note(left.label, outcome, target.label, kind)
-        if run.chatty:
+        if control.chatty:
             self._log(left, outcome, target)
         if target.is_exit:
             container.call_termination_cbs([left.label], target.label)
@@ -533,12 +525,12 @@ class Frame:
 
     def note(self, source: str, outcome: Any, target: str, kind: str) -> None:
         """Tell the run's trace, if there is one, of a transition; see `Noted`."""
-        trace = self.run.control.trace
+        trace = self.control.trace
         if trace is not None:
-            now, userdata = self.run.now(), raw(self.container.userdata).copy()
+            now, userdata = self.control.now(), raw(self.container.userdata).copy()
             trace(Noted(self.path, source, str(outcome), target, now, userdata, kind))
 
-    # What others want; under the run's condition.
+    # What others want; under the machine's condition.
 
     @property
     def wanted(self) -> bool:
@@ -558,8 +550,8 @@ class Frame:
             self.preempted = current
             self.thread.asked()
             current.state.request_preempt()
-        if self.run.control.paused:
-            self.run.condition.notify_all()
+        if self.control.paused:
+            self.control.condition.notify_all()
 
     def interrupted(self) -> None:
         """Make way for the container's raised interrupts."""
@@ -567,8 +559,8 @@ class Frame:
         priority = self.current.priority
         if any(branch.priority > priority for branch in self.container.fsm_raised):
             self.cut_short()
-        if self.run.control.paused:
-            self.run.condition.notify_all()
+        if self.control.paused:
+            self.control.condition.notify_all()
 
     def suspend(self) -> None:
         """Have the container put aside with its history."""

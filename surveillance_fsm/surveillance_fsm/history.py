@@ -26,10 +26,10 @@ from typing import IO, Any
 from surveillance_fsm.clock import elapsed_of
 from surveillance_fsm.container import Container
 from surveillance_fsm.exceptions import MachineFileError, describe, shown
-from surveillance_fsm.execution import Noted, RawTransition, unfold
 from surveillance_fsm.files import parse_json, read_file, replace_file
 from surveillance_fsm.frame import History
 from surveillance_fsm.log import logerr, logwarn
+from surveillance_fsm.nodes import Noted, RawTransition, unfold
 from surveillance_fsm.state import State
 from surveillance_fsm.structure import Edge, Structure
 from surveillance_fsm.userdata import raw

@@ -42,9 +42,9 @@ from surveillance_fsm.concurrence import Concurrence
 from surveillance_fsm.container import Container
 from surveillance_fsm.exceptions import MachineFileError, describe, shown, unknown
 from surveillance_fsm.files import read_file
+from surveillance_fsm.nodes import LimitOptions
 from surveillance_fsm.state import CBState, State
 from surveillance_fsm.state_machine import Iterator, Sequence, StateMachine
-from surveillance_fsm.timeouts import LimitOptions
 
 KINDS: dict[str, type[Container]] = {
     kind.__name__: kind for kind in (StateMachine, Sequence, Concurrence, Iterator)

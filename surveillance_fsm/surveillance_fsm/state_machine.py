@@ -15,15 +15,10 @@ from surveillance_fsm.exceptions import (
     InvalidUserCodeError,
     describe,
 )
-from surveillance_fsm.execution import (
-    SUSPENDED,
-    Exit,
-    Node,
-)
 from surveillance_fsm.frame import Frame
 from surveillance_fsm.log import logwarn
+from surveillance_fsm.nodes import SUSPENDED, Exit, LimitOptions, Node
 from surveillance_fsm.state import State, structure_version
-from surveillance_fsm.timeouts import LimitOptions
 from surveillance_fsm.userdata import UserData, raw
 
 Items = Iterable[Any] | Callable[[], Iterable[Any]]

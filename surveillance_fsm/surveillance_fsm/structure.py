@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from surveillance_fsm.container import Container
-from surveillance_fsm.execution import RESUME
+from surveillance_fsm.nodes import RESUME
 from surveillance_fsm.state import State
 from surveillance_fsm.state_machine import Iterator as IteratorContainer
 

@@ -21,7 +21,7 @@ from typing import Any
 from surveillance_fsm.clock import Interrupt
 from surveillance_fsm.container import Container
 from surveillance_fsm.exceptions import InvalidStateError, InvalidTransitionError
-from surveillance_fsm.execution import RawTransition, unfold
+from surveillance_fsm.nodes import RawTransition, unfold
 from surveillance_fsm.state import State
 from surveillance_fsm.structure import Structure, state_at
 

@@ -9,102 +9,19 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
-from typing import TYPE_CHECKING, Any, TypedDict
+from typing import TYPE_CHECKING, Any
 
 from surveillance_fsm.clock import Interrupt
 from surveillance_fsm.exceptions import InvalidTransitionError
-from surveillance_fsm.execution import (
-    SUSPENDED,
-    ExecutionThread,
-    Limits,
-    Node,
-    Run,
-    Watch,
-    Work,
-)
+from surveillance_fsm.execution import Control, ExecutionThread, Watch, Work
 from surveillance_fsm.log import logerr, logwarn
-from surveillance_fsm.state import State, this_thread
+from surveillance_fsm.nodes import SUSPENDED, Limits, Node
+from surveillance_fsm.state import this_thread
 
 if TYPE_CHECKING:
     from surveillance_fsm.frame import Frame
-
-TIMEOUT = 'timeout'
-"""The outcome of a state that ran out of time, where its transitions bind it."""
-
-
-class LimitOptions(TypedDict, total=False):
-    """What limits a state, as the ``add`` of every container takes it; each may be left out.
-
-    Attributes:
-        timeout: Seconds of the machine's clock after which the state is asked to stop. Its outcome
-            is then ``timeout`` if the transitions bind that, else ``aborted``, else ``preempted``.
-        deadline: Seconds after which the machine goes on without the state, with the same outcome;
-            with a timeout alone it is left to the preempt's bound.
-        retry: How often the state is executed again when it ran out of time or ended with one of
-            `retry_on`.
-        retry_on: Outcomes that count as failures, beside running out of time; ``aborted`` by
-            itself.
-    """
-
-    timeout: float | None
-    deadline: float | None
-    retry: int
-    retry_on: Iterable[str]
-
-
-def make_limits(
-    path: str,
-    state: State,
-    bound: Iterable[str],
-    *,
-    timeout: float | None = None,
-    deadline: float | None = None,
-    retry: int = 0,
-    retry_on: Iterable[str] = ('aborted',),
-) -> Limits | None:
-    """Check limits and settle which outcome running out of time has.
-
-    Args:
-        path: The state's path, for errors.
-        state: The state.
-        bound: The outcomes that its container binds; ``timeout`` need not be declared.
-        timeout: See `LimitOptions`, as the rest.
-        deadline: Seconds.
-        retry: How often.
-        retry_on: Outcomes.
-
-    Raises:
-        InvalidTransitionError: There is no outcome for running out of time, or a number is wrong.
-    """
-    if timeout is None and deadline is None and not retry:
-        return None
-    for name, value in (('timeout', timeout), ('deadline', deadline)):
-        if value is not None and not value > 0:
-            raise InvalidTransitionError(
-                f"State '{path}' has {name} {value!r}: expected seconds above 0"
-            )
-    if retry < 0:
-        raise InvalidTransitionError(f"State '{path}' has retry {retry}: expected 0 or more")
-    outcomes = state.get_registered_outcomes()
-    late = ''
-    if timeout is not None or deadline is not None:
-        for late in (TIMEOUT, 'aborted', 'preempted'):
-            if late in bound or late in outcomes:
-                break
-        else:
-            raise InvalidTransitionError(
-                f"State '{path}' has a time limit but no outcome for it: bind '{TIMEOUT}' in its "
-                f'transitions (its outcomes are {sorted(outcomes)})'
-            )
-    failures = {outcome for outcome in retry_on if outcome in outcomes} | ({late} - {''})
-    if retry and not failures:
-        raise InvalidTransitionError(
-            f"State '{path}' has retry {retry} but none of the outcomes {sorted(retry_on)} to "
-            f'retry on (its outcomes are {sorted(outcomes)})'
-        )
-    return Limits(timeout, deadline, retry, frozenset(failures), late)
 
 
 def limited(node: Node, limits: Limits) -> Callable[[Any], Any]:
@@ -164,8 +81,8 @@ def settle(node: Node, frame: Frame | None, watch: Watch | None, outcome: Any) -
 
 def _begin_watch(thread: ExecutionThread, node: Node, limits: Limits) -> Watch:
     """Put limits to work on the state that the innermost frame is about to execute."""
-    now = thread.run.now()
-    with thread.run.condition:
+    now = thread.control.now()
+    with thread.control.condition:
         thread.check()
         watch = Watch(
             node,
@@ -180,7 +97,7 @@ def _begin_watch(thread: ExecutionThread, node: Node, limits: Limits) -> Watch:
 
 def end_watch(thread: ExecutionThread, watch: Watch) -> None:
     """End the limits of a state that has returned."""
-    with thread.run.condition:
+    with thread.control.condition:
         thread.check()
         thread.watches.remove(watch)
 
@@ -196,18 +113,18 @@ def watch_of(frame: Frame) -> Watch | None:
 # Watching.
 
 
-def supervise(run: Run, threads: Sequence[ExecutionThread], wakeup: Interrupt) -> None:
+def supervise(control: Control, threads: Sequence[ExecutionThread], wakeup: Interrupt) -> None:
     """Watch threads until one of them ends or `wakeup` is raised by somebody else.
 
     A preempt need not wake a watcher that sleeps on no clock: it looks at least once in every
     bound, so that it always looks before a bound that has just begun is over.
 
     Args:
-        run: The execution they belong to.
+        control: The control of the machine they belong to.
         threads: The threads; each raises `wakeup` when it ends or its limits change.
         wakeup: What the wait ends by.
     """
-    with run.condition:
+    with control.condition:
         wakeup.clear()
         quiet = True
         for thread in threads:
@@ -215,20 +132,20 @@ def supervise(run: Run, threads: Sequence[ExecutionThread], wakeup: Interrupt) -
                 return
             if thread.watches:
                 # Before the look at what is due: a request that comes after it wakes.
-                run.sleeps_on_clock = True
+                control.sleeps_on_clock = True
             quiet = quiet and not thread.watches and thread.asked_at is None
         dues = [] if quiet else [_due(thread) for thread in threads]
     clocked = min((due for due, _ in dues if due is not None), default=None)
     steady = min((due for _, due in dues if due is not None), default=None)
     left = None if steady is None else max(0.0, steady - time.monotonic())
     if clocked is None:
-        wakeup.wait(run.preempt_timeout if left is None else left)
+        wakeup.wait(control.preempt_timeout if left is None else left)
     else:
         alarm = threading.Timer(left, wakeup.set) if left is not None else None
         if alarm is not None:
             alarm.daemon = True
             alarm.start()
-        run.clock.sleep(max(0.0, clocked - run.now()), wakeup)
+        control.clock.sleep(max(0.0, clocked - control.now()), wakeup)
         if alarm is not None:
             alarm.cancel()
     for thread in threads:
@@ -239,7 +156,7 @@ def supervise(run: Run, threads: Sequence[ExecutionThread], wakeup: Interrupt) -
 def _due(thread: ExecutionThread) -> tuple[float | None, float | None]:
     """When something is due next: (on the machine's clock, in steady time)."""
     times = [t for watch in thread.watches for t in (watch.soft, watch.hard) if t is not None]
-    bound = thread.run.preempt_timeout
+    bound = thread.control.preempt_timeout
     steady = None
     if thread.asked_at is not None and bound is not None and not _bounds_itself(thread):
         steady = thread.asked_at + bound
@@ -255,8 +172,8 @@ def _bounds_itself(thread: ExecutionThread) -> bool:
 
 def _enforce(thread: ExecutionThread) -> None:
     """Do what is due: ask states to stop, or go on without them."""
-    now = thread.run.now()
-    with thread.run.condition:
+    now = thread.control.now()
+    with thread.control.condition:
         if thread.done:
             return
         for watch in tuple(thread.watches):
@@ -287,9 +204,9 @@ def stopped_outcome(node: Node) -> str | None:
 def _abandon_unpreemptible(thread: ExecutionThread) -> None:
     """Go on without a state that ignores a preempt: with its preempted outcome, or its container's.
 
-    Under the run's condition.
+    Under the machine's condition.
     """
-    reason = f'ignored a preempt for {thread.run.preempt_timeout:g} s'
+    reason = f'ignored a preempt for {thread.control.preempt_timeout:g} s'
     for depth, frame in reversed(list(enumerate(thread.stack))):
         if not isinstance(frame.current, Node):
             return  # It is ending by itself.
@@ -311,7 +228,7 @@ def _abandon(
 ) -> None:
     """Go on without the present thread, as if the state in frame `depth` had ended.
 
-    Under the run's condition.
+    Under the machine's condition.
 
     Args:
         thread: The logical thread.
@@ -333,7 +250,7 @@ def _abandon(
 def leave_behind(thread: ExecutionThread, depth: int = -1) -> list[Frame]:
     """Leave the present thread behind, and take its containers and userdata away from it.
 
-    Under the run's condition.
+    Under the machine's condition.
 
     Args:
         thread: The logical thread.
@@ -350,7 +267,7 @@ def leave_behind(thread: ExecutionThread, depth: int = -1) -> list[Frame]:
     for frame in frames:
         frame.hold()
     if work is not None:
-        thread.run.left_behind.append((thread.path_inside(), work))
+        thread.control.hanging.append((thread.path_inside(), work))
     if isinstance(inside, Node) and work is not None:
         # The request stays with the state, so that the thread left behind ends some time.
         inside.state.request_preempt()
@@ -365,7 +282,7 @@ def leave_behind(thread: ExecutionThread, depth: int = -1) -> list[Frame]:
     thread.asked_at = None
     if not frames:
         thread.retire()
-    thread.run.condition.notify_all()
+    thread.control.condition.notify_all()
     return frames
 
 
@@ -376,7 +293,7 @@ def _go_on(thread: ExecutionThread, frames: list[Frame], outcome: Any) -> Any:
         for frame in reversed(frames):
             outcome = frame.to_its_end(partial(frame.run_on, outcome))
     finally:
-        with thread.run.condition:
+        with thread.control.condition:
             for rest in frames[: frames.index(frame) + 1]:
                 if rest.container.fsm_frame is rest:
                     rest.container.fsm_frame = None
@@ -390,7 +307,7 @@ def block_reentry(node: Node, left: Work) -> None:
 
     def wait_and_enter(view: Any) -> Any:
         thread: ExecutionThread | None = this_thread.thread
-        if not left.await_end(thread.run.preempt_timeout if thread is not None else None):
+        if not left.await_end(thread.control.preempt_timeout if thread is not None else None):
             logerr(f"State '{node.label}' is still running from an earlier execution")
             if thread is not None:
                 thread.still_gone(node)

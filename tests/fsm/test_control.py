@@ -7,9 +7,7 @@ import threading
 import pytest
 
 import surveillance_fsm as fsm
-from surveillance_fsm.clock import WALL_CLOCK
-from surveillance_fsm.control import Control
-from surveillance_fsm.execution import Run
+from surveillance_fsm.execution import Control
 from surveillance_fsm.history import TransitionFeed
 from surveillance_fsm.testing import FakeClock, watching
 
@@ -287,4 +285,4 @@ def test_reports_may_end_in_the_moment_in_which_the_machine_ends(monkeypatch):
     traces = [lambda raw: None]
     ends_when_it_was_read = property(lambda _: traces.pop() if traces else None)
     monkeypatch.setattr(Control, 'trace', ends_when_it_was_read, raising=False)
-    control.fsm_end(Run(control, WALL_CLOCK, None))
+    control.fsm_end()
