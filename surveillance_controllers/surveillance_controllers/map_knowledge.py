@@ -134,16 +134,16 @@ class MapKnowledge:
 
     def follow_places(self, take: Callable[[Mapping[str, Points]], None]) -> None:
         """Have a function take the places, on a thread of its own, now and when they change."""
-        stopping, watched = self._node.stopping, False
+        stopping, news, watched = self._node.stopping, Interrupt(), False
 
         def catch_up() -> None:
             nonlocal watched
             if not watched:
-                self.watch_doors(stopping, lambda: news.set())
+                self.watch_doors(stopping, news.set)
                 watched = True
             take(self.places(stopping))
 
-        news = keep_up(self._node, 'map follower', catch_up)
+        keep_up(self._node, 'map follower', news, catch_up)
 
     def watch_robot_place(
         self, interrupt: Interrupt, on_change: Callable[[], None]
@@ -248,22 +248,20 @@ def answered() -> Iterator[None]:
 def keep_up(
     node: PatrolNode,
     name: str,
+    news: Interrupt,
     catch_up: Callable[[], float | None],
     retry: float = CATCH_UP_PERIOD,
-) -> Interrupt:
+) -> None:
     """Have a worker thread catch up with what the map's peers say, as long as the node lives.
 
     Args:
         node: The node.
         name: Of the thread.
+        news: To be set when there is news.
         catch_up: Does what is to be done; returns after how many seconds to look again, None: when
             there is news. May raise `OntologyNotReadyError` or `CallError`.
         retry: Pause after such an error, seconds.
-
-    Returns:
-        To be set when there is news.
     """
-    news = Interrupt()
 
     def work() -> None:
         while not node.stopping.is_set():
@@ -280,4 +278,3 @@ def keep_up(
 
     node.stopping.subscribe(news.set)
     node.spawn(work, name=name)
-    return news

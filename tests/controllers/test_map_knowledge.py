@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
 from typing import Any
 
+import pytest
 from geometry_msgs.msg import Point
 
 from surveillance_controllers.map_knowledge import MapKnowledge
+from surveillance_fsm import Interrupt
 from surveillance_fsm.ros import ServiceCaller
 from surveillance_interfaces.srv import AddRoom
 from surveillance_ontology.armor_server_node import ArmorServer
@@ -34,3 +37,21 @@ def test_who_is_told_of_a_new_room_finds_it_with_its_point(
     assert answer.success, answer.message
     graph.until(lambda: any('ALCOVE' in rooms for rooms, _ in told))
     assert all(has_point for rooms, has_point in told if 'ALCOVE' in rooms)
+
+
+def test_places_may_change_at_once_when_they_begin_to_be_followed(
+    graph: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    knowledge = MapKnowledge(graph.node, 1.0)
+    node = SimpleNamespace(stopping=Interrupt(), spawn=lambda work, name: work())
+    monkeypatch.setattr(knowledge, '_node', node)
+    monkeypatch.setattr(knowledge, 'watch_doors', lambda _interrupt, on_change: on_change())
+
+    def places(_interrupt: Interrupt) -> dict[str, Any]:
+        node.stopping.set()
+        return {}
+
+    monkeypatch.setattr(knowledge, 'places', places)
+    taken: list[Any] = []
+    knowledge.follow_places(taken.append)
+    assert taken == [{}]

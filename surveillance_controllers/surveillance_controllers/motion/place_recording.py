@@ -12,6 +12,7 @@ from std_msgs.msg import Header
 from surveillance_controllers.geometry import Points
 from surveillance_controllers.map_knowledge import MapKnowledge, answered, keep_up
 from surveillance_controllers.motion.arrival import nearest_place
+from surveillance_fsm import Interrupt
 from surveillance_interfaces.msg import OntologyMap, RobotPlace
 from surveillance_ontology.armor_client import FactSubscription
 from surveillance_runtime.conversions import nanoseconds_of
@@ -62,7 +63,8 @@ class PlaceRecorder:
         self._facts: FactSubscription | None = None
         self._topic = node.create_publisher(RobotPlace, 'robot_place', STATE_QOS)
         self._done = node.create_publisher(Time, 'robot_place_written', STATE_QOS)
-        self._news = keep_up(node, 'place recorder', self._catch_up)
+        self._news = Interrupt()
+        keep_up(node, 'place recorder', self._news, self._catch_up)
         if start == '':
             node.create_subscription(
                 OntologyMap, 'ontology_map/build_map', self._on_build_map, STATE_QOS
@@ -111,7 +113,7 @@ class PlaceRecorder:
         """
         stopping = self._node.stopping
         if self._facts is None:
-            self._facts = self._knowledge.watch_robot_place(stopping, lambda: self._news.set())
+            self._facts = self._knowledge.watch_robot_place(stopping, self._news.set)
         self._find_place()
         if self._told is None and self._start is not None:
             self._begin()

@@ -48,7 +48,8 @@ class DoorWatch:
         self._told: frozenset[str] = frozenset()
         self._sides: dict[str, set[str]] = {}
         self._set_door = ServiceCaller(node, SetDoor, 'ontology_map/set_door')
-        self._news = keep_up(node, 'door watch', self._catch_up, RETRY_PERIOD)
+        self._news = Interrupt()
+        keep_up(node, 'door watch', self._news, self._catch_up, RETRY_PERIOD)
         node.create_subscription(DoorStates, 'door_states', self._on_states, STATE_QOS)
 
     def rooms_of(self, interrupt: Interrupt) -> dict[str, set[str]]:
