@@ -17,7 +17,6 @@ from geometry_msgs.msg import PoseWithCovarianceStamped
 from nav_msgs.msg import OccupancyGrid
 
 from surveillance_controllers.controller_parameters import MotionSettings
-from surveillance_controllers.motion import docking
 from surveillance_controllers.motion import nav2 as nav2_motion
 from surveillance_controllers.motion.arrival import MotionFailedError
 from surveillance_controllers.motion_controller_node import MotionController
@@ -69,7 +68,6 @@ def servers(monkeypatch: pytest.MonkeyPatch) -> Servers:
     monkeypatch.setitem(sys.modules, 'nav2_msgs', package)
     monkeypatch.setitem(sys.modules, 'nav2_msgs.action', module)
     monkeypatch.setattr(nav2_motion, 'GoalCaller', servers.caller)
-    monkeypatch.setattr(docking, 'GoalCaller', servers.caller)
     return servers
 
 
@@ -219,9 +217,9 @@ def test_what_nav2_cannot_do_fails_with_the_reason(
         nav2(graph).follow(PATH, run, lambda _: None)
 
 
-def docked(graph: Any, station: tuple[float, float, float]) -> docking.DockingMotion:
+def docked(graph: Any, station: tuple[float, float, float]) -> nav2_motion.DockingMotion:
     settings = MotionSettings(station=station, dock_type='charger', peer_timeout=1.0)
-    return docking.DockingMotion(graph.node, nav2(graph), settings)
+    return nav2_motion.DockingMotion(graph.node, nav2(graph), settings)
 
 
 def test_a_way_to_the_station_ends_in_the_dock_and_the_next_one_begins_by_undocking(
@@ -256,7 +254,8 @@ def test_without_their_messages_both_say_what_to_install(
 ) -> None:
     monkeypatch.setitem(sys.modules, 'nav2_msgs', None)
     monkeypatch.setitem(sys.modules, 'nav2_msgs.action', None)
-    with pytest.raises(ParameterError, match='install ros-jazzy-nav2-msgs'):
-        nav2_motion.navigate_through_poses()
+    none: Any = None
+    with pytest.raises(ParameterError, match=r'navigator: got nav2.* install ros-jazzy-nav2-msgs'):
+        nav2_motion.Nav2Motion(none, none, none, MotionSettings())
     with pytest.raises(ParameterError, match=r'docking: .* install ros-jazzy-nav2-msgs'):
-        docking.docking_actions()
+        nav2_motion.DockingMotion(none, none, MotionSettings())

@@ -1,8 +1,12 @@
-"""Motion for `motion_controller` by Nav2: a path becomes a NavigateThroughPoses goal.
+"""Motion for `motion_controller` by Nav2, and docking by Nav2's docking server.
 
-Nav2 so goes the way that was planned here, through the doors that are open. (Its action FollowPath
-has the name of this project's own, `follow_path`.) Nav2's messages come with Nav2; without them
-this way to move cannot start and says so.
+A path becomes a NavigateThroughPoses goal, so that Nav2 goes the way that was planned here, through
+the doors that are open. (Its action FollowPath has the name of this project's own, `follow_path`.)
+At the end of a way to the station a docking server (opennav_docking) may dock the robot, whoever
+drove it there.
+
+The messages of both come with Nav2, in nav2_msgs (Humble had opennav_docking_msgs); without them
+neither can start, and says so.
 """
 
 from __future__ import annotations
@@ -25,7 +29,7 @@ from surveillance_controllers.controller_parameters import (
 )
 from surveillance_controllers.geometry import Points, equally_spaced, length, point_of
 from surveillance_controllers.map_knowledge import MapKnowledge
-from surveillance_controllers.motion.arrival import MotionFailedError, expect_place
+from surveillance_controllers.motion.arrival import Motion, MotionFailedError, expect_place
 from surveillance_controllers.motion.place_recording import PlaceRecorder
 from surveillance_controllers.motion.place_regions import PlaceMap
 from surveillance_fsm.ros import CallError, CallInterruptedError, GoalCaller, GoalRun
@@ -40,20 +44,28 @@ MOST_POSES = 10_000
 """A path that would need more poses is led through poses farther apart."""
 
 
-def navigate_through_poses() -> Any:
-    """Nav2's action type.
+def nav2_actions(parameter: str, value: str, without: str, *names: str) -> list[Any]:
+    """Return action types of Nav2 by their names.
+
+    Args:
+        parameter: Of the node, which asks for them,
+        value: with this value.
+        without: The value that does not need them.
+        names: Of the types.
 
     Raises:
         ParameterError: nav2_msgs is not installed.
     """
     try:
-        from nav2_msgs.action import NavigateThroughPoses
-    except ImportError:
+        from nav2_msgs import action
+
+        return [getattr(action, name) for name in names]
+    except (ImportError, AttributeError):
         raise ParameterError(
-            'parameter navigator: got nav2, but the Python package nav2_msgs is not installed: '
-            'install ros-jazzy-nav2-msgs and source its workspace, or use navigator:=own'
+            f'parameter {parameter}: got {value}, but the Python package nav2_msgs is not '
+            'installed: install ros-jazzy-nav2-msgs and source its workspace, or use '
+            f'{parameter}:={without}'
         ) from None
-    return NavigateThroughPoses
 
 
 class Nav2Motion:
@@ -78,7 +90,7 @@ class Nav2Motion:
     ) -> None:
         self._node = node
         self._recorder = recorder
-        self._type = navigate_through_poses()
+        (self._type,) = nav2_actions('navigator', 'nav2', 'own', 'NavigateThroughPoses')
         self._timeout = settings.peer_timeout
         self._navigator = GoalCaller(node, self._type, 'navigate_through_poses')
         self._lock = threading.Lock()
@@ -181,6 +193,82 @@ class Nav2Motion:
 
     def look_around(self, _run: GoalRun) -> None:
         """Nothing: Nav2's own behaviours turn the robot where that is wanted."""
+
+
+class DockingMotion:
+    """Moves as another motion does, and docks where a way ends at the station.
+
+    Args:
+        node: The motion controller's node.
+        inner: Drives the robot.
+        settings: The station, how near to it a way must end, the dock's type, and how long the
+            server may take to appear and accept a goal.
+
+    Raises:
+        ParameterError: nav2_msgs is not installed.
+    """
+
+    def __init__(self, node: PatrolNode, inner: Motion, settings: MotionSettings) -> None:
+        self._node = node
+        self._inner = inner
+        self._settings = settings
+        actions = nav2_actions('docking', 'opennav', 'none', 'DockRobot', 'UndockRobot')
+        self._dock, self._undock = actions
+        self._docker = GoalCaller(node, self._dock, 'dock_robot')
+        self._undocker = GoalCaller(node, self._undock, 'undock_robot')
+        self._docked = False
+
+    def follow(self, path: Points, run: GoalRun, report: Callable[[Points], None]) -> Points:
+        """Undocks where that is needed, drives, and docks where the way ends at the station.
+
+        Raises:
+            MotionFailedError: One of the three failed.
+        """
+        if self._docked:
+            self._docked = False
+            goal = self._undock.Goal(dock_type=self._settings.dock_type)
+            self._carry_out(self._undocker, goal, 'undocking', path[0], run)
+        end = self._inner.follow(path, run, report)
+        if (
+            math.dist(end[:2], self._settings.station[:2]) > self._settings.dock_reach
+            or run.interrupt.is_set()
+        ):
+            return end
+        pose = PoseStamped()
+        pose.header.frame_id = 'map'
+        pose.header.stamp = self._node.get_clock().now().to_msg()
+        pose.pose = pose_message(self._settings.station)
+        goal = self._dock.Goal(
+            use_dock_id=False,
+            dock_pose=pose,
+            dock_type=self._settings.dock_type,
+            navigate_to_staging_pose=False,
+        )
+        self._carry_out(self._docker, goal, 'docking', end, run)
+        self._docked = True
+        return end
+
+    def place_reached(self, goal: Points, end: Points, run: GoalRun) -> str:
+        """As the motion that drives."""
+        return self._inner.place_reached(goal, end, run)
+
+    def look_around(self, run: GoalRun) -> None:
+        """As the motion that drives; a docked robot stays as it is."""
+        if not self._docked:
+            self._inner.look_around(run)
+
+    def _carry_out(
+        self, caller: GoalCaller, goal: Any, what: str, at: Points, run: GoalRun
+    ) -> None:
+        try:
+            end = caller.run(
+                goal, accept_timeout=self._settings.peer_timeout, interrupt=run.interrupt
+            )
+        except CallError as error:
+            raise MotionFailedError(f'{what}: {error}', at) from error
+        if end.status != 'succeeded' or not end.result.success:
+            why = reason_of(end.result)
+            raise MotionFailedError(f'{what}: the docking server {end.status} the goal{why}', at)
 
 
 def reason_of(result: Any) -> str:
