@@ -19,14 +19,13 @@ from sensor_msgs.msg import LaserScan
 
 from surveillance_controllers import conversions
 from surveillance_controllers.geometry import Points, Scan
-from surveillance_controllers.motion.command_publisher import CommandPublisher
+from surveillance_controllers.motion.command_publisher import STANDSTILL, CommandPublisher
 from surveillance_controllers.motion.path_following import (
     Velocity,
     as_forwards,
     room_ahead,
     speed_to_stop,
 )
-from surveillance_controllers.motion.sensor_age import STANDSTILL
 from surveillance_controllers.motion.transforms import ScanReader
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.parameters import parameter

@@ -9,9 +9,14 @@ from typing import Any
 
 import pytest
 
-from surveillance_controllers.motion.command_publisher import CommandPublisher
+from surveillance_controllers.motion.command_publisher import (
+    LEAD,
+    REACTION,
+    STANDSTILL,
+    CommandPublisher,
+    SensorAge,
+)
 from surveillance_controllers.motion.path_following import Velocity
-from surveillance_controllers.motion.sensor_age import LEAD, REACTION, STANDSTILL, SensorAge
 
 DECELERATION = 2.5
 LOOK_PERIOD = 0.01
