@@ -21,8 +21,7 @@ from std_srvs.srv import Empty
 from trajectory_msgs.msg import JointTrajectory
 
 from surveillance_controllers import conversions, stimuli
-from surveillance_controllers.battery.model import Battery
-from surveillance_controllers.battery.use import BatteryInUse
+from surveillance_controllers.battery import Battery, BatteryInUse
 from surveillance_controllers.controller_parameters import (
     BatterySettings,
     battery_settings,

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from surveillance_controllers.battery.model import BatteryParameters
+from surveillance_controllers.battery import BatteryParameters
 from surveillance_controllers.geometry import Points, Pose
 from surveillance_runtime import parameter_checks
 from surveillance_runtime.node import PatrolNode

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from rclpy.node import Node
 from sensor_msgs.msg import BatteryState, LaserScan
 
-from surveillance_controllers.battery.model import Battery
+from surveillance_controllers.battery import Battery
 from surveillance_controllers.geometry import Mount, Points, Scan
 from surveillance_runtime.conversions import map_from, point_message
 

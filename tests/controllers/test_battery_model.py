@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from surveillance_controllers.battery.model import Battery, BatteryParameters
+from surveillance_controllers.battery import Battery, BatteryParameters
 
 LEVELS = st.floats(0, 100)
 TIMES = st.floats(0, 100_000)

@@ -6,8 +6,7 @@ import math
 
 import pytest
 
-from surveillance_controllers.battery.model import Battery, BatteryParameters
-from surveillance_controllers.battery.use import BatteryInUse
+from surveillance_controllers.battery import Battery, BatteryInUse, BatteryParameters
 from surveillance_runtime.robot_arm import TrajectoryPoint
 
 PARAMETERS = BatteryParameters(

@@ -15,7 +15,7 @@ from sensor_msgs.msg import BatteryState, LaserScan, PointCloud2, PointField
 from std_msgs.msg import Header
 
 from surveillance_controllers import conversions
-from surveillance_controllers.battery.model import Battery, BatteryParameters
+from surveillance_controllers.battery import Battery, BatteryParameters
 from surveillance_controllers.geometry import Mount
 from surveillance_controllers.motion.path_following import Velocity
 from surveillance_runtime.conversions import (
