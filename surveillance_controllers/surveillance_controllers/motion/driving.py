@@ -91,11 +91,8 @@ _STANDS = 0.004
 SPIN_SPEED, SPIN_ACCELERATION = 1.0, 3.0
 """Of one turn on the spot, rad/s and rad/s^2."""
 
-_RECOVERIES = (
-    (State.WAITING, State.ASKING),
-    (State.BACKING, State.ASKING),
-    (State.LOOKING, State.ASKING),
-)
+_RECOVERIES = (State.WAITING, State.BACKING, State.LOOKING)
+"""What is tried one after the other; after each, another path is asked for."""
 
 
 class Drive:
@@ -125,7 +122,6 @@ class Drive:
         self.state = State.DRIVING
         self.reason = ''
         self.recoveries = 0
-        self._plan: list[State] = []
         self._level = 0
         self._paths = 0
         self._now: float | None = None
@@ -186,14 +182,14 @@ class Drive:
                 self.state = State.ARRIVED
             return Velocity()
         if self.state is State.WAITING and now - self._since >= self._recovery.wait:
-            self._next(now)
+            self._begin(State.ASKING, now)
         elif self.state is State.BACKING:
             self._backed += moved
             return self._back(now, seen)
         elif self.state is State.LOOKING:
             self._turned += abs(turned)
             if self._turned >= math.tau or now - self._since > 20.0:
-                self._next(now)
+                self._begin(State.ASKING, now)
             else:
                 return Velocity(0.0, min(self._robot.turn, 1.0))
         return self._follower.halt(seen, dt)
@@ -319,9 +315,8 @@ class Drive:
                 return
             self._level = 1
         self.recoveries += 1
-        self._plan = list(_RECOVERIES[self._level])
+        self._begin(_RECOVERIES[self._level], now)
         self._level += 1
-        self._next(now)
 
     def _ask(self, now: float, reason: str) -> None:
         self.reason = reason
@@ -331,11 +326,10 @@ class Drive:
             self._recover(now, reason)
             return
         self.recoveries += 1
-        self._plan = [State.ASKING]
-        self._next(now)
+        self._begin(State.ASKING, now)
 
-    def _next(self, now: float) -> None:
-        self.state = self._plan.pop(0)
+    def _begin(self, state: State, now: float) -> None:
+        self.state = state
         self._since = now
         self._turned = self._backed = 0.0
         self._blocked_since = self._mark = None
@@ -346,7 +340,7 @@ class Drive:
         room = room_ahead(behind, 0.0, self._robot.radius + self._robot.margin, 1.0)
         slow = r.back_speed**2 / (2 * self._robot.acceleration) + 0.02
         if self._backed >= r.back_up or room <= slow or now - self._since > 10.0:
-            self._next(now)
+            self._begin(State.ASKING, now)
             return Velocity()
         return Velocity(-r.back_speed, 0.0)
 
