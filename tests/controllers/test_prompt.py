@@ -7,6 +7,7 @@ import os
 import pty
 import termios
 import threading
+from pathlib import Path
 from typing import Any
 
 from geometry_msgs.msg import Point
@@ -100,6 +101,15 @@ def test_a_pipe_gives_its_last_line_also_without_an_end(operator: Any) -> None:
     operator.hang_up()
     assert console.run() == 'end of input'
     assert lines == ['one', '', 'two', 'three']
+
+
+def test_a_file_is_read_like_a_pipe(tmp_path: Path) -> None:
+    commands = tmp_path / 'commands'
+    commands.write_bytes(b'battery set 5\r\nmove 1 0')
+    lines: list[str] = []
+    with commands.open() as source:
+        assert Console('test', lines.append, lambda _: [], source=source).run() == 'end of input'
+    assert lines == ['battery set 5', 'move 1 0']
 
 
 def test_one_console_addresses_every_controller(graph: Any, operator: Any, capfd: Any) -> None:

@@ -12,7 +12,7 @@ import os
 import selectors
 import sys
 import threading
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from typing import TYPE_CHECKING, TextIO
 
 if TYPE_CHECKING:
@@ -92,11 +92,9 @@ class Console:
         except (OSError, ValueError, AttributeError):
             return 'end of input'
         buffer = b''
-        with selectors.DefaultSelector() as selector:
-            try:
-                selector.register(descriptor, selectors.EVENT_READ)
-            except (PermissionError, ValueError):
-                return self._run_file(self._source)
+        # Unlike the default one, it takes files, too.
+        with selectors.PollSelector() as selector:
+            selector.register(descriptor, selectors.EVENT_READ)
             selector.register(self._wake_read, selectors.EVENT_READ)
             while not self._stopped:
                 selector.select()
@@ -115,13 +113,6 @@ class Console:
                 if not chunk:
                     return 'end of input'
         return 'stopped'
-
-    def _run_file(self, lines: Iterable[str]) -> str:
-        for line in lines:
-            if self._stopped:
-                return 'stopped'
-            self._on_line(line.rstrip('\r\n'))
-        return 'end of input'
 
     def _run_terminal(self) -> str:
         # Only here, for most consoles never have a terminal and need not wait for the import.
