@@ -77,31 +77,37 @@ class ClockRateModel:
         return self.step / (self.speed or self.ceiling)
 
 
-class Answers:
-    """The answers of a program that works in step with the measurements.
+class Awaited:
+    """A program that time waits for while its answer is late.
 
     Args:
-        window: Simulated seconds that may pass after what was answered last.
-        patience: Real seconds after which a late answer is not waited for any more.
+        patience: Real seconds after which it is given up until it answers again.
+
+    Attributes:
+        answered: The simulated time that it answered last; None while it is not waited for.
     """
 
-    def __init__(self, window: float, patience: float) -> None:
-        self._window = window
+    def __init__(self, patience: float) -> None:
         self._patience = patience
-        self._answered: float | None = None
         self._late_since: float | None = None
+        self.answered: float | None = None
 
     def note(self, answered: float) -> None:
-        """Note an answer to what was measured at this simulated time, seconds."""
-        self._answered, self._late_since = answered, None
+        """Note an answer, to a moment of simulated time, seconds."""
+        self.answered, self._late_since = answered, None
 
     def end(self) -> None:
         """Expect no further answer until one comes."""
-        self._answered = self._late_since = None
+        self.answered = self._late_since = None
 
-    def are_late(self, simulated: float, steady: float) -> bool:
-        """Return whether time must wait for the next answer."""
-        if self._answered is None or simulated - self._answered < self._window - 1e-9:
+    def since(self, simulated: float) -> float:
+        """Return the seconds from its last answer to a simulated time; -inf: none is waited for."""
+        return -math.inf if self.answered is None else simulated - self.answered
+
+    def holds_time(self, is_late: bool, steady: float) -> bool:
+        """Return whether time must wait for the next answer, by whether that is late now."""
+        if self.answered is None or not is_late:
+            self._late_since = None
             return False
         if self._late_since is None:
             self._late_since = steady
@@ -126,21 +132,20 @@ class ClockRate:
         self._last = steady
         self._owed = 0.0
         self.pause: float | None = None
-        self._commands = Answers(model.window, model.patience)
-        self._estimates = Answers(model.estimate_window, model.patience)
-        self._looks = Answers(model.look_window, model.patience)
+        self._commands = Awaited(model.patience)
+        self._estimates = Awaited(model.patience)
+        self._looks = Awaited(model.patience)
         self._look_from, self._look_until = math.inf, math.inf
-        self._mission_waits_until: float | None = None
-        self._mission_late_since: float | None = None
+        # It answers until when it waits.
+        self._mission = Awaited(model.patience)
         self._executed: dict[str, bool] = {}
+        self._places_written = Awaited(model.patience)
         self._place_told = -1.0
-        self._place_written: float | None = None
-        self._place_late_since: float | None = None
         self.is_waiting = self.awaits_picture = False
 
     def mission_waits(self, until: float) -> None:
         """Note that the mission waits until this simulated time, seconds; inf: for an event."""
-        self._mission_waits_until, self._mission_late_since = until, None
+        self._mission.note(until)
 
     def place_told(self, seen: float) -> None:
         """Note that the robot was seen in another place at this simulated time, seconds."""
@@ -148,18 +153,7 @@ class ClockRate:
 
     def place_written(self, seen: float) -> None:
         """Note that the ontology has the place in which the robot was seen at this time."""
-        self._place_written, self._place_late_since = seen, None
-
-    def _place_is_late(self, steady: float) -> bool:
-        """Return whether time must wait until the ontology knows the robot's place."""
-        if self._place_written is None or self._place_told <= self._place_written:
-            return False
-        if self._place_late_since is None:
-            self._place_late_since = steady
-        if steady - self._place_late_since < self._model.patience:
-            return True
-        self._place_written = self._place_late_since = None
-        return False
+        self._places_written.note(seen)
 
     def goals(self, action: str, simulated: float, *, executed: bool) -> None:
         """Note whether an action's goal is executed at a simulated time, seconds.
@@ -177,20 +171,9 @@ class ClockRate:
     def _is_driving(self) -> bool:
         return any(self._executed.get(action) for action in DRIVING)
 
-    def _mission_is_late(self, simulated: float, steady: float) -> bool:
-        """Return whether time must wait for the mission, or for a planner that it waits for."""
-        if self._mission_waits_until is None:
-            return False
-        planning = any(self._executed.get(action) for action in PLANNING)
-        if not planning and (self._is_driving or simulated < self._mission_waits_until - 1e-9):
-            self._mission_late_since = None
-            return False
-        if self._mission_late_since is None:
-            self._mission_late_since = steady
-        if steady - self._mission_late_since < self._model.patience:
-            return True
-        self._mission_waits_until = None
-        return False
+    @property
+    def _is_planning(self) -> bool:
+        return any(self._executed.get(action) for action in PLANNING)
 
     def command(self, moving: bool, simulated: float) -> None:
         """Note a command: whether it moves the base, and the simulated time when it came."""
@@ -222,15 +205,21 @@ class ClockRate:
         """Return whether time stands still until a program answers; times as for `due`."""
         if simulated > self._look_until:
             self._looks.end()
-        self.awaits_picture = self._looks.are_late(simulated, steady)
+        model, just = self._model, 1e-9
+        look_is_late = self._looks.since(simulated) >= model.look_window - just
+        command_is_late = self._commands.since(simulated) >= model.window - just
+        estimate_is_late = self._estimates.since(simulated) >= model.estimate_window - just
+        step_is_late = not self._is_driving and self._mission.since(simulated) >= -just
+        place_is_late = self._places_written.since(self._place_told) > 0.0
+        self.awaits_picture = self._looks.holds_time(look_is_late, steady)
         late = (
             self.awaits_picture,
-            self._commands.are_late(simulated, steady),
-            self._estimates.are_late(simulated, steady),
-            self._mission_is_late(simulated, steady),
-            self._place_is_late(steady),
+            self._commands.holds_time(command_is_late, steady),
+            self._estimates.holds_time(estimate_is_late, steady),
+            self._mission.holds_time(self._is_planning or step_is_late, steady),
+            self._places_written.holds_time(place_is_late, steady),
         )
-        self.is_waiting = self._model.speed == 0.0 and any(late)
+        self.is_waiting = model.speed == 0.0 and any(late)
         return self.is_waiting
 
     def due(self, simulated: float, steady: float, *, moving: bool) -> float:
@@ -252,8 +241,8 @@ class ClockRate:
             looking = self._look_from <= simulated <= self._look_until
             if not (moving or looking or any(self._executed.values())):
                 step = model.idle_step
-            if self._mission_waits_until is not None and not any(self._executed.values()):
-                step = min(step, max(self._mission_waits_until - simulated, MIN_STEP))
+            if self._mission.answered is not None and not any(self._executed.values()):
+                step = min(step, max(self._mission.answered - simulated, MIN_STEP))
             self._owed = min(self._owed + elapsed * model.ceiling, step)
         else:
             # What a busy machine falls behind is caught up with, but not without bound.
