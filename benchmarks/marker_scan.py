@@ -26,8 +26,7 @@ from surveillance_perception.detection import MarkerStream, StreamSettings
 from surveillance_perception.marker_registry import read_registry
 from surveillance_runtime.robot_arm import ARM
 from surveillance_simulation import Camera, Conditions, Renderer, read_world
-from surveillance_simulation.camera.lighting import LIGHTINGS
-from surveillance_simulation.camera.model import expose
+from surveillance_simulation.camera.model import LIGHTINGS, expose
 
 CONFIG = Path(__file__).resolve().parents[1] / 'config'
 PICTURE_PERIOD, PICTURES = 0.1, 6

@@ -10,8 +10,7 @@ import pytest
 
 from surveillance_runtime.place import PlaceError
 from surveillance_runtime.place.floor_plan import Marker
-from surveillance_simulation.camera.lighting import LIGHTINGS, lit
-from surveillance_simulation.camera.model import Camera, Conditions, expose
+from surveillance_simulation.camera.model import LIGHTINGS, Camera, Conditions, expose, lit
 from surveillance_simulation.camera.rendering import Renderer
 from surveillance_simulation.world import textures
 from surveillance_simulation.world.world import World, read_world
