@@ -18,6 +18,8 @@ from surveillance_simulation.world.world import World
 
 _NEAR = 0.03
 """What is nearer to the lens than this is not seen, metres."""
+_FINER = 2
+"""A picture is drawn at this multiple of its resolution."""
 
 _CEILING = (196.0, 198.0, 200.0)
 
@@ -25,8 +27,8 @@ _CEILING = (196.0, 198.0, 200.0)
 class Renderer:
     """Takes pictures of one world with one camera, keeping what does not change between them."""
 
-    def __init__(self, world: World, camera: Camera, supersampling: int = 2) -> None:
-        """Prepare pictures, drawn at `supersampling` times the camera's resolution.
+    def __init__(self, world: World, camera: Camera) -> None:
+        """Prepare pictures.
 
         Raises:
             PlaceError: A marker's dictionary or id does not exist.
@@ -34,12 +36,12 @@ class Renderer:
         self._world = world
         self._camera = camera
         matrix = camera.matrix
-        matrix[:2] *= supersampling
+        matrix[:2] *= _FINER
         # The centre of pixel 0 stays the centre of the block of fine pixels that it is made of.
-        matrix[:2, 2] += (supersampling - 1) / 2
+        matrix[:2, 2] += (_FINER - 1) / 2
         self._matrix = matrix
         self._inverse = np.linalg.inv(matrix)
-        self._size = (camera.width * supersampling, camera.height * supersampling)
+        self._size = (camera.width * _FINER, camera.height * _FINER)
         self._faces: list[Face] = []
         self._version = -1
         self._shrunk: dict[tuple[int, int, int], Texture] = {}

@@ -15,19 +15,18 @@ from surveillance_runtime.robot_arm import Arm, Array, TrajectoryPoint
 
 
 class ArmMotion:
-    """The arm's joints in time."""
+    """The arm's joints in time.
+
+    Attributes:
+        arm: The arm that moves.
+    """
 
     def __init__(self, arm: Arm) -> None:
         """Put the arm at rest in its home position."""
-        self._arm = arm
+        self.arm = arm
         self._times = np.array([0.0])
         self._positions: Array = np.array([arm.home])
         self._velocities: Array | None = None
-
-    @property
-    def arm(self) -> Arm:
-        """The arm that moves."""
-        return self._arm
 
     def follow(self, names: Sequence[str], points: Sequence[TrajectoryPoint], now: float) -> None:
         """Leave the present trajectory and follow another; without points, stop where it is.
@@ -40,10 +39,10 @@ class ArmMotion:
         Raises:
             ValueError: The arm cannot follow it; see `Arm.check`.
         """
-        self._arm.check(names, points)
+        self.arm.check(names, points)
         start = self.positions(now)
         velocity = self.velocities(now)
-        column = [self._arm.names.index(name) for name in names]
+        column = [self.arm.names.index(name) for name in names]
         times, positions, velocities = [now], [start], [velocity]
         for point in points:
             row = positions[-1].copy()
@@ -96,4 +95,4 @@ class ArmMotion:
             + (3 * square - 4 * share + 1) * first_speed
             + (3 * square - 2 * share) * last_speed
         )
-        return np.clip(position, self._arm.lower, self._arm.upper), velocity
+        return np.clip(position, self.arm.lower, self.arm.upper), velocity
