@@ -168,9 +168,7 @@ class Reference:
         Returns:
             Whether the ontology is consistent.
         """
-        if self.queue:
-            queued, self.queue = self.queue, []
-            apply_all(self.kb, queued)
+        self.flush()
         if self.kb.stale:
             self.revision += 1
         return self._derive()

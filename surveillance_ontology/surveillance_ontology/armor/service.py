@@ -234,17 +234,20 @@ class ArmorService:
         if directive.kind is Kind.UTILITY:
             _check_name(request.reference_name)
             values = directive.read(request.args, '')
-            return _response(directive.run(self, request, *values))
-        if directive.slow:
+            response: DirectiveResponse = directive.run(self, request, *values)
+        elif directive.slow:
             ref = self.references.find(request.reference_name)
-            return _response(directive.run(self, ref, *self._values(directive, request, ref)))
-        with self.references.locked(request.reference_name) as ref:
-            if directive.kind is Kind.QUERY:
-                return _response(directive.run(ref, *self._values(directive, request, ref)))
-            remark = self._change(directive, request, ref)
-        if self.store:
+            response = directive.run(self, ref, *self._values(directive, request, ref))
+        else:
+            with self.references.locked(request.reference_name) as ref:
+                if directive.kind is Kind.QUERY:
+                    response = directive.run(ref, *self._values(directive, request, ref))
+                else:
+                    remark = self._change(directive, request, ref)
+                    response = DirectiveResponse(error_description=remark)
+        if self.store and directive.kind.may_reason:
             self.store.compact_if_large(self.references.held_briefly)
-        return DirectiveResponse(error_description=remark)
+        return response
 
     def _change(self, directive: Directive, request: DirectiveRequest, ref: Reference) -> str:
         """Carry out a manipulation; return what a client should know of it."""
@@ -281,11 +284,6 @@ class ArmorService:
 
 def _refusal(problem: str) -> DirectiveResponse:
     return DirectiveError(problem).response
-
-
-def _response(result: Any) -> DirectiveResponse:
-    assert isinstance(result, DirectiveResponse)
-    return result
 
 
 def _check_name(name: str) -> None:

@@ -122,13 +122,12 @@ class SparqlEngine:
         with self._lock:
             if self._closed:
                 raise DirectiveError('QUERY SPARQL: the server stops')
-            # The one that has most of it.
-            self._idle.sort(key=lambda worker: _distance(worker.version, version))
-            worker = self._idle[0] if self._idle else None
-            if worker is None:
-                worker = _Worker()
-            else:
+            if self._idle:
+                # The one that has most of it.
+                worker = min(self._idle, key=lambda idle: _distance(idle.version, version))
                 self._idle.remove(worker)
+            else:
+                worker = _Worker()
             self._busy.add(worker)
             return worker
 

@@ -18,7 +18,7 @@ from surveillance_ontology.armor.directives.table import (
     DAT,
     IND,
     OBJ,
-    Enter,
+    Run,
     flag,
     query,
     text,
@@ -418,7 +418,7 @@ _SPARQL_DIFFERS = (
 )
 
 
-def _sparql(words: str, form: str, **properties: Any) -> Enter:
+def _sparql(words: str, form: str, **properties: Any) -> Callable[[Run], Run]:
     """Enter a SPARQL query; ``form`` says in what form the rows come."""
     summary = _SPARQL_SUMMARY + form
     return query(words, text('query'), rest=1, slow=True, summary=summary, **properties)

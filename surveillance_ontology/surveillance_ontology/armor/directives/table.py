@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from enum import Enum, StrEnum
 from functools import cached_property, lru_cache
-from typing import Any, Protocol, TypeVar
+from typing import Any, TypeVar
 
 from surveillance_ontology.armor.protocol import DirectiveError, DirectiveRequest, ExitCode
 from surveillance_ontology.armor.rendering import (
@@ -26,13 +26,6 @@ from surveillance_runtime.suggestions import nearest
 
 MAX_CARDINALITY = 2**31 - 1
 Run = TypeVar('Run', bound=Callable[..., Any])
-
-
-class Enter(Protocol):
-    """A decorator that leaves the function as it is."""
-
-    def __call__(self, run: Run, /) -> Run:
-        """Enter the function in the table."""
 
 
 class Kind(Enum):
@@ -284,7 +277,9 @@ def _echo(request: DirectiveRequest) -> str:
     return ' '.join(shown(word, 40) for word in _words(request))
 
 
-def _enter(kind: Kind, words: str, arguments: Sequence[Argument], **properties: Any) -> Enter:
+def _enter(
+    kind: Kind, words: str, arguments: Sequence[Argument], **properties: Any
+) -> Callable[[Run], Run]:
     def enter(run: Run, /) -> Run:
         for spelling in words.split('|'):
             command, primary, secondary, *_ = (*spelling.split(), '', '')
@@ -300,7 +295,7 @@ def _enter(kind: Kind, words: str, arguments: Sequence[Argument], **properties: 
     return enter
 
 
-def manipulation(words: str, *arguments: Argument, **properties: Any) -> Enter:
+def manipulation(words: str, *arguments: Argument, **properties: Any) -> Callable[[Run], Run]:
     """Enter a manipulation: ``run(reference, *values) -> list of changes``.
 
     Args:
@@ -311,7 +306,7 @@ def manipulation(words: str, *arguments: Argument, **properties: Any) -> Enter:
     return _enter(Kind.MANIPULATION, words, arguments, **properties)
 
 
-def query(words: str, *arguments: Argument, **properties: Any) -> Enter:
+def query(words: str, *arguments: Argument, **properties: Any) -> Callable[[Run], Run]:
     """Enter a query: ``run(reference, *values) -> response``; see `manipulation`.
 
     ``is_consistent`` is filled in afterwards. A slow query is run without the reference's lock,
@@ -320,12 +315,12 @@ def query(words: str, *arguments: Argument, **properties: Any) -> Enter:
     return _enter(Kind.QUERY, words, arguments, **properties)
 
 
-def control(words: str, **properties: Any) -> Enter:
+def control(words: str, **properties: Any) -> Callable[[Run], Run]:
     """Enter APPLY or REASON: ``run(reference)``; see `manipulation`."""
     return _enter(Kind.CONTROL, words, (), **properties)
 
 
-def utility(words: str, *arguments: Argument, **properties: Any) -> Enter:
+def utility(words: str, *arguments: Argument, **properties: Any) -> Callable[[Run], Run]:
     """Enter a utility: ``run(service, request, *values) -> response``; see `manipulation`."""
     return _enter(Kind.UTILITY, words, arguments, **properties)
 
