@@ -4,8 +4,8 @@ rclpy's `SingleThreadedExecutor` gathers every entity of every node anew before 
 a task and two coroutines for each callback: half of the processor time of a process with all the
 patrol's nodes (230 entities, 30 waits for each simulated second). Here the entities are gathered
 when one came or went, and a callback is simply called. While messages and timers alone keep the
-process busy, the rest (most of the entities) is looked at every 10 ms, and the events of publishers
-and subscriptions every 100 ms; the waits between look only at what had a message lately.
+process busy, the rest (most of the entities) is looked at every 10 ms; the waits between look only
+at what had a message lately.
 
 rclpy's own `EventsExecutor` waits for no set at all, but in Jazzy it leaves asynchronous service
 callbacks unanswered (rclpy 1613), asks a waiting coroutine again without pause, and may end the
@@ -22,7 +22,6 @@ from contextlib import ExitStack
 from typing import Any
 
 from rclpy.callback_groups import CallbackGroup
-from rclpy.event_handler import EventHandler
 from rclpy.executors import (
     ExternalShutdownException,
     SingleThreadedExecutor,
@@ -37,11 +36,9 @@ from rclpy.waitable import NumberOfEntities
 
 _MOST_LISTS = 30
 """Wait lists that are kept: one for each set of callback groups that coroutines held at once."""
-_WORK_PERIOD = 0.01
+_EVERYTHING_PERIOD = 0.01
 """Seconds of real time between two looks at more than the messages and timers that keep the process
 busy."""
-_EVENTS_PERIOD = 0.1
-"""Seconds between two looks at the events of publishers and subscriptions, too."""
 _CHOICE_PERIOD = 1.0
 """Seconds after which it is chosen anew what keeps the process busy."""
 _BUSY_KINDS = ('timer', 'subscription')
@@ -153,11 +150,9 @@ class PatrolExecutor(SingleThreadedExecutor):  # type: ignore[misc]  # rclpy has
         # Tasks that wait, and the entity whose callback group they hold, if any.
         self._waiting: dict[Task, Any] = {}
         self._entities: dict[str, list[Any]] = {}
-        # By the groups that coroutines hold: what keeps a process busy, all work, and everything.
-        self._wait_lists: dict[
-            frozenset[CallbackGroup], tuple[_WaitList, _WaitList, _WaitList]
-        ] = {}
-        self._work_due = self._events_due = self._choice_due = 0.0
+        # By the groups that coroutines hold: what keeps a process busy, and everything.
+        self._wait_lists: dict[frozenset[CallbackGroup], tuple[_WaitList, _WaitList]] = {}
+        self._everything_due = self._choice_due = 0.0
         self._lately_called: set[Any] = set()
         self._changed = True
         self._take: dict[str, Callable[[Any], Any]] = {
@@ -221,24 +216,20 @@ class PatrolExecutor(SingleThreadedExecutor):  # type: ignore[misc]  # rclpy has
             if len(self._wait_lists) >= _MOST_LISTS:
                 self._close_wait_lists()
             self._wait_lists[held] = self._new_wait_lists()
-        busy, work, everything = self._wait_lists[held]
+        busy, everything = self._wait_lists[held]
         now = time.monotonic()
         try:
             if now >= self._choice_due:
                 busy.look_only_at(self._lately_called)
                 self._lately_called.clear()
                 self._choice_due = now + _CHOICE_PERIOD
-            if now < self._work_due:
+            if now < self._everything_due:
                 self._ready.extend(busy.wait(0))
-            elif now < self._events_due:
-                self._ready.extend(work.wait(0))
-                self._work_due = now + _WORK_PERIOD
             if not self._ready:
                 for kind, entity in everything.wait(timeout):
                     if entity.callback_group is not None:  # as the executor's own guards have
                         self._ready.append((kind, entity))
-                now = time.monotonic()
-                self._work_due, self._events_due = now + _WORK_PERIOD, now + _EVENTS_PERIOD
+                self._everything_due = time.monotonic() + _EVERYTHING_PERIOD
         except _rclpy.InvalidHandle:
             self._changed = True  # another thread has just destroyed something
 
@@ -264,20 +255,15 @@ class PatrolExecutor(SingleThreadedExecutor):  # type: ignore[misc]  # rclpy has
         self._wait_lists.clear()
         self._lately_called.clear()
 
-    def _new_wait_lists(self) -> tuple[_WaitList, _WaitList, _WaitList]:
+    def _new_wait_lists(self) -> tuple[_WaitList, _WaitList]:
         """Return what may be waited for now: entities whose groups are not held."""
         free = {
             kind: [each for each in entities if each.callback_group.can_execute(each)]
             for kind, entities in self._entities.items()
         }
         busy = {kind: each if kind in _BUSY_KINDS else [] for kind, each in free.items()}
-        work = {
-            kind: [each for each in entities if not isinstance(each, EventHandler)]
-            for kind, entities in free.items()
-        }
         return (
             _WaitList(busy, [], self._context),
-            _WaitList(work, [], self._context),
             _WaitList(free, [self._guard, self._sigint_gc], self._context),
         )
 
