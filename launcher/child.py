@@ -7,6 +7,7 @@ with TARGET as `name=module:Class`. Started as a file, so it imports nothing of 
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
 import importlib
 import os
@@ -29,9 +30,10 @@ def end_with_parent(parent: int) -> None:
 
 def say_up() -> None:
     """Tell the launcher that the imports, most of the start, are done: the next one may begin."""
-    descriptor = os.environ.pop(launch_protocol.UP, None)
+    descriptor = os.environ.get(launch_protocol.HEARTBEAT)
     if descriptor is not None:
-        os.close(int(descriptor))
+        with contextlib.suppress(OSError):  # the launcher is gone
+            os.write(int(descriptor), launch_protocol.UP)
 
 
 def limit_memory() -> None:

@@ -224,8 +224,8 @@ class Supervisor:
 
     def _start(self, child: Child) -> None:
         child.finished, child.done, child.ended_for = False, False, ''
-        with self._pipe(self._when_up(child)) as up, self._pipe(self._when_it_beats(child)) as beat:
-            process = self._spawn(child, {UP: up, HEARTBEAT: beat})
+        with self._pipe(self._when_it_tells(child)) as writer:
+            process = self._spawn(child, writer)
         child.process = process
         child.started = time.monotonic()
         child.starts += 1
@@ -256,41 +256,35 @@ class Supervisor:
         finally:
             os.close(writer)
 
-    def _when_up(self, child: Child) -> Callable[[bytes], None]:
-        """Return what is told that a process is up, or is dead before that."""
+    def _when_it_tells(self, child: Child) -> Callable[[bytes], None]:
+        """Return what takes the bytes that a process tells of itself (`launch_protocol`)."""
         child.coming_up = True
-
-        def up(_nothing: bytes) -> None:
-            child.coming_up = False
-            self._start_next()
-
-        return up
-
-    def _when_it_beats(self, child: Child) -> Callable[[bytes], None]:
-        """Return what is told a process's heartbeats."""
         heartbeats = child.heartbeats = Heartbeats(time.monotonic())
 
-        def beat(chunk: bytes) -> None:
-            if chunk and child.heartbeats is heartbeats:
+        def take(told: bytes) -> None:
+            if child.heartbeats is not heartbeats:
+                return  # the process before
+            if UP in told:
+                child.coming_up = False
+            if told.strip(UP):
                 heartbeats.beat(time.monotonic())
-                child.finished = child.finished or FINISHED in chunk
-                child.done = child.done or DONE in chunk
-                # Who is alone has nobody who could have forgotten it.
-                if SLEPT in chunk and len(self.children) > 1:
-                    self._end(child, 'slept so long that its peers may have forgotten it')
+            child.finished = child.finished or FINISHED in told
+            child.done = child.done or DONE in told
+            # Who is alone has nobody who could have forgotten it.
+            if SLEPT in told and len(self.children) > 1:
+                self._end(child, 'slept so long that its peers may have forgotten it')
 
-        return beat
+        return take
 
-    def _spawn(self, child: Child, given: Mapping[str, int]) -> subprocess.Popen[bytes]:
-        environ = {**child.program.environ, RESTARTS: str(child.starts)}
-        environ |= {name: str(descriptor) for name, descriptor in given.items()}
+    def _spawn(self, child: Child, writer: int) -> subprocess.Popen[bytes]:
+        environ = {**child.program.environ, HEARTBEAT: str(writer), RESTARTS: str(child.starts)}
         if child.program.memory:
             # What is mapped is more than what is held.
             environ[MEMORY] = str(2 * child.program.memory + 2**30)
         return subprocess.Popen(
             child.program.command,
             env=environ,
-            pass_fds=tuple(given.values()),
+            pass_fds=(writer,),
             stdin=subprocess.PIPE if child.program.takes_input else subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
@@ -307,6 +301,7 @@ class Supervisor:
             code = process.wait()
             self._close(child, process)
             child.process = child.kill_at = None
+            child.coming_up = False
             self._after_death(child, code)
             child.heartbeats = None
 

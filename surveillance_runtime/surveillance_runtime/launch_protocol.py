@@ -1,6 +1,6 @@
 """What the launcher and the processes that it starts say to each other, exit codes included.
 
-A process gets descriptors of pipes and its limits in environment variables, and writes bytes.
+A process gets the descriptor of a pipe and its limits in environment variables, and writes bytes.
 """
 
 from __future__ import annotations
@@ -8,10 +8,8 @@ from __future__ import annotations
 import os
 import signal
 
-UP = 'LAUNCH_UP'
-"""A descriptor that a process closes to say that the bulk of its start is done."""
 HEARTBEAT = 'LAUNCH_HEARTBEAT'
-"""A descriptor that a process writes `BEAT`, `SLEPT`, `FINISHED` or `DONE` to."""
+"""A descriptor that a process writes `UP`, `BEAT`, `SLEPT`, `FINISHED` or `DONE` to."""
 RESTARTS = 'LAUNCH_RESTARTS'
 """How often the process has been started again."""
 MEMORY = 'LAUNCH_MEMORY'
@@ -21,6 +19,8 @@ ONE_THREAD = dict.fromkeys(('OPENBLAS_NUM_THREADS', 'OMP_NUM_THREADS', 'MKL_NUM_
 """Has the libraries behind NumPy and SciPy work on the calling thread alone, see `process`. They
 read it when they are loaded, before a process can say so itself."""
 
+UP = b'U'
+"""The bulk of its start is done."""
 BEAT = b'.'
 """The process runs."""
 SLEPT = b'S'

@@ -139,7 +139,7 @@ def test_no_more_processes_come_up_at_once_than_allowed(start):
     slow = (
         'import os, signal\n'
         'print("coming", flush=True); input(); print("up", flush=True)\n'
-        'os.close(int(os.environ["LAUNCH_UP"])); signal.pause()'
+        'os.write(int(os.environ["LAUNCH_HEARTBEAT"]), b"U"); signal.pause()'
     )
     programs = (f'one={slow}', f'two={FINISHED}', f'three={WAIT}')
     launch = start(DRIVER, *programs, environ={**USER_ENVIRON, 'AT_ONCE': '1'})
