@@ -29,7 +29,7 @@ from surveillance_interfaces.msg import OntologyMap
 from surveillance_interfaces.srv import ReferenceName
 from surveillance_runtime.files import KeptFile
 from surveillance_runtime.node import PatrolNode
-from surveillance_runtime.place.parameters import described_place
+from surveillance_runtime.place import described_place
 from surveillance_runtime.process import run_node
 from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
 from surveillance_runtime.waiting import AwaitedEvent

@@ -25,8 +25,7 @@ from surveillance_ontology.patrol_ontology import PatrolOntology, checked_names
 from surveillance_runtime.conversions import point_from, point_message
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.parameters import ParameterError
-from surveillance_runtime.place import Place, PlaceError
-from surveillance_runtime.place.parameters import described_place
+from surveillance_runtime.place import Place, PlaceError, described_place
 from surveillance_runtime.process import run_node
 from surveillance_runtime.qos import STATE_QOS
 from surveillance_runtime.waiting import AwaitedEvent, AwaitedWork

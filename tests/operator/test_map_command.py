@@ -14,8 +14,7 @@ from PIL import Image
 
 from surveillance_behaviour.mission.mission_log import MissionRecord
 from surveillance_operator import map_command
-from surveillance_runtime.place.canvas import Canvas, blend
-from surveillance_runtime.place.drawing import draw_place
+from surveillance_runtime.place.drawing import Canvas, blend, draw_place
 from surveillance_simulation.world.world import read_world
 
 CONFIG = Path(__file__).parents[2] / 'config'

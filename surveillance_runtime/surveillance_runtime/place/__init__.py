@@ -2,14 +2,16 @@
 
 `Place` is what the nodes share: rooms, the doors that join them, a point in each. `FloorPlan` adds
 what the place's file says of walls, doors and markers, and `Regions` which room a point lies in.
-`read_place_file` reads and checks a file; `python -m surveillance_runtime.place.generation` writes
-regular ones; `surveillance_runtime.place.drawing` draws them.
+`read_place_file` reads and checks a file, `described_place` the parameters of a node;
+`python -m surveillance_runtime.place.generation` writes regular files;
+`surveillance_runtime.place.drawing` draws places.
 """
 
+from surveillance_runtime.place.description import PlaceFile as PlaceFile
+from surveillance_runtime.place.description import checked_place as checked_place
+from surveillance_runtime.place.description import described_place as described_place
+from surveillance_runtime.place.description import read_place_file as read_place_file
 from surveillance_runtime.place.floor_plan import FloorPlan as FloorPlan
-from surveillance_runtime.place.place_file import PlaceFile as PlaceFile
-from surveillance_runtime.place.place_file import checked_place as checked_place
-from surveillance_runtime.place.place_file import read_place_file as read_place_file
 from surveillance_runtime.place.regions import Regions as Regions
 from surveillance_runtime.place.regions import check_passable as check_passable
 from surveillance_runtime.place.rooms import Place as Place

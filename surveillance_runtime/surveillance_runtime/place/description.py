@@ -1,12 +1,16 @@
-"""A place's file, read and checked: its rooms always, its walls and doors where it has them."""
+"""A place as a file or the parameters of a node describe it, read and checked.
+
+Rooms always, walls and doors where they are given.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+from surveillance_runtime.parameters import ParameterError, parameter
 from surveillance_runtime.place.floor_plan import FloorPlan
 from surveillance_runtime.place.regions import Regions, check_passable
 from surveillance_runtime.place.rooms import (
@@ -14,12 +18,16 @@ from surveillance_runtime.place.rooms import (
     PLACE_KEYS,
     Place,
     PlaceError,
+    make_place,
     place_from,
     tables_of,
 )
 from surveillance_runtime.robot_base import ROBOT_RADIUS
 from surveillance_runtime.suggestions import nearest
 from surveillance_runtime.yaml_file import YamlFile, parameters_of, read_yaml_file
+
+if TYPE_CHECKING:
+    from surveillance_runtime.node import PatrolNode
 
 
 @dataclass(frozen=True)
@@ -92,3 +100,48 @@ def checked_place(
     Regions(plan)
     check_passable(plan, radius)
     return plan.place, plan
+
+
+@dataclass(frozen=True)
+class PlaceSettings:
+    """Parameters of the place that describe no room."""
+
+    map_source: str = parameter(
+        'configuration',
+        'Where the map comes from: the parameters, or the markers that the robot finds.',
+        choices=('configuration', 'markers'),
+    )
+    robot_room: str = parameter(
+        '', 'Room in which the robot starts; empty with markers: the one nearest to it.'
+    )
+    recharge_rooms: tuple[str, ...] = parameter(
+        (), 'Rooms with a charging station; they are never removed.', of=str
+    )
+
+
+def described_place(
+    node: PatrolNode, source: str = 'configuration', *, required: bool = False
+) -> Place | None:
+    """Declare where the map comes from, and make the place that the parameters describe.
+
+    Args:
+        node: The node.
+        source: Default of the parameter `map_source`.
+        required: Whether the parameters must describe one if that is where the map comes from.
+
+    Returns:
+        None when the map comes from markers, or when none is described and none required.
+
+    Raises:
+        ParameterError: A parameter is of the wrong type, or what is described is not a place.
+    """
+    settings = node.declare_fields(PlaceSettings(source))
+    if settings.map_source == 'markers':
+        return None
+    rooms, positions = node.parameters_under('map'), node.parameters_under('room_positions')
+    if not rooms and not positions and not required:
+        return None
+    try:
+        return make_place(rooms, positions, settings.robot_room, settings.recharge_rooms)
+    except PlaceError as error:
+        raise ParameterError(f'{node.get_name()}: parameter {error}') from None
