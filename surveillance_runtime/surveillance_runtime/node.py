@@ -41,7 +41,7 @@ from rclpy.timer import Timer
 from surveillance_fsm import Interrupt
 from surveillance_fsm.ros.waiting import CLIENT_QOS, SERVICE_QOS
 from surveillance_runtime.configuration import RosArguments, Setting, read_schema
-from surveillance_runtime.health import Health
+from surveillance_runtime.diagnostics import Health
 from surveillance_runtime.logging import CleanLogger, clean
 from surveillance_runtime.parameters import ParameterError, ParameterSpec, specs_of, with_values
 

@@ -9,9 +9,8 @@ from typing import Any, cast
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 
-from surveillance_runtime import diagnostics, health
-from surveillance_runtime.diagnostics import DiagnosticsThread, Heartbeat
-from surveillance_runtime.health import ERROR, OK, WARN, Health
+from surveillance_runtime import diagnostics
+from surveillance_runtime.diagnostics import ERROR, OK, WARN, DiagnosticsThread, Health, Heartbeat
 from surveillance_runtime.launch_protocol import HEARTBEAT, RESTARTS
 from surveillance_runtime.node import PatrolNode, report_exception
 
@@ -44,7 +43,7 @@ class Watched:
 def watched(graph: Any, monkeypatch: pytest.MonkeyPatch) -> Iterator[Watched]:
     monkeypatch.setattr(diagnostics, 'PERIOD', 0.05)
     monkeypatch.setattr(diagnostics, 'RECENT', 0.3)
-    monkeypatch.setattr(health, 'RECENT', 0.3)
+    monkeypatch.setattr(diagnostics, 'RECENT', 0.3)
     monkeypatch.setenv(RESTARTS, '2')
     made = Watched(graph)
     yield made
