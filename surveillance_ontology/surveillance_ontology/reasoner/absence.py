@@ -192,7 +192,7 @@ class Absences:
         elif isinstance(atom, SameAtom):
             yield bound, values[0] == values[1], None
         else:
-            yield bound, atom.test(values[0]), None
+            yield bound, atom.values.contains(values[0]), None
 
     def _computed(
         self, atom: ComputedAtom, values: list[Any], bound: dict[Term, Any]

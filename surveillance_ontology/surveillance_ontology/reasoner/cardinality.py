@@ -21,6 +21,7 @@ from surveillance_ontology.reasoner.clauses import (
     Premises,
 )
 from surveillance_ontology.reasoner.difference import Difference, clique, cliques
+from surveillance_ontology.reasoner.value_sets import ValueSet
 
 Emit = Callable[[Fact], None]
 MergeRequest = Callable[[str, str, Axiom | None, Premises], None]
@@ -41,7 +42,7 @@ class _Counter:
         self.pred: dict[Any, dict[Any, None]] = self.prop.succ if self.inverse else self.prop.pred
         filler = condition.filler
         self.filler = filler if isinstance(filler, Predicate) else None
-        self.test = None if isinstance(filler, Predicate) else filler
+        self.values = filler if isinstance(filler, ValueSet) else None
         self._hooks: list[tuple[list[Any], Any]] = []
 
     def hook(self, place: list[Any], what: Any) -> None:
@@ -61,9 +62,8 @@ class _Counter:
         if self.filler is not None:
             members = self.filler.members
             return [y for y in values if y in members]
-        if self.test is not None:
-            test = self.test
-            return [v for v in values if test(v)]
+        if self.values is not None:
+            return list(filter(self.values.contains, values))
         return list(values)
 
     def facts(self, z: str, values: list[Any]) -> Premises:

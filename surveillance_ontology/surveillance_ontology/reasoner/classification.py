@@ -328,19 +328,16 @@ class Classification:
         filler = existential.filler
         clauses: list[Clause] = []
         if isinstance(filler, ValueSet):
-            if condition.values is not None:
-                if not filler.within(condition.values):
-                    return
-                assert condition.filler is not None
             atoms: tuple[BodyAtom, ...] = (*body, wide)
-            if callable(condition.filler) and condition.values is not None:
-                atoms = (*atoms, RangeAtom(condition.filler, (_Y,), condition.values))
+            outside, counted = ~filler, condition.filler
+            if isinstance(counted, ValueSet):
+                if not filler.within(counted):
+                    return
+                atoms = (*atoms, RangeAtom(counted, (_Y,)))
+                outside = outside & counted
             clauses.append(Clause(atoms, narrow, existential.origin))
-            outside = ~filler
-            if condition.values is not None:
-                outside = outside & condition.values
             if not outside.is_empty:
-                atom = RangeAtom(outside.contains, (_Y,), outside)
+                atom = RangeAtom(outside, (_Y,))
                 nothing = PredicateAtom(self.program.nothing, (_X,))
                 clauses.append(Clause((*atoms, atom), nothing, existential.origin))
         else:

@@ -13,7 +13,7 @@ from typing import Any, TypeAlias, TypeVar
 
 from surveillance_ontology.owl.axioms import Axiom
 from surveillance_ontology.owl.expressions import ClassExpression, PropertyExpression
-from surveillance_ontology.reasoner.datatypes import Test, Value
+from surveillance_ontology.reasoner.datatypes import Value
 from surveillance_ontology.reasoner.value_sets import ValueSet
 
 T = TypeVar('T')
@@ -159,11 +159,8 @@ class SameAtom:
 
 @dataclass(frozen=True, slots=True)
 class RangeAtom:
-    """`values` holds what passes the test."""
-
-    test: Test
+    values: ValueSet
     terms: tuple[Term]
-    values: ValueSet = field(compare=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -206,17 +203,15 @@ class Clause:
 class AtLeast:
     """`head` holds of what has `n` pairwise different related individuals (values) in the filler.
 
-    `inverse` counts along the property backwards; `filler` None admits every individual; `values`
-    is what a test as filler admits.
+    `inverse` counts along the property backwards; `filler` None admits everything.
     """
 
     head: Predicate
     n: int
     prop: Predicate
     inverse: bool
-    filler: Predicate | Test | None
+    filler: Predicate | ValueSet | None
     origin: Axiom | None = field(default=None, compare=False)
-    values: ValueSet | None = field(default=None, compare=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -229,9 +224,8 @@ class AtMost:
     n: int
     prop: Predicate
     inverse: bool
-    filler: Predicate | Test | None
+    filler: Predicate | ValueSet | None
     origin: Axiom | None = field(default=None, compare=False)
-    values: ValueSet | None = field(default=None, compare=False)
 
 
 @dataclass(frozen=True, slots=True)

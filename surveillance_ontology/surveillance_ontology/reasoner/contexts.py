@@ -756,7 +756,8 @@ class Contexts:
         return found
 
     def _counted_values(self, context: Context, condition: AtLeast | AtMost) -> list[_Values]:
-        admitted = condition.values
+        admitted = condition.filler
+        assert not isinstance(admitted, Predicate)
         return [
             held
             for held in context.values

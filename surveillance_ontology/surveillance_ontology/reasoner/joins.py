@@ -135,7 +135,7 @@ class _Writer:
             else:
                 self.bind(second, self.text(first))
         elif isinstance(atom, RangeAtom):
-            self.open(f'if {self.use(atom.test)}({self.text(atom.terms[0])}):')
+            self.open(f'if {self.use(atom.values.contains)}({self.text(atom.terms[0])}):')
         elif atom.solve is None:
             arguments = ', '.join(map(self.text, atom.terms))
             self.open(f'if {self.use(atom.holds)}({arguments}):')

@@ -148,7 +148,7 @@ class _Keys:
             if isinstance(atom, PredicateAtom):
                 return (self.predicate(atom.predicate), terms)
             if isinstance(atom, RangeAtom):
-                return ('range', atom.values, terms)
+                return (atom.values, terms)
             if isinstance(atom, ComputedAtom):
                 return ('computed', atom.builtin, terms)
             return (type(atom), terms)
@@ -173,13 +173,12 @@ class _Keys:
         """Return a condition by its parts."""
         return tuple(self._value(getattr(record, entry.name)) for entry in fields(record))
 
-    def _value(self, value: Any) -> _Key:
+    def _value(self, value: Any) -> Any:
         if isinstance(value, Predicate):
             return self.predicate(value)
         if isinstance(value, tuple):
             return tuple(map(self._value, value))
-        # A test is made anew by each translation; what it admits stands beside it.
-        return 'test' if callable(value) else value
+        return value
 
 
 class _Translation:

