@@ -8,7 +8,7 @@ those of `datatypes`.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields, replace
 from typing import Any, TypeAlias, TypeVar
 
 from surveillance_ontology.owl.axioms import Axiom
@@ -340,6 +340,20 @@ class Program:
         yield from self.datas.values()
         yield from self.labels.values()
         yield from self.negatives.values()
+
+
+def with_predicates(record: T, predicate: Callable[[Predicate], Predicate]) -> T:
+    """Return a clause, an atom or a condition with what `predicate` gives for its predicates."""
+    changed: dict[str, Any] = {}
+    for entry in fields(record):  # type: ignore[arg-type]
+        value = getattr(record, entry.name)
+        if isinstance(value, Predicate):
+            changed[entry.name] = predicate(value)
+        elif entry.name == 'body':
+            changed['body'] = tuple(with_predicates(atom, predicate) for atom in value)
+        elif entry.name == 'head':
+            changed['head'] = with_predicates(value, predicate)
+    return replace(record, **changed) if changed else record  # type: ignore[type-var]
 
 
 def closure(start: T, following: Callable[[T], Iterable[T]]) -> dict[T, None]:

@@ -8,8 +8,8 @@ such a part differs, the engine is made anew.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Iterable
-from dataclasses import dataclass, fields, replace
+from collections.abc import Callable, Hashable, Iterator
+from dataclasses import dataclass, fields
 from typing import Any, TypeVar
 
 from surveillance_ontology.reasoner.clauses import (
@@ -25,11 +25,13 @@ from surveillance_ontology.reasoner.clauses import (
     RangeAtom,
     SameAtom,
     Term,
+    with_predicates,
 )
 from surveillance_ontology.reasoner.threshold_rules import split_rule
 
 _Key = Hashable
 _Pair = tuple[Predicate, Predicate]
+_Rename = Callable[[Predicate], Predicate]
 _N = TypeVar('_N')
 
 
@@ -79,30 +81,32 @@ class ProgramChange:
 
 def program_change(running: Program, wanted: Program) -> ProgramChange | None:
     """Return what is to be done to a running program; None where it takes a new engine."""
-    old, new = _Keys(running), _Keys(wanted)
-    if old.rest() != new.rest():
+    mine = _Predicates(running, wanted)
+    if _rest(running, _itself) != _rest(wanted, mine):
         return None
     present: dict[_Key, list[Clause]] = {}
     for clause in running.clauses:
-        present.setdefault(old.clause(clause), []).append(clause)
-    of_running = _Translation(running, old, new)
+        present.setdefault(_clause_key(clause, _itself), []).append(clause)
     clauses: list[Clause] = []
     added: list[Clause] = []
-    for key, clause in {new.clause(clause): clause for clause in wanted.clauses}.items():
+    for key, clause in {_clause_key(clause, mine): clause for clause in wanted.clauses}.items():
         same = present.pop(key, None)
         if same is None:
-            same = [of_running.record(clause)]
+            same = [with_predicates(clause, mine)]
             added += same
         clauses += same
     removed = [clause for gone in present.values() for clause in gone]
     if any(isinstance(c.head, SameAtom) or split_rule(c) is not None for c in (*removed, *added)):
         return None
-    kept = {old.record(limit): limit for limit in running.at_most}
-    limits = [kept.get(new.record(limit)) or of_running.record(limit) for limit in wanted.at_most]
-    before = _disjoint(running, lambda one: one)
-    after = _disjoint(wanted, of_running.predicate)
+    kept = {_record_key(limit, _itself): limit for limit in running.at_most}
+    limits = [
+        kept.get(_record_key(limit, mine)) or with_predicates(limit, mine)
+        for limit in wanted.at_most
+    ]
+    before = _disjoint(running, _itself)
+    after = _disjoint(wanted, mine)
     for one in wanted.predicates():
-        if of_running.predicate(one) is one:
+        if mine(one) is one:
             one.disjoint = set()  # The running engine fills it, in its own predicates.
     return ProgramChange(
         wanted,
@@ -112,98 +116,90 @@ def program_change(running: Program, wanted: Program) -> ProgramChange | None:
         [pair for pair in after if pair not in before and pair[::-1] not in before],
         [pair for pair in before if pair not in after and pair[::-1] not in after],
         limits,
-        [of_running.record(existential) for existential in wanted.existentials],
-        [tuple(map(of_running.record, pair)) for pair in wanted.meetings],
-        of_running.predicate,
+        [with_predicates(existential, mine) for existential in wanted.existentials],
+        [tuple(with_predicates(one, mine) for one in pair) for pair in wanted.meetings],
+        mine,
     )
 
 
-class _Keys:
-    """Names the parts of one program so that equal ones of another have equal names."""
+class _Predicates:
+    """Gives the running program's predicate for one of a wanted program.
 
-    def __init__(self, program: Program) -> None:
-        self._program = program
-        self._fixed: dict[Predicate, _Key] = {
-            program.thing: 'thing',
-            program.nothing: 'nothing',
-            program.apart: 'apart',
-            program.same: 'same',
-        }
-        for prop, negative in program.negatives.items():
-            self._fixed[negative] = ('not', prop.kind, prop.expression)
+    Where it has none, the wanted program's own is taken, from then on.
+    """
 
-    def predicate(self, predicate: Predicate) -> _Key:
-        """Return what the predicate stands for."""
-        return self._fixed.get(predicate) or (predicate.kind, predicate.expression)
+    def __init__(self, running: Program, wanted: Program) -> None:
+        self._fixed = {getattr(wanted, name): getattr(running, name) for name in _FIXED}
+        self._known = {(one.kind, one.expression): one for one in _named(running)}
+        negatives = {self(prop): negative for prop, negative in running.negatives.items()}
+        for prop, negative in wanted.negatives.items():
+            self._fixed[negative] = negatives.get(self(prop), negative)
 
-    def clause(self, clause: Clause) -> _Key:
-        """Return the clause with its variables numbered as they come; its axiom is part of it."""
-        numbers: dict[int, int] = {}
-
-        def term(term: Term) -> _Key:
-            return numbers.setdefault(term, len(numbers)) if isinstance(term, int) else term
-
-        def atom(atom: BodyAtom | HeadAtom) -> _Key:
-            terms = tuple(map(term, atom.terms))
-            if isinstance(atom, PredicateAtom):
-                return (self.predicate(atom.predicate), terms)
-            if isinstance(atom, RangeAtom):
-                return (atom.values, terms)
-            if isinstance(atom, ComputedAtom):
-                return ('computed', atom.builtin, terms)
-            return (type(atom), terms)
-
-        body = tuple(map(atom, clause.body))
-        return (body, atom(clause.head), clause.origin, clause.named_only)
-
-    def rest(self) -> _Key:
-        """Return all but clauses and what serves the classification alone."""
-        program, predicate = self._program, self.predicate
-        return (
-            program.uses_thing,
-            tuple(map(self.record, program.at_least)),
-            tuple(map(self.record, program.keys)),
-            tuple(map(predicate, program.irreflexive)),
-            tuple(map(predicate, program.asymmetric)),
-            tuple(map(self._value, program.disjoint_properties)),
-            frozenset(map(predicate, program.negatives.values())),
-        )
-
-    def record(self, record: Any) -> _Key:
-        """Return a condition by its parts."""
-        return tuple(self._value(getattr(record, entry.name)) for entry in fields(record))
-
-    def _value(self, value: Any) -> Any:
-        if isinstance(value, Predicate):
-            return self.predicate(value)
-        if isinstance(value, tuple):
-            return tuple(map(self._value, value))
-        return value
+    def __call__(self, predicate: Predicate) -> Predicate:
+        fixed = self._fixed.get(predicate)
+        return fixed or self._known.setdefault((predicate.kind, predicate.expression), predicate)
 
 
-class _Translation:
-    """Writes parts of a wanted program in the predicates of the running one."""
+_FIXED = ('thing', 'nothing', 'apart', 'same')
 
-    def __init__(self, running: Program, old: _Keys, new: _Keys) -> None:
-        self._known = {old.predicate(one): one for one in _all(running)}
-        self._key = new.predicate
 
-    def predicate(self, predicate: Predicate) -> Predicate:
-        """Return the running program's predicate; where it has none, this one from now on."""
-        return self._known.setdefault(self._key(predicate), predicate)
+def _itself(predicate: Predicate) -> Predicate:
+    return predicate
 
-    def record(self, record: Any) -> Any:
-        """Return a clause, an atom or a condition, rewritten."""
-        changed: dict[str, Any] = {}
-        for entry in fields(record):
-            value = getattr(record, entry.name)
-            if isinstance(value, Predicate):
-                changed[entry.name] = self.predicate(value)
-            elif entry.name == 'body':
-                changed['body'] = tuple(map(self.record, value))
-            elif entry.name == 'head':
-                changed['head'] = self.record(value)
-        return replace(record, **changed) if changed else record
+
+def _named(program: Program) -> Iterator[Predicate]:
+    """Yield the predicates that stand for an expression."""
+    atoms = (atom for clause in program.clauses for atom in (*clause.body, clause.head))
+    used = (atom.predicate for atom in atoms if isinstance(atom, PredicateAtom))
+    return (one for one in (*program.predicates(), *used) if one.expression is not None)
+
+
+# --- keys: equal for what is the same in two programs ---
+
+
+def _clause_key(clause: Clause, predicate: _Rename) -> _Key:
+    """Return the clause with its variables numbered as they come; its axiom is part of it."""
+    numbers: dict[int, int] = {}
+
+    def term(term: Term) -> _Key:
+        return numbers.setdefault(term, len(numbers)) if isinstance(term, int) else term
+
+    def atom(atom: BodyAtom | HeadAtom) -> _Key:
+        terms = tuple(map(term, atom.terms))
+        if isinstance(atom, PredicateAtom):
+            return (predicate(atom.predicate), terms)
+        if isinstance(atom, RangeAtom):
+            return (atom.values, terms)
+        if isinstance(atom, ComputedAtom):
+            return (atom.builtin, terms)
+        return (type(atom), terms)
+
+    body = tuple(map(atom, clause.body))
+    return (body, atom(clause.head), clause.origin, clause.named_only)
+
+
+def _record_key(record: Any, predicate: _Rename) -> _Key:
+    """Return a condition by its parts."""
+    return tuple(_value_key(getattr(record, entry.name), predicate) for entry in fields(record))
+
+
+def _value_key(value: Any, predicate: _Rename) -> Any:
+    if isinstance(value, tuple):
+        return tuple(_value_key(part, predicate) for part in value)
+    return predicate(value) if isinstance(value, Predicate) else value
+
+
+def _rest(program: Program, predicate: _Rename) -> _Key:
+    """Return all but clauses and what serves the classification alone."""
+    return (
+        program.uses_thing,
+        tuple(_record_key(condition, predicate) for condition in program.at_least),
+        tuple(_record_key(key, predicate) for key in program.keys),
+        tuple(map(predicate, program.irreflexive)),
+        tuple(map(predicate, program.asymmetric)),
+        tuple(_value_key(pair, predicate) for pair in program.disjoint_properties),
+        frozenset(map(predicate, program.negatives.values())),
+    )
 
 
 def _disjoint(program: Program, predicate: Callable[[Predicate], Predicate]) -> dict[_Pair, None]:
@@ -215,12 +211,3 @@ def _disjoint(program: Program, predicate: Callable[[Predicate], Predicate]) -> 
             if pair[::-1] not in found:
                 found[pair] = None
     return found
-
-
-def _all(program: Program) -> Iterable[Predicate]:
-    yield program.same
-    yield from program.predicates()
-    for clause in program.clauses:
-        for atom in (*clause.body, clause.head):
-            if isinstance(atom, PredicateAtom):
-                yield atom.predicate

@@ -21,6 +21,7 @@ from surveillance_ontology.reasoner.clauses import (
     PredicateAtom,
     Program,
     closure,
+    with_predicates,
 )
 
 Condition = TypeVar('Condition', AtLeast, AtMost)
@@ -76,38 +77,20 @@ def _replace_aliases(program: Program, kept: set[Predicate]) -> None:
 
 
 def _substitute(program: Program, alias: dict[Predicate, Predicate]) -> None:
-    def atom_of(atom: BodyAtom) -> BodyAtom:
-        if isinstance(atom, PredicateAtom) and atom.predicate in alias:
-            return PredicateAtom(alias[atom.predicate], atom.terms)
-        return atom
+    def other(predicate: Predicate) -> Predicate:
+        return alias.get(predicate, predicate)
 
     clauses: dict[Clause, None] = {}
-    for clause in program.clauses:
-        body = tuple(dict.fromkeys(map(atom_of, clause.body)))
-        head = atom_of(clause.head)
-        if head not in body:
-            clauses[Clause(body, head, clause.origin, clause.named_only)] = None  # type: ignore[arg-type]
+    for clause in (with_predicates(clause, other) for clause in program.clauses):
+        body = tuple(dict.fromkeys(clause.body))
+        if clause.head not in body:
+            clauses[replace(clause, body=body)] = None
     program.clauses = list(clauses)
-    program.at_least = [
-        replace(condition, filler=alias.get(condition.filler, condition.filler))  # type: ignore[arg-type]
-        for condition in program.at_least
-    ]
-    program.at_most = [
-        replace(
-            condition,
-            label=alias.get(condition.label, condition.label),  # type: ignore[arg-type]
-            filler=alias.get(condition.filler, condition.filler),  # type: ignore[arg-type]
-        )
-        for condition in program.at_most
-    ]
-    program.keys = [replace(key, cls=alias.get(key.cls, key.cls)) for key in program.keys]  # type: ignore[arg-type]
-    program.existentials = [
-        replace(existential, label=alias.get(existential.label, existential.label))
-        for existential in program.existentials
-    ]
-    program.labels = {
-        expression: alias.get(label, label) for expression, label in program.labels.items()
-    }
+    program.at_least = [with_predicates(condition, other) for condition in program.at_least]
+    program.at_most = [with_predicates(condition, other) for condition in program.at_most]
+    program.keys = [with_predicates(key, other) for key in program.keys]
+    program.existentials = [with_predicates(one, other) for one in program.existentials]
+    program.labels = {expression: other(label) for expression, label in program.labels.items()}
 
 
 def _prune(program: Program, kept: set[Predicate]) -> None:
