@@ -25,7 +25,7 @@ from surveillance_fsm.execution import ExecutionThread, LeftBehindError
 from surveillance_fsm.frame import Answer, Frame, History, Move, answer_of
 from surveillance_fsm.nodes import SUSPENDED, Exit, LimitOptions, Node
 from surveillance_fsm.state import State, this_thread
-from surveillance_fsm.timeouts import leave_behind, supervise
+from surveillance_fsm.timeouts import leave_behind, settled, supervise
 
 Outcomes = dict[str, str | None]
 ChildTerminationCallback = Callable[[Outcomes], bool | Iterable[str] | None]
@@ -85,7 +85,7 @@ class ChildFrame(Frame):
 
     def run_on(self, outcome: Any) -> Any:
         """Take `outcome` for that of the state."""
-        return self.settled(outcome)
+        return settled(self, outcome)
 
     def answer(self) -> Answer:
         """Tell what the state's end answers, and take back what it did not acknowledge."""

@@ -332,13 +332,9 @@ class Container(State):
             **kwargs: ``transitions``: a mapping of outcomes to targets that every state added
                 inside takes for those of its outcomes that it does not bind itself.
         """
-        self.open(**kwargs)
-        try:
+        with self:
+            _construction.stack[-1] = self, kwargs
             yield self
-        except BaseException:
-            self._leave_construction()
-            raise
-        self.close()
 
     def open(self, **kwargs: Any) -> None:
         """Make this the container that states are added to in this thread."""

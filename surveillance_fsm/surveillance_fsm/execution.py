@@ -20,6 +20,7 @@ import threading
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING, Any
 
 from surveillance_fsm import log
@@ -422,7 +423,7 @@ class Work:
             worker = _idle.pop()
         except IndexError:
             worker = _Worker()
-        worker.give(self)
+        worker.given.put(self)
 
     def is_going_on(self) -> bool:
         """Tell whether it has not ended."""
@@ -465,32 +466,29 @@ os.register_at_fork(after_in_child=_idle.clear)
 
 
 class _Worker:
-    """A thread of the interpreter that does one piece of work after another."""
+    """A thread of the interpreter that does one piece of work after another.
+
+    Attributes:
+        given: What it is to do; one that is idle is given one piece.
+    """
 
     def __init__(self) -> None:
-        self._given = threading.Lock()
-        self._given.acquire()
-        self._work: Work | None = None
+        self.given: SimpleQueue[Work] = SimpleQueue()
         self._thread = threading.Thread(target=self._serve, name='state machine', daemon=True)
         self._thread.start()
 
-    def give(self, work: Work) -> None:
-        """Have it do something; it is idle."""
-        self._work = work
-        self._given.release()
-
     def _serve(self) -> None:
         while True:
-            if not self._given.acquire(timeout=IDLE_SECONDS):
+            try:
+                work = self.given.get(timeout=IDLE_SECONDS)
+            except Empty:
                 try:
                     _idle.remove(self)
                 except ValueError:
                     # Somebody is about to give it something.
-                    self._given.acquire()
+                    work = self.given.get()
                 else:
                     return
-            work, self._work = self._work, None
-            assert work is not None
             self._thread.name = work.name
             work.do()
             del work

@@ -18,7 +18,7 @@ from surveillance_fsm.exceptions import InvalidStateError, SmachError
 from surveillance_fsm.execution import ExecutionThread, LeftBehindError
 from surveillance_fsm.nodes import LOWEST, RESUMPTION, SUSPENDED, Exit, Node, Noted
 from surveillance_fsm.state import State, this_thread
-from surveillance_fsm.timeouts import end_watch, settle, watch_of
+from surveillance_fsm.timeouts import settled
 from surveillance_fsm.userdata import raw
 
 if TYPE_CHECKING:
@@ -215,18 +215,10 @@ class Frame:
         """Go on as if the current state had just returned `outcome`, and run to the end."""
         node = self.current
         assert isinstance(node, Node)
-        outcome = self.settled(outcome)
+        outcome = settled(self, outcome)
         self.current = target = node.target(outcome)
         node.release()
         return self._run_from(self._attend(node, outcome, target))
-
-    def settled(self, outcome: Any) -> Any:
-        """Return the current state's outcome, its limits taken into account and ended."""
-        watch = watch_of(self)
-        if watch is None:
-            return outcome
-        end_watch(self.thread, watch)
-        return settle(watch.node, self, watch, outcome)
 
     def successor(self) -> Frame:
         """Return a copy for the thread that takes this execution over."""

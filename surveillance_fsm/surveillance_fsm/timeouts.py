@@ -36,9 +36,9 @@ def limited(node: Node, limits: Limits) -> Callable[[Any], Any]:
                 outcome = node.enter(view)
             finally:
                 if watch is not None and thread is not None:
-                    end_watch(thread, watch)
+                    _end_watch(thread, watch)
             frame = thread.stack[-1] if thread is not None else None
-            outcome = settle(node, frame, watch, outcome)
+            outcome = _settle(node, frame, watch, outcome)
             if outcome not in limits.failures or attempt == limits.retry:
                 return outcome
             if node.state.preempt_requested() or (frame is not None and frame.wanted):
@@ -52,7 +52,7 @@ def limited(node: Node, limits: Limits) -> Callable[[Any], Any]:
     return run
 
 
-def settle(node: Node, frame: Frame | None, watch: Watch | None, outcome: Any) -> Any:
+def _settle(node: Node, frame: Frame | None, watch: Watch | None, outcome: Any) -> Any:
     """Turn what a state returned after running out of time into the outcome for that.
 
     Args:
@@ -95,19 +95,20 @@ def _begin_watch(thread: ExecutionThread, node: Node, limits: Limits) -> Watch:
     return watch
 
 
-def end_watch(thread: ExecutionThread, watch: Watch) -> None:
+def _end_watch(thread: ExecutionThread, watch: Watch) -> None:
     """End the limits of a state that has returned."""
     with thread.control.condition:
         thread.check()
         thread.watches.remove(watch)
 
 
-def watch_of(frame: Frame) -> Watch | None:
-    """Return the limits at work on the state that `frame` executes."""
+def settled(frame: Frame, outcome: Any) -> Any:
+    """Return the outcome of the state that `frame` executed, its limits having been ended."""
     for watch in frame.thread.watches:
         if frame.thread.stack[watch.depth] is frame:
-            return watch
-    return None
+            _end_watch(frame.thread, watch)
+            return _settle(watch.node, frame, watch, outcome)
+    return outcome
 
 
 # Watching.
