@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from geometry_msgs.msg import PoseArray
@@ -24,7 +24,6 @@ from surveillance_perception.conversions import (
 )
 from surveillance_perception.detection.annotation import annotated
 from surveillance_perception.detection.camera_model import CameraModel
-from surveillance_perception.detection.detector import DetectorSettings, MarkerDetector
 from surveillance_perception.detection.marker_stream import MarkerStream, StreamSettings
 from surveillance_perception.stream.image_subscription import IMAGES_QOS, ImageSubscription, Latest
 from surveillance_runtime.node import PatrolNode
@@ -57,70 +56,6 @@ class ImageSettings:
     )
 
 
-class DetectorParameters:
-    """Declares the parameters on a node; tells when one changed.
-
-    Args:
-        node: The node.
-        changed: Called after each change.
-
-    Attributes:
-        images: Which images are looked at.
-
-    Raises:
-        ParameterError: A value given at the start is not allowed.
-    """
-
-    def __init__(self, node: PatrolNode, changed: Callable[[], None]) -> None:
-        self._changed = changed
-        self._codes: dict[str, Any] = {'dictionary': DetectorSettings.dictionary}
-        self._codes['dictionary'] = node.parameter(
-            'marker_dictionary',
-            DetectorSettings.dictionary,
-            "One of OpenCV's marker dictionaries, or a file in OpenCV's form.",
-            check=lambda value: self._problem(dictionary=value),
-            on_change=lambda value: self._set_codes(dictionary=value),
-        )
-        known = node.parameter(
-            'known_ids',
-            [],
-            'Ids that are expected; empty: none more than another.',
-            of=int,
-            check=lambda ids: self._problem(known_ids=_known(ids)),
-            on_change=lambda ids: self._set_codes(known_ids=_known(ids)),
-        )
-        self._codes['known_ids'] = _known(known)
-        self._stream = node.declare_fields(StreamSettings(), on_change=self._set_stream)
-        self.images = node.declare_fields(ImageSettings(), on_change=self._set_images)
-
-    def settings(self) -> StreamSettings:
-        """Return the settings that the present values make."""
-        return replace(self._stream, detector=replace(self._stream.detector, **self._codes))
-
-    def _set_codes(self, **changed: Any) -> None:
-        self._codes.update(changed)
-        self._changed()
-
-    def _set_stream(self, settings: StreamSettings) -> None:
-        self._stream = settings
-        self._changed()
-
-    def _set_images(self, settings: ImageSettings) -> None:
-        self.images = settings
-        self._changed()
-
-    def _problem(self, **changed: Any) -> str | None:
-        try:
-            MarkerDetector(DetectorSettings(**{**self._codes, **changed}))
-        except ValueError as error:
-            return str(error)
-        return None
-
-
-def _known(ids: Sequence[int]) -> frozenset[int] | None:
-    return frozenset(ids) or None
-
-
 class ArucoDetector(PatrolNode):
     """Finds ArUco markers in the camera's images.
 
@@ -130,14 +65,15 @@ class ArucoDetector(PatrolNode):
 
     def __init__(self, **node_options: Any) -> None:
         super().__init__('aruco_detector', **node_options)
-        self._options = DetectorParameters(self, self._settings_changed)
+        self._settings = self.declare_fields(StreamSettings(), on_change=self._set_stream)
+        self._options = self.declare_live(ImageSettings())
         self._described: CameraModel | None = None
         self._undescribed = True
         self._rest_since: Time | None = Time(clock_type=self.get_clock().clock_type)
         self._stale = False
         self._said_left_out = False
         self.skipped = self._skipped_before = 0
-        self._watch = MarkerStream(self._options.settings())
+        self._watch = MarkerStream(self._settings)
         self._images: Latest[Image | CompressedImage] = Latest()
         self._ids = self.create_publisher(Int32, 'aruco_detector/id', IDS_QOS)
         self._detections = self.create_publisher(
@@ -160,8 +96,8 @@ class ArucoDetector(PatrolNode):
         """End the worker."""
         self._images.close()
 
-    def _settings_changed(self) -> None:
-        self._stale = True
+    def _set_stream(self, settings: StreamSettings) -> None:
+        self._settings, self._stale = settings, True
 
     def _on_camera_info(self, message: CameraInfo) -> None:
         self._undescribed = False
@@ -179,11 +115,11 @@ class ArucoDetector(PatrolNode):
 
     def _work(self) -> None:
         while (message := self._images.take()) is not None:
-            if self._stale:
-                self._stale = False
-                self._adopt()
             try:
-                if self._options.images.only_at_rest and not self._taken_at_rest(message):
+                if self._stale:
+                    self._stale = False
+                    self._watch.adopt(self._settings)
+                if self._options.only_at_rest and not self._taken_at_rest(message):
                     self.skipped += 1
                     continue
                 self._look(message)
@@ -201,18 +137,12 @@ class ArucoDetector(PatrolNode):
         self.health.error('images', reason)
         self.get_logger().error(reason, throttle_duration_sec=5.0)
 
-    def _adopt(self) -> None:
-        try:
-            self._watch.adopt(self._options.settings())
-        except ValueError as error:
-            self.get_logger().error(f'settings refused: {error}')
-
     def _taken_at_rest(self, message: Any) -> bool:
         since = self._rest_since
         return since is not None and Time.from_msg(message.header.stamp) >= since
 
     def _look(self, message: Any) -> None:
-        image = image_from_any(message, self._options.images.max_pixels)
+        image = image_from_any(message, self._options.max_pixels)
         height, width = image.shape[:2]
         sightings, new = self._watch.look(image, self._camera_of(width, height))
         if self._watch.left_out and not self._said_left_out:
@@ -235,7 +165,7 @@ class ArucoDetector(PatrolNode):
     def _camera_of(self, width: int, height: int) -> CameraModel | None:
         """Return the camera that took an image of this size; None when it is not known."""
         if self._undescribed:
-            field_of_view = math.radians(self._options.images.field_of_view)
+            field_of_view = math.radians(self._options.field_of_view)
             return CameraModel.from_field_of_view(width, height, field_of_view)
         if self._described is None:
             return None

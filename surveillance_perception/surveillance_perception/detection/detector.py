@@ -32,7 +32,11 @@ from surveillance_perception.detection.candidates import (
 )
 from surveillance_perception.detection.cell_differences import CellReadings
 from surveillance_perception.detection.decoding import MarkerReader, Readings
-from surveillance_perception.detection.dictionaries import MarkerCodes, dictionary_named
+from surveillance_perception.detection.dictionaries import (
+    MarkerCodes,
+    dictionary_expected,
+    dictionary_named,
+)
 from surveillance_perception.detection.image_sampling import (
     Array,
     Grey,
@@ -43,7 +47,7 @@ from surveillance_perception.detection.image_sampling import (
 from surveillance_perception.detection.preprocessing import PreparedImage, prepare
 from surveillance_perception.detection.template_fit import Indices
 from surveillance_runtime import parameter_checks
-from surveillance_runtime.parameters import parameter
+from surveillance_runtime.parameters import converted, parameter
 
 # pixels between the middles of outlines that are one: what the search's masks differ by
 _SAME_QUAD = 2.0
@@ -84,8 +88,18 @@ class DetectorSettings:
             unexplained, when its id is known.
     """
 
-    dictionary: str = 'DICT_5X5_100'
-    known_ids: frozenset[int] | None = None
+    dictionary: str = parameter(
+        'DICT_5X5_100',
+        "One of OpenCV's marker dictionaries, or a file in OpenCV's form.",
+        name='marker_dictionary',
+        check=dictionary_expected,
+    )
+    known_ids: frozenset[int] | None = converted(
+        lambda ids: frozenset(ids) or None,
+        [],
+        'Ids that are expected; empty: none more than another.',
+        of=int,
+    )
     windows: tuple[int, ...] = parameter(
         (15, 31, 5), 'Neighbourhoods of a border, odd, pixels.', check=parameter_checks.odd_numbers
     )

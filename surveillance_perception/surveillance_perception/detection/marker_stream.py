@@ -11,6 +11,7 @@ import numpy as np
 
 from surveillance_perception.detection.camera_model import Array, CameraModel
 from surveillance_perception.detection.detector import Detection, DetectorSettings, MarkerDetector
+from surveillance_perception.detection.dictionaries import MarkerCodes, dictionary_named
 from surveillance_perception.detection.pose import MarkerPose, pose_of
 from surveillance_perception.stream.image_files import ImageArray
 from surveillance_runtime.parameters import converted, parameter, parameters
@@ -53,6 +54,9 @@ class StreamSettings:
     Attributes:
         detector: What to look for.
         known_frames: Images that must show an id of the known list before it is confirmed.
+
+    Raises:
+        ValueError: A known id is not in the dictionary.
     """
 
     detector: DetectorSettings = parameters(DetectorSettings)
@@ -73,6 +77,13 @@ class StreamSettings:
     unknown_frames: int = parameter(
         4, 'Images that confirm any other id.', 1, 100, name='unknown_confirmation_frames'
     )
+
+    def __post_init__(self) -> None:
+        known = self.detector.known_ids or ()
+        try:
+            MarkerCodes.of(dictionary_named(self.detector.dictionary), known)
+        except ValueError as error:
+            raise ValueError(f'known_ids: {error}') from None
 
 
 @dataclass(frozen=True, eq=False)
