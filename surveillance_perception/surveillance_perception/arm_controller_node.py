@@ -21,8 +21,7 @@ from surveillance_interfaces.msg import MarkerDetectionArray
 from surveillance_interfaces.srv import MarkerRoutine, PointCamera
 from surveillance_perception.arm.driver import ArmDriver
 from surveillance_perception.arm.kinematics import ArmMotionError, in_base, look_at
-from surveillance_perception.arm.scan import scan
-from surveillance_perception.arm.view_coverage import View
+from surveillance_perception.arm.scan import View, scan
 from surveillance_perception.conversions import (
     base_pose_from_ros,
     fuse_views,

@@ -17,9 +17,8 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 from surveillance_interfaces.action import ScanSurroundings
 from surveillance_interfaces.msg import MarkerDetection, MarkerDetectionArray, RoomConnection
 from surveillance_interfaces.srv import RoomInformation
-from surveillance_perception.arm.scan import ScanOutcome, ScanPlan
+from surveillance_perception.arm.scan import ScanOutcome, ScanPlan, View
 from surveillance_perception.arm.trajectory import ArmTrajectory
-from surveillance_perception.arm.view_coverage import View
 from surveillance_perception.detection.camera_model import DISTORTION_MODELS, Array, CameraModel
 from surveillance_perception.detection.detector import Detection
 from surveillance_perception.detection.fusion import FusedPosition, FusedPositions, is_measured

@@ -57,7 +57,7 @@ class VideoSource(PatrolNode):
     def _work(self, source: FrameSource) -> None:
         while True:
             good = self._play(source)
-            source.close()
+            source.frames.close()
             if self.stopping.is_set():
                 return
             if self._is_camera:
@@ -71,7 +71,7 @@ class VideoSource(PatrolNode):
     def _play(self, source: FrameSource) -> bool:
         """Send every image once; whether there was one."""
         good = False
-        for frame in source.frames():
+        for frame in source.frames:
             if isinstance(frame, ImageError):
                 self.get_logger().error(str(frame))
                 continue

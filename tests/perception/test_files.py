@@ -143,7 +143,7 @@ def test_folder_is_played_in_order_of_names(tmp_path, image):
         cv2.imwrite(str(tmp_path / f'{index}.png'), np.full((8, 8), level, np.uint8))
     (tmp_path / 'notes.txt').write_text('no image')
     (tmp_path / '1b.png').write_bytes(b'broken')
-    frames = list(open_source(str(tmp_path)).frames())
+    frames = list(open_source(str(tmp_path)).frames)
     assert [int(each[0, 0, 0]) for each in frames if not isinstance(each, ImageError)] == [
         10,
         20,
@@ -160,8 +160,8 @@ def test_video_file_is_played_at_its_own_rate(tmp_path):
     writer.release()
     source = open_source(str(path))
     assert source.rate == pytest.approx(12.5)
-    assert [round(float(np.mean(each)), -1) for each in source.frames()] == [0, 100, 200]
-    source.close()
+    assert [round(float(np.mean(each)), -1) for each in source.frames] == [0, 100, 200]
+    source.frames.close()
 
 
 def test_source_that_is_not_there_is_named(tmp_path):

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Generator
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
 
 import cv2
 import numpy as np
@@ -18,20 +18,18 @@ from surveillance_perception.stream.image_files import (
 from surveillance_runtime.files import like_file
 
 
-class FrameSource(Protocol):
+@dataclass(frozen=True)
+class FrameSource:
     """Where images come from.
 
     Attributes:
+        frames: Each image (height, width, 3) BGR in turn, or why one cannot be read; its `close`
+            lets go of the source.
         rate: Images a second that the source itself has; 0 when it has none.
     """
 
-    rate: float
-
-    def frames(self) -> Iterator[ImageArray | ImageError]:
-        """Return each image (height, width, 3) BGR in turn, or why one cannot be read."""
-
-    def close(self) -> None:
-        """Let go of the source."""
+    frames: Generator[ImageArray | ImageError]
+    rate: float = 0.0
 
 
 def open_source(source: str) -> FrameSource:
@@ -41,57 +39,46 @@ def open_source(source: str) -> FrameSource:
         ImageError: There is no such thing, or it holds no images.
     """
     if source.isdigit():
-        return _Capture(int(source), f'camera {source}')
+        # a camera keeps its own time: reading blocks until the next image
+        return FrameSource(_captured(_opened(int(source), f'camera {source}')))
     path = Path(source)
     if path.is_dir():
         files = sorted(each for each in path.iterdir() if each.suffix.lower() in IMAGE_SUFFIXES)
         if not files:
             raise ImageError(f'{path} holds no images ({", ".join(IMAGE_SUFFIXES)})')
-        return _Files(files)
+        return FrameSource(_images_in(files))
     if not path.exists():
         likely = like_file(path)
         expected = f", expected '{likely}'" if likely else ''
         raise ImageError(f'{source}: no such video file or folder of images{expected}')
     if path.suffix.lower() in IMAGE_SUFFIXES:
-        return _Files([path])
-    return _Capture(str(path), f'video {path}')
+        return FrameSource(_images_in([path]))
+    capture = _opened(str(path), f'video {path}')
+    rate = float(capture.get(cv2.CAP_PROP_FPS))
+    return FrameSource(_captured(capture), rate if 0.0 < rate < 1000.0 else 0.0)
 
 
-class _Files:
-    rate = 0.0
-
-    def __init__(self, files: list[Path]) -> None:
-        self._files = files
-
-    def frames(self) -> Iterator[ImageArray | ImageError]:
-        for path in self._files:
-            try:
-                yield read_image(path)
-            except ImageError as error:
-                yield error
-
-    def close(self) -> None:
-        """Nothing is held open."""
+def _images_in(files: list[Path]) -> Generator[ImageArray | ImageError]:
+    for path in files:
+        try:
+            yield read_image(path)
+        except ImageError as error:
+            yield error
 
 
-class _Capture:
-    def __init__(self, source: int | str, what: str) -> None:
-        self._capture = cv2.VideoCapture(source)
-        if not self._capture.isOpened():
-            raise ImageError(f'{what} cannot be opened')
-        self.rate = float(self._capture.get(cv2.CAP_PROP_FPS))
-        if not 0.0 < self.rate < 1000.0:
-            self.rate = 0.0
-        if isinstance(source, int):
-            # a camera keeps its own time: reading blocks until the next image
-            self.rate = 0.0
+def _opened(source: int | str, what: str) -> cv2.VideoCapture:
+    capture = cv2.VideoCapture(source)
+    if not capture.isOpened():
+        raise ImageError(f'{what} cannot be opened')
+    return capture
 
-    def frames(self) -> Iterator[ImageArray | ImageError]:
+
+def _captured(capture: cv2.VideoCapture) -> Generator[ImageArray | ImageError]:
+    try:
         while True:
-            good, frame = self._capture.read()
+            good, frame = capture.read()
             if not good:
                 return
             yield np.asarray(frame, dtype=np.uint8)
-
-    def close(self) -> None:
-        self._capture.release()
+    finally:
+        capture.release()

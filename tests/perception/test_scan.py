@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from surveillance_perception.arm.view_coverage import View, coverage, views_covering
+from surveillance_perception.arm.scan import ScanPlan, View
 
 WHOLE = (-math.pi / 2, math.pi / 2)
 
@@ -23,25 +23,26 @@ WHOLE = (-math.pi / 2, math.pi / 2)
 )
 def test_every_direction_of_the_band_is_in_a_picture(horizontal, vertical, overlap, band):
     lowest, highest = band
-    views = views_covering(horizontal, vertical, overlap, lowest, highest)
+    views = ScanPlan(horizontal, vertical, overlap, lowest, highest).views
     keep = 1.0 - overlap
-    assert coverage(views, horizontal * keep, vertical * keep, lowest, highest) == 1.0
+    kept = ScanPlan(horizontal * keep, vertical * keep, 0.0, lowest, highest)
+    assert kept.covered(views) == 1.0
 
 
 def test_views_are_not_many_more_than_the_sphere_needs():
     horizontal, vertical = math.radians(60), math.radians(46.8)
-    views = views_covering(horizontal, vertical, 0.0, *WHOLE)
+    views = ScanPlan(horizontal, vertical, 0.0, *WHOLE).views
     # solid angle of a rectangular pyramid
     one = 4 * math.asin(math.sin(horizontal / 2) * math.sin(vertical / 2))
     assert len(views) < 1.8 * 4 * math.pi / one
 
 
 def test_one_view_covers_little():
-    assert coverage([View(0.0, 0.0)], 1.0, 0.8, *WHOLE) < 0.1
+    assert ScanPlan(1.0, 0.8, 0.0, *WHOLE).covered([View(0.0, 0.0)]) < 0.1
 
 
 def test_views_follow_each_other_closely():
-    views = views_covering(1.0, 0.8, 0.2, -0.5, 0.5)
+    views = ScanPlan(1.0, 0.8, 0.2, -0.5, 0.5).views
     for first, second in pairwise(views):
         assert abs(first.azimuth - second.azimuth) < 1.1
 
@@ -58,4 +59,4 @@ def test_views_follow_each_other_closely():
 )
 def test_scan_that_cannot_be_is_refused(arguments, reason):
     with pytest.raises(ValueError, match=reason):
-        views_covering(*arguments)
+        ScanPlan(*arguments)
