@@ -108,6 +108,9 @@ def test_a_killed_writer_loses_nothing_that_was_sealed(tmp_path: Path) -> None:
     (line,) = repair(folder)
     assert '50 messages saved' in line
     assert read(folder) == [str(n) for n in range(50)]
+    with Reader(folder) as reader:
+        (qos,) = reader.connections[0].ext.offered_qos_profiles
+        assert (qos.depth, qos.durability.name) == (1, 'TRANSIENT_LOCAL')
     assert repair(folder) == []
 
 

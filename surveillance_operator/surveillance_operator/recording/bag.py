@@ -9,12 +9,11 @@ from __future__ import annotations
 
 import contextlib
 import fcntl
-import json
 import os
 import shutil
 import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from io import BufferedWriter
 from pathlib import Path
 from typing import Any
@@ -26,11 +25,12 @@ from mcap.records import Channel, Message, Schema
 from mcap.stream_reader import StreamReader
 from mcap.writer import CompressionType, Writer
 
-from surveillance_fsm.files import parse_json
 from surveillance_runtime.files import RECORDING, replace_text
 
 METADATA = 'metadata.yaml'
 PROFILE, ENCODING, SCHEMA_ENCODING = 'ros2', 'cdr', 'ros2msg'
+QOS, TYPE_HASH = 'offered_qos_profiles', 'topic_type_hash'
+"""What rosbag2 has a file say about a topic, beside its type."""
 LIBRARY = 'surveillance_operator'
 CHUNK_BYTES = 1_000_000
 MAGIC = b'\x89MCAP0\r\n'
@@ -68,14 +68,14 @@ class _Segment:
         name: Of the file.
         start, end: Of its messages, nanoseconds since 1970.
         counts: Messages by topic.
-        topics: What they carry, by name.
+        topics: Each topic's type, and what `_register` wrote about it.
     """
 
     name: str
     start: int
     end: int
     counts: Mapping[str, int]
-    topics: Mapping[str, TopicType]
+    topics: Mapping[str, tuple[str, Mapping[str, str]]]
 
     @property
     def count(self) -> int:
@@ -264,14 +264,14 @@ def write_metadata(folder: Path, closed: Sequence[_Segment]) -> None:
                 {
                     'topic_metadata': {
                         'name': name,
-                        'type': topic.type,
+                        'type': kind,
                         'serialization_format': ENCODING,
-                        'offered_qos_profiles': [_qos(topic)],
-                        'type_description_hash': topic.type_hash,
+                        'offered_qos_profiles': yaml.safe_load(more.get(QOS, '[]')),
+                        'type_description_hash': more.get(TYPE_HASH, ''),
                     },
                     'message_count': counts[name],
                 }
-                for name, topic in sorted(topics.items())
+                for name, (kind, more) in sorted(topics.items())
             ],
             'compression_format': '',
             'compression_mode': '',
@@ -314,19 +314,9 @@ def _writer(file: Any) -> Writer:
 
 def _register(writer: Writer, topic: TopicType) -> int:
     schema = writer.register_schema(topic.type, SCHEMA_ENCODING, topic.definition.encode())
-    metadata = {
-        'offered_qos_profiles': yaml.safe_dump([_qos(topic)], sort_keys=False),
-        'topic_type_hash': topic.type_hash,
-        'topic': json.dumps(asdict(topic)),
-    }
+    qos = yaml.safe_dump([_qos(topic)], sort_keys=False)
+    metadata = {QOS: qos, TYPE_HASH: topic.type_hash}
     return writer.register_channel(topic.name, ENCODING, schema, metadata)
-
-
-def _topic_of(schema: Schema, channel: Channel) -> TopicType:
-    try:
-        return TopicType(**parse_json(channel.metadata['topic']))
-    except (KeyError, TypeError, ValueError):
-        return TopicType(channel.topic, schema.name, schema.data.decode(errors='replace'))
 
 
 def _whole_segments(folder: Path) -> list[_Segment]:
@@ -353,7 +343,7 @@ def _scanned(paths: Iterable[Path]) -> list[_Segment]:
         for number, count in said.channel_message_counts.items():
             channel = summary.channels[number]
             counts[channel.topic] = count
-            topics[channel.topic] = _topic_of(summary.schemas[channel.schema_id], channel)
+            topics[channel.topic] = summary.schemas[channel.schema_id].name, channel.metadata
         times = said.message_start_time, said.message_end_time
         found.append(_Segment(path.name, *times, counts, topics))
     return found
@@ -372,17 +362,23 @@ def _is_whole(path: Path) -> bool:
 def _rewrite(path: Path) -> None:
     """Write what can be read of a torn file anew, in its place."""
     temporary = path.with_suffix('.tmp')
-    schemas: dict[int, Schema] = {}
+    schemas: dict[int, int] = {}
     channels: dict[int, int] = {}
     with open(path, 'rb') as file, open(temporary, 'wb') as output:
         writer = _writer(output)
         try:
             for record in StreamReader(file, record_size_limit=path.stat().st_size).records:
                 if isinstance(record, Schema):
-                    schemas[record.id] = record
+                    schemas[record.id] = writer.register_schema(
+                        record.name, record.encoding, record.data
+                    )
                 elif isinstance(record, Channel):
-                    topic = _topic_of(schemas[record.schema_id], record)
-                    channels[record.id] = _register(writer, topic)
+                    channels[record.id] = writer.register_channel(
+                        record.topic,
+                        record.message_encoding,
+                        schemas[record.schema_id],
+                        record.metadata,
+                    )
                 elif isinstance(record, Message):
                     number = channels[record.channel_id]
                     writer.add_message(
