@@ -6,6 +6,7 @@ Python play the robot. The terminal view, the page and the recording all show su
 
 from __future__ import annotations
 
+import time
 from dataclasses import replace
 
 import numpy as np
@@ -56,11 +57,12 @@ def main() -> None:
             'urgent': frozenset(),
         },
     ]
+    start = time.time()
     for second, fields in enumerate(steps):
         new = replace(snapshot, now=100.0 + second, **fields)  # type: ignore[arg-type]
-        snapshot, told = follow(snapshot, new, f'12:00:{second:02d}')
+        snapshot, told = follow(snapshot, new, at=start + second)
         for change in told:
-            print(f'12:00:{second:02d} {change.text} {change.detail}'.rstrip())
+            print(f'{second:3d} s      {change.text} {change.detail}'.rstrip())
         patch = framer.patch(snapshot)
         print(f'          the page gets {", ".join(patch) or "nothing"}')
     console = Console(width=80, height=20, highlight=False)

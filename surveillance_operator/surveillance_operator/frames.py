@@ -72,6 +72,12 @@ def _status(snapshot: Snapshot) -> Any:
     return status and {**vars(status), 'whereabouts': status.whereabouts}
 
 
+def _plan(snapshot: Snapshot) -> Any:
+    """Return the way that the robot means to drive; none while it waits for help."""
+    waits = snapshot.status is not None and snapshot.status.waiting_for_help
+    return [] if waits else _points(snapshot.plan)
+
+
 def _places(snapshot: Snapshot) -> Any:
     names = sorted({*snapshot.positions, *snapshot.visited_at})
     return {
@@ -186,7 +192,7 @@ PARTS: Mapping[str, tuple[tuple[str, ...], Callable[[Snapshot], Any]]] = {
         ('others',),
         lambda s: {name: [round(v, 3) for v in pose] for name, pose in s.others.items()},
     ),
-    'plan': (('plan',), lambda s: _points(s.plan)),
+    'plan': (('plan', 'status'), _plan),
     'scan': (('scan',), lambda s: _points(s.scan)),
     'obstacles': (('obstacles',), lambda s: _points(s.obstacles)),
     'machine': (('containers',), lambda s: [asdict(each) for each in s.containers]),
@@ -203,7 +209,7 @@ PARTS: Mapping[str, tuple[tuple[str, ...], Callable[[Snapshot], Any]]] = {
     'requests': (('requests',), lambda s: dict(s.requests)),
     'health': (('namespace', 'nodes', 'ended', 'restarts', 'health', 'silent'), health),
     'figures': (('namespace', 'health'), _figures),
-    'events': (('events',), lambda s: [list(each) for each in s.events]),
+    'events': (('events',), lambda s: [[round(at, 1), text] for at, text in s.events]),
     'history': (('history',), _history),
 }
 """Each part with the snapshot's fields that it comes from."""

@@ -138,7 +138,7 @@ class MissionFeed:
                 new = change(old)
             # Nothing passes after a mission's end.
             now = old.now if self._over else self._now()
-            new, told = follow(old, replace(new, now=now), time.strftime('%H:%M:%S'))
+            new, told = follow(old, replace(new, now=now), time.time())
             self._over = self._over or bool(old.nodes and not new.nodes)
             self._snapshot = new
         self._on_change(new, told)

@@ -175,7 +175,7 @@ class Player:
             'playing': self._playing,
             'speed': self._speed,
             'read': round(self._read(), 2),
-            'day': time.strftime('%Y-%m-%d %H:%M:%S', time.localtime(self._time)),
+            'time': round(self._time, 1),
         }
         self._hub.show_parts({**parts, 'replay': replay}, now, whole=whole)
 

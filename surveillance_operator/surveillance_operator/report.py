@@ -53,7 +53,7 @@ def write_report(folder: Path) -> Path:
     with _one_line(folder):
         events, plan, run = _material(folder)
         if not any(mission_log.summarize(events).visits.values()):
-            raise FileError(f'{folder / RECORD}: no visit was recorded')
+            raise FileError(f'no visit was recorded in {folder / RECORD}')
         drawn = _map(plan, run) if plan is not None and run is not None else ''
         speed = _fastest(events)
         bound = graph_over_doors(plan).tour.bound / speed if plan is not None and speed else None

@@ -187,7 +187,7 @@ class Snapshot:
         requests: What each controller in MANUAL mode announced last.
         health: What the nodes report, by name.
         silent: Why nothing comes on a topic, where that is known.
-        events: The latest changes with the time of the day, routine ones left out.
+        events: The latest changes with their times, seconds since 1970; routine ones left out.
         history: What happened in the last hour.
     """
 
@@ -233,14 +233,19 @@ class Snapshot:
     requests: Mapping[str, str] = field(default_factory=dict)
     health: Mapping[str, Health] = field(default_factory=dict)
     silent: Mapping[str, str] = field(default_factory=dict)
-    events: tuple[tuple[str, str], ...] = ()
+    events: tuple[tuple[float, str], ...] = ()
     history: History = History()
 
 
-def follow(old: Snapshot, new: Snapshot, time_of_day: str) -> tuple[Snapshot, list[Change]]:
-    """Return `new` with its events, restarts and history, and what changed since `old`."""
+def follow(old: Snapshot, new: Snapshot, at: float) -> tuple[Snapshot, list[Change]]:
+    """Return `new` with its events, restarts and history, and what changed since `old`.
+
+    Args:
+        old, new: Two moments.
+        at: The later one, seconds since 1970.
+    """
     told = list(changes(old, new))
-    events = [(time_of_day, each.text) for each in told if not each.routine]
+    events = [(at, each.text) for each in told if not each.routine]
     more: dict[str, object] = {}
     if events:
         more['events'] = (*new.events, *events)[-KEPT_EVENTS:]

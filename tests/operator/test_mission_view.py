@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import io
 import math
+import time
 from dataclasses import replace
 
 import numpy as np
@@ -12,10 +14,11 @@ from hypothesis import strategies as st
 from rich.console import Console
 
 from surveillance_behaviour.policy.world import Decision
+from surveillance_fsm import Interrupt
 from surveillance_operator.snapshot import Health, Snapshot, Status, changes
 from surveillance_operator.watch import raster
 from surveillance_operator.watch.raster import Frame, rasterise
-from surveillance_operator.watch.view import MissionView, node_page
+from surveillance_operator.watch.view import MissionView, node_page, show_once
 from surveillance_runtime.place.occupancy_grid import Grid
 
 STATUS = Status(95.0, 'surveillance', 'MOVE_TO_NEXT_ROOM', 'A', 'B', False, 'arrived in A', ())
@@ -51,7 +54,7 @@ def whole() -> Snapshot:
         pose=(1.0, 3.0, math.pi / 2),
         trail=np.array([(0.0, 3.0), (1.0, 3.0)]),
         obstacles=np.array([(2.0, 3.5)]),
-        events=(('12:00:00', 'arrived in A'),),
+        events=((time.mktime((2026, 1, 1, 12, 0, 0, 0, 0, -1)), 'arrived in A'),),
     )
 
 
@@ -243,3 +246,11 @@ def test_each_node_has_one_line_with_the_worst_that_it_reports() -> None:
         '✗ ended simulator',
         '● up    mission_recorder: up',
     ]
+
+
+def test_a_single_picture_in_a_pipe_is_as_wide_as_columns_says(monkeypatch):
+    for columns, width in (('', 100), ('60', 60)):
+        monkeypatch.setenv('COLUMNS', columns)
+        file = io.StringIO()
+        assert show_once(whole, Interrupt(), Console(file=file), timeout=5.0)
+        assert max(map(len, file.getvalue().splitlines())) == width

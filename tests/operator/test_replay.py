@@ -95,6 +95,7 @@ def test_a_viewer_moves_in_time(page: Page) -> None:
     assert parts['pose'] == [12.0, 0.0, 0.0]
     assert parts['replay']['at'] == 120.0
     assert parts['replay']['length'] == 199.0
+    assert parts['replay']['time'] == 1120.0
     assert len(parts['trail']) == 121
     assert act(page, 'jump', kind='decision')['ok']
     assert shown(page)['decision']['number'] == 4

@@ -12,7 +12,7 @@ import pytest
 from surveillance_behaviour.policy.world import Decision
 from surveillance_operator.frames import Framer
 from surveillance_operator.recording.timeline import Timeline, TimelineWriter
-from surveillance_operator.snapshot import Snapshot
+from surveillance_operator.snapshot import Snapshot, Status
 from surveillance_runtime.files import FileError
 
 DECISION = Decision(0.0, 'A', 'B', 'B', 'URGENT', 'tour', 'why', {'B': 1.0})
@@ -123,3 +123,12 @@ def test_a_patch_holds_what_changed_alone() -> None:
     assert framer.patch(replace(Snapshot(), battery=50.0, decision=DECISION, number=1)) == {}
     after = framer.patch(replace(Snapshot(), battery=49.0, decision=DECISION, number=1))
     assert after == {'battery': {'level': 49.0, 'low': False}}
+
+
+def test_a_robot_that_waits_for_help_has_no_plan() -> None:
+    framer = Framer()
+    moving = Status(0.0, 'm', 'MOVE', 'A', 'B', False, '', ())
+    snapshot = Snapshot(status=moving, plan=np.array([(0.0, 0.0), (1.0, 0.0)]))
+    assert framer.patch(snapshot)['plan'] == [[0.0, 0.0], [1.0, 0.0]]
+    stuck = replace(snapshot, status=replace(moving, waiting_for_help=True))
+    assert framer.patch(stuck)['plan'] == []

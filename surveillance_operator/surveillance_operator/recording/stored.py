@@ -12,7 +12,6 @@ import contextlib
 import shutil
 import sys
 import threading
-import time
 from collections import deque
 from collections.abc import Iterable
 from dataclasses import replace
@@ -176,8 +175,7 @@ class Conversion:
             ended = new.ended.union(new.nodes).difference(nodes)
             new = replace(new, nodes=dict.fromkeys(sorted(nodes), frozenset()), ended=ended)
         new = replace(new, now=at if self._clock is None else self._clock)
-        day = time.strftime('%H:%M:%S', time.localtime(at))
-        self._snapshot, _ = follow(self._snapshot, new, day)
+        self._snapshot, _ = follow(self._snapshot, new, at)
         writer.add(self._snapshot, at)
 
 

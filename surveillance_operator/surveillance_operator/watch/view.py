@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import os
 import select
+import shutil
 import sys
 import termios
 import time
@@ -43,7 +44,8 @@ PERIOD = 0.2
 SETTLING = 2.0
 """How long a single picture waits for what is latched, once a mission was seen, seconds."""
 PLAIN_SIZE = 100, 40
-"""Columns and rows of a single picture where there is no terminal."""
+"""Columns and rows of a single picture where there is no terminal, and COLUMNS and LINES are not
+set."""
 KEY_NOTE = 'q quit · p hold · d decision · n nodes · e events'
 KEYS = {
     'm': 'map',
@@ -144,7 +146,7 @@ class MissionView:
         fixed += [*decision[:most], *doors]
         places = place_lines(snapshot, width)
         told = snapshot.events[-MOST_EVENTS:]
-        texts = [Text.assemble((at, DIM), ' ', text) for at, text in told]
+        texts = [_event(*each) for each in told]
         # The places come before all but the latest events.
         room = max(0, height - len(fixed) - 2)
         events = _wrapped(console, texts, width)
@@ -257,8 +259,12 @@ def node_page(snapshot: Snapshot) -> list[Text]:
 
 def event_page(snapshot: Snapshot) -> list[Text]:
     """Return the latest events, newest first."""
-    told = [Text.assemble((at, DIM), ' ', text) for at, text in reversed(snapshot.events)]
+    told = [_event(*each) for each in reversed(snapshot.events)]
     return told or [_dim('no events yet')]
+
+
+def _event(at: float, text: str) -> Text:
+    return Text.assemble((time.strftime('%H:%M:%S', time.localtime(at)), DIM), ' ', text)
 
 
 PAGES: dict[str, Callable[[Snapshot], list[Text]]] = {
@@ -458,7 +464,7 @@ def show_once(see: See, stopping: Interrupt, console: Console, timeout: float) -
     while not _is_complete(see()) and time.monotonic() < settled and not stopping.wait(PERIOD / 4):
         pass
     if not console.is_terminal:
-        console.size = PLAIN_SIZE
+        console.size = shutil.get_terminal_size(PLAIN_SIZE)
     console.print(MissionView(see(), whole=False))
     return True
 

@@ -1,5 +1,5 @@
 // Follows the mission's events and hands each part to those who show it.
-import {$, h} from './dom.js';
+import {$, h, timeOfDay} from './dom.js';
 import {MapView} from './map.js';
 import {drawMachine, lightMachine} from './machine.js';
 import {drawStrips} from './time.js';
@@ -49,7 +49,7 @@ function list(id, lines) {
 
 function lists() {
   const {events, markers, transitions} = state;
-  list('events', (events ?? []).toReversed().map(([at, text]) => [at, text]));
+  list('events', (events ?? []).toReversed().map(([at, text]) => [timeOfDay(at), text]));
   $('markers').replaceChildren(...(markers?.seen ?? []).map(([id, known, confirmed, confidence]) =>
     h('li', {}, `marker ${id}${confirmed ? ', confirmed' : ''}${known ? '' : ', not on the list'}, confidence ${confidence}`)));
   $('markers').hidden = !markers?.seen?.length;

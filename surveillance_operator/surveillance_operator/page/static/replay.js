@@ -1,5 +1,5 @@
 // Moves through a recording: slider, speed, jumps.
-import {$, h, act} from './dom.js';
+import {$, h, act, timeOfDay} from './dom.js';
 
 const SPEEDS = [0.1, 0.5, 1, 2, 5, 10, 30, 100];
 
@@ -18,14 +18,15 @@ export class Replay {
     });
   }
 
-  show({at, length, playing, speed, day, read}) {
+  show({at, length, playing, speed, time, read}) {
     this.playing = playing;
     $('play').textContent = playing ? 'Pause' : 'Play';
     $('slider').max = length;
     if (!this.dragging) $('slider').value = at;
     if (document.activeElement !== $('speed')) $('speed').value = speed;
     const two = (number) => String(Math.floor(number)).padStart(2, '0');
-    const time = (seconds) => `${two(seconds / 3600)}:${two(seconds / 60 % 60)}:${two(seconds % 60)}`;
-    $('moment').textContent = `${time(at)} of ${time(length)} · ${day}${read < 1 ? ` · reading, ${Math.round(100 * read)} %` : ''}`;
+    const passed = (seconds) => `${two(seconds / 3600)}:${two(seconds / 60 % 60)}:${two(seconds % 60)}`;
+    const day = new Date(1000 * time).toLocaleDateString('sv');
+    $('moment').textContent = `${passed(at)} of ${passed(length)} · ${day} ${timeOfDay(time)}${read < 1 ? ` · reading, ${Math.round(100 * read)} %` : ''}`;
   }
 }
