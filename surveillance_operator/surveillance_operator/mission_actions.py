@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from geometry_msgs.msg import Point
@@ -58,6 +58,28 @@ _OFFERED_BY = {
     'armor_interface_srv': ('armor_server',),
 }
 """The nodes that a service needs, by the first word of its name; else that word is the node."""
+_KINDS: Mapping[str, Any] = {
+    'simulation/set_door': SetDoor,
+    'ontology_map/set_door': SetDoor,
+    'simulation/place_obstacle': PlaceObstacle,
+    'simulation/remove_obstacle': RemoveObstacle,
+    'simulation/drain_battery': DrainBattery,
+    'ontology_map/add_room': AddRoom,
+    'ontology_map/remove_room': RemoveRoom,
+    'ontology_map/reference_name': ReferenceName,
+    'move_arm': MarkerRoutine,
+    'go_to': GoTo,
+    'why_not': WhyNot,
+    f'{BEHAVIOUR}/set_parameters': SetParameters,
+    **dict.fromkeys((f'{BEHAVIOUR}/fsm/{word}' for word in ('pause', 'step', 'resume')), Trigger),
+    **dict.fromkeys((f'{name}/command' for name in CONTROLLERS), ConsoleCommand),
+}
+"""The services that are looked for from the start; others for parameters once they are used."""
+_PARAMETER_KINDS: Mapping[str, Any] = {
+    'get_parameters': GetParameters,
+    'list_parameters': ListParameters,
+    'set_parameters': SetParameters,
+}
 ARM_SECONDS = 60.0
 """Deadline of a movement of the arm, whose answer comes when it has arrived."""
 
@@ -73,71 +95,51 @@ class MissionActions:
     def __init__(self, node: PatrolNode, timeout: float = 5.0) -> None:
         self._node = node
         self._timeout = timeout
-        self._callers: dict[str, ServiceCaller] = {}
+        self._callers = {name: ServiceCaller(node, _KINDS[name], name) for name in _KINDS}
         self._armor: ArmorClient | None = None
         self._found_by = time.monotonic() + min(_DISCOVERY, timeout)
-        for kind, name in (
-            (SetDoor, 'simulation/set_door'),
-            (SetDoor, 'ontology_map/set_door'),
-            (PlaceObstacle, 'simulation/place_obstacle'),
-            (RemoveObstacle, 'simulation/remove_obstacle'),
-            (DrainBattery, 'simulation/drain_battery'),
-            (AddRoom, 'ontology_map/add_room'),
-            (RemoveRoom, 'ontology_map/remove_room'),
-            (ReferenceName, 'ontology_map/reference_name'),
-            (MarkerRoutine, 'move_arm'),
-            (GoTo, 'go_to'),
-            (WhyNot, 'why_not'),
-            (SetParameters, f'{BEHAVIOUR}/set_parameters'),
-            *((Trigger, f'{BEHAVIOUR}/fsm/{word}') for word in ('pause', 'step', 'resume')),
-            *((ConsoleCommand, f'{name}/command') for name in CONTROLLERS),
-        ):
-            self._callers[name] = ServiceCaller(node, kind, name)
 
     def set_door(self, door: str, is_open: bool) -> str:
         """Open or close a door: a simulated one, or else as the map has it."""
-        request = SetDoor.Request(door=_name(door), open=bool(is_open))
+        wanted: dict[str, Any] = {'door': _name(door), 'open': bool(is_open)}
         try:
-            return self._told('simulation/set_door', request)
+            return self._told('simulation/set_door', **wanted)
         except UnavailableError:
-            return self._told('ontology_map/set_door', request)
+            return self._told('ontology_map/set_door', **wanted)
 
     def place_obstacle(self, name: str, x: float, y: float, radius: float) -> str:
         """Put a cylinder in the simulated robot's way, metres."""
         at = {'x': _number('x', x), 'y': _number('y', y), 'radius': _number('radius', radius)}
-        return self._told(
-            'simulation/place_obstacle', PlaceObstacle.Request(name=_name(name), **at)
-        )
+        return self._told('simulation/place_obstacle', name=_name(name), **at)
 
     def remove_obstacle(self, name: str) -> str:
         """Take an obstacle away."""
-        return self._told('simulation/remove_obstacle', RemoveObstacle.Request(name=_name(name)))
+        return self._told('simulation/remove_obstacle', name=_name(name))
 
     def drain_battery(self, percent: float) -> str:
         """Take charge out of the simulated battery."""
-        request = DrainBattery.Request(percent=_number('percent', percent))
-        return self._told('simulation/drain_battery', request)
+        return self._told('simulation/drain_battery', percent=_number('percent', percent))
 
     def add_room(self, name: str, x: float, y: float, doors: Sequence[str]) -> str:
         """Add a place to the map and the ontology."""
-        request = AddRoom.Request(
+        return self._told(
+            'ontology_map/add_room',
             room_name=_name(name),
             position=Point(x=_number('x', x), y=_number('y', y)),
             doors=[_name(door) for door in doors],
         )
-        return self._told('ontology_map/add_room', request)
 
     def remove_room(self, name: str) -> str:
         """Remove a place from the map and the ontology."""
-        return self._told('ontology_map/remove_room', RemoveRoom.Request(room_name=_name(name)))
+        return self._told('ontology_map/remove_room', room_name=_name(name))
 
     def go_to(self, place: str) -> str:
         """Send the robot to a place next; an empty one calls it home."""
-        return self._told('go_to', GoTo.Request(place=_name(place) if place else ''))
+        return self._told('go_to', place=_name(place) if place else '')
 
     def why_not(self, place: str) -> tuple[str, list[str]]:
         """Return why the robot would not go to a place now, and the premises of that."""
-        answer = self._call('why_not', WhyNot.Request(place=_name(place)))
+        answer = self._call('why_not', place=_name(place))
         if not answer.success:
             raise ValueError(answer.message or f'no answer about {place}')
         return answer.message, list(answer.premises)
@@ -146,7 +148,7 @@ class MissionActions:
         """Pause, step or resume the state machine."""
         if word not in ('pause', 'step', 'resume'):
             raise ValueError(f'{word!r}: expected pause, step or resume')
-        answer = self._call(f'{BEHAVIOUR}/fsm/{word}', Trigger.Request())
+        answer = self._call(f'{BEHAVIOUR}/fsm/{word}')
         if not answer.success:
             raise ValueError(answer.message or f'{word} was refused')
         done = {'pause': 'paused', 'step': 'one step made', 'resume': 'going on'}
@@ -162,13 +164,11 @@ class MissionActions:
 
     def parameters(self, node: str) -> dict[str, Any]:
         """Return the values that a node's parameters have now, by name."""
-        listed = self._call_node(node, ListParameters, ListParameters.Request()).result.names
-        names = sorted(listed)
-        answer = self._call_node(node, GetParameters, GetParameters.Request(names=names))
-        values = map(parameter_value_to_python, answer.values)
+        names = sorted(self._call(f'{node}/list_parameters').result.names)
+        values = self._call(f'{node}/get_parameters', names=names).values
         return {
             name: value.tolist() if hasattr(value, 'tolist') else value
-            for name, value in zip(names, values, strict=False)
+            for name, value in zip(names, map(parameter_value_to_python, values), strict=False)
         }
 
     def set_parameter(self, node: str, name: str, text: str) -> str:
@@ -183,8 +183,7 @@ class MissionActions:
             value = text
         value = spec.accept(value)
         parameter = Parameter(name, value=value).to_parameter_msg()
-        request = SetParameters.Request(parameters=[parameter])
-        (result,) = self._call_node(node, SetParameters, request).results
+        (result,) = self._call(f'{node}/set_parameters', parameters=[parameter]).results
         if not result.successful:
             raise ValueError(result.reason or f'{name} was refused')
         return f'{name} of {node} is {shown(value)}'
@@ -194,15 +193,13 @@ class MissionActions:
         number = getattr(MarkerRoutine.Request, str(pose).upper(), None)
         if not isinstance(number, int):
             raise ValueError(f'{pose!r}: expected left, home, right, back or stop')
-        return self._told('move_arm', MarkerRoutine.Request(pos=number), ARM_SECONDS)
+        return self._told('move_arm', ARM_SECONDS, pos=number)
 
     def command(self, controller: str, line: str) -> str:
         """Give a controller one of its console's commands: the answers of mode MANUAL."""
         if controller not in CONTROLLERS:
             raise ValueError(f'{controller!r}: expected {nearest(controller, CONTROLLERS)}')
-        answer = self._call(
-            f'{controller}/command', ConsoleCommand.Request(line=str(line)[:20_000])
-        )
+        answer = self._call(f'{controller}/command', line=str(line)[:20_000])
         if not answer.accepted:
             raise ValueError(answer.answer)
         return str(answer.answer)
@@ -231,7 +228,7 @@ class MissionActions:
     def _ask(self, question: Callable[[Any], Any]) -> Any:
         try:
             if self._armor is None:
-                answer = self._call('ontology_map/reference_name', ReferenceName.Request())
+                answer = self._call('ontology_map/reference_name')
                 self._armor = ArmorClient(
                     self._node,
                     self._node.get_name(),
@@ -245,28 +242,26 @@ class MissionActions:
         except ArmorServiceInternalError as error:
             raise ValueError(str(error)) from None
 
-    def _call_node(self, node: str, kind: Any, request: Any) -> Any:
-        words = {GetParameters: 'get', ListParameters: 'list', SetParameters: 'set'}
-        service = f'{node}/{words[kind]}_parameters'
-        if service not in self._callers:
-            self._callers[service] = ServiceCaller(self._node, kind, service)
-        return self._call(service, request)
-
-    def _told(self, service: str, request: Any, timeout: float | None = None) -> str:
-        answer = self._call(service, request, timeout)
+    def _told(self, service: str, timeout: float | None = None, **fields: Any) -> str:
+        answer = self._call(service, timeout, **fields)
         if not answer.success:
             raise ValueError(answer.message or f'{service} refused')
         return str(answer.message) or 'done'
 
-    def _call(self, service: str, request: Any, timeout: float | None = None) -> Any:
-        caller = self._callers[service]
+    def _call(self, service: str, timeout: float | None = None, **fields: Any) -> Any:
+        kind = _KINDS.get(service) or _PARAMETER_KINDS[service.rpartition('/')[2]]
+        if service not in self._callers:
+            self._callers[service] = ServiceCaller(self._node, kind, service)
         discovery = self._timeout
         if service.startswith(_OPTIONAL):
             # Nobody waits for a service that this kind of mission does not have.
             discovery = max(min(0.5, self._timeout), self._found_by - time.monotonic())
         try:
-            return caller.call(
-                request, timeout or self._timeout, self._node.stopping, discovery=discovery
+            return self._callers[service].call(
+                kind.Request(**fields),
+                timeout or self._timeout,
+                self._node.stopping,
+                discovery=discovery,
             )
         except UnavailableError as error:
             raise UnavailableError(self._away(service) or str(error)) from None
