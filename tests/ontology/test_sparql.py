@@ -18,9 +18,10 @@ from surveillance_ontology.armor.client import (
     InProcessTransport,
     checked,
 )
+from surveillance_ontology.armor.reference import Origin, Reference
 from surveillance_ontology.armor.service import ArmorService
-from surveillance_ontology.armor.sparql_engine import SparqlEngine
-from surveillance_ontology.armor.sparql_graph import GraphChanges, GraphUpdate, Version
+from surveillance_ontology.armor.sparql import GraphChanges, GraphUpdate, SparqlEngine, Version
+from surveillance_ontology.knowledge_base import KnowledgeBase
 from surveillance_ontology.owl.axioms import ObjectPropertyAssertion
 from surveillance_ontology.owl.vocabulary import OWL
 
@@ -115,21 +116,24 @@ def test_the_time_asked_for_is_the_querys_own(monkeypatch: pytest.MonkeyPatch) -
     passed = 0.0
     clock = time.monotonic
 
-    def update(_known: Version | None) -> GraphUpdate:
+    def update(*_: object) -> GraphUpdate:
         nonlocal passed
         passed += 100.0
         fact = ObjectPropertyAssertion('urn:b', 'urn:a', 'urn:c')
         return GraphUpdate(Version(0, True, 0), True, 'urn:x', [fact])
 
     monkeypatch.setattr(time, 'monotonic', lambda: clock() + passed)
-    engine = SparqlEngine()
+    monkeypatch.setattr(GraphChanges, 'update', update)
+    ref = Reference('map', KnowledgeBase('urn:x'), Origin('', ''))
+    patient, short = (SparqlEngine(Settings(sparql_timeout=most)) for most in (1000.0, 50.0))
     try:
-        rows = engine.select(Version(0, True, 0), update, QUERY, 20.0, 1000.0, 10)
+        rows = patient.select(ref, QUERY, 20.0)
         assert [[item.value for item in row] for row in rows] == [['urn:c']]
         with pytest.raises(TimeoutError):
-            engine.select(Version(0, True, 1), update, QUERY, 20.0, 50.0, 10)
+            short.select(ref, QUERY, 20.0)
     finally:
-        engine.close()
+        patient.close()
+        short.close()
 
 
 def test_derived_facts_can_be_left_out() -> None:
@@ -264,9 +268,9 @@ def test_a_graph_that_is_kept_up_to_date_is_the_one_that_a_new_process_gets(
     wholes: list[bool] = []
     update = GraphChanges.update
 
-    def counted(*args: Any) -> GraphUpdate:
+    def counted(*args: Any) -> GraphUpdate | None:
         found = update(*args)
-        wholes.append(found.whole)
+        wholes.extend([found.whole] if found else [])
         return found
 
     monkeypatch.setattr(GraphChanges, 'update', counted)
@@ -296,7 +300,7 @@ def test_a_graph_that_is_kept_up_to_date_is_the_one_that_a_new_process_gets(
             ]
         )()
         kept = graph_of(client)
-        service.graphs.note('map', None)
+        service.sparql.note('map', None)
         assert kept == graph_of(client), step
     assert wholes.count(False) > 20, 'most changes were told as a difference'
     service.close()

@@ -203,7 +203,6 @@ class Registry:
 
     def __init__(self) -> None:
         self._references: dict[str, Reference] = {}
-        self._lock = threading.Lock()
 
     def __contains__(self, name: object) -> bool:
         return name in self._references
@@ -214,8 +213,7 @@ class Registry:
 
     def hold_more_than(self, axioms: int) -> bool:
         """Tell whether one of the references has more axioms."""
-        with self._lock:
-            return any(len(ref.kb) > axioms for ref in self._references.values())
+        return any(len(ref.kb) > axioms for ref in list(self._references.values()))
 
     def get(self, name: str) -> Reference | None:
         """Find a reference, None when there is none of the name."""
@@ -229,9 +227,12 @@ class Registry:
         """
         ref = self._references.get(name)
         if ref is None:
-            loaded = ', '.join(map(shown, self.names()[:10])) or 'none'
-            raise DirectiveError(f'unknown reference {shown(name)}; loaded: {loaded}')
+            raise self._unknown(name)
         return ref
+
+    def _unknown(self, name: str) -> DirectiveError:
+        loaded = ', '.join(map(shown, self.names()[:10])) or 'none'
+        return DirectiveError(f'unknown reference {shown(name)}; loaded: {loaded}')
 
     @contextlib.contextmanager
     def locked_if_there(self, name: str) -> Iterator[Reference | None]:
@@ -251,7 +252,9 @@ class Registry:
             DirectiveError: 205, there is no such reference.
         """
         with self.locked_if_there(name) as ref:
-            yield ref or self.find(name)
+            if ref is None:
+                raise self._unknown(name)
+            yield ref
 
     @contextlib.contextmanager
     def held(self, names: Iterable[str]) -> Iterator[list[Reference]]:
@@ -275,14 +278,12 @@ class Registry:
 
     def add(self, ref: Reference) -> None:
         """Enter a reference under its name."""
-        with self._lock:
-            self._references[ref.name] = ref
+        self._references[ref.name] = ref
 
     def remove(self, ref: Reference) -> None:
         """Take a reference out; whoever holds it sees that it is dropped."""
         ref.dropped = True
-        with self._lock:
-            self._references.pop(ref.name, None)
+        self._references.pop(ref.name, None)
 
 
 def _becomes_free(lock: threading.RLock) -> bool:

@@ -31,8 +31,7 @@ from surveillance_ontology.armor.protocol import (
 )
 from surveillance_ontology.armor.reference import Reference, Registry
 from surveillance_ontology.armor.rendering import one_line, shown
-from surveillance_ontology.armor.sparql_engine import SparqlEngine
-from surveillance_ontology.armor.sparql_graph import GraphChanges
+from surveillance_ontology.armor.sparql import SparqlEngine
 from surveillance_ontology.armor.store import Store
 from surveillance_ontology.knowledge_base import Changes
 from surveillance_ontology.reasoner.java_reasoning import JavaReasonerError
@@ -66,7 +65,6 @@ class ArmorService:
         paths: Which files may be read and written.
         log: The log of directives.
         sparql: Runs SPARQL queries.
-        graphs: What changed in the graphs that they see.
         references: What is loaded.
         entering: Held while what was loaded gets its name.
         store: Makes references durable; None: they end with the process.
@@ -84,15 +82,14 @@ class ArmorService:
         readable = (*self.settings.directories, *self.settings.read_only_directories)
         self.paths = SafePaths(self.settings.writable, readable)
         self.log = DirectiveLog(screen, self.settings.max_file_bytes)
-        self.sparql = SparqlEngine()
-        self.graphs = GraphChanges()
+        self.sparql = SparqlEngine(self.settings)
         self.references = Registry()
         self.entering = threading.Lock()
         self.clock = clock
         self.store = store
         self._saving: dict[str, threading.Lock] = {}
         self._warn = warn
-        self._watchers: list[Watcher] = [self.graphs.note]
+        self._watchers: list[Watcher] = [self.sparql.note]
         if store:
             store.warn = self.warn
             with memory.uncollected():

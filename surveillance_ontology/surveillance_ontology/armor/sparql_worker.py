@@ -22,8 +22,6 @@ from typing import Any, BinaryIO
 
 import pyoxigraph
 
-from surveillance_ontology.armor.sparql_engine import OUT_OF_MEMORY
-
 MOST_SHOWN = 160
 """Characters of the engine's own words about a query."""
 NO_FURTHER_FILES = 3
@@ -236,8 +234,11 @@ def _iri(term: Any) -> str:
 
 
 def main() -> None:
-    """Limit this process, then serve."""
-    memory = int(sys.argv[1])
+    """Limit this process, then serve.
+
+    Its arguments are the bytes of memory that it may use, and its exit code where it needs more.
+    """
+    memory, out_of_memory = map(int, sys.argv[1:])
     resource.setrlimit(resource.RLIMIT_DATA, (memory, memory))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     resource.setrlimit(resource.RLIMIT_NOFILE, (NO_FURTHER_FILES, NO_FURTHER_FILES))
@@ -246,7 +247,7 @@ def main() -> None:
     try:
         serve(sys.stdin.buffer, sys.stdout.buffer)
     except MemoryError:
-        sys.exit(OUT_OF_MEMORY)
+        sys.exit(out_of_memory)
 
 
 if __name__ == '__main__':

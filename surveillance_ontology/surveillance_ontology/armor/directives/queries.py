@@ -41,7 +41,6 @@ from surveillance_ontology.armor.rendering import (
     shown,
 )
 from surveillance_ontology.armor.rendering import render_literal as _literal
-from surveillance_ontology.armor.sparql_graph import GraphUpdate, Version
 from surveillance_ontology.knowledge_base import Fact, KnowledgeBase
 from surveillance_ontology.owl.axioms import (
     Axiom,
@@ -464,25 +463,8 @@ def _select(service: ArmorService, ref: Reference, parts: tuple[str, ...]) -> li
     limit = service.settings.sparql_timeout
     asked = _milliseconds(last) / 1000
     seconds = min(asked, limit) if asked > 0 else limit
-    derived = service.settings.sparql_derived
-
-    def update(known: Version | None) -> GraphUpdate | None:
-        with ref.held():
-            if known == service.graphs.version(ref, derived):
-                return None
-            return service.graphs.update(ref, derived, known)
-
-    with ref.held():
-        version = service.graphs.version(ref, derived)
     try:
-        return service.sparql.select(
-            version,
-            update,
-            ''.join(texts),
-            seconds,
-            limit,
-            service.settings.sparql_rows,
-        )
+        return service.sparql.select(ref, ''.join(texts), seconds)
     except TimeoutError:
         raise DirectiveError(
             f'QUERY SPARQL: stopped after {seconds * 1000:g} ms', timeout=True
