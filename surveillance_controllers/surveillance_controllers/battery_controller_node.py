@@ -67,7 +67,9 @@ class BatteryController(PatrolNode):
         self._recharged = AwaitedEvent(self)
         group = ReentrantCallbackGroup()
         self.create_service(Empty, 'recharge', self._on_recharge, callback_group=group)
-        self._console = CommandConsole(self, BATTERY, self._carry_out, self._status)
+        self._console: CommandConsole[None] = CommandConsole(
+            self, BATTERY, self._carry_out, self._status
+        )
         self._change(lambda: None)
         self.get_logger().info(f'{self._mode} mode, battery at {self._battery.percent} %')
         if self._mode == 'MANUAL' and self._settings.console:

@@ -17,7 +17,7 @@ from surveillance_controllers.controller_parameters import MotionSettings, execu
 from surveillance_controllers.geometry import Points
 from surveillance_controllers.manual import commands
 from surveillance_controllers.manual.commands import MOTION, ParsedCommand
-from surveillance_controllers.manual.requests import CommandConsole, RequestQueue
+from surveillance_controllers.manual.requests import CommandConsole
 from surveillance_controllers.map_knowledge import MapKnowledge
 from surveillance_controllers.motion.arrival import Motion, MotionFailedError, place_reached
 from surveillance_controllers.motion.place_recording import PlaceRecorder
@@ -43,10 +43,9 @@ class MotionController(PatrolNode):
         self._settings = self.declare_fields(MotionSettings())
         self._draw = stimuli.generator(self._settings.random_seed)
         self._knowledge = MapKnowledge(self, self._settings.peer_timeout)
-        self._requests: RequestQueue[tuple[float, float]] = RequestQueue(
-            lambda text: self._console.announce(text)
+        self._console: CommandConsole[tuple[float, float]] = CommandConsole(
+            self, MOTION, self._carry_out
         )
-        self._console = CommandConsole(self, MOTION, self._carry_out, lambda: self._requests.status)
         localises = self._mode == 'SIMULATED' and self._settings.navigator == 'own'
         start = None if localises else self._settings.robot_room
         reach = self._settings.place_reach
@@ -76,7 +75,7 @@ class MotionController(PatrolNode):
         seconds, delta = command.values
         assert isinstance(seconds, float)
         assert isinstance(delta, float)
-        self._requests.answer((seconds, delta))
+        self._console.answer((seconds, delta))
         return f'Moving for {seconds:g} s.'
 
     def _follow_path(self, goal: Any, run: GoalRun) -> FollowPath.Result:
@@ -150,7 +149,7 @@ class MotionController(PatrolNode):
             report(end)
             return end
         if self._mode == 'MANUAL':
-            answer = self._requests.ask(commands.move_request(what, path), run.interrupt)
+            answer = self._console.ask(commands.move_request(what, path), run.interrupt)
             if answer is None:
                 raise MotionFailedError(f'{what}: withdrawn before the operator answered', None)
             seconds, delta = answer

@@ -19,7 +19,7 @@ from surveillance_controllers.controller_parameters import PlannerSettings, exec
 from surveillance_controllers.geometry import Points
 from surveillance_controllers.manual import commands
 from surveillance_controllers.manual.commands import PLANNER, ParsedCommand, Point3
-from surveillance_controllers.manual.requests import CommandConsole, RequestQueue
+from surveillance_controllers.manual.requests import CommandConsole
 from surveillance_controllers.map_knowledge import MapKnowledge
 from surveillance_fsm.ros import GoalAbortedError, GoalRun, GoalServer
 from surveillance_interfaces.action import ComputePath, Plan
@@ -46,11 +46,8 @@ class PlannerController(PatrolNode):
         self._settings = self.declare_fields(PlannerSettings())
         self._draw = stimuli.generator(self._settings.random_seed)
         self._knowledge = MapKnowledge(self, self._settings.peer_timeout)
-        self._requests: RequestQueue[tuple[Point3, ...]] = RequestQueue(
-            lambda text: self._console.announce(text)
-        )
-        self._console = CommandConsole(
-            self, PLANNER, self._carry_out, lambda: self._requests.status
+        self._console: CommandConsole[tuple[Point3, ...]] = CommandConsole(
+            self, PLANNER, self._carry_out
         )
         self._simulated: NavigationPlanning | None = None
         if self._mode == 'SIMULATED':
@@ -69,7 +66,7 @@ class PlannerController(PatrolNode):
     def _carry_out(self, command: ParsedCommand) -> str:
         (points,) = command.values
         assert isinstance(points, tuple)
-        self._requests.answer(points)
+        self._console.answer(points)
         count = '1 point' if len(points) == 1 else f'{len(points)} points'
         return f'A path with {count} between start and goal.'
 
@@ -125,7 +122,7 @@ class PlannerController(PatrolNode):
         between: Sequence[Point3] | None
         if self._mode == 'MANUAL':
             text = commands.path_request(what, start, goal)
-            between = self._requests.ask(text, run.interrupt)
+            between = self._console.ask(text, run.interrupt)
             if between is None:
                 raise GoalAbortedError(f'{what}: withdrawn before the operator answered')
         else:

@@ -1,6 +1,6 @@
 """Queue of pending operator requests (MANUAL mode), and the commands that answer them.
 
-A worker thread that carries out an action calls `RequestQueue.ask` and sleeps until somebody
+A worker thread that carries out an action calls `CommandConsole.ask` and sleeps until somebody
 answers or its goal is interrupted; requests are answered in the order in which they came. Commands
 come from the controller's own terminal or pipe and from the service `~/command`, so that one
 console elsewhere can serve all controllers; what the operator is told also goes out on the topic
@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from concurrent.futures import CancelledError, Future
 from typing import Any, Generic, TextIO, TypeVar
 
 from std_msgs.msg import String
@@ -35,83 +35,15 @@ from surveillance_runtime.qos import STATE_QOS
 Answer = TypeVar('Answer')
 
 
-@dataclass(eq=False)
-class _Request(Generic[Answer]):
-    description: str
-    answered: threading.Event = field(default_factory=threading.Event)
-    answer: Answer | None = None
-
-
-class RequestQueue(Generic[Answer]):
-    """The pending requests of one controller.
-
-    Args:
-        announce: Shows the operator a text of one or more lines.
-    """
-
-    def __init__(self, announce: Callable[[str], None]) -> None:
-        self._announce = announce
-        self._lock = threading.Lock()
-        self._waiting: list[_Request[Answer]] = []
-
-    @property
-    def status(self) -> str:
-        """What waits at the moment, in words."""
-        with self._lock:
-            waiting = [request.description for request in self._waiting]
-        return '\n'.join(waiting) if waiting else 'No request is waiting.'
-
-    def ask(self, description: str, interruption: Interrupt) -> Answer | None:
-        """Wait until the operator answers.
-
-        Args:
-            description: What is asked, shown to the operator: lines of text.
-            interruption: Ends the wait; the operator is told.
-
-        Returns:
-            The answer, or None when the wait was interrupted.
-        """
-        request: _Request[Answer] = _Request(description)
-        with self._lock:
-            self._waiting.append(request)
-        self._announce(description)
-        unsubscribe = interruption.subscribe(request.answered.set)
-        try:
-            request.answered.wait()
-        finally:
-            unsubscribe()
-            with self._lock:
-                withdrawn = request in self._waiting
-                if withdrawn:
-                    self._waiting.remove(request)
-        if withdrawn:
-            self._announce('The request was withdrawn: ' + description.partition('\n')[0])
-            return None
-        return request.answer
-
-    def answer(self, answer: Answer) -> None:
-        """Answer the request that has waited longest.
-
-        Raises:
-            CommandError: No request is waiting.
-        """
-        with self._lock:
-            if not self._waiting:
-                raise CommandError('no request is waiting: expected one before this command')
-            request = self._waiting.pop(0)
-        request.answer = answer
-        request.answered.set()
-
-
-class CommandConsole:
-    """The commands of one controller.
+class CommandConsole(Generic[Answer]):
+    """The operator of one controller, who gives it commands and answers its requests.
 
     Args:
         node: The controller.
         commands: Its own commands.
         carry_out: Does what a command says and returns what to tell the operator; raises
             `CommandError`.
-        status: What `status` answers.
+        status: What `status` answers; unless given, the requests that wait.
     """
 
     def __init__(
@@ -119,12 +51,14 @@ class CommandConsole:
         node: PatrolNode,
         commands: Sequence[Command],
         carry_out: Callable[[ParsedCommand], str],
-        status: Callable[[], str],
+        status: Callable[[], str] | None = None,
     ) -> None:
         self._node = node
         self._grammar = Grammar(commands)
         self._carry_out = carry_out
-        self._status = status
+        self._status = status or self._what_waits
+        self._lock = threading.Lock()
+        self._waiting: dict[Future[Answer], str] = {}
         self._console: Console | None = None
         self._announcements = node.create_publisher(String, '~/announcement', STATE_QOS)
         node.create_service(ConsoleCommand, '~/command', self._on_request)
@@ -138,12 +72,59 @@ class CommandConsole:
         self._node.stopping.subscribe(self._console.stop)
         self._node.spawn(self._read, name=f'{name} console')
 
+    def ask(self, description: str, interruption: Interrupt) -> Answer | None:
+        """Wait until the operator answers.
+
+        Args:
+            description: What is asked, shown to the operator: lines of text.
+            interruption: Ends the wait; the operator is told.
+
+        Returns:
+            The answer, or None when the wait was interrupted.
+        """
+        request: Future[Answer] = Future()
+
+        def withdraw() -> None:
+            request.cancel()
+
+        with self._lock:
+            self._waiting[request] = description
+        self._announce(description)
+        unsubscribe = interruption.subscribe(withdraw)
+        try:
+            return request.result()
+        except CancelledError:
+            with self._lock:
+                self._waiting.pop(request, None)
+            self._announce('The request was withdrawn: ' + description.partition('\n')[0])
+            return None
+        finally:
+            unsubscribe()
+
+    def answer(self, answer: Answer) -> None:
+        """Answer the request that has waited longest.
+
+        Raises:
+            CommandError: No request is waiting.
+        """
+        with self._lock:
+            for request in tuple(self._waiting):
+                del self._waiting[request]
+                if request.set_running_or_notify_cancel():
+                    request.set_result(answer)
+                    return
+        raise CommandError('no request is waiting: expected one before this command')
+
+    def _what_waits(self) -> str:
+        with self._lock:
+            return '\n'.join(self._waiting.values()) or 'No request is waiting.'
+
     @property
     def has_terminal(self) -> bool:
         """Whether an operator edits lines on the terminal that this process writes to."""
         return self._console is not None and self._console.on_terminal
 
-    def announce(self, text: str) -> None:
+    def _announce(self, text: str) -> None:
         """Tell the operator something, wherever the operator is."""
         if self._console is not None:
             print_lines(text)
