@@ -115,7 +115,6 @@ class Localiser:
     Args:
         grid: The map.
         pose: Where the robot is believed to be at first.
-        parameters: How the localiser works.
         before_search: Called before a search everywhere, which takes up to a second.
 
     Attributes:
@@ -129,10 +128,9 @@ class Localiser:
         self,
         grid: Grid,
         pose: Pose,
-        parameters: LocalisationParameters | None = None,
         before_search: Callable[[], None] = lambda: None,
     ) -> None:
-        self.parameters = parameters or LocalisationParameters()
+        self.parameters = LocalisationParameters()
         self._before_search = before_search
         self.pose = pose
         self.agreement = 1.0

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from surveillance_controllers.geometry import Points, Pose, Scan, in_map, relative
 from surveillance_controllers.motion.driving import Drive, Spin
-from surveillance_controllers.motion.localisation import LocalisationParameters, Localiser
+from surveillance_controllers.motion.localisation import Localiser
 from surveillance_controllers.motion.obstacle_memory import ObstacleMemory
 from surveillance_controllers.motion.path_following import Velocity
 from surveillance_controllers.motion.place_regions import PlaceMap
@@ -44,7 +44,6 @@ class Navigator:
 
     Args:
         doors: All doors by name, as segments; they divide the map into places.
-        localisation: How the pose is estimated.
         guesses: Where the robot may be at first, beside where its odometry says.
 
     Attributes:
@@ -58,12 +57,10 @@ class Navigator:
     def __init__(
         self,
         doors: Mapping[str, Segment] | None = None,
-        localisation: LocalisationParameters | None = None,
         guesses: Iterable[Pose] = (),
     ) -> None:
         self._doors = dict(doors or {})
         self._closed: frozenset[str] = frozenset()
-        self._localisation = localisation
         self._guesses = tuple(guesses)
         self._places = PlaceMap(self._doors.values())
         self._grid: Grid | None = None
@@ -199,9 +196,7 @@ class Navigator:
 
     def _first_localiser(self, scan: Scan, odometry: Pose) -> Localiser:
         """Begin where the robot is said to be, or else where its first scan fits best."""
-        localiser = Localiser(
-            self._seen_map, odometry, self._localisation, lambda: self.before_search()
-        )
+        localiser = Localiser(self._seen_map, odometry, lambda: self.before_search())
         if self._believed is not None:
             localiser.believe(self._believed)
         else:

@@ -68,19 +68,12 @@ class SampledPlanner:
 
     Args:
         robot: The robot's limits.
-        parameters: How it samples.
-        seed: Of what is drawn.
     """
 
-    def __init__(
-        self,
-        robot: DriveParameters,
-        parameters: SamplingParameters | None = None,
-        seed: int = 0,
-    ) -> None:
+    def __init__(self, robot: DriveParameters) -> None:
         self._robot = robot
-        self._parameters = p = parameters or SamplingParameters()
-        self._rng = np.random.default_rng(seed)
+        self._parameters = p = SamplingParameters()
+        self._rng = np.random.default_rng(0)
         self._plan: Floats = np.zeros((p.steps, 2), np.float32)
         self._ahead = (np.arange(p.steps) + 1.0) * p.step
         # Noise is drawn at a few moments and linear between them: the sequences are smooth.

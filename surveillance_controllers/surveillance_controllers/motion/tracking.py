@@ -82,14 +82,10 @@ class _Body:
 
 
 class Tracker:
-    """Follows the bodies around the robot.
+    """Follows the bodies around the robot."""
 
-    Args:
-        parameters: How.
-    """
-
-    def __init__(self, parameters: TrackingParameters | None = None) -> None:
-        self._parameters = parameters or TrackingParameters()
+    def __init__(self) -> None:
+        self._parameters = TrackingParameters()
         self._bodies: list[_Body] = []
         self._now = -math.inf
 
