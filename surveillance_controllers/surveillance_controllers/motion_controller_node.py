@@ -122,7 +122,7 @@ class MotionController(PatrolNode):
             places = self._knowledge.places(run.interrupt)
             place = place_reached(places, end, self._settings.place_reach)
         else:
-            place = self._robot.place_reached(goal, end, run)
+            place = self._robot.place_reached(goal, end)
         self._recorder.tell(place)
         if self._robot is not None:
             self._robot.look_around(run)

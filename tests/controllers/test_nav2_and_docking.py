@@ -186,9 +186,9 @@ def test_the_place_follows_the_pose_by_the_rooms_of_the_map(
     graph.until(lambda: recorder.places[-1] == 'A')
     end = motion.follow(PATH, run, lambda _: None)
     assert tuple(end) == (3.6, 2.7, 0.0)
-    assert motion.place_reached(np.array([2.0, 1.5, 0.0]), end, run) == 'A'
+    assert motion.place_reached(np.array([2.0, 1.5, 0.0]), end) == 'A'
     with pytest.raises(MotionFailedError, match='stopped in A: expected B'):
-        motion.place_reached(np.array([5.5, 1.5, 0.0]), end, run)
+        motion.place_reached(np.array([5.5, 1.5, 0.0]), end)
 
 
 @pytest.mark.parametrize(

@@ -141,9 +141,8 @@ def test_a_robot_that_does_not_know_where_it_is_tells_no_place(
     # It finds out with the next scan: the simulated navigator changes its mind there.
     navigator.see = lambda _scan, _now: setattr(navigator, doubt, True)
     graph.until(lambda: last(None))
-    run: Any = SimpleNamespace(interrupt=Interrupt())
     with pytest.raises(MotionFailedError, match='does not know in which'):
-        motion.place_reached(np.zeros(3), np.zeros(3), run)
+        motion.place_reached(np.zeros(3), np.zeros(3))
     navigator.place = 'R2'
     navigator.see = lambda _scan, _now: setattr(navigator, doubt, False)
     graph.until(lambda: last('R2'))

@@ -22,7 +22,7 @@ class Motion(Protocol):
         It may report where the robot is as often as it likes.
         """
 
-    def place_reached(self, goal: Points, end: Points, run: GoalRun) -> str:
+    def place_reached(self, goal: Points, end: Points) -> str:
         """Return the place the robot is in; raises `MotionFailedError` when it is not the
         goal's.
         """

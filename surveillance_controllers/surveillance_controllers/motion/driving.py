@@ -138,16 +138,6 @@ class Drive:
         self._moved_at = -math.inf
         self._trouble_since = -math.inf
 
-    @property
-    def path(self) -> Points:
-        """The path that is followed now."""
-        return self._follower.path
-
-    @property
-    def progress(self) -> float:
-        """Way along the present path, metres."""
-        return self._follower.progress
-
     def step(
         self,
         now: float,

@@ -181,7 +181,7 @@ class Nav2Motion:
         if place is not None:
             self._recorder.tell(place)
 
-    def place_reached(self, goal: Points, end: Points, _run: GoalRun) -> str:
+    def place_reached(self, goal: Points, end: Points) -> str:
         """Return the place that the robot is in, which is at `end`, shape (3,).
 
         Raises:
@@ -248,9 +248,9 @@ class DockingMotion:
         self._docked = True
         return end
 
-    def place_reached(self, goal: Points, end: Points, run: GoalRun) -> str:
+    def place_reached(self, goal: Points, end: Points) -> str:
         """As the motion that drives."""
-        return self._inner.place_reached(goal, end, run)
+        return self._inner.place_reached(goal, end)
 
     def look_around(self, run: GoalRun) -> None:
         """As the motion that drives; a docked robot stays as it is."""

@@ -134,13 +134,12 @@ class NavigationMotion:
         self._recorder.tell(self._navigator.place_at(end) if self._is_sure else None)
         return end
 
-    def place_reached(self, goal: Points, end: Points, _run: GoalRun) -> str:
+    def place_reached(self, goal: Points, end: Points) -> str:
         """Return the place the robot is in after a drive.
 
         Args:
             goal: Where the robot should be, shape (3,).
             end: Where it is, shape (3,).
-            _run: The goal that is carried out.
 
         Raises:
             MotionFailedError: It is not in the goal's place.
