@@ -19,7 +19,7 @@ from surveillance_fsm import Interrupt
 from surveillance_fsm.ros import CallInterruptedError, GoalCaller, ServiceCaller
 from surveillance_interfaces.action import ComputePath, Control, FollowPath, Plan
 from surveillance_interfaces.msg import OntologyMap, OntologyPlace, RoomConnection
-from surveillance_interfaces.srv import PlaceObstacle, PushRobot, SetDoor
+from surveillance_interfaces.srv import PlaceObstacle, PushRobot, ReferenceName, SetDoor
 from surveillance_ontology.armor_client import ArmorClient
 from surveillance_ontology.armor_server_node import ArmorServer
 from surveillance_ontology.ontology_map_builder_node import OntologyMapBuilder
@@ -42,6 +42,9 @@ class World:
         self.collisions = graph.listen(UInt32, 'collisions', STATE_QOS)
         self.armor = ArmorClient(graph.node, 'test', 'surveillance', timeout=60.0)
         node = graph.node
+        # Before the map is built, there is no ontology to be asked.
+        names = ServiceCaller(node, ReferenceName, 'ontology_map/reference_name')
+        names.call(ReferenceName.Request(), 60.0)
         self._compute = GoalCaller(node, ComputePath, 'compute_path')
         self._follow = GoalCaller(node, FollowPath, 'follow_path')
         self._plan = GoalCaller(node, Plan, 'motion/planner')
