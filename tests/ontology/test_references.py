@@ -205,6 +205,32 @@ def test_an_older_state_never_replaces_a_newer_one(
     assert {path.name for path in tmp_path.iterdir()} == {'map.owl', 'other.owl'}, 'no draft'
 
 
+def test_a_state_that_was_taken_before_the_newest_is_not_written_after_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    service = ArmorService(Settings(str(tmp_path)))
+    ask = asker(service)
+    assert ask('LOAD FILE', ONTOLOGY, IRI, 'false', 'PELLET', 'false').success
+    saving, taken, go_on = service.saving, threading.Event(), threading.Event()
+
+    def late(path: Path) -> threading.Lock:
+        if not taken.is_set():
+            taken.set()
+            assert go_on.wait(30)
+        return saving(path)
+
+    monkeypatch.setattr(service, 'saving', late)
+    older = threading.Thread(target=ask, args=('SAVE', 'map.owl'))
+    older.start()
+    assert taken.wait(30)
+    ask('ADD IND CLASS', 'X', 'DOOR')
+    assert ask('SAVE', 'map.owl').success
+    newest = (tmp_path / 'map.owl').read_bytes()
+    go_on.set()
+    older.join()
+    assert (tmp_path / 'map.owl').read_bytes() == newest
+
+
 def test_a_list_that_saves_waits_for_no_save_that_waits_for_it(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

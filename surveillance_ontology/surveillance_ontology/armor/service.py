@@ -11,6 +11,7 @@ Nothing that a client sends makes it raise.
 from __future__ import annotations
 
 import contextlib
+import itertools
 import threading
 import time
 from collections.abc import Callable, Sequence
@@ -68,6 +69,8 @@ class ArmorService:
         references: What is loaded.
         entering: Held while what was loaded gets its name.
         store: Makes references durable; None: they end with the process.
+        states: Numbers the states that are taken to be saved.
+        saved: The newest state that each file holds.
     """
 
     def __init__(
@@ -87,7 +90,9 @@ class ArmorService:
         self.entering = threading.Lock()
         self.clock = clock
         self.store = store
-        self._saving: dict[str, threading.Lock] = {}
+        self.states = itertools.count(1)
+        self.saved: dict[Path, int] = {}
+        self._saving: dict[Path, threading.Lock] = {}
         self._warn = warn
         self._watchers: list[Watcher] = [self.sparql.note]
         if store:
@@ -127,8 +132,8 @@ class ArmorService:
         self.tell(ref.name, None)
 
     def saving(self, path: Path) -> threading.Lock:
-        """Return what is held from taking a state to its being in a file: the newest stays."""
-        return self._saving.setdefault(str(path), threading.Lock())
+        """Return what is held while a state is written to a file."""
+        return self._saving.setdefault(path, threading.Lock())
 
     def check_free(self, ref: Reference, client: str) -> None:
         """Check that no other client is mounted on a reference.

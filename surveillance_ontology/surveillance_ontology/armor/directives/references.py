@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import threading
 import time
 from pathlib import Path
@@ -197,30 +196,26 @@ def _save(service: ArmorService, request: DirectiveRequest, path: str) -> Direct
         chosen = path or _loaded_file(service, first)
     # While nobody waits for the reference: the disk may not answer.
     target = service.paths.to_write(chosen, ONTOLOGY_ENDINGS)
-    saving = service.saving(target)
-    with contextlib.ExitStack() as turn:
-        while True:
-            with service.references.locked(request.reference_name) as ref:
-                service.check_free(ref, request.client_name)
-                if ref is not first and not path:
-                    # Its own file is another one.
-                    raise DirectiveError(f'SAVE: {ref.name} was loaded again meanwhile')
-                # Whose turn it is waits for no reference: a list may hold it, and wait for a turn.
-                if saving.acquire(blocking=False):
-                    turn.callback(saving.release)
-                    turn.enter_context(memory.uncollected())
-                    axioms = list(ref.kb.axioms())
-                    if request.primary:
-                        axioms = list(dict.fromkeys([*axioms, *ref.kb.facts()]))
-                    origin = ref.origin
-                    break
-            with saving:
-                pass
-        form = 'ntriples' if target.suffix.lower() == '.nt' else origin.format
+    with service.references.locked(request.reference_name) as ref, memory.uncollected():
+        service.check_free(ref, request.client_name)
+        if ref is not first and not path:
+            # Its own file is another one.
+            raise DirectiveError(f'SAVE: {ref.name} was loaded again meanwhile')
+        taken = next(service.states)
+        axioms = list(ref.kb.axioms())
+        if request.primary:
+            axioms = list(dict.fromkeys([*axioms, *ref.kb.facts()]))
+        iri, origin = ref.kb.iri, ref.origin
+    form = 'ntriples' if target.suffix.lower() == '.nt' else origin.format
+    with service.saving(target):
+        if taken < service.saved.get(target, 0):
+            return DirectiveResponse()  # A newer state is there already.
         try:
-            write_ontology(axioms, ref.kb.iri, target, form, origin.prefixes)
+            with memory.uncollected():
+                write_ontology(axioms, iri, target, form, origin.prefixes)
         except OntologyFileError as error:
             raise DirectiveError(f'SAVE: {error}') from None
+        service.saved[target] = taken
     return DirectiveResponse()
 
 
