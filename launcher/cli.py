@@ -9,22 +9,17 @@ import os
 import signal
 import sys
 from collections.abc import Callable, Sequence
-from dataclasses import fields
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from launcher import interrupt, package_commands, system
 from launcher.environment import CHECKOUT, Environment, clean_environ, keep_bytecode
 from launcher.instance_lock import claim
-from launcher.options import DEFAULT_MEMORY, make_parser, shared_options
+from launcher.run import Run, make_parser, shared_options, wanted_run
 from surveillance_runtime import node_table
 from surveillance_runtime.command_line import EXIT_BAD_INPUT, CommandParser
 from surveillance_runtime.files import in_one_line, replace_text
 from surveillance_runtime.launch_protocol import NotNowError
 from surveillance_runtime.suggestions import nearest
-
-if TYPE_CHECKING:
-    from launcher.run import Run
 
 
 def runs_folder(checkout: Path = CHECKOUT) -> Path:
@@ -113,7 +108,7 @@ def _run(argv: list[str]) -> int:
     options = make_parser().parse_args(argv)
     node_table.select('RANDOM', only=options.only, without=options.without)
     _enter(['run', *argv])
-    from launcher.run import resumed
+    from launcher.run_folder import resumed
     from launcher.run_mission import run_mission
 
     run, folder = wanted_run(options), None
@@ -122,14 +117,6 @@ def _run(argv: list[str]) -> int:
         run, folder = resumed(run, usual, RUNS, options.resume)
     interrupt.raise_if_lost()
     return run_mission(run, CONFIG, RUNS, folder)
-
-
-def wanted_run(options: argparse.Namespace) -> Run:
-    """Return what the options of `run`, or those that `node` has of them, ask for."""
-    from launcher.run import Run
-
-    wanted = {field.name for field in fields(Run)}
-    return Run(**{name: value for name, value in vars(options).items() if name in wanted})
 
 
 def _node(argv: list[str]) -> int:
@@ -226,7 +213,7 @@ def _service(argv: list[str]) -> int:
     options = parser.parse_args(argv)
     words = [word for word in argv if word != '--print']
     # All nodes at their limit would be more than most machines have.
-    text = service.unit_text(CHECKOUT, words, 4 * (options.memory or DEFAULT_MEMORY))
+    text = service.unit_text(CHECKOUT, words, 4 * (options.memory or Run.memory))
     if options.print:
         print(text, end='')
         return 0

@@ -1,76 +1,230 @@
-"""What one run of the robot is asked for."""
+"""What one run of the robot is asked for: the options of `launch.py`, and what each takes.
+
+Each option stands once, as a field of `Run`; `make_parser` reads them from the command line. It
+needs no set-up: `--help` is said at once.
+"""
 
 from __future__ import annotations
 
-import json
+import argparse
+import math
 import re
 import shlex
 import shutil
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
-from launcher import run_folder
-from launcher.options import DEFAULT_KEEP, DEFAULT_MEMORY
+from launcher import package_commands
 from surveillance_runtime import node_table
+from surveillance_runtime.command_line import CommandParser
 from surveillance_runtime.discovery import LAST_DOMAIN
 from surveillance_runtime.files import FileError
-from surveillance_runtime.place import read_place_file
 
 NOT_RECORDED = 'off'
 RECORDER, MARKERS, PAGE = 'mission_recorder', 'mission_markers', 'mission_page'
 _NAMESPACE = re.compile(r'/?[A-Za-z]\w*(/[A-Za-z]\w*)*\Z', re.ASCII)
+_DESCRIPTION = """\
+Runs a patrol until Ctrl-C, each node in its own process, or runs COMMAND. The first start sets up
+.venv."""
+_COMMANDS = """\
+commands (each has its own --help):
+  run                       run a patrol: the same as without a command
+  node NAME [ROS args]      run one node in this terminal
+  list                      list the nodes
+  params [NODE]             print the value of each parameter and where it comes from
+  service                   write a systemd unit that keeps the robot running
+  setup                     only set up .venv
+  test [pytest args]        run the test suite
+  lint                      check format, lint and types
+"""
+_PROCESSES, _TRACES, _PAGE_GROUP = 'how it runs', 'what it leaves behind', 'the page'
+"""Groups of options that `run` has and `node` has not."""
+
+
+def _names(text: str) -> list[str]:
+    names = [name for name in text.replace(' ', '').split(',') if name]
+    if not names:
+        raise argparse.ArgumentTypeError(f'{text!r} names no node')
+    return names
+
+
+def _number(
+    kind: type[float], expected: str, fits: Callable[[float], bool]
+) -> Callable[[str], Any]:
+    """Return what reads an option's number, an `int` or a `float`."""
+
+    def read(text: str) -> Any:
+        try:
+            value = kind(text)
+        except ValueError:
+            value = math.nan
+        if not fits(value):
+            raise argparse.ArgumentTypeError(f'{text!r} is not {expected}')
+        return value
+
+    return read
+
+
+def _option(flag: str, unset: Any = None, *, group: str = '', **argument: Any) -> Any:
+    """Return a field of `Run` that an option sets.
+
+    Args:
+        flag: As it is typed.
+        unset: Default of the field, and of the option where `argument` has no other one.
+        group: The group in the help text; empty: one that `node` has, too.
+        **argument: As `argparse` takes it.
+    """
+    default = [] if unset == () else unset  # argparse appends to it
+    argument = {'default': default, **argument}
+    return field(default=unset, metadata={'flag': flag, 'group': group, 'argument': argument})
+
+
+def _switch(flag: str, help_text: str, group: str) -> Any:
+    return _option(flag, False, group=group, action='store_true', help=help_text)
+
+
+def _nodes_option(flag: str, help_text: str) -> Any:
+    return _option(
+        flag,
+        (),
+        group=_PROCESSES,
+        type=_names,
+        action='extend',
+        metavar='NODE,...',
+        help=help_text,
+    )
 
 
 @dataclass(frozen=True)
 class Run:
-    """What the command line asks for.
+    """What the command line asks for; None where the user says nothing.
 
-    Attributes:
-        mode: one of `node_table.MODES`, or None for the default one.
-        behaviour: one of `node_table.BEHAVIOURS`.
-        place: file that describes the place, None for the behaviour's own.
-        parameters: further parameter file, None for none.
-        assignments: `[NODE:]NAME:=VALUE` of `-p`, which win over every file.
-        composed: all nodes in one process.
-        only, without: names of nodes, see `node_table.select`.
-        log_level: one of `node_table.LOG_LEVELS`, None for ROS's own choice.
-        namespace: of all nodes, None for none.
-        domain: ROS domain, None for the environment's.
-        seconds: how long to run, None until stopped.
-        record: `off`, or the folder for the run's own, None for the usual one.
-        keep: most of the recordings to keep, gigabytes.
-        web, web_control: show the mission in browsers; let them act.
-        web_address: where, as HOST:PORT, None for the page's own choice.
-        memory: megabytes that a node may hold before it is started again; 0: any.
-        alarm: a command that is run, with one line as its argument, when somebody is needed.
-        fresh: do not go on with a run that had not come to its end.
-        network: whether nodes of other machines are heard.
+    Without a command line nothing is recorded.
     """
 
-    mode: str | None = None
-    behaviour: str = node_table.DEFAULT_BEHAVIOUR
-    place: Path | None = None
-    parameters: Path | None = None
-    assignments: Sequence[str] = ()
-    composed: bool = False
-    only: Sequence[str] = ()
-    without: Sequence[str] = ()
-    log_level: str | None = None
-    namespace: str | None = None
-    domain: int | None = None
-    seconds: float | None = None
-    record: str | None = NOT_RECORDED
-    keep: float = DEFAULT_KEEP
-    web: bool = False
-    web_control: bool = False
-    web_address: str | None = None
-    memory: int = DEFAULT_MEMORY
-    alarm: str = ''
-    network: bool = False
-    fresh: bool = False
+    mode: str | None = _option(
+        '--mode',
+        choices=node_table.MODES,
+        type=str.upper,
+        metavar='|'.join(node_table.MODES),
+        help='what replaces the hardware: a simulation, random values, or you at the console '
+        f'(default: {node_table.DEFAULT_MODE})',
+    )
+    behaviour: str = _option(
+        '--behaviour',
+        node_table.DEFAULT_BEHAVIOUR,
+        choices=node_table.BEHAVIOURS,
+        metavar='|'.join(node_table.BEHAVIOURS),
+        help='surveillance starts with a map, patrol learns it from markers (default: %(default)s)',
+    )
+    place: Path | None = _option(
+        '--map',
+        type=Path,
+        metavar='FILE',
+        help='the place (default: config/seven_rooms.yaml, for patrol config/patrol_world.yaml)',
+    )
+    parameters: Path | None = _option(
+        '--params',
+        type=Path,
+        metavar='FILE',
+        help='a ROS parameter file; it overrides config/parameters.yaml and the place',
+    )
+    assignments: Sequence[str] = _option(
+        '-p',
+        (),
+        action='append',
+        metavar='[NODE:]NAME:=VALUE',
+        help='set a parameter; it overrides every file',
+    )
+    log_level: str | None = _option(
+        '--log-level',
+        choices=node_table.LOG_LEVELS,
+        type=str.lower,
+        metavar='|'.join(node_table.LOG_LEVELS),
+        help='lowest severity that the nodes print (default: info)',
+    )
+    namespace: str | None = _option(
+        '--namespace', metavar='NAME', help='prefix of all ROS names, for a second robot'
+    )
+    domain: int | None = _option(
+        '--domain',
+        type=int,
+        metavar='N',
+        help='ROS domain, 0 to 101; robots in different domains do not hear each other '
+        '(default: ROS_DOMAIN_ID, else 0)',
+    )
+    seconds: float | None = _option(
+        '--for',
+        group=_PROCESSES,
+        type=_number(float, 'a positive number of seconds', lambda value: 0.0 < value < 1e9),
+        metavar='SECONDS',
+        help='stop after this time (default: at Ctrl-C)',
+    )
+    composed: bool = _switch(
+        '--composed', 'run all nodes in one process: less memory, faster start', _PROCESSES
+    )
+    only: Sequence[str] = _nodes_option(
+        '--only', 'start only these nodes; the others run elsewhere'
+    )
+    without: Sequence[str] = _nodes_option(
+        '--without', 'do not start these nodes; they run elsewhere'
+    )
+    memory: int = _option(
+        '--memory',
+        2048,
+        group=_PROCESSES,
+        type=_number(
+            int,
+            'a number of megabytes from 100, or 0',
+            lambda value: value == 0 or 100 <= value < 1e7,
+        ),
+        metavar='MB',
+        help='restart a node that uses more memory; 0: no limit (default: %(default)s)',
+    )
+    alarm: str = _option(
+        '--alarm',
+        '',
+        group=_PROCESSES,
+        metavar='COMMAND',
+        help='run this when the robot needs a person; the last argument says why',
+    )
+    network: bool = _switch(
+        '--network',
+        'talk to nodes on other machines, which can then control the robot (default: only this '
+        'machine)',
+        _PROCESSES,
+    )
+    record: str | None = _option(
+        '--record',
+        NOT_RECORDED,
+        group=_TRACES,
+        default=None,
+        metavar='off|DIR',
+        help='folder for the files of runs; off: no recording (default: runs)',
+    )
+    keep: float = _option(
+        '--keep',
+        20.0,
+        group=_TRACES,
+        type=_number(float, 'a number of gigabytes', lambda value: 0.0 <= value < 1e6),
+        metavar='GB',
+        help='delete the oldest recordings when all together exceed this (default: %(default)g)',
+    )
+    fresh: bool = _switch('--fresh', 'begin a new run even if the last one was killed', _TRACES)
+    web: bool = _switch('--web', 'serve a live page; its address is printed', _PAGE_GROUP)
+    web_control: bool = _switch(
+        '--web-control', 'like --web, with controls for whoever has the printed token', _PAGE_GROUP
+    )
+    web_address: str | None = _option(
+        '--web-address',
+        group=_PAGE_GROUP,
+        metavar='HOST:PORT',
+        help='address of the page; implies --web; other addresses than 127.0.0.1 need the printed '
+        'token even to look (default: 127.0.0.1:8080)',
+    )
 
     def check(self) -> None:
         """Look at everything that can be wrong before a process is started.
@@ -85,6 +239,8 @@ class Run:
         if self.domain is not None and not 0 <= self.domain <= LAST_DOMAIN:
             raise ValueError(f'--domain {self.domain}: expected a number from 0 to {LAST_DOMAIN}')
         if self.place is not None:
+            from surveillance_runtime.place import read_place_file  # needs a set-up
+
             try:
                 read_place_file(self.place)
             except FileError as error:
@@ -137,42 +293,49 @@ def page_address(text: str) -> tuple[str, int]:
     return found.hostname or '127.0.0.1', port
 
 
-def options_of(run: Run) -> dict[str, Any]:
-    """Return what a run is asked for, as JSON holds it."""
-    options: dict[str, Any] = json.loads(json.dumps(vars(run), default=str))
-    return options
+def shared_options() -> argparse.ArgumentParser:
+    """Options of `run` and of `node`."""
+    parser = CommandParser(add_help=False)
+    _add_options(parser, '')
+    return parser
 
 
-def run_from(options: Mapping[str, Any]) -> Run:
-    """Return the run of options that `options_of` gave.
+def make_parser(*, help_too: bool = True) -> argparse.ArgumentParser:
+    """Return the parser of the whole command line."""
+    package_lines = ''.join(
+        f'  {name:<25} {purpose}\n' for name, (_, purpose) in package_commands.COMMANDS.items()
+    )
+    parser = CommandParser(
+        prog='launch.py',
+        description=_DESCRIPTION,
+        usage='%(prog)s [COMMAND] [options]',
+        epilog=_COMMANDS + package_lines,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        parents=[shared_options()],
+        add_help=help_too,
+    )
+    for title in (_PROCESSES, _TRACES, _PAGE_GROUP):
+        group = parser.add_argument_group(title)
+        _add_options(group, title)
+        if title == _TRACES:
+            group.add_argument(
+                '--resume',
+                nargs='?',
+                const='',
+                metavar='RUN',
+                help='continue this run (default: the last one) with its record, ontology and '
+                'battery; automatic when the last run was killed',
+            )
+    return parser
 
-    Raises:
-        ValueError: They are not of a run.
-    """
-    known = {field.name for field in fields(Run)}
-    try:
-        values = {name: options[name] for name in options if name in known}
-        for name in ('place', 'parameters'):
-            values[name] = Path(values[name]) if values.get(name) else None
-        return Run(**values)
-    except TypeError as error:
-        raise ValueError(f'--resume: {error}') from None
+
+def _add_options(parser: argparse._ActionsContainer, group: str) -> None:
+    for each in fields(Run):
+        if each.metadata['group'] == group:
+            parser.add_argument(each.metadata['flag'], dest=each.name, **each.metadata['argument'])
 
 
-def resumed(run: Run, usual: Run, runs: Path, name: str) -> tuple[Run, Path]:
-    """Return the run to go on with and its folder.
-
-    Args:
-        run: What the command line asks for now; it goes before what the run was asked for.
-        usual: What a command line without options asks for.
-        runs: The folder of the runs.
-        name: Of the run; empty: the last one.
-
-    Raises:
-        ValueError: There is no such run.
-    """
-    if run.record not in (None, NOT_RECORDED):
-        runs = Path(run.record)
-    found = run_folder.find(runs, name)
-    given = {name: value for name, value in vars(run).items() if value != getattr(usual, name)}
-    return replace(run_from(found.options), **given), found.folder
+def wanted_run(options: argparse.Namespace) -> Run:
+    """Return what the options of `run`, or those that `node` has of them, ask for."""
+    wanted = {each.name for each in fields(Run)}
+    return Run(**{name: value for name, value in vars(options).items() if name in wanted})

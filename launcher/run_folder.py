@@ -14,10 +14,11 @@ import os
 import shutil
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
+from launcher.run import NOT_RECORDED, Run
 from surveillance_fsm.files import parse_json
 from surveillance_runtime.launch_protocol import NotNowError
 from surveillance_runtime.suggestions import like
@@ -151,6 +152,47 @@ def find(runs: Path, name: str) -> Found:
     if found.running:
         raise NotNowError(f'--resume: {found.folder}: this run is still going on')
     return found
+
+
+def options_of(run: Run) -> dict[str, Any]:
+    """Return what a run is asked for, as JSON holds it."""
+    options: dict[str, Any] = json.loads(json.dumps(vars(run), default=str))
+    return options
+
+
+def run_from(options: Mapping[str, Any]) -> Run:
+    """Return the run of options that `options_of` gave.
+
+    Raises:
+        ValueError: They are not of a run.
+    """
+    known = {field.name for field in fields(Run)}
+    try:
+        values = {name: options[name] for name in options if name in known}
+        for name in ('place', 'parameters'):
+            values[name] = Path(values[name]) if values.get(name) else None
+        return Run(**values)
+    except TypeError as error:
+        raise ValueError(f'--resume: {error}') from None
+
+
+def resumed(run: Run, usual: Run, runs: Path, name: str) -> tuple[Run, Path]:
+    """Return the run to go on with and its folder.
+
+    Args:
+        run: What the command line asks for now; it goes before what the run was asked for.
+        usual: What a command line without options asks for.
+        runs: The folder of the runs.
+        name: Of the run; empty: the last one.
+
+    Raises:
+        ValueError: There is no such run.
+    """
+    if run.record not in (None, NOT_RECORDED):
+        runs = Path(run.record)
+    found = find(runs, name)
+    given = {name: value for name, value in vars(run).items() if value != getattr(usual, name)}
+    return replace(run_from(found.options), **given), found.folder
 
 
 def prune(runs: Path, most: float, chosen: Path) -> list[Path]:

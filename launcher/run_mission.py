@@ -12,7 +12,7 @@ from pathlib import Path
 from launcher import run_folder
 from launcher.instance_lock import claim
 from launcher.log_merge import MergedLog
-from launcher.run import NOT_RECORDED, Run, options_of
+from launcher.run import NOT_RECORDED, Run
 from launcher.run_configuration import check_assignments, check_clocks, configuration, with_mode_of
 from launcher.run_processes import COMPOSED, node_environ, programs_of, ros_domain
 from launcher.service import is_service
@@ -42,7 +42,7 @@ def run_mission(run: Run, config: Path, runs: Path, resume: Path | None = None) 
         runs = Path(run.record)
     folder, how = chosen_folder(run, runs, resume)
     deleted = run_folder.prune(runs, run.keep * 1e9, folder)
-    state = run_folder.RunState(folder, options_of(run))
+    state = run_folder.RunState(folder, run_folder.options_of(run))
     merged = configuration(config, run, folder)
     everyone = (*nodes, *observers)
     files = write_parameters(folder / 'parameters', run.namespace, merged, everyone)
@@ -87,7 +87,7 @@ def chosen_folder(run: Run, runs: Path, resume: Path | None) -> tuple[Path, str]
         return resume, f'continuing {_short(resume)}'
     found = run_folder.latest(runs) if not run.fresh else None
     if found is not None and not found.ended and not found.running:
-        same = {**found.options, 'seconds': None} == {**options_of(run), 'seconds': None}
+        same = {**found.options, 'seconds': None} == {**run_folder.options_of(run), 'seconds': None}
         if same:
             how = 'which was not finished; --fresh begins a new one'
             return found.folder, f'continuing {_short(found.folder)}, {how}'

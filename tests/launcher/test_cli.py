@@ -7,7 +7,7 @@ import sys
 import pytest
 
 from launcher.cli import main, runs_folder
-from launcher.options import make_parser
+from launcher.run import make_parser
 from surveillance_runtime.node_table import NODES
 from tests.launcher.conftest import ROOT
 

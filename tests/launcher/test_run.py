@@ -13,12 +13,19 @@ from pathlib import Path
 import pytest
 import yaml
 
-from launcher.cli import CONFIG, wanted_run
+from launcher.cli import CONFIG
 from launcher.log_merge import MergedLog
-from launcher.options import make_parser
-from launcher.run import MARKERS, PAGE, RECORDER, Run, options_of, page_address, resumed, run_from
+from launcher.run import (
+    MARKERS,
+    PAGE,
+    RECORDER,
+    Run,
+    make_parser,
+    page_address,
+    wanted_run,
+)
 from launcher.run_configuration import check_assignments, check_clocks, configuration, with_mode_of
-from launcher.run_folder import RunState, make_folder
+from launcher.run_folder import RunState, make_folder, options_of, resumed, run_from
 from launcher.run_mission import (
     alarm_caller,
     chosen_folder,
