@@ -28,9 +28,8 @@ MODULES = {
         'to_ascii',
         'to_mermaid',
         'to_graphviz',
-        'to_yaml',
     ],
-    'surveillance_fsm.machine_file': ['load_machine', 'machine_from'],
+    'surveillance_fsm.machine_file': ['load_machine', 'machine_from', 'to_yaml'],
     'surveillance_fsm.history': [
         'Transition',
         'TransitionFeed',

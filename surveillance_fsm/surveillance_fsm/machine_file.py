@@ -1,6 +1,6 @@
 """A machine as data: YAML that names states, outcomes, transitions and remappings.
 
-A file is loaded with the same checks as code, and `export.to_yaml` writes a machine back. Classes
+A file is loaded with the same checks as code, and `to_yaml` writes a machine back. Classes
 and functions are named as ``package.module:Name`` and imported, so a machine's file is trusted as
 code is; names without a colon are looked up in what the caller offers.
 
@@ -28,7 +28,7 @@ Sequence, ``default_outcome`` and ``outcome_map`` of a Concurrence, and ``items`
 ``exhausted_outcome`` of an Iterator, whose one state has ``loop_outcomes``, ``break_outcomes`` and
 ``final_outcome_map``.
 
-Reading needs PyYAML.
+Both need PyYAML.
 """
 
 from __future__ import annotations
@@ -45,6 +45,7 @@ from surveillance_fsm.files import read_file
 from surveillance_fsm.nodes import LimitOptions
 from surveillance_fsm.state import CBState, State
 from surveillance_fsm.state_machine import Iterator, Sequence, StateMachine
+from surveillance_fsm.userdata import raw
 
 KINDS: dict[str, type[Container]] = {
     kind.__name__: kind for kind in (StateMachine, Sequence, Concurrence, Iterator)
@@ -56,13 +57,20 @@ LARGEST = 4_000_000
 _LIMITS = set(LimitOptions.__annotations__)
 _KEYS = {'input_keys', 'output_keys'}
 _CONTAINER = {'machine', 'name', 'outcomes', 'userdata', 'states', 'interrupts', *_KEYS}
-_OF_KIND = {
+_OF_KIND: dict[str, dict[str, tuple[str, str]]] = {
     'StateMachine': {},
-    'Sequence': {'connector_outcome': 'connector_outcome'},
-    'Concurrence': {'default_outcome': 'default_outcome', 'outcome_map': 'outcome_map'},
-    'Iterator': {'items': 'it', 'item_key': 'it_label', 'exhausted_outcome': 'exhausted_outcome'},
+    'Sequence': {'connector_outcome': ('connector_outcome', 'connector_outcome')},
+    'Concurrence': {
+        'default_outcome': ('default_outcome', 'default_outcome'),
+        'outcome_map': ('outcome_map', 'outcome_map'),
+    },
+    'Iterator': {
+        'items': ('it', 'items'),
+        'item_key': ('it_label', 'items_label'),
+        'exhausted_outcome': ('exhausted_outcome', 'exhausted_outcome'),
+    },
 }
-"""Further keys of a container, and the arguments of its class that they stand for."""
+"""Further keys of a container: the argument of its class for each, and the attribute."""
 _NEEDED = {'connector_outcome', 'default_outcome', 'items'}
 _INTERRUPT = {'priority', 'transitions', 'remapping'}
 
@@ -201,7 +209,7 @@ class _Builder:
     def _arguments(self, kind: str, entry: Mapping[str, Any], place: str) -> dict[str, Any]:
         """Return the arguments that one kind of container alone takes."""
         arguments = {}
-        for key, argument in _OF_KIND[kind].items():
+        for key, (argument, _) in _OF_KIND[kind].items():
             if key in _NEEDED:
                 _needed(place, entry, key)
             elif key not in entry:
@@ -327,3 +335,163 @@ def _known_keys(place: str, entry: Mapping[str, Any], known: Iterable[str]) -> N
     for key in entry:
         if key not in known:
             raise MachineFileError(f'{place}: {unknown(key, known)}')
+
+
+# Writing.
+
+
+def to_yaml(container: Container) -> str:
+    """Write a machine as YAML that `load_machine` reads; needs PyYAML.
+
+    Raises:
+        MachineFileError: A part of it has no form as data: a callback, a function without a name, a
+            class with arguments that did not come from a file.
+    """
+    import yaml
+
+    data = to_data(container)
+    text: str = yaml.safe_dump(data, sort_keys=False, allow_unicode=True, default_flow_style=None)
+    return text
+
+
+def to_data(container: Container) -> dict[str, Any]:
+    """Describe a machine by plain data, as `machine_from` takes it.
+
+    Raises:
+        MachineFileError: See `to_yaml`.
+    """
+    return {
+        'machine': _kind_of(container),
+        'name': container.get_name(),
+        **_container_data(container, container.get_name()),
+    }
+
+
+def _kind_of(container: Container) -> str:
+    kind = type(container).__name__
+    if KINDS.get(kind) is not type(container):
+        raise MachineFileError(
+            f"'{container.get_name()}' is a {kind}: only the engine's own containers have a form "
+            'as data'
+        )
+    return kind
+
+
+def _container_data(container: Container, path: str) -> dict[str, Any]:
+    data = {'outcomes': [], **_declared(container)}
+    if raw(container.userdata):
+        data['userdata'] = {
+            key: _plain(f'userdata key {key!r} of {path!r}', value)
+            for key, value in raw(container.userdata).items()
+        }
+    data |= _kind_data(container, path)
+    data['states'] = {
+        label: _state_data(container, label, state, f'{path}/{label}')
+        for label, state in container.fsm_states.items()
+    }
+    if container.fsm_branches:
+        data['interrupts'] = {
+            branch.label: {
+                **_what(branch.state, f'{path}/{branch.label}'),
+                'priority': branch.priority,
+                'transitions': dict(branch.transitions),
+                **_remapping(container, branch.label),
+            }
+            for branch in container.fsm_branches.values()
+        }
+    return data
+
+
+def _kind_data(container: Container, path: str) -> dict[str, Any]:
+    """Return what one kind of container alone has."""
+    data: dict[str, Any] = {}
+    for key, (_, attribute) in _OF_KIND[_kind_of(container)].items():
+        value = getattr(container, attribute)
+        if key == 'items':
+            if not isinstance(value, list | tuple | range | str):
+                raise MachineFileError(f"'{path}' has items that are no list")
+            value = list(value)
+        if value or key in _NEEDED:
+            data[key] = _plain(f'{key} of {path!r}', value)
+    if isinstance(container, Concurrence):
+        if container.outcome_cb is not None or container.child_termination_cb is not None:
+            raise MachineFileError(f"'{path}' has callbacks, which have no form as data")
+    elif isinstance(container, StateMachine) and container.fsm_states:
+        data['initial'] = container.get_initial_states()[0]
+    return data
+
+
+def _state_data(container: Container, label: str, state: State, path: str) -> dict[str, Any]:
+    data = _what(state, path)
+    if isinstance(container, StateMachine):
+        bound = {
+            outcome: target
+            for outcome, source, target in container.get_internal_edges()
+            if source == label and target
+        }
+        if bound:
+            data['transitions'] = bound
+    elif isinstance(container, Iterator):
+        data['loop_outcomes'] = sorted(container.loop_outcomes)
+        if container.final_outcome_map:
+            data['final_outcome_map'] = dict(container.final_outcome_map)
+    data |= _remapping(container, label)
+    if container.fsm_constants.get(label):
+        data['constants'] = {
+            key: _plain(f'constant {key!r} of {path!r}', value)
+            for key, value in container.fsm_constants[label].items()
+        }
+    limits = container.fsm_limits.get(label)
+    if limits is not None:
+        for name in ('timeout', 'deadline', 'retry'):
+            if getattr(limits, name):
+                data[name] = getattr(limits, name)
+        if limits.retry:
+            data['retry_on'] = sorted(limits.failures - {limits.late_outcome}) or ['aborted']
+    return data
+
+
+def _remapping(container: Container, label: str) -> dict[str, Any]:
+    remapping = container.fsm_remappings.get(label)
+    return {'remapping': dict(remapping)} if remapping else {}
+
+
+def _what(state: State, path: str) -> dict[str, Any]:
+    """Return what a state is, as data."""
+    if isinstance(state, Container):
+        return {'machine': _kind_of(state), **_container_data(state, path)}
+    if state.fsm_source is not None:
+        source = {'state': state.fsm_source['state']}
+        if state.fsm_source['arguments']:
+            source['arguments'] = dict(state.fsm_source['arguments'])
+        return source
+    if type(state) is CBState:
+        return {'function': _name_of(state.function, path), **_declared(state)}
+    return {'state': _name_of(type(state), path)}
+
+
+def _declared(state: State) -> dict[str, Any]:
+    """Return outcomes and keys of a state, as far as it has any."""
+    declared = {
+        'outcomes': state.get_registered_outcomes(),
+        'input_keys': state.get_registered_input_keys(),
+        'output_keys': state.get_registered_output_keys(),
+    }
+    return {name: sorted(names) for name, names in declared.items() if names}
+
+
+def _name_of(thing: Any, path: str) -> str:
+    name = f'{thing.__module__}:{thing.__qualname__}'
+    if '<' in name or thing.__module__ == '__main__':
+        raise MachineFileError(f"'{path}': {name} cannot be imported by that name")
+    return name
+
+
+def _plain(what: str, value: Any) -> Any:
+    if isinstance(value, list | tuple):
+        return [_plain(what, item) for item in value]
+    if isinstance(value, dict):
+        return {str(key): _plain(what, item) for key, item in value.items()}
+    if value is None or isinstance(value, bool | int | float | str):
+        return value
+    raise MachineFileError(f'{what} is a {type(value).__name__}, which has no form as data')

@@ -5,8 +5,14 @@ from __future__ import annotations
 import pytest
 
 import surveillance_fsm as fsm
-from surveillance_fsm.export import to_ascii, to_data, to_yaml
-from surveillance_fsm.machine_file import MachineFileError, load_machine, machine_from, parse
+from surveillance_fsm.export import to_ascii, to_yaml
+from surveillance_fsm.machine_file import (
+    MachineFileError,
+    load_machine,
+    machine_from,
+    parse,
+    to_data,
+)
 from surveillance_fsm.verify import verify
 
 
