@@ -176,7 +176,6 @@ class ConcurrentFrame(Frame):
     """
 
     container: Concurrence
-    _watches = False
 
     def __init__(
         self,
@@ -199,7 +198,7 @@ class ConcurrentFrame(Frame):
 
     def _begin_anew(self) -> None:
         """Watch no thread yet."""
-        self._watches = False
+        self.watches_threads = False
         self._wakeup = Interrupt()
         # Of all states that were started, by label; most have ended.
         self._children: dict[str, ChildFrame] = {}
@@ -225,10 +224,6 @@ class ConcurrentFrame(Frame):
         if self.current is not self.container.fsm_first():
             return super().active_labels()
         return [label for label, outcome in self.outcomes.items() if outcome is None]
-
-    def waits_for_threads(self) -> bool:
-        """Tell whether it watches threads of its own at present, which have bounds of their own."""
-        return self._watches
 
     def abandoned(self, *, for_good: bool) -> None:
         """Note that the machine went on without the thread; it goes on without the states, too."""
@@ -343,12 +338,12 @@ class ConcurrentFrame(Frame):
         """
         self._check()
         while running:
-            self._watches = True
+            self.watches_threads = True
             supervise(self.control, [child.thread for child in running.values()], self._wakeup)
             with self.control.condition:
                 self._check()
                 # From here on it is the callbacks that a preempt waits for.
-                self._watches = False
+                self.watches_threads = False
                 self.thread.asked_anew()
             for label in [label for label, child in running.items() if child.thread.done]:
                 error = running.pop(label).thread.error

@@ -533,7 +533,9 @@ class Container(State):
         """
         here = this_thread
         thread: ExecutionThread | None = here.thread
-        if thread is not None and thread.executes_next(self, here.stack):
+        current = here.stack[-1].current if here.stack else None
+        if thread is not None and isinstance(current, Node) and current.state is self:
+            # It is the engine that executes it, not the code of a state.
             return self._enter(thread, here.stack, parent_ud)
         return self._execute_as_root(parent_ud)
 

@@ -27,7 +27,7 @@ from surveillance_fsm import log
 from surveillance_fsm.clock import WALL_CLOCK, Clock, Interrupt, elapsed_of
 from surveillance_fsm.exceptions import InvalidStateError, InvalidTransitionError, describe
 from surveillance_fsm.nodes import Node, Noted, RawTransition, Trace
-from surveillance_fsm.state import State, this_thread
+from surveillance_fsm.state import this_thread
 
 if TYPE_CHECKING:
     from surveillance_fsm.frame import Frame
@@ -311,11 +311,6 @@ class ExecutionThread:
 
     # The side of the thread that executes.
 
-    def executes_next(self, container: State, stack: list[Frame]) -> bool:
-        """Tell whether `container` is what the engine executes next, not some user code."""
-        current = stack[-1].current if stack else None
-        return isinstance(current, Node) and current.state is container
-
     def path_inside(self) -> str:
         """Return the path of the state that is being executed."""
         for frame in reversed(self.stack):
@@ -389,10 +384,6 @@ class ExecutionThread:
             self.check()
             frame = self.stack[-1]
             frame.gone, frame.attention = node, True
-
-    def heeded(self) -> None:
-        """Note that the state that was asked to stop has returned."""
-        self.asked_at = None
 
 
 class Work:

@@ -131,9 +131,7 @@ class Frame:
             so that a checkpoint taken in between does not take it for one that has not begun.
         saved: Where to go on after each of the interrupts under way.
         stopped: Where the shutdown check ended the run.
-        items: An iterator's items that are left.
-        index: How many items an iterator has begun.
-        repeat: An iterator's current item has not ended: it is not followed by the next one.
+        watches_threads: It watches threads of its own, which have bounds of their own.
     """
 
     # Class attributes: most executions of a container need none of them.
@@ -147,9 +145,7 @@ class Frame:
     ended = False
     saved: tuple[Node | Exit, ...] = ()
     stopped: Node | Exit = SHUTDOWN
-    items: Any = None
-    index = 0
-    repeat = False
+    watches_threads = False
 
     def __init__(
         self,
@@ -253,7 +249,6 @@ class Frame:
 
         self.saved = tuple(place(*saved) for saved in history.saved)
         self.current = place(history.current, history.leaving)
-        self.index, self.items, self.repeat = history.index, history.items, history.repeat
 
     def _run_from(self, target: Any) -> Any:
         """Execute states from `target` on until one leads out of the container; the outcome."""
@@ -332,7 +327,7 @@ class Frame:
                     control.condition.wait()
                 if self.stale:
                     raise LeftBehindError
-                self.thread.heeded()
+                self.thread.asked_at = None  # The state that was asked has returned.
                 self.attention = False
                 target, moves = self._decide(left, outcome, target, stood=stood)
                 self.current = target
@@ -424,7 +419,6 @@ class Frame:
             # Whoever forces the next state's outcome has seen this one end.
             forced_next = self.forced is not None and self.forced[0] is target
             if answer.made_way and not forced_next:
-                self.repeat = True
                 return None
             kind, node.state.fsm_progress = '', None
             if preempted and target is node:
@@ -578,19 +572,12 @@ class Frame:
             target.label,
             target.is_exit,
             [(node.label, node.is_exit) for node in self.saved],
-            self.index,
-            self.repeat,
-            items=self.items,
         )
 
     def active_labels(self) -> list[str]:
         """Return the label of the state that runs; empty when none does."""
         current = self.current
         return [] if current.is_exit else [current.label]
-
-    def waits_for_threads(self) -> bool:
-        """Tell whether it watches threads of its own at present, which have bounds of their own."""
-        return False
 
     def abandoned(self, *, for_good: bool) -> None:
         """Note that the machine went on without the thread that runs this frame.

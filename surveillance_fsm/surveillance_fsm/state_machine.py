@@ -15,7 +15,7 @@ from surveillance_fsm.exceptions import (
     InvalidUserCodeError,
     describe,
 )
-from surveillance_fsm.frame import Frame
+from surveillance_fsm.frame import Frame, History, Move
 from surveillance_fsm.log import logwarn
 from surveillance_fsm.nodes import SUSPENDED, Exit, LimitOptions, Node
 from surveillance_fsm.state import State, structure_version
@@ -278,9 +278,29 @@ class _Exhausted:
 
 
 class IteratorFrame(Frame):
-    """One execution of an iterator."""
+    """One execution of an iterator.
+
+    Attributes:
+        items: The items that are left; None before they were asked for.
+        index: How many items it has begun.
+        repeat: The current item has not ended: it is not followed by the next one.
+    """
 
     container: Iterator
+    items: Any = None
+    index = 0
+    repeat = False
+
+    def go_on_from(self, history: History) -> None:
+        """Begin where the container was put aside."""
+        super().go_on_from(history)
+        self.index, self.items, self.repeat = history.index, history.items, history.repeat
+
+    def history_before(self, target: Node | Exit) -> History:
+        """Return where to go on when the container is put aside before `target`."""
+        history = super().history_before(target)
+        history.index, history.items, history.repeat = self.index, self.items, self.repeat
+        return history
 
     def draw(self) -> bool:
         """Put the next item into userdata, or the current one again if it has not ended.
@@ -323,6 +343,13 @@ class IteratorFrame(Frame):
         """Take `outcome` for that of the current item, and run to the end."""
         self.repeat = outcome is SUSPENDED
         return super().run_on(outcome)
+
+    def _leave(self, node: Node, outcome: Any, target: Node | Exit) -> Move | None:
+        """As of any container; an item whose state made way has not ended."""
+        move = super()._leave(node, outcome, target)
+        if move is None:
+            self.repeat = True
+        return move
 
     def _end_of_loop(self, outcome: Any, target: Node | Exit) -> Node | Exit:
         """End the loop when a preempt came while it would go on.

@@ -168,7 +168,7 @@ def _bounds_itself(thread: ExecutionThread) -> bool:
     """Tell whether a thread is in a concurrence, which watches its states' threads."""
     # A copy: the thread itself changes its stack at any moment.
     stack = tuple(thread.stack)
-    return bool(stack) and stack[-1].waits_for_threads()
+    return bool(stack) and stack[-1].watches_threads
 
 
 def _enforce(thread: ExecutionThread) -> None:
