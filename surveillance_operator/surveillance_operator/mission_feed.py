@@ -24,7 +24,6 @@ from surveillance_interfaces.srv import ReferenceName, RoomPosition
 from surveillance_ontology.armor.facts import ShortFact
 from surveillance_ontology.armor_client import ArmorClient, FactSubscription
 from surveillance_ontology.patrol_ontology import CONNECTIONS, PLACES, URGENT_PLACES, VISITS
-from surveillance_operator import conversions
 from surveillance_operator.polled_subscription import PolledSubscription, await_message
 from surveillance_operator.snapshot import STALE, Change, Pose, Snapshot, follow
 from surveillance_operator.topics import (
@@ -33,6 +32,7 @@ from surveillance_operator.topics import (
     TOPICS,
     Topic,
     behaviour_fields,
+    point_from,
     read_message,
     with_fact,
     without,
@@ -338,7 +338,7 @@ class _Facts:
             answer = await self._position.call_async(request, TIMEOUT)
             self._without_position.discard(place)
             if answer.valid:
-                self._update(_with_position(place, conversions.point_from(answer.position)))
+                self._update(_with_position(place, point_from(answer.position)))
 
     async def _ask_doors(self) -> None:
         listed = await self._list.call_async(ListParameters.Request(prefixes=['doors']), TIMEOUT)

@@ -18,9 +18,9 @@ from nav_msgs.msg import Path
 from std_msgs.msg import ColorRGBA, String
 from visualization_msgs.msg import Marker, MarkerArray
 
-from surveillance_operator.conversions import URGENT_MARK
 from surveillance_operator.mission_feed import MissionFeed
 from surveillance_operator.snapshot import STALE, Snapshot
+from surveillance_operator.topics import URGENT_MARK
 from surveillance_runtime.diagnostics import TOPIC
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.process import run_node

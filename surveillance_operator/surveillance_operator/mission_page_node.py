@@ -13,7 +13,7 @@ from typing import Any
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import Image as ImageMessage
 
-from surveillance_operator.conversions import jpeg_from
+from surveillance_operator.images import ANNOTATED, PLAIN, jpeg_from
 from surveillance_operator.mission_actions import MissionActions
 from surveillance_operator.mission_feed import MissionFeed
 from surveillance_operator.page.hub import Hub
@@ -27,8 +27,6 @@ POLL_PERIOD = 0.015
 """Least seconds between two looks at the topics while somebody looks at the page."""
 IDLE_PERIOD = 0.5
 """And while nobody does."""
-ANNOTATED, RAW = 'aruco_detector/annotated', 'camera/rgb/image_raw'
-"""The image with the markers drawn in, which a detector publishes while it looks; the plain one."""
 PATIENCE = 4.0
 """The plain image is heard when none with markers came for this time, seconds; and an image that
 is older than this is not shown as if it were new."""
@@ -140,9 +138,9 @@ class Camera:
             newest = self._newest(ANNOTATED)
             if newest is not None:
                 self._annotated_at = now
-                self._leave(RAW)
+                self._leave(PLAIN)
             elif now - self._annotated_at > PATIENCE:
-                newest = self._newest(RAW)
+                newest = self._newest(PLAIN)
             if newest is not None:
                 self._jpeg, self._came_at = jpeg_from(newest), now
             return self._jpeg if now - self._came_at <= PATIENCE else None
@@ -152,7 +150,7 @@ class Camera:
         with self._lock:
             if time.monotonic() - self._asked > IDLE_SECONDS:
                 self._leave(ANNOTATED)
-                self._leave(RAW)
+                self._leave(PLAIN)
                 self._jpeg = None
 
     def _newest(self, topic: str) -> ImageMessage | None:

@@ -22,7 +22,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.serialization import serialize_message
 from sensor_msgs.msg import CompressedImage, Image
 
-from surveillance_operator.conversions import jpeg_from
+from surveillance_operator.images import COMPRESSED, KINDS, SUFFIX, jpeg_from
 from surveillance_operator.mission_feed import MissionFeed
 from surveillance_operator.polled_subscription import PolledSubscription
 from surveillance_operator.recording.bag import (
@@ -46,10 +46,6 @@ RETRY_PERIOD = 3.0
 DISK_FULL = errno.ENOSPC, errno.EDQUOT
 QUEUE = 2000
 """Messages of one topic that may come within `DRAIN_PERIOD`; a latched topic brings its own."""
-RAW, COMPRESSED = 'sensor_msgs/msg/Image', 'sensor_msgs/msg/CompressedImage'
-IMAGES = {RAW: Image, COMPRESSED: CompressedImage}
-SUFFIX = '/compressed'
-"""Ends the name of a topic of compressed images, as image_transport has it."""
 
 
 class MissionRecorder(PatrolNode):
@@ -173,7 +169,7 @@ class MissionRecorder(PatrolNode):
                 self._follow(topic, types[0], offers)
 
     def _follow(self, topic: str, kind: str, offers: Sequence[Any]) -> None:
-        if kind in IMAGES and not self._all_images:
+        if kind in KINDS and not self._all_images:
             self._images.offer(topic, kind)
             return
         profiles = [each.qos_profile for each in offers]
@@ -217,7 +213,7 @@ class ImageRecorder:
 
     def offer(self, topic: str, kind: str) -> None:
         """Take note of a topic with images."""
-        self._offers[topic] = IMAGES[kind]
+        self._offers[topic] = KINDS[kind]
 
     def attend(self) -> None:
         """Hear the topics that others hear too, and leave those that they left."""

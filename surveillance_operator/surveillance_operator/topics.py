@@ -1,13 +1,14 @@
 """What each topic tells of a mission: from its messages to the fields of a snapshot.
 
-A running mission (`mission_feed`) and a recording (`recording.stored`) are read by the same
-table.
+A running mission (`mission_feed`) and a recording (`recording.stored`) are read by the same table.
+A message from the network may hold anything. What cannot be used raises `ValueError` with one line.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+import time
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -17,6 +18,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseWithCovarianceStamped
 from nav_msgs.msg import OccupancyGrid
 from nav_msgs.msg import Path as PathMessage
+from numpy.typing import NDArray
 from rcl_interfaces.msg import ParameterEvent
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState, LaserScan, PointCloud2
@@ -36,13 +38,27 @@ from surveillance_interfaces.msg import (
 from surveillance_ontology.armor.facts import ShortFact, parse_fact
 from surveillance_ontology.armor_client import value_in
 from surveillance_ontology.patrol_ontology import CONNECTIONS, URGENT_PLACES, VISITS
-from surveillance_operator import conversions
-from surveillance_operator.conversions import MOST_NAMES
-from surveillance_operator.snapshot import NO_POINTS, TRAIL_STEP, Pose, Snapshot
-from surveillance_runtime.conversions import pose_from, seconds_of
+from surveillance_operator.snapshot import (
+    NO_POINTS,
+    TRAIL_STEP,
+    Container,
+    Health,
+    Pose,
+    Snapshot,
+    Status,
+    Transition,
+)
+from surveillance_runtime.conversions import map_from, points_from_cloud, pose_from, seconds_of
 from surveillance_runtime.qos import STATE_QOS
 from surveillance_runtime.robot_arm import ARM
 
+MOST_CELLS = 16_000_000
+MOST_POINTS = 20_000
+MOST_NAMES = 10_000
+MOST_BEAMS = 120
+"""Of a scan with more beams every n-th is shown."""
+URGENT_MARK = ' URGENT'
+"""Follows the name of a place on `place_markers`."""
 TRAIL_POINTS = 1000
 """How many points of the trail are kept."""
 KEPT_TRANSITIONS = 60
@@ -52,6 +68,8 @@ SAME_VIEW = 0.8
 """Most seconds between the stamps of an image and of the arm's joints, which stand still."""
 STILL = 0.01
 """Metres and radians within which the robot counts as standing still between two poses."""
+JOINT_STILL = 0.01
+"""A joint that is slower stands still, rad/s."""
 
 POSE_TOPIC = 'amcl_pose'
 DETECTIONS_TOPIC = 'aruco_detector/detections'
@@ -113,7 +131,7 @@ def _fed_back(point: Any, old: Snapshot) -> Fields:
     # Where somebody estimates the pose, it is known better than from the drive's feedback.
     if old.localised and old.mode not in ('RANDOM', 'MANUAL'):
         return {}
-    x, y = conversions.point_from(point)
+    x, y = point_from(point)
     yaw = 0.0
     if old.pose is not None:
         dx, dy = x - old.pose[0], y - old.pose[1]
@@ -122,11 +140,11 @@ def _fed_back(point: Any, old: Snapshot) -> Fields:
 
 
 def _on_map(message: OccupancyGrid, _old: Snapshot) -> Fields:
-    return {'grid': conversions.grid_from(message), 'trail': NO_POINTS}
+    return {'grid': map_from(message, MOST_CELLS), 'trail': NO_POINTS}
 
 
 def _on_transition(message: FsmTransition, old: Snapshot) -> Fields:
-    transition = conversions.transition_from(message)
+    transition = transition_from(message)
     return {'transitions': (*old.transitions, transition)[-KEPT_TRANSITIONS:]}
 
 
@@ -143,7 +161,7 @@ def _on_pose(message: PoseWithCovarianceStamped, old: Snapshot) -> Fields:
 
 
 def _on_scan(message: LaserScan, old: Snapshot) -> Fields:
-    lidar = seconds_of(message.header.stamp), conversions.scan_from(message)
+    lidar = seconds_of(message.header.stamp), scan_from(message)
     return {'lidar': lidar, **_seen(old.pose, old.pose_time, lidar)}
 
 
@@ -160,7 +178,12 @@ def _seen(pose: Pose | None, at: float, lidar: tuple[float, Any] | None) -> Fiel
 
 
 def _on_joints(message: JointState, _old: Snapshot) -> Fields:
-    positions, still = conversions.joints_from(message)
+    if len(message.name) != len(message.position):
+        raise ValueError(f'{len(message.position)} positions came for {len(message.name)} joints')
+    if not all(map(math.isfinite, message.position)):
+        raise ValueError('joints whose positions are not finite')
+    positions = dict(zip(message.name, message.position, strict=True))
+    still = all(abs(speed) < JOINT_STILL for speed in message.velocity)
     if not still or not set(ARM.names) <= positions.keys():
         return {'camera': None}
     frame = ARM.camera_frame([positions[name] for name in ARM.names])
@@ -169,7 +192,13 @@ def _on_joints(message: JointState, _old: Snapshot) -> Fields:
 
 def _on_detections(message: MarkerDetectionArray, old: Snapshot) -> Fields:
     """Take in the markers of an image, also on the map where robot and camera stood still."""
-    fields: Fields = {'detections': conversions.detections_from(message)}
+    found = message.detections[:MOST_NAMES]
+    fields: Fields = {
+        'detections': tuple(
+            (each.id, each.known, each.confirmed, round(float(each.confidence), 2))
+            for each in found
+        )
+    }
     if old.pose is None or old.camera is None or not old.stands:
         return fields
     at, frame = old.camera
@@ -177,9 +206,13 @@ def _on_detections(message: MarkerDetectionArray, old: Snapshot) -> Fields:
         return fields
     x, y, yaw = old.pose
     placed = dict(old.markers)
-    for number, point in conversions.confirmed_from(message).items():
-        ahead, left, _ = frame[:3, :3] @ point + frame[:3, 3]
-        placed[number] = (
+    for each in found:
+        point = each.pose.position
+        seen = np.array([point.x, point.y, point.z])
+        if not each.confirmed or not np.isfinite(seen).all():
+            continue
+        ahead, left, _ = frame[:3, :3] @ seen + frame[:3, 3]
+        placed[int(each.id)] = (
             round(float(x + ahead * math.cos(yaw) - left * math.sin(yaw)), 2),
             round(float(y + ahead * math.sin(yaw) + left * math.cos(yaw)), 2),
         )
@@ -189,7 +222,7 @@ def _on_detections(message: MarkerDetectionArray, old: Snapshot) -> Fields:
 
 
 def _on_diagnostics(message: DiagnosticArray, old: Snapshot) -> Fields:
-    health = {**old.health, **conversions.health_from(message)}
+    health = {**old.health, **health_from(message)}
     if len(health) > MOST_NAMES:
         raise ValueError(f'{len(health)} parts report: expected at most {MOST_NAMES}')
     return {'health': health}
@@ -242,6 +275,148 @@ def without(values: Mapping[str, Any], name: str) -> dict[str, Any]:
     return {key: value for key, value in values.items() if key != name}
 
 
+def status_from(message: MissionStatus) -> Status:
+    """Return what the machine does, as it was published."""
+    return Status(
+        since=seconds_of(message.stamp),
+        machine=message.machine,
+        state=message.state,
+        place=message.place,
+        heading_to=message.heading_to,
+        waiting_for_help=message.waiting_for_help,
+        text=message.text,
+        avoided=_names(message.avoided, 'avoided'),
+    )
+
+
+def doors_from(message: DoorStates) -> dict[str, bool]:
+    """Return whether each door is open, by name."""
+    opened, closed = _names(message.open, 'open doors'), _names(message.closed, 'closed doors')
+    return dict(sorted({**dict.fromkeys(opened, True), **dict.fromkeys(closed, False)}.items()))
+
+
+def point_from(message: Any) -> tuple[float, float]:
+    """Return x and y of a point in metres.
+
+    Raises:
+        ValueError: A coordinate is not finite.
+    """
+    if not (math.isfinite(message.x) and math.isfinite(message.y)):
+        raise ValueError(f'a point at ({message.x:g}, {message.y:g}): expected finite numbers')
+    return message.x, message.y
+
+
+def percent_from(message: UInt8) -> float:
+    """Return a battery level.
+
+    Raises:
+        ValueError: It is not from 0 to 100.
+    """
+    if not 0 <= message.data <= 100:
+        raise ValueError(f'a level of {message.data} %: expected 0 to 100')
+    return float(message.data)
+
+
+def cloud_from(message: PointCloud2) -> NDArray[np.float64]:
+    """Return the points of a cloud that are finite, shape (n, 2), metres.
+
+    Raises:
+        ValueError: It has no x and y, or its sizes contradict each other.
+    """
+    count = message.width * message.height
+    if count > MOST_POINTS:
+        raise ValueError(f'a cloud of {count} points: expected at most {MOST_POINTS}')
+    if count * message.point_step > len(message.data):
+        raise ValueError(f'{len(message.data)} bytes came for {count} points')
+    points = points_from_cloud(message)
+    return points[np.isfinite(points).all(axis=1)]
+
+
+def path_from(message: PathMessage) -> NDArray[np.float64]:
+    """Return the points of a path, shape (n, 2), metres.
+
+    Raises:
+        ValueError: Too many points, or one is not finite.
+    """
+    if len(message.poses) > MOST_POINTS:
+        raise ValueError(f'a path of {len(message.poses)} points: expected at most {MOST_POINTS}')
+    points = [point_from(each.pose.position) for each in message.poses]
+    return np.array(points, dtype=float).reshape(-1, 2)
+
+
+def scan_from(message: LaserScan) -> NDArray[np.float64]:
+    """Return where a lidar's beams end, shape (n, 2), metres, in the lidar's frame.
+
+    Beams that hit nothing are left out.
+
+    Raises:
+        ValueError: Its angles are not finite.
+    """
+    count = len(message.ranges)
+    if not (math.isfinite(message.angle_min) and math.isfinite(message.angle_increment)):
+        raise ValueError('a scan whose angles are not finite')
+    step = max(1, -(-min(count, MOST_POINTS) // MOST_BEAMS))
+    ranges = np.asarray(message.ranges[:MOST_POINTS:step], dtype=float)
+    angles = message.angle_min + message.angle_increment * step * np.arange(len(ranges))
+    with np.errstate(invalid='ignore'):
+        good = np.isfinite(ranges) & (ranges >= message.range_min) & (ranges < message.range_max)
+    ranges, angles = ranges[good], angles[good]
+    return np.stack([ranges * np.cos(angles), ranges * np.sin(angles)], axis=1)
+
+
+def containers_from(message: FsmStructure) -> tuple[Container, ...]:
+    """Return the containers of a state machine, outermost first."""
+    if len(message.containers) > MOST_NAMES:
+        raise ValueError(f'a state machine of {len(message.containers)} containers')
+    return tuple(
+        Container(
+            each.path,
+            each.kind,
+            _names(each.states, 'states'),
+            _names(each.initial_states, 'initial states'),
+            _names(each.outcomes, 'outcomes'),
+            tuple((edge.from_state, edge.outcome, edge.to_state) for edge in each.edges),
+        )
+        for each in message.containers
+    )
+
+
+def transition_from(message: FsmTransition) -> Transition:
+    """Return a transition of the state machine."""
+    duration = float(message.duration)
+    return Transition(
+        message.sequence,
+        seconds_of(message.stamp),
+        message.path,
+        message.from_state,
+        message.outcome,
+        message.to_state,
+        duration if math.isfinite(duration) else 0.0,
+    )
+
+
+def health_from(message: DiagnosticArray) -> dict[str, Health]:
+    """Return what each part reports, by name."""
+    heard = time.monotonic()
+    return {
+        each.name: Health(
+            each.level[0] if isinstance(each.level, bytes) else int(each.level),
+            each.message,
+            tuple((value.key, value.value) for value in each.values[:50]),
+            each.hardware_id,
+            heard,
+        )
+        for each in message.status[:MOST_NAMES]
+    }
+
+
+def _names(names: Iterable[str], what: str) -> tuple[str, ...]:
+    found = tuple(names)
+    if len(found) > MOST_NAMES:
+        raise ValueError(f'{len(found)} {what}: expected at most {MOST_NAMES}')
+    return found
+
+
 def _on_request(controller: str) -> Callable[[String, Snapshot], Fields]:
     return lambda message, old: {'requests': {**old.requests, controller: message.data}}
 
@@ -263,15 +438,15 @@ def _feedback(action: str, kind: Any, read: Callable[[Any, Snapshot], Fields]) -
 
 
 TOPICS: tuple[Topic, ...] = (
-    Topic('mission_status', MissionStatus, _sets('status', conversions.status_from)),
+    Topic('mission_status', MissionStatus, _sets('status', status_from)),
     Topic('decision', Decision, lambda m, _: {'decision': decision_from(m), 'number': m.sequence}),
-    Topic('battery_level', UInt8, _sets('battery', conversions.percent_from)),
+    Topic('battery_level', UInt8, _sets('battery', percent_from)),
     Topic('state/battery_low', Bool, lambda m, _: {'battery_low': m.data}),
     Topic('map', OccupancyGrid, _on_map),
-    Topic('door_states', DoorStates, _sets('doors', conversions.doors_from)),
-    Topic('obstacles', PointCloud2, _sets('obstacles', conversions.cloud_from)),
+    Topic('door_states', DoorStates, _sets('doors', doors_from)),
+    Topic('obstacles', PointCloud2, _sets('obstacles', cloud_from)),
     Topic(POSE_TOPIC, PoseWithCovarianceStamped, _on_pose),
-    Topic('plan', PathMessage, _sets('plan', conversions.path_from)),
+    Topic('plan', PathMessage, _sets('plan', path_from)),
     Topic('scan', LaserScan, _on_scan, _STREAM, stream=True, beside=POSE_TOPIC),
     _feedback('follow_path', FollowPath, lambda m, old: _fed_back(m.position, old)),
     _feedback('motion/controller', Control, lambda m, old: _fed_back(m.reached_point, old)),
@@ -281,7 +456,7 @@ TOPICS: tuple[Topic, ...] = (
     Topic('scan_surroundings/_action/status', GoalStatusArray, _on_scan_goals),
     Topic(DETECTIONS_TOPIC, MarkerDetectionArray, _on_detections, _NEWEST),
     Topic('joint_states', JointState, _on_joints, _STREAM, beside=DETECTIONS_TOPIC),
-    Topic(f'{FSM}/structure', FsmStructure, _sets('containers', conversions.containers_from)),
+    Topic(f'{FSM}/structure', FsmStructure, _sets('containers', containers_from)),
     Topic(f'{FSM}/status', FsmStatus, lambda m, _: {'active': tuple(m.active), 'paused': m.paused}),
     Topic(f'{FSM}/transition', FsmTransition, _on_transition, _QUEUE),
     *(Topic(f'{name}/announcement', String, _on_request(name)) for name in CONTROLLERS),

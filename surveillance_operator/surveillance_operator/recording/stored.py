@@ -21,21 +21,23 @@ import numpy as np
 from rclpy.qos import QoSProfile
 from rclpy.serialization import deserialize_message
 from rosgraph_msgs.msg import Clock
-from sensor_msgs.msg import CompressedImage, Image
 from visualization_msgs.msg import MarkerArray
 
 from surveillance_interfaces.msg import FactChanges
 from surveillance_ontology.conversions import changes_from_ros
-from surveillance_operator import conversions
+from surveillance_operator.images import ANNOTATED, KINDS, PLAIN, SUFFIX, jpeg_from
 from surveillance_operator.recording.reading import Messages
 from surveillance_operator.recording.timeline import TimelineWriter
 from surveillance_operator.snapshot import STALE, Snapshot, follow
 from surveillance_operator.topics import (
     BEHAVIOUR,
+    MOST_NAMES,
     POSE_TOPIC,
     TOPICS,
+    URGENT_MARK,
     Fields,
     Topic,
+    point_from,
     read_message,
     with_fact,
 )
@@ -46,9 +48,7 @@ WINDOW = 0.4
 """Seconds of the recording that make one snapshot."""
 RECENT = 2.5
 """What was seen longer ago is not shown, seconds."""
-IMAGES = ('aruco_detector/annotated', 'camera/rgb/image_raw')
 SCAN_TOPIC = 'scan'
-KINDS = {'sensor_msgs/msg/Image': Image, 'sensor_msgs/msg/CompressedImage': CompressedImage}
 
 
 def _on_fact_changes(message: FactChanges, old: Snapshot) -> Fields:
@@ -59,7 +59,13 @@ def _on_fact_changes(message: FactChanges, old: Snapshot) -> Fields:
 
 
 def _on_place_markers(message: MarkerArray, _old: Snapshot) -> Fields:
-    positions, lines = conversions.places_from(message)
+    """Take in the places' points and the doors' lines, metres."""
+    positions, lines = {}, {}
+    for each in message.markers[:MOST_NAMES]:
+        if each.ns == 'names':
+            positions[each.text.removesuffix(URGENT_MARK)] = point_from(each.pose.position)
+        elif each.ns == 'doors' and len(each.points) == 2 and each.text:
+            lines[each.text] = (*point_from(each.points[0]), *point_from(each.points[1]))
     return {'positions': positions, 'door_lines': lines}
 
 
@@ -202,7 +208,7 @@ class RecordedSights:
         self._messages = Messages(recording)
         self._prefix = prefix_of(self._messages.types)
         self._images = [
-            f'{self._prefix}{name}{end}' for name in IMAGES for end in ('', '/compressed')
+            f'{self._prefix}{name}{end}' for name in (ANNOTATED, PLAIN) for end in ('', SUFFIX)
         ]
         by_name = {topic.name: topic for topic in TOPICS}
         self._pose, self._scan = by_name[POSE_TOPIC], by_name[SCAN_TOPIC]
@@ -229,7 +235,7 @@ class RecordedSights:
             if kind is None:
                 continue
             try:
-                return conversions.jpeg_from(deserialize_message(data, kind))
+                return jpeg_from(deserialize_message(data, kind))
             except Exception:  # whatever rmw finds: the bytes may be anything
                 return None
         return None

@@ -13,9 +13,8 @@ from sensor_msgs.msg import LaserScan, PointCloud2
 from std_msgs.msg import UInt8
 
 from surveillance_interfaces.msg import Decision
-from surveillance_operator import conversions
 from surveillance_operator.snapshot import Snapshot
-from surveillance_operator.topics import TOPICS, read_message
+from surveillance_operator.topics import TOPICS, read_message, scan_from
 from surveillance_runtime.conversions import pose_from
 
 TOPIC = {topic.name: topic for topic in TOPICS}
@@ -63,5 +62,5 @@ def test_a_pose_that_is_not_finite_is_refused() -> None:
 def test_a_scan_leaves_out_what_is_no_hit() -> None:
     ranges = [1.0, math.inf, math.nan, 0.0, 9.0, 2.0]
     scan = LaserScan(angle_increment=math.pi / 2, range_min=0.1, range_max=8.0, ranges=ranges)
-    points = conversions.scan_from(scan)
+    points = scan_from(scan)
     np.testing.assert_allclose(points, [[1.0, 0.0], [0.0, 2.0]], atol=1e-5)
