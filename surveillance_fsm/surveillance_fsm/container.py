@@ -448,22 +448,23 @@ class Container(State):
         structure_version.changed()
 
     def fsm_path_of(self, label: str) -> str:
-        """Return the path of the state with a label."""
-        return f'{self.fsm_path}/{label}'
+        """Return the path of the state with a label; without one, the container's own."""
+        return f'{self.fsm_path}/{label}' if label else self.fsm_path
 
     # Nodes.
 
     def fsm_node(self, label: str, state: State, priority: float = LOWEST) -> Node:
         """Make the node of one state; its targets are left to the container's kind."""
+        path = self.fsm_path_of(label)
         view = Remapper(
             self.userdata,
             state.get_registered_input_keys(),
             state.get_registered_output_keys(),
             self.fsm_remappings.get(label, ()),
             self.fsm_constants.get(label),
-            self.fsm_path_of(label),
+            path,
         )
-        node = Node(self.fsm_path, label, state, view, priority)
+        node = Node(self.fsm_path, label, path, state, view, priority)
         clock = self.fsm_clock
         if state.fsm_clock is not clock:
             state.fsm_clock = clock

@@ -186,11 +186,17 @@ class Node:
     kind = 'transition'
 
     def __init__(
-        self, within: str, label: str, state: State, view: Remapper, priority: float = LOWEST
+        self,
+        within: str,
+        label: str,
+        path: str,
+        state: State,
+        view: Remapper,
+        priority: float = LOWEST,
     ) -> None:
         self.within = within
         self.label = label
-        self.path = f'{within}/{label}' if label else within
+        self.path = path
         self.state = state
         self.is_container = hasattr(state, 'fsm_frame')
         self.enter: Callable[[Any], Any] = state.execute
