@@ -9,7 +9,6 @@ this node decides: it publishes `decision` and offers `why_not` and `go_to`; in 
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from typing import Any
 
@@ -21,7 +20,7 @@ from surveillance_behaviour.charging import BatteryMonitor
 from surveillance_behaviour.decision import DecisionSettings
 from surveillance_behaviour.machines import MACHINES
 from surveillance_behaviour.mission.mission import Mission, MissionSettings
-from surveillance_behaviour.mission.mission_log import CutOff, MissionRecord, cut_off, read
+from surveillance_behaviour.mission.mission_log import MissionRecord
 from surveillance_behaviour.peers.deciding import (
     MemorySettings,
     decider_of,
@@ -64,16 +63,13 @@ class RobotBehavior(PatrolNode):
         settings = self.declare_fields(MissionSettings(choice))
         deadlines = self.declare_fields(Deadlines(), prefix='deadline.')
         memory = self.declare_fields(MemorySettings())
-        left_at = self._where_it_was_cut_off(memory.record)
-        self._record = _open_record(memory.record)
+        self._record = self._open_record(memory.record)
         self._mission_clock = MissionClock(self)
         self._announcer = RosAnnouncer(self)
         battery = BatteryMonitor()
         ports = self._ports(choice, deadlines, battery, memory)
         clock = self._mission_clock
-        self.mission = Mission(
-            self._behaviour, settings, ports, battery, clock, self._record, left_at
-        )
+        self.mission = Mission(self._behaviour, settings, ports, battery, clock, self._record)
         self.machine = MACHINES[self._behaviour](self.mission)
         self._announcer.attach(self.mission, self.machine)
         self._introspection = IntrospectionServer(self, self.get_name(), self.machine, '/')
@@ -132,23 +128,18 @@ class RobotBehavior(PatrolNode):
             if self._record is not None:
                 self._record.close()
 
-    def _where_it_was_cut_off(self, path: str) -> CutOff | None:
-        if not path or not os.path.isfile(path):
+    def _open_record(self, path: str) -> MissionRecord | None:
+        if not path:
             return None
         try:
-            return cut_off(read(path))
+            record = MissionRecord(path)
         except FileError as error:
-            self.get_logger().warn(f'the earlier run is not continued, a new one begins: {error}')
-            return None
-
-
-def _open_record(path: str) -> MissionRecord | None:
-    if not path:
-        return None
-    try:
-        return MissionRecord(path)
-    except FileError as error:
-        raise NotNowError(f'parameter record: {error}') from None
+            raise NotNowError(f'parameter record: {error}') from None
+        if record.problem:
+            self.get_logger().warn(
+                f'the earlier run is not continued, a new one begins: {record.problem}'
+            )
+        return record
 
 
 def main(args: Sequence[str] | None = None) -> int:

@@ -9,10 +9,7 @@ from surveillance_behaviour.experience import Experience
 from surveillance_behaviour.machines import MACHINES
 from surveillance_behaviour.mission.mission import Mission, MissionSettings
 from surveillance_behaviour.mission.mission_log import (
-    CutOff,
     MissionRecord,
-    cut_off,
-    read,
 )
 from surveillance_fsm.testing import watching
 
@@ -57,12 +54,11 @@ class Run:
         world: World,
         mission_settings: MissionSettings | None = None,
         record: MissionRecord | None = None,
-        cut_off: CutOff | None = None,
         experience: Experience | None = None,
     ) -> None:
         self.world = world
         self.mission: Mission = world.mission(
-            mission_settings or settings(), record, cut_off, machine, experience
+            mission_settings or settings(), record, machine, experience
         )
         self.machine = MACHINES[machine](self.mission)
         self.untaken: set[tuple[str, str, str]] = set()
@@ -89,8 +85,5 @@ class Killed:
         self.machine, self.world, self.path, self.choice = machine, world, path, choice
 
     def run(self, until: float) -> Run:
-        left_at = cut_off(read(self.path)) if self.path.exists() else None
         with MissionRecord(self.path) as record:
-            return Run(self.machine, self.world, settings(**self.choice), record, left_at).until(
-                until
-            )
+            return Run(self.machine, self.world, settings(**self.choice), record).until(until)

@@ -16,7 +16,7 @@ from surveillance_behaviour.decider import Decider
 from surveillance_behaviour.decision import NowhereToGoError
 from surveillance_behaviour.experience import Experience
 from surveillance_behaviour.mission.mission import Mission, MissionSettings
-from surveillance_behaviour.mission.mission_log import CutOff, MissionRecord
+from surveillance_behaviour.mission.mission_log import MissionRecord
 from surveillance_behaviour.peers.ports import Point, Ports, UnknownPlaceError
 from surveillance_behaviour.policy.world import Decision
 from surveillance_fsm import Interrupt
@@ -262,7 +262,6 @@ class World:
         self,
         settings: MissionSettings | None = None,
         record: MissionRecord | None = None,
-        cut_off: CutOff | None = None,
         machine: str = 'surveillance',
         experience: Experience | None = None,
     ) -> Mission:
@@ -287,7 +286,7 @@ class World:
             motion=ScriptedMotion(self),
             routine=ScriptedRoutine(self),
         )
-        mission = Mission('scripted', settings, ports, self.battery, self.clock, record, cut_off)
+        mission = Mission('scripted', settings, ports, self.battery, self.clock, record)
         self.avoided = lambda: mission.recovery.avoided(mission.now())
         self.battery.watch(lambda: self.decider.learn_draw(self.clock.time))
         return mission

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from surveillance_behaviour.charging import BatteryMonitor, charge
 from surveillance_behaviour.decision import DecisionSettings
-from surveillance_behaviour.mission.mission_log import CutOff, MissionRecord, is_other_simulation
+from surveillance_behaviour.mission.mission_log import MissionRecord, is_other_simulation
 from surveillance_behaviour.mission.recovery import Failure, Recovery, RecoveryLimits
 from surveillance_behaviour.peers.ports import Point, Ports
 from surveillance_behaviour.policy.battery_reserve import Battery
@@ -59,8 +59,8 @@ class Mission:
         ports: The peers, and who decides.
         battery: The battery.
         clock: The mission's clock, in seconds; also the machine's.
-        record: Where it is written down; None: nowhere.
-        cut_off: Where a process that was killed left the mission; None: nothing is known of one.
+        record: Where it is written down, and where a process that was killed left it; None:
+            nowhere.
 
     Attributes:
         place: Where the robot was last known to be.
@@ -79,7 +79,6 @@ class Mission:
         battery: BatteryMonitor,
         clock: Clock,
         record: MissionRecord | None = None,
-        cut_off: CutOff | None = None,
     ) -> None:
         self.machine = machine
         self.settings = settings
@@ -94,7 +93,7 @@ class Mission:
         self.astray = False
         self.explored = 0.0
         self._record = record
-        self._cut_off = cut_off
+        self._cut_off = None if record is None else record.left_at
         self._started: float | None = None
         self._noted_places: frozenset[str] = frozenset()
         self._noted_threshold = 0.0

@@ -24,13 +24,13 @@ counted. `read` takes the last file only, which tells how the mission stands and
 `read_all` gives every event.
 
 To go on with a mission (``launch.py --resume``), hand the same file to `robot_behavior` and
-`reasoner` as the parameter ``record``: the one goes on where `cut_off` says, and the visits, leg
-times and the battery's draw come from the record and from ``FILE.experience.json`` beside it.
+`reasoner` as the parameter ``record``: the one goes on where `MissionRecord.left_at` says, and the
+visits, leg times and the battery's draw come from the record and from ``FILE.experience.json``
+beside it.
 """
 
 from __future__ import annotations
 
-import contextlib
 import glob
 import gzip
 import json
@@ -109,6 +109,10 @@ class MissionRecord:
         path: The file; made with its directory when missing, continued when it exists.
         segment_bytes: Size from which on it is packed away and a new one begun.
 
+    Attributes:
+        path: The file.
+        problem: Why nothing is known of what the file holds already; empty: it is known.
+
     Raises:
         FileError: The file cannot be opened for writing.
     """
@@ -128,9 +132,16 @@ class MissionRecord:
             content = self.path.read_bytes()
         except OSError as error:
             raise FileError(f'cannot write the mission record {path}: {error.strerror}') from None
-        # A broken line is named by whoever reads the record.
-        with contextlib.suppress(FileError):
+        self.problem = ''
+        try:
             self._account = account_of(_events(content, f'{self.path}'))
+        except FileError as error:
+            self.problem = str(error)
+
+    @property
+    def left_at(self) -> CutOff | None:
+        """Where the mission stands; None: it ended as told, or never began."""
+        return self._account.left_at
 
     def write(self, name: str, time: float, **fields: object) -> None:
         """Append one event, after those that the disk did not take before.
