@@ -26,9 +26,9 @@ LINES_PER_SECOND, LINES_AT_ONCE = 7.0, 40.0
 WARNINGS_PER_SECOND, WARNINGS_AT_ONCE = 2.0, 20.0
 """The same for its warnings and errors: 600 lines of both kinds in any minute."""
 
-# rclpy tells the throttles of different callers apart by the first frame outside of these files.
+# rclpy takes the first frame outside of these files for the caller: it names it in its log, and
+# keeps its throttles.
 rcutils._internal_callers.append(os.path.realpath(__file__))
-_LOGGERS = (__file__, rcutils.__file__)
 
 
 def clean(text: str) -> str:
@@ -118,19 +118,4 @@ class CleanLogger(rcutils.RcutilsLogger):  # type: ignore[misc]
         text = clean(str(message))
         if left_out:
             text += f' ({left_out} lines left out before this one)'
-        if options:  # rclpy's filters, which know each caller
-            return bool(super().log(text, severity, **options))
-        # As rclpy does, but with the caller looked up in 0.01 ms instead of 0.2, at first 20.
-        frame = sys._getframe(1)
-        while frame.f_back is not None and frame.f_code.co_filename in _LOGGERS:
-            frame = frame.f_back
-        code = frame.f_code
-        rcutils._rclpy.rclpy_logging_rcutils_log(
-            LoggingSeverity(severity),
-            self.name,
-            text,
-            code.co_name,
-            code.co_filename,
-            frame.f_lineno,
-        )
-        return True
+        return bool(super().log(text, severity, **options))
