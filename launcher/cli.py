@@ -143,7 +143,6 @@ def _node(argv: list[str]) -> int:
     from surveillance_runtime.run_parameters import full_name
 
     run = wanted_run(options)
-    run.check()
     given = split_arguments(rest)
     merged = run_configuration.configuration(CONFIG, run, more=given)
     run_configuration.check_assignments(merged, [node])
@@ -192,7 +191,6 @@ def _params(argv: list[str]) -> int:
             print(f'written: {path}')
         return 0
     run = wanted_run(options)
-    run.check()
     merged = run_configuration.configuration(CONFIG, run)
     run_configuration.check_assignments(merged, chosen)
     namespace = (run.namespace or '').strip('/')

@@ -46,6 +46,7 @@ def configuration(
     Raises:
         ValueError: One line about the first entry that is wrong.
     """
+    run.check()
     try:
         merged = _merged(config, run, folder, more)
         merged.check()

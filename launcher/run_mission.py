@@ -30,7 +30,6 @@ EXIT_NOTHING_DONE = 1
 
 def run_mission(run: Run, config: Path, runs: Path, resume: Path | None = None) -> int:
     """Start the nodes, supervise them to the end, print the summary; return the exit code."""
-    run.check()
     merged = configuration(config, run)  # before anything is written
     run = with_mode_of(run, merged)
     nodes = run.nodes()

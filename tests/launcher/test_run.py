@@ -43,7 +43,6 @@ from surveillance_runtime.run_parameters import place_file, run_layers, write_pa
 
 def look_over(run: Run) -> None:
     """Look at a run as a launch does before it starts anything."""
-    run.check()
     configuration(CONFIG, run)
 
 
