@@ -30,11 +30,13 @@ from surveillance_controllers.controller_parameters import (
 from surveillance_controllers.manual.commands import BATTERY, BATTERY_SET, ParsedCommand
 from surveillance_controllers.manual.requests import CommandConsole
 from surveillance_fsm.ros import ClockWait
-from surveillance_runtime.conversions import trajectory_from
+from surveillance_runtime.conversions import (
+    pose_of_serialized,
+    trajectory_from,
+)
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.process import run_node
 from surveillance_runtime.qos import STATE_QOS
-from surveillance_runtime.serialized import pose_of_serialized
 from surveillance_runtime.state_file import StateFile
 from surveillance_runtime.waiting import AwaitedEvent
 

@@ -20,14 +20,17 @@ from std_msgs.msg import Bool
 from trajectory_msgs.msg import JointTrajectory
 
 from surveillance_interfaces.msg import MarkerDetectionArray, RobotPlace
-from surveillance_runtime.conversions import seconds_of, trajectory_from
+from surveillance_runtime.conversions import (
+    seconds_of,
+    stamp_of_serialized,
+    trajectory_from,
+)
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.parameters import ParameterError
 from surveillance_runtime.place import PlaceError
 from surveillance_runtime.place.rooms import PLACE_TABLES
 from surveillance_runtime.process import run_node
 from surveillance_runtime.qos import STATE_QOS
-from surveillance_runtime.serialized import stamp_of_serialized
 from surveillance_runtime.state_file import StateFile
 from surveillance_simulation import conversions
 from surveillance_simulation.clock_rate import (

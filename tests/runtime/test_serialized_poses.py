@@ -12,8 +12,13 @@ from hypothesis import strategies as st
 from nav_msgs.msg import Odometry
 from rclpy.serialization import serialize_message
 
-from surveillance_runtime.conversions import pose_from, pose_message, seconds_of
-from surveillance_runtime.serialized import pose_of_serialized, stamp_of_serialized
+from surveillance_runtime.conversions import (
+    pose_from,
+    pose_message,
+    pose_of_serialized,
+    seconds_of,
+    stamp_of_serialized,
+)
 
 NAMES = st.text(st.characters(blacklist_characters='\0', blacklist_categories=['Cs']), max_size=20)
 METRES = st.floats(-1e7, 1e7)

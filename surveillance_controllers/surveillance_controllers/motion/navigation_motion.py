@@ -43,11 +43,11 @@ from surveillance_runtime.conversions import (
     point_message,
     pose_estimate,
     pose_from,
+    pose_of_serialized,
     seconds_of,
 )
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
-from surveillance_runtime.serialized import pose_of_serialized
 
 POSE_PERIOD = 0.19
 """Least time between two messages on amcl_pose, seconds: with every second scan at 10 Hz."""

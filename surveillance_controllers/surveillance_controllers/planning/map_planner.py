@@ -26,10 +26,13 @@ from surveillance_controllers.planning.grid_planning import (
 )
 from surveillance_fsm import Interrupt
 from surveillance_fsm.ros import GoalAbortedError, GoalRun
-from surveillance_runtime.conversions import points_from_cloud, values_from_cloud
+from surveillance_runtime.conversions import (
+    points_from_cloud,
+    pose_of_serialized,
+    values_from_cloud,
+)
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.qos import STATE_QOS
-from surveillance_runtime.serialized import pose_of_serialized
 
 
 class NavigationPlanning:
