@@ -22,7 +22,7 @@ from surveillance_interfaces.msg import ArmorDirectiveRes, FactChanges
 from surveillance_interfaces.srv import ArmorDirective, ArmorDirectiveList
 from surveillance_ontology.armor.access import Settings, state_folder
 from surveillance_ontology.armor.changes import ChangeFeed, NumberedChange
-from surveillance_ontology.armor.protocol import DirectiveRequest
+from surveillance_ontology.armor.protocol import DirectiveRequest, DirectiveResponse
 from surveillance_ontology.armor.service import ArmorService
 from surveillance_ontology.armor.store import Store
 from surveillance_ontology.armor.turns import Backlog, Turns
@@ -105,7 +105,10 @@ class ArmorServer(PatrolNode):
 
     async def _on_directive(self, request: Any, response: Any) -> Any:
         self._take_more()
-        return await self._carry_out(request, response)
+        directive = request_from_ros(request.armor_request)
+        answer = self._service.execute_at_once(directive) or await self._slow_answer(directive)
+        fill_response(response.armor_response, answer)
+        return response
 
     def _take_more(self) -> None:
         """Take the requests that wait in the middleware as well.
@@ -130,32 +133,26 @@ class ArmorServer(PatrolNode):
             directive = request_from_ros(request.armor_request)
             answer = self._service.execute_at_once(directive)
             if answer is None:
-                self.executor.create_task(self._answer_slow, request, header)
-                continue
-            response = ArmorDirective.Response()
-            fill_response(response.armor_response, answer)
-            self._single.send_response(response, header)
+                self.executor.create_task(self._answer_slow, directive, header)
+            else:
+                self._send(answer, header)
         if self._backlog:
             # Others first: those who subscribe, lists, and requests that came meanwhile.
             self._take_more()
             self.executor.create_task(self._answer_backlog)
 
-    async def _answer_slow(self, request: Any, header: Any) -> None:
-        response = await self._carry_out(request, ArmorDirective.Response())
+    async def _answer_slow(self, directive: DirectiveRequest, header: Any) -> None:
+        self._send(await self._slow_answer(directive), header)
+
+    def _send(self, answer: DirectiveResponse, header: Any) -> None:
+        response = ArmorDirective.Response()
+        fill_response(response.armor_response, answer)
         self._single.send_response(response, header)
 
-    async def _carry_out(self, request: Any, response: Any) -> Any:
-        directive = request_from_ros(request.armor_request)
-        answer = self._service.execute_at_once(directive)
-        if answer is None:
-            answer = await self._done(
-                self._turns_of(directive),
-                directive.reference_name,
-                directive.client_name,
-                lambda: self._service.execute(directive),
-            )
-        fill_response(response.armor_response, answer)
-        return response
+    async def _slow_answer(self, directive: DirectiveRequest) -> DirectiveResponse:
+        name, client = directive.reference_name, directive.client_name
+        turns = self._turns_of(directive)
+        return await self._done(turns, name, client, lambda: self._service.execute(directive))
 
     def _turns(self, each: int = 1) -> Turns:
         """Make threads of their own for directives of one kind; see `Turns`."""
