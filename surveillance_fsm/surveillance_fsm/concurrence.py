@@ -8,7 +8,7 @@ thread watches. `Concurrence` is the container.
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Iterable, Mapping
-from typing import Any, Unpack
+from typing import Any, Self, Unpack
 
 from surveillance_fsm import log
 from surveillance_fsm.clock import Interrupt
@@ -52,10 +52,9 @@ class ChildFrame(Frame):
         super().__init__(within.container, thread, within.path, node, None)
         self.node = node
 
-    def successor(self) -> ChildFrame:
+    def successor(self) -> Self:
         """Return a copy for the thread that takes this execution over."""
         frame = super().successor()
-        assert isinstance(frame, ChildFrame)
         # Not kept: the two would refer to each other, which is left to no garbage collector.
         within = self.container.fsm_frame
         assert isinstance(within, ConcurrentFrame)
@@ -189,10 +188,9 @@ class ConcurrentFrame(Frame):
         self.outcomes: Outcomes = dict.fromkeys(container.fsm_states)
         self._begin_anew()
 
-    def successor(self) -> Frame:
+    def successor(self) -> Self:
         """Return a copy for the thread that takes this execution over."""
         frame = super().successor()
-        assert isinstance(frame, ConcurrentFrame)
         frame._begin_anew()
         return frame
 

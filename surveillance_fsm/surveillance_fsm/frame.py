@@ -11,7 +11,7 @@ from __future__ import annotations
 import copy
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
 from surveillance_fsm import execution, log
 from surveillance_fsm.exceptions import InvalidStateError, SmachError
@@ -216,7 +216,7 @@ class Frame:
         node.release()
         return self._run_from(self._attend(node, outcome, target))
 
-    def successor(self) -> Frame:
+    def successor(self) -> Self:
         """Return a copy for the thread that takes this execution over."""
         frame = copy.copy(self)
         frame.attention, frame.gone = False, None
