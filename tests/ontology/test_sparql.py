@@ -306,6 +306,29 @@ def test_a_graph_that_is_kept_up_to_date_is_the_one_that_a_new_process_gets(
     service.close()
 
 
+def test_facts_and_new_classes_are_told_as_a_difference(
+    built: ArmorClient, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    graph_of(built)
+    wholes: list[bool] = []
+    update = GraphChanges.update
+
+    def noted(*args: Any) -> GraphUpdate | None:
+        found = update(*args)
+        wholes.extend([found.whole] if found else [])
+        return found
+
+    monkeypatch.setattr(GraphChanges, 'update', noted)
+    for change in (
+        lambda: built.manipulation.add_dataprop_to_ind('visitedAt', 'R1', 'LONG', '7'),
+        lambda: built.manipulation.add_class('NEW'),
+        lambda: built.manipulation.add_ind_to_class('R1', 'NEW'),
+    ):
+        change()
+        graph_of(built)
+    assert wholes == [False] * 3
+
+
 def test_a_long_text_in_a_query_is_read_once(built: ArmorClient) -> None:
     long = 'x' * 2_000_000
     # A word was looked at again from each of its characters, for hours.

@@ -370,7 +370,7 @@ class GraphChanges:
         touched = dict.fromkeys(fact for at, fact in log.touched if at > known.sequence)
         if now.derived:
             if now.classified != known.classified or any(
-                isinstance(fact, SubClassOf) for fact in touched
+                isinstance(fact, SubClassOf) and fact.sup != THING for fact in touched
             ):
                 return None  # Many classes may have come to be below others.
             # A class that assertions alone name is below owl:Thing as long as they do.
