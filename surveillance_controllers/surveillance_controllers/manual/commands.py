@@ -208,29 +208,15 @@ class Grammar:
         return ParsedCommand(command.name, _read_arguments(command, line))
 
     def _command_of(self, words: Sequence[str]) -> Command:
-        candidates: tuple[Command, ...] = self.commands
-        for depth in range(max(len(command.words) for command in self.commands)):
-            given = words[depth].lower() if depth < len(words) else ''
-            fitting = tuple(
-                command
-                for command in candidates
-                if len(command.words) > depth and command.words[depth] == given
-            )
-            if not fitting:
-                words_here = [c.words[depth] for c in candidates if len(c.words) > depth]
-                before = ' '.join(words[:depth])
-                where = f' after {before!r}' if before else ''
-                if not given:
-                    expected = _alternatives(words_here)
-                    raise CommandError(f'the line ends{where}: expected {expected}')
-                expected = nearest(given, words_here)
-                raise CommandError(
-                    f'{_shown(words[depth])}{where} is no command: expected {expected}'
-                )
-            candidates = fitting
-            if len(candidates) == 1 and len(candidates[0].words) == depth + 1:
+        fitting: tuple[Command, ...] = self.commands
+        for depth, word in enumerate((*words, '')):
+            longer = tuple(c for c in fitting if c.words[depth : depth + 1] == (word.lower(),))
+            if not longer:
+                raise CommandError(_no_command(words, depth, fitting))
+            fitting = longer
+            if len(fitting) == 1 and len(fitting[0].words) == depth + 1:
                 break
-        return candidates[0]
+        return fitting[0]
 
     def help(self) -> str:
         """Return every command with its arguments and what it does, one a line."""
@@ -255,6 +241,17 @@ class Grammar:
             elif len(done) - count < len(command.arguments):
                 found.update(command.arguments[len(done) - count].known(*done[count:]))
         return sorted(each for each in found if each.lower().startswith(typed.lower()))
+
+
+def _no_command(words: Sequence[str], depth: int, fitting: Sequence[Command]) -> str:
+    """Say that no command goes on as the words do from `depth` on."""
+    expected = [command.words[depth] for command in fitting if len(command.words) > depth]
+    before = ' '.join(words[:depth])
+    where = f' after {before!r}' if before else ''
+    if depth == len(words):
+        return f'the line ends{where}: expected {_alternatives(expected)}'
+    found = words[depth]
+    return f'{_shown(found)}{where} is no command: expected {nearest(found.lower(), expected)}'
 
 
 def _read_arguments(command: Command, line: str) -> tuple[object, ...]:
