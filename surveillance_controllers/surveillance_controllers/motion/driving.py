@@ -127,7 +127,7 @@ class Drive:
         self._now: float | None = None
         self._since = 0.0
         self._blocked_since: float | None = None
-        self._mark: tuple[float, Pose] | None = None
+        self._mark: tuple[float, Pose, float] | None = None
         self._best = 0.0
         self._turned = 0.0
         self._backed = 0.0
@@ -264,25 +264,21 @@ class Drive:
         elif now - self._blocked_since >= r.patience:
             where = self._what_is_near(pose, seen)
             self._recover(now, f'something stands in the way{where}')
-        if self._is_stuck(now, pose, guidance):
+        if self._is_stuck(now, pose):
             self._recover(now, f'no progress for {r.stuck_after:g} s')
-        if guidance.progress - self._best >= r.fresh_start:
-            self._best, self._level, self._paths = guidance.progress, 0, 0
+        if self._follower.progress - self._best >= r.fresh_start:
+            self._best, self._level, self._paths = self._follower.progress, 0, 0
         return guidance.velocity
 
-    def _is_stuck(self, now: float, pose: Pose, guidance: Guidance) -> bool:
-        r = self._recovery
-        if self._mark is None:
-            self._mark = now, pose
-            self._marked_progress = guidance.progress
-            return False
-        since, before = self._mark
-        turned = abs(angle_between(before[2], pose[2]))
-        if guidance.progress - self._marked_progress >= r.step or turned >= 3 * r.step:
-            self._mark = now, pose
-            self._marked_progress = guidance.progress
-            return False
-        return now - since >= r.stuck_after
+    def _is_stuck(self, now: float, pose: Pose) -> bool:
+        r, progress = self._recovery, self._follower.progress
+        if self._mark is not None:
+            since, before, marked = self._mark
+            turned = abs(angle_between(before[2], pose[2]))
+            if progress - marked < r.step and turned < 3 * r.step:
+                return now - since >= r.stuck_after
+        self._mark = now, pose, progress
+        return False
 
     @staticmethod
     def _what_is_near(pose: Pose, seen: Points) -> str:

@@ -81,14 +81,12 @@ class Guidance:
         velocity: The velocity to command.
         done: The end of the path is reached.
         blocked: Something seen on the way leaves no room to go on.
-        progress: Way along the path done so far, metres.
         off_path: Distance from the path, metres.
     """
 
     velocity: Velocity
     done: bool
     blocked: bool
-    progress: float
     off_path: float
 
 
@@ -98,6 +96,10 @@ class PathFollower:
     Args:
         path: Points of shape (n, 2), n of at least 1, metres.
         parameters: The robot's limits and tracking settings.
+
+    Attributes:
+        path: Its points that are not all the same, shape (m, 2), metres.
+        progress: Way along the path done so far, metres.
     """
 
     def __init__(self, path: ArrayLike, parameters: DriveParameters | None = None) -> None:
@@ -207,7 +209,7 @@ class PathFollower:
 
     def _end(self, off_path: float) -> Guidance:
         self._velocity = Velocity()
-        return Guidance(self._velocity, True, False, self.progress, off_path)
+        return Guidance(self._velocity, True, False, off_path)
 
     def _safe_speed(self, seen: Points, curvature: float, way: float) -> float:
         """Return the speed from which the robot stops before what it sees on an arc, m/s.
@@ -271,7 +273,7 @@ class PathFollower:
         self, speed: float, turn: float, blocked: bool, off_path: float, dt: float
     ) -> Guidance:
         self._take(Velocity(float(speed), float(turn)), dt)
-        return Guidance(self._velocity, False, blocked, self.progress, off_path)
+        return Guidance(self._velocity, False, blocked, off_path)
 
     def _turn(self, side: float, seen: Points, dt: float) -> tuple[float, float]:
         p = self.parameters
