@@ -25,7 +25,6 @@ from surveillance_controllers.battery import Battery, BatteryInUse
 from surveillance_controllers.controller_parameters import (
     BatterySettings,
     battery_settings,
-    execution_mode,
 )
 from surveillance_controllers.manual.commands import BATTERY, BATTERY_SET, ParsedCommand
 from surveillance_controllers.manual.requests import CommandConsole
@@ -53,8 +52,8 @@ class BatteryController(PatrolNode):
 
     def __init__(self, console_source: TextIO | None = None, **node_options: Any) -> None:
         super().__init__('battery_controller', **node_options)
-        self._mode = execution_mode(self)
         self._settings = battery_settings(self, self._set_low_below)
+        self._mode = self._settings.execution_mode
         self._low_below = self._settings.require_recharge
         self._kept = StateFile(self, self._settings.state_file)
         kept = self._kept.number('level')

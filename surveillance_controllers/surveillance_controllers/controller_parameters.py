@@ -18,22 +18,15 @@ from surveillance_runtime.place.floor_plan import Door, Segment
 EXECUTION_MODES = ('MANUAL', 'RANDOM', 'SIMULATED')
 
 
-def execution_mode(node: PatrolNode) -> str:
-    """Declare `execution_mode`."""
-    mode: str = node.parameter(
-        'execution_mode',
-        'RANDOM',
-        'Where the node takes its actions from: the operator, chance, or the simulated robot.',
-        choices=EXECUTION_MODES,
-        read_only=True,
-    )
-    return mode
-
-
 @dataclass(frozen=True)
 class ControllerSettings:
     """What every controller is told by its parameters."""
 
+    execution_mode: str = parameter(
+        'RANDOM',
+        'Where the node takes its actions from: the operator, chance, or the simulated robot.',
+        choices=EXECUTION_MODES,
+    )
     random_seed: int = parameter(
         -1, 'Makes a RANDOM run repeatable; -1 takes another course each time.', minimum=-1
     )

@@ -13,7 +13,7 @@ from collections.abc import Callable, Sequence
 from typing import Any, TextIO
 
 from surveillance_controllers import conversions, geometry, stimuli
-from surveillance_controllers.controller_parameters import MotionSettings, execution_mode
+from surveillance_controllers.controller_parameters import MotionSettings
 from surveillance_controllers.geometry import Points
 from surveillance_controllers.manual import commands
 from surveillance_controllers.manual.commands import MOTION, ParsedCommand
@@ -39,8 +39,8 @@ class MotionController(PatrolNode):
 
     def __init__(self, console_source: TextIO | None = None, **node_options: Any) -> None:
         super().__init__('motion_controller', **node_options)
-        self._mode = execution_mode(self)
         self._settings = self.declare_fields(MotionSettings())
+        self._mode = self._settings.execution_mode
         self._draw = stimuli.generator(self._settings.random_seed)
         self._knowledge = MapKnowledge(self, self._settings.peer_timeout)
         self._console: CommandConsole[tuple[float, float]] = CommandConsole(

@@ -15,7 +15,7 @@ import numpy as np
 from nav_msgs.msg import Path
 
 from surveillance_controllers import conversions, geometry, stimuli
-from surveillance_controllers.controller_parameters import PlannerSettings, execution_mode
+from surveillance_controllers.controller_parameters import PlannerSettings
 from surveillance_controllers.geometry import Points
 from surveillance_controllers.manual import commands
 from surveillance_controllers.manual.commands import PLANNER, ParsedCommand, Point3
@@ -42,8 +42,8 @@ class PlannerController(PatrolNode):
 
     def __init__(self, console_source: TextIO | None = None, **node_options: Any) -> None:
         super().__init__('planner_controller', **node_options)
-        self._mode = execution_mode(self)
         self._settings = self.declare_fields(PlannerSettings())
+        self._mode = self._settings.execution_mode
         self._draw = stimuli.generator(self._settings.random_seed)
         self._knowledge = MapKnowledge(self, self._settings.peer_timeout)
         self._console: CommandConsole[tuple[Point3, ...]] = CommandConsole(
