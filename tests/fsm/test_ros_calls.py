@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import itertools
 import threading
 import time
@@ -259,6 +260,21 @@ def test_awaited_call_times_out(graph, server):
     graph.node.create_service(Trigger, 'relay', relay)
     ServiceCaller(graph.node, Trigger, 'relay').call(Trigger.Request(), timeout=60.0)
     assert seen == ['service ask: no answer within 0.1 s']
+
+
+def test_the_failure_of_an_awaited_call_that_nobody_awaits_any_more_is_no_complaint(
+    graph, server, capfd
+):
+    asked = never_answers(server)
+    caller = ServiceCaller(graph.node, Trigger, 'ask')
+    graph.until(caller.is_ready)
+    awaited = caller.call_async(Trigger.Request(), timeout=0.1)
+    awaited.send(None)
+    assert asked.wait(60.0)
+    awaited.close()
+    graph.until(lambda: all(t.name != 'call of ask' for t in threading.enumerate()))
+    gc.collect()
+    assert capfd.readouterr().err == ''
 
 
 def test_goal_succeeds_with_feedback(graph, server):

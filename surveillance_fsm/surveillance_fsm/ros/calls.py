@@ -16,7 +16,6 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
 from action_msgs.msg import GoalStatus
@@ -242,8 +241,18 @@ class ServiceCaller:
         """
         if not self.is_ready():
             raise UnavailableError(f'{self._what}: no server', self.is_ready)
-        work = partial(self.call, request, timeout, stopping_of(self._node))
-        return await work_aside(self._node, work, f'call of {self.name}')
+
+        def work() -> tuple[Any, CallError | None]:
+            try:
+                return self.call(request, timeout, stopping_of(self._node)), None
+            except CallError as error:
+                return None, error
+
+        # Not as the future's exception: one that is not awaited any more would complain of that.
+        answer, error = await work_aside(self._node, work, f'call of {self.name}')
+        if error is not None:
+            raise error
+        return answer
 
 
 def await_ready(
