@@ -40,7 +40,12 @@ from rclpy.timer import Timer
 
 from surveillance_fsm import Interrupt
 from surveillance_fsm.ros.waiting import CLIENT_QOS, SERVICE_QOS
-from surveillance_runtime.configuration import RosArguments, Setting, read_schema
+from surveillance_runtime.configuration import (
+    Configuration,
+    RosArguments,
+    Setting,
+    read_schema,
+)
 from surveillance_runtime.diagnostics import Health
 from surveillance_runtime.logging import CleanLogger, clean
 from surveillance_runtime.parameters import ParameterError, ParameterSpec, specs_of, with_values
@@ -65,13 +70,17 @@ JOIN_SECONDS = 2.0
 """How long a stopping node waits for its threads, seconds."""
 
 
-_given: RosArguments | None = None
+_given: tuple[RosArguments, Configuration] | None = None
 
 
 def give_arguments(arguments: RosArguments | None) -> None:
-    """Let the nodes that this process makes from now on take their parameters from arguments."""
+    """Let the nodes that this process makes from now on take their parameters from arguments.
+
+    Raises:
+        ParameterError: A file or an assignment cannot be used.
+    """
     global _given
-    _given = arguments
+    _given = (arguments, arguments.configuration()) if arguments is not None else None
 
 
 class Destroyable(Protocol):
@@ -111,11 +120,12 @@ class PatrolNode(Node):  # type: ignore[misc]
         self._owned: list[Destroyable] = []
         self._overrides_given: dict[str, Setting] = {}
         if _given is not None and 'parameter_overrides' not in node_options:
-            given = _given.configuration()
+            arguments, given = _given
+            full_name = arguments.full_name(name)
             if name in given.schema:
                 given.check()
-            self._overrides_given = given.resolve(name, _given.full_name(name))
-            given.place(name, _given.full_name(name))
+            self._overrides_given = given.resolve(name, full_name)
+            given.place(name, full_name)
             node_options['parameter_overrides'] = [
                 _override(name, key, setting.value)
                 for key, setting in self._overrides_given.items()

@@ -95,13 +95,13 @@ def _run_nodes(factories: Sequence[Callable[[], PatrolNode]], args: Sequence[str
     argv = [sys.argv[0], *(sys.argv[1:] if args is None else args)]
     try:
         arguments = split_arguments(argv[1:])
-        arguments.configuration()  # the files are there, and of the right form
+        give_arguments(arguments)
         words = [argv[0], *arguments.rest]
         rclpy.init(args=words, signal_handler_options=SignalHandlerOptions.NO)
     except Exception as error:
+        give_arguments(None)
         print(f'cannot start: {_one_line(error)}{_about_security()}', file=sys.stderr)
         return EXIT_CANNOT_START
-    give_arguments(arguments)
     nodes: list[PatrolNode] = []
     spinner = ExecutorThread()
     heartbeat = diagnostics = None
