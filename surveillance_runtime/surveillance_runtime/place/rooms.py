@@ -158,6 +158,13 @@ def make_place(rooms: Any, room_positions: Any, robot_room: Any, recharge_rooms:
     Raises:
         PlaceError: The first thing that is wrong, with the parameter it stands in.
     """
+    place = _unjoined_place(rooms, room_positions, robot_room, recharge_rooms)
+    _check_graph(place)
+    return place
+
+
+def _unjoined_place(rooms: Any, room_positions: Any, robot_room: Any, recharge_rooms: Any) -> Place:
+    """Make a place as `make_place`; whether its doors join its rooms is not looked at."""
     checked = _rooms(rooms)
     positions = _positions(room_positions, checked)
     start = _member(('robot_room',), robot_room, checked)
@@ -168,9 +175,7 @@ def make_place(rooms: Any, room_positions: Any, robot_room: Any, recharge_rooms:
         _member(('recharge_rooms',), station, checked)
     if twice := _first_duplicate(stations):
         raise PlaceError(('recharge_rooms',), f"duplicate room '{twice}'")
-    place = Place(checked, positions, start, tuple(stations))
-    _check_graph(place)
-    return place
+    return Place(checked, positions, start, tuple(stations))
 
 
 def description_of(place: Place) -> dict[str, Any]:
@@ -189,23 +194,20 @@ def edited_place(description: Mapping[str, Any]) -> Place:
     Raises:
         PlaceError: A name, a position or a list is none.
     """
-    checked = _rooms(description.get('map'))
-    positions = _positions(description.get('room_positions'), checked)
-    start = _member(('robot_room',), description.get('robot_room'), checked)
-    stations = tuple(
-        _member(('recharge_rooms',), station, checked)
-        for station in description.get('recharge_rooms', ())
-    )
-    return Place(checked, positions, start, stations)
+    return _unjoined_place(*_parts(description))
 
 
 def place_from(parameters: Mapping[str, Any]) -> Place:
     """Check what a place's file says of its rooms, and make the `Place` of it; see `make_place`."""
-    return make_place(
-        parameters.get('map'),
-        parameters.get('room_positions'),
-        parameters.get('robot_room'),
-        parameters.get('recharge_rooms', ()),
+    return make_place(*_parts(parameters))
+
+
+def _parts(described: Mapping[str, Any]) -> tuple[Any, Any, Any, Any]:
+    return (
+        described.get('map'),
+        described.get('room_positions'),
+        described.get('robot_room'),
+        described.get('recharge_rooms', ()),
     )
 
 
