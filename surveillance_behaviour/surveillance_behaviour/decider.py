@@ -116,10 +116,18 @@ class Decider:
             return replace(battery, sent_to_charge='')
         return battery
 
-    def learn_draw(self, now: float) -> None:
-        """Learn from the battery's level now how fast it falls."""
-        if self._battery.level is not None:
-            self.experience.draw.observe(now, self._battery.level)
+    def learn_draw(self, now: Callable[[], float]) -> None:
+        """Learn from now on, whenever the battery is heard, how fast it falls.
+
+        Args:
+            now: Seconds on the mission's clock.
+        """
+
+        def learn() -> None:
+            if self._battery.level is not None:
+                self.experience.draw.observe(now(), self._battery.level)
+
+        self._battery.watch(learn)
 
     def look(
         self, now: float, interrupt: Interrupt, avoided: frozenset[str] = frozenset()

@@ -20,7 +20,6 @@ from surveillance_interfaces.srv import RoomInformation
 from surveillance_perception.arm.scan import ScanOutcome, ScanPlan, View
 from surveillance_perception.arm.trajectory import ArmTrajectory
 from surveillance_perception.detection.camera_model import DISTORTION_MODELS, Array, CameraModel
-from surveillance_perception.detection.detector import Detection
 from surveillance_perception.detection.fusion import FusedPosition, FusedPositions, is_measured
 from surveillance_perception.detection.marker_stream import Sighting
 from surveillance_perception.detection.pose import MarkerPose
@@ -116,12 +115,14 @@ def camera_to_ros(camera: CameraModel, header: Header) -> CameraInfo:
     return message
 
 
-def detection_to_ros(
-    detection: Detection, pose: MarkerPose | None, size: float, confirmed: bool
-) -> MarkerDetection:
+def detection_to_ros(sighting: Sighting) -> MarkerDetection:
     """Return a MarkerDetection; without a pose its position is not a number."""
+    detection, pose = sighting.detection, sighting.pose
     message = MarkerDetection(
-        id=detection.marker_id, known=detection.known, confirmed=confirmed, size=size
+        id=detection.marker_id,
+        known=detection.known,
+        confirmed=sighting.confirmed,
+        size=sighting.size,
     )
     message.confidence = detection.confidence
     message.corners = detection.corners.ravel().astype(float)
@@ -139,13 +140,7 @@ def detection_to_ros(
 
 def detections_to_ros(header: Header, sightings: Iterable[Sighting]) -> MarkerDetectionArray:
     """Return all markers of one image."""
-    return MarkerDetectionArray(
-        header=header,
-        detections=[
-            detection_to_ros(each.detection, each.pose, each.size, each.confirmed)
-            for each in sightings
-        ],
-    )
+    return MarkerDetectionArray(header=header, detections=[*map(detection_to_ros, sightings)])
 
 
 def fuse_views(fused: FusedPositions, message: MarkerDetectionArray, camera: Array) -> list[int]:

@@ -288,7 +288,7 @@ class World:
         )
         mission = Mission('scripted', settings, ports, self.battery, self.clock, record)
         self.avoided = lambda: mission.recovery.avoided(mission.now())
-        self.battery.watch(lambda: self.decider.learn_draw(self.clock.time))
+        self.decider.learn_draw(self.clock.now)
         return mission
 
 

@@ -82,7 +82,7 @@ def decider_of(
     decider = Decider(
         settings, ontology, places, battery, experience, generator, lambda w: log.warn(w), announce
     )
-    battery.watch(lambda: decider.learn_draw(now()))
+    decider.learn_draw(now)
     return decider
 
 
