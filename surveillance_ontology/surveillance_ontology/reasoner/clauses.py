@@ -8,7 +8,7 @@ those of `datatypes`.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, TypeAlias, TypeVar
 
 from surveillance_ontology.owl.axioms import Axiom
@@ -345,14 +345,18 @@ class Program:
 def with_predicates(record: T, predicate: Callable[[Predicate], Predicate]) -> T:
     """Return a clause, an atom or a condition with what `predicate` gives for its predicates."""
     changed: dict[str, Any] = {}
-    for entry in fields(record):  # type: ignore[arg-type]
-        value = getattr(record, entry.name)
+    for name in record.__slots__:  # type: ignore[attr-defined]
+        value = getattr(record, name)
         if isinstance(value, Predicate):
-            changed[entry.name] = predicate(value)
-        elif entry.name == 'body':
-            changed['body'] = tuple(with_predicates(atom, predicate) for atom in value)
-        elif entry.name == 'head':
-            changed['head'] = with_predicates(value, predicate)
+            other: Any = predicate(value)
+        elif name == 'body':
+            other = tuple([with_predicates(atom, predicate) for atom in value])
+        elif name == 'head':
+            other = with_predicates(value, predicate)
+        else:
+            continue
+        if other is not value and other != value:
+            changed[name] = other
     return replace(record, **changed) if changed else record  # type: ignore[type-var]
 
 

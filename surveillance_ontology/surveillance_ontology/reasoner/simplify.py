@@ -84,7 +84,7 @@ def _substitute(program: Program, alias: dict[Predicate, Predicate]) -> None:
     for clause in (with_predicates(clause, other) for clause in program.clauses):
         body = tuple(dict.fromkeys(clause.body))
         if clause.head not in body:
-            clauses[replace(clause, body=body)] = None
+            clauses[clause if len(body) == len(clause.body) else replace(clause, body=body)] = None
     program.clauses = list(clauses)
     program.at_least = [with_predicates(condition, other) for condition in program.at_least]
     program.at_most = [with_predicates(condition, other) for condition in program.at_most]

@@ -236,6 +236,10 @@ class ValueSet:
         return self.intervals == other.intervals and self.parts == other.parts
 
     def __hash__(self) -> int:
+        return self._hash
+
+    @cached_property
+    def _hash(self) -> int:
         return hash((frozenset(self.intervals.items()), frozenset(self.parts.items())))
 
     # --- algebra ---
