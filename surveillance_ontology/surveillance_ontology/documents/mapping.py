@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import partial
-from typing import TypeAlias, TypeVar
+from typing import Any, TypeAlias, TypeVar
 
 from surveillance_ontology.documents.rdf_xml import Graph, Node
 from surveillance_ontology.documents.xml_reading import DEEPEST, IllFormedError
@@ -60,6 +60,22 @@ CARDINALITIES = (
     ('maxCardinality', 'maxQualifiedCardinality', ex.ObjectMaxCardinality, ex.DataMaxCardinality),
     ('cardinality', 'qualifiedCardinality', ex.ObjectExactCardinality, ex.DataExactCardinality),
 )
+_ONE, _TWO = (SWRL + 'argument1', 'first'), (SWRL + 'argument2', 'second')
+_PROPERTY, _ARGUMENT = (SWRL + 'propertyPredicate', 'prop'), (SWRL + 'argument1', 'argument')
+ATOMS: dict[str, tuple[Any, *tuple[tuple[str, str], ...]]] = {
+    SWRL + 'ClassAtom': (ex.ClassAtom, (SWRL + 'classPredicate', 'cls'), _ARGUMENT),
+    SWRL + 'DataRangeAtom': (ex.DataRangeAtom, (SWRL + 'dataRange', 'range'), _ARGUMENT),
+    SWRL + 'IndividualPropertyAtom': (ex.ObjectPropertyAtom, _PROPERTY, _ONE, _TWO),
+    SWRL + 'DatavaluedPropertyAtom': (ex.DataPropertyAtom, _PROPERTY, _ONE, _TWO),
+    SWRL + 'SameIndividualAtom': (ex.SameIndividualAtom, _ONE, _TWO),
+    SWRL + 'DifferentIndividualsAtom': (ex.DifferentIndividualsAtom, _ONE, _TWO),
+    SWRL + 'BuiltinAtom': (
+        ex.BuiltinAtom,
+        (SWRL + 'builtin', 'builtin'),
+        (SWRL + 'arguments', 'arguments'),
+    ),
+}
+"""The atoms of rules: the node's type, the record, and each predicate with the field behind it."""
 _CONSTRUCTORS = ('intersectionOf', 'unionOf', 'complementOf', 'oneOf', 'onProperty')
 _CONSTRUCTED = tuple(OWL + name for name in _CONSTRUCTORS[:-1])
 _RESTRICTIONS = (
@@ -698,39 +714,33 @@ class Mapping:
             self._report(node, 'an annotation on a rule is not kept')
         self._add(ax.Rule(body, head, kept))
 
-    def _argument(self, value: Node | None, atom: str) -> str | ex.Variable | Literal:
-        if value is None:
-            raise self._ill_formed(atom, 'a rule atom lacks an argument')
-        if isinstance(value, str) and value in self._variables:
-            return ex.Variable(value)
-        return value
-
     def _atom(self, node: str) -> ex.Atom:
         kind = self._one(node, _TYPE)
-        first = self._one(node, SWRL + 'argument1')
-        second = self._one(node, SWRL + 'argument2')
-        if kind == SWRL + 'BuiltinAtom':
-            head = self._one(node, SWRL + 'arguments') or RDF + 'nil'
-            arguments = tuple(self._argument(item, node) for item in self._list(head))
-            return ex.BuiltinAtom(self._resource(node, SWRL + 'builtin'), arguments)  # type: ignore[arg-type]
-        one = self._argument(first, node)
-        if kind == SWRL + 'ClassAtom':
-            cls = self.expression(self._resource(node, SWRL + 'classPredicate'))
-            return ex.ClassAtom(cls, one)  # type: ignore[arg-type]
-        if kind == SWRL + 'DataRangeAtom':
-            return ex.DataRangeAtom(self.data_range(self._resource(node, SWRL + 'dataRange')), one)  # type: ignore[arg-type]
-        two = self._argument(second, node)
-        if kind == SWRL + 'IndividualPropertyAtom':
-            prop = self._property(self._resource(node, SWRL + 'propertyPredicate'))
-            return ex.ObjectPropertyAtom(prop, one, two)  # type: ignore[arg-type]
-        if kind == SWRL + 'DatavaluedPropertyAtom':
-            name = self._resource(node, SWRL + 'propertyPredicate')
-            return ex.DataPropertyAtom(name, one, two)  # type: ignore[arg-type]
-        if kind == SWRL + 'SameIndividualAtom':
-            return ex.SameIndividualAtom(one, two)  # type: ignore[arg-type]
-        if kind == SWRL + 'DifferentIndividualsAtom':
-            return ex.DifferentIndividualsAtom(one, two)  # type: ignore[arg-type]
-        raise self._ill_formed(node, f'rule atom of type {kind} is not understood')
+        if not isinstance(kind, str) or kind not in ATOMS:
+            raise self._ill_formed(node, f'rule atom of type {kind} is not understood')
+        record, *statements = ATOMS[kind]
+        atom: ex.Atom = record(*(self._atom_part(node, predicate) for predicate, _ in statements))
+        return atom
+
+    def _atom_part(self, node: str, predicate: str) -> Any:
+        if predicate == SWRL + 'arguments':
+            items = self._list(self._one(node, predicate) or RDF + 'nil')
+            return tuple(self._argument(item) for item in items)
+        if predicate in (SWRL + 'argument1', SWRL + 'argument2'):
+            value = self._one(node, predicate)
+            if value is None:
+                raise self._ill_formed(node, 'a rule atom lacks an argument')
+            return self._argument(value)
+        part = self._resource(node, predicate)
+        if predicate == SWRL + 'classPredicate':
+            return self.expression(part)
+        if predicate == SWRL + 'dataRange':
+            return self.data_range(part)
+        return self._property(part) if predicate == SWRL + 'propertyPredicate' else part
+
+    def _argument(self, value: Node) -> Node | ex.Variable:
+        is_variable = isinstance(value, str) and value in self._variables
+        return ex.Variable(value) if is_variable else value  # type: ignore[arg-type]
 
 
 _BETWEEN: dict[str, tuple[Callable[..., Axiom], Callable[..., Axiom]]] = {

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from itertools import count
 from typing import Any
 
-from surveillance_ontology.documents.mapping import CARDINALITIES
+from surveillance_ontology.documents.mapping import ATOMS, CARDINALITIES
 from surveillance_ontology.documents.rdf_xml import Node, Triple
 from surveillance_ontology.owl import axioms as ax
 from surveillance_ontology.owl import expressions as ex
@@ -27,9 +27,6 @@ _KIND_TYPES = {
 }
 _CLASS, _RESTRICTION, _DATATYPE = OWL + 'Class', OWL + 'Restriction', RDFS + 'Datatype'
 _ON = (OWL + 'onProperty', 'prop')
-_PROPERTY = (SWRL + 'propertyPredicate', 'prop')
-_ARGUMENT, _ARGUMENTS = (SWRL + 'argument1', 'argument'), (SWRL + 'arguments', 'arguments')
-_ONE, _TWO = (SWRL + 'argument1', 'first'), (SWRL + 'argument2', 'second')
 _NEGATIVE = (
     OWL + 'NegativePropertyAssertion',
     (OWL + 'sourceIndividual', 'subject'),
@@ -54,13 +51,7 @@ _NODES: dict[type, tuple[Any, ...]] = {
     ex.DataComplementOf: (_DATATYPE, (OWL + 'datatypeComplementOf', 'operand')),
     ex.DataOneOf: (_DATATYPE, (OWL + 'oneOf', 'literals')),
     ex.DatatypeRestriction: (_DATATYPE, (OWL + 'onDatatype', 'datatype')),
-    ex.ClassAtom: (SWRL + 'ClassAtom', (SWRL + 'classPredicate', 'cls'), _ARGUMENT),
-    ex.DataRangeAtom: (SWRL + 'DataRangeAtom', (SWRL + 'dataRange', 'range'), _ARGUMENT),
-    ex.ObjectPropertyAtom: (SWRL + 'IndividualPropertyAtom', _PROPERTY, _ONE, _TWO),
-    ex.DataPropertyAtom: (SWRL + 'DatavaluedPropertyAtom', _PROPERTY, _ONE, _TWO),
-    ex.SameIndividualAtom: (SWRL + 'SameIndividualAtom', _ONE, _TWO),
-    ex.DifferentIndividualsAtom: (SWRL + 'DifferentIndividualsAtom', _ONE, _TWO),
-    ex.BuiltinAtom: (SWRL + 'BuiltinAtom', (SWRL + 'builtin', 'builtin'), _ARGUMENTS),
+    **{record: (kind, *statements) for kind, (record, *statements) in ATOMS.items()},
     ax.NegativeObjectPropertyAssertion: (*_NEGATIVE, (OWL + 'targetIndividual', 'object')),
     ax.NegativeDataPropertyAssertion: (*_NEGATIVE, (OWL + 'targetValue', 'literal')),
 }
