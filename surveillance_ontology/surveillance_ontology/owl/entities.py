@@ -2,32 +2,32 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from dataclasses import fields, replace
 from typing import Any
 
-from surveillance_ontology.owl.axioms import Axiom, Declaration, Import
+from surveillance_ontology.owl.axioms import AnnotationAssertion, Axiom, Declaration, Import
 from surveillance_ontology.owl.expressions import Literal, Variable
 
-# The kind of entity a string field stands for, by field name; fields of class expressions, property
-# expressions and data ranges recurse. 'individual' wins over the rest in assertions.
-_ROLE_OF_FIELD = {
+_KIND_OF_TYPE = {
+    'ClassExpression': 'class',
+    'PropertyExpression': 'object_property',
+    'DataRange': 'datatype',
+    'IndividualArgument': 'individual',
+}
+"""The kind of entity that a bare string stands for where a field is of such a type."""
+_KIND_OF_NAME = {
     'cls': 'class',
-    'classes': 'class',
-    'sub': 'class',
-    'sup': 'class',
-    'filler': 'class',
-    'operand': 'class',
-    'operands': 'class',
-    'domain': 'class',
     'individual': 'individual',
     'individuals': 'individual',
     'subject': 'individual',
     'object': 'individual',
-    'argument': 'individual',
     'datatype': 'datatype',
+    'data_props': 'data_property',
 }
-_OBJECT, _DATA = 'object_property', 'data_property'
+"""The same where the type is a string: by the name of the field."""
+_SEVERAL = re.compile(r'(?:tuple|frozenset)\[(\w+)')
 
 
 _ROLES: dict[type, tuple[tuple[str, str], ...]] = {}
@@ -42,28 +42,15 @@ def roles_of(record: type) -> tuple[tuple[str, str], ...]:
 
 
 def _roles_of(record: type[Any]) -> tuple[tuple[str, str], ...]:
-    name = record.__name__
-    data = name.startswith('Data') or 'Data' in name
+    if issubclass(record, AnnotationAssertion):
+        return (('prop', 'annotation_property'), ('subject', 'annotated'), ('value', 'annotated'))
     pairs = []
     for entry in fields(record):
-        role = _ROLE_OF_FIELD.get(entry.name, '')
-        if entry.name in ('prop', 'props', 'chain'):
-            role = 'annotation_property' if name == 'AnnotationAssertion' else ''
-            role = role or (_DATA if data else _OBJECT)
-        elif entry.name in ('sub', 'sup') and 'Property' in name:
-            role = _DATA if data else _OBJECT
-        elif entry.name in ('first', 'second'):
-            role = _OBJECT if name == 'InverseObjectProperties' else 'individual'
-        elif entry.name == 'object_props':
-            role = _OBJECT
-        elif entry.name == 'data_props':
-            role = _DATA
-        elif entry.name == 'range':
-            role = 'class' if name == 'ObjectPropertyRange' else 'datatype'
-        elif data and entry.name in ('operand', 'operands'):
-            role = 'datatype'
-        elif (entry.name == 'subject' and name == 'AnnotationAssertion') or entry.name == 'value':
-            role = 'annotated'
+        several = _SEVERAL.match(str(entry.type))
+        role = _KIND_OF_TYPE.get(several[1] if several else str(entry.type), '')
+        role = role or _KIND_OF_NAME.get(entry.name, '')
+        if not role and entry.name in ('prop', 'props', 'sub', 'sup'):
+            role = 'data_property' if 'Data' in record.__name__ else 'object_property'
         pairs.append((entry.name, role))
     return tuple(pairs)
 
