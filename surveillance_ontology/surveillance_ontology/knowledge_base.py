@@ -849,13 +849,6 @@ class KnowledgeBase:
         if self._feed:
             self._feed.replaced(before, engine)
 
-    def recompute(self) -> bool:
-        """Forget what is derived and derive it again; return whether the ontology is consistent."""
-        self._told.schema_changed = True
-        self._classify()
-        self._rebuild(self._engine)
-        return self._consistent
-
     def give_up(self, part: int = 500) -> Iterator[None]:
         """Let go of everything, some entries with each step; afterwards it can be used no more.
 
