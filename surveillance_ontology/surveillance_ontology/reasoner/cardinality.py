@@ -89,11 +89,7 @@ class _Counter:
         if self.is_data:
             return ()
         predicate = self.difference.predicate
-        return tuple(
-            (predicate, one, other)
-            for place, one in enumerate(values)
-            for other in values[place + 1 :]
-        )
+        return tuple((predicate, *pair) for pair in combinations(values, 2))
 
     def _subjects(self, act: Callable[[str], None]) -> Callable[..., None]:
         return (lambda y, z: act(z)) if self.inverse else (lambda z, y: act(z))
@@ -206,12 +202,7 @@ class AtMostCounter(_Counter):
             for other in related[1:]:
                 yield related[0], other
         elif len(related) == self.n + 1:
-            pairs = [
-                (one, other)
-                for place, one in enumerate(related)
-                for other in related[place + 1 :]
-                if not different(one, other)
-            ]
+            pairs = [pair for pair in combinations(related, 2) if not different(*pair)]
             if len(pairs) == 1:
                 yield pairs[0]
 

@@ -11,6 +11,7 @@ reaches.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from itertools import combinations
 
 from surveillance_ontology.owl.assertions import Assertions, is_assertion
 from surveillance_ontology.owl.axioms import (
@@ -106,7 +107,8 @@ class Engine:
         self._flushes = [index.flush for index in self._network.thresholds]
         for predicate in dict.fromkeys(program.predicates()):
             self._attach_touching(predicate)
-        self._start()
+        for fire in self._network.initial:
+            fire()
 
     # --- assertions as facts ---
 
@@ -227,8 +229,7 @@ class Engine:
             return len({self.equality.find(name) for name in axiom.individuals}) == 1
         if isinstance(axiom, DifferentIndividuals):
             names = sorted(self.equality.find(name) for name in axiom.individuals)
-            pairs = [(a, b) for n, a in enumerate(names) for b in names[n + 1 :]]
-            return all(self.difference.different(*pair) for pair in pairs)
+            return all(self.difference.different(*pair) for pair in combinations(names, 2))
         fact = self.fact_of(axiom)
         return fact is not None and bool(fact[0].holds(fact))
 
@@ -494,10 +495,6 @@ class Engine:
         fresh += self._enter()
         for other in others:
             self._split(other, fresh)
-
-    def _start(self) -> None:
-        for fire in self._network.initial:
-            fire()
 
     # --- updates ---
 

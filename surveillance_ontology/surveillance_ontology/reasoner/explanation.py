@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from itertools import combinations
 
 from surveillance_ontology.owl import axioms as ax
 from surveillance_ontology.owl import expressions as ex
@@ -121,14 +122,10 @@ class Reasons:
             return parts[0] if len(parts) == 1 else self._joined(axiom_text(axiom), parts)
         if isinstance(axiom, ax.DifferentIndividuals):
             names = sorted(engine.equality.find(name) for name in axiom.individuals)
-            pairs = [
-                (engine.program.different, one, other)
-                for place, one in enumerate(names)
-                for other in names[place + 1 :]
-            ]
-            if not all(engine.difference.different(one, other) for _, one, other in pairs):
+            pairs = list(combinations(names, 2))
+            if not all(engine.difference.different(*pair) for pair in pairs):
                 return None
-            proofs = [engine.proofs.find(pair) for pair in pairs]
+            proofs = [engine.proofs.find((engine.program.different, *pair)) for pair in pairs]
             parts = [self._explained(proof) for proof in proofs if proof is not None]
             return parts[0] if len(parts) == 1 else self._joined(axiom_text(axiom), parts)
         fact = engine.fact_of(axiom)
