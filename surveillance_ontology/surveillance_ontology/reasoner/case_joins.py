@@ -28,6 +28,7 @@ from surveillance_ontology.reasoner.case_model import (
     Related,
     Same,
     Valued,
+    still_open,
 )
 from surveillance_ontology.reasoner.case_rules import (
     FactAtom,
@@ -418,16 +419,9 @@ class CaseJoins:
                 return
             alternatives.append(stated[0])
             choices |= stated[1]
-        left: list[Alternative] = []
-        for alternative in alternatives:
-            found = alternative.look(self._model)
-            if found is None:
-                return
-            now, more = found
-            choices |= more
-            if now is not None:
-                left.append(now)
-        self._either(left, choices)
+        found = still_open(self._model, alternatives, choices)
+        if found is not None:
+            self._either(*found)
 
     def _stated(self, head: Any, nodes: list[Any]) -> tuple[Alternative, Choices] | None:
         """Return what a head states of nodes, by which choices; None where a value is tried

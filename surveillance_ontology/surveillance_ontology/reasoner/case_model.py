@@ -518,3 +518,22 @@ class Apart(NamedTuple):
 Alternative: TypeAlias = Has | Same | Root | In | Related | Valued | Gains | Apart
 Either: TypeAlias = Callable[[list[Alternative], Choices], None]
 """States that one of some alternatives holds, by these choices."""
+
+
+def still_open(
+    model: CaseModel, alternatives: Iterable[Alternative], choices: Choices
+) -> tuple[list[Alternative], Choices] | None:
+    """Return the alternatives that are possible now, and by which choices no other one is.
+
+    None where one of them holds, or is about nobody that is there.
+    """
+    left: list[Alternative] = []
+    for alternative in alternatives:
+        found = alternative.look(model)
+        if found is None:
+            return None
+        now, more = found
+        choices |= more
+        if now is not None:
+            left.append(now)
+    return left, choices

@@ -26,6 +26,7 @@ from surveillance_ontology.reasoner.case_model import (
     Has,
     Root,
     Same,
+    still_open,
     total,
 )
 from surveillance_ontology.reasoner.case_rules import (
@@ -249,15 +250,10 @@ class CaseSearch:
 
     def _try(self, alternatives: tuple[Alternative, ...], choices: Choices, x: int | None) -> bool:
         """Try alternatives, about one unnamed individual `x` where it is given."""
-        left: list[Alternative] = []
-        for alternative in alternatives:
-            found = alternative.look(self.model)
-            if found is None:
-                return False
-            now, more = found
-            choices |= more
-            if now is not None:
-                left.append(now)
+        found = still_open(self.model, alternatives, choices)
+        if found is None:
+            return False
+        left, choices = found
         if not left:
             raise ClashError(choices)
         self.model.step()
