@@ -261,12 +261,16 @@ class OpenCases:
             name = self._open_instance(clause)
             if name is not None:
                 yield _sentence(clause.origin, name)
+        said: list[Clause] = []
         for unknown in self._unknowns:
-            name = None if unknown.is_decided else self._with_unknown(unknown)
-            asking = unknown.asking
-            if name is not None and asking.clause is not None:
-                prop = local_name(asking.atom.predicate.name)
-                yield _sentence(asking.clause.origin, name, f'a value of {prop} that is not known')
+            rule, atom, _ = unknown.asking
+            if unknown.is_decided or rule is None or rule in said:
+                continue
+            name = self._with_unknown(unknown)
+            if name is not None:
+                said.append(rule)
+                what = f'a value of {local_name(atom.predicate.name)} that is not known'
+                yield _sentence(rule.origin, name, what)
 
     def unknowns_matter(self) -> bool:
         """Tell whether reasoning by cases is needed for a rule or key that could apply by a value

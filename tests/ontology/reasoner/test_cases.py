@@ -285,6 +285,23 @@ def test_a_rule_that_asks_for_one_of_very_many_values_is_named() -> None:
     assert kb.unsupported
 
 
+def test_a_rule_is_named_once_however_many_unknown_values_it_could_apply_by() -> None:
+    x, v, w = map(ex.Variable, 'xvw')
+    body = (
+        ex.DataPropertyAtom(S, x, v),
+        ex.BuiltinAtom(SWRLB + 'add', (w, v, whole(5))),
+        ex.DataPropertyAtom(T, x, w),
+    )
+    kb = reasoned(
+        ax.Rule(body, (ex.ClassAtom(D, x),)),
+        SubClassOf(A, ex.DataSomeValuesFrom(S, XSD + 'integer')),
+        SubClassOf(B, ex.DataMinCardinality(2, S, XSD + 'integer')),
+        *(ClassAssertion(cls, one) for cls, one in ((A, i), (B, j))),
+        *(ax.DataPropertyAssertion(T, one, whole(7)) for one in (i, j)),
+    )
+    assert len(kb.unsupported) == 1
+
+
 def test_what_stops_is_named() -> None:
     numbers = [SubClassOf(A, ex.ObjectMinCardinality(30, P, ex.ObjectUnionOf((A, B))))]
     reasoner = CaseReasoner([*numbers, ClassAssertion(A, i)], most_steps=100)
