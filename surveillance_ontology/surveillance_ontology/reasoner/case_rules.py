@@ -40,7 +40,6 @@ from surveillance_ontology.reasoner.clauses import (
     closure,
     turned,
 )
-from surveillance_ontology.reasoner.datatypes import unfolded
 from surveillance_ontology.reasoner.normal_form import normal_form
 from surveillance_ontology.reasoner.property_chains import AnyRole, Chains
 from surveillance_ontology.reasoner.translation import (
@@ -49,7 +48,7 @@ from surveillance_ontology.reasoner.translation import (
     directed,
     inclusions,
 )
-from surveillance_ontology.reasoner.value_sets import EVERY, ValueSet, value_set
+from surveillance_ontology.reasoner.value_sets import EVERY, ValueSet, unfolded, value_set
 
 _X, _Y = 0, 1
 Heads = tuple[tuple[int, int], ...]

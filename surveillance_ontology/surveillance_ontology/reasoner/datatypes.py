@@ -1,5 +1,4 @@
-"""Literals by value: value spaces, lexical forms, ranges and facets (XML Schema 1.1 part 2, OWL 2
-section 4).
+"""Literals by value: value spaces, lexical forms, order (XML Schema 1.1 part 2, OWL 2 section 4).
 
 A value is a hashable Python object that is equal to another exactly where the value spaces say so:
 whole numbers of the decimal space are `int`, other decimals `Fraction`, plain strings `str`; any
@@ -14,22 +13,13 @@ import contextlib
 import math
 import re
 import struct
-from collections.abc import Callable, Mapping
 from fractions import Fraction
 from functools import cache
 from typing import Any, TypeAlias
 from xml.etree import ElementTree
 
-from surveillance_ontology.owl.expressions import (
-    DataComplementOf,
-    DataIntersectionOf,
-    DataOneOf,
-    DataRange,
-    DatatypeRestriction,
-    DataUnionOf,
-    Literal,
-)
-from surveillance_ontology.owl.vocabulary import OWL, RDF, RDFS, XSD, local_name
+from surveillance_ontology.owl.expressions import Literal
+from surveillance_ontology.owl.vocabulary import OWL, RDF, XSD
 from surveillance_ontology.reasoner import moments
 from surveillance_ontology.reasoner.moments import moment_of, text_of
 
@@ -57,8 +47,7 @@ BOUNDS: dict[str, tuple[int | None, int | None]] = {
     'unsignedShort': (0, 2**16 - 1),
     'unsignedByte': (0, 2**8 - 1),
 }
-_STRINGS = ('string', 'normalizedString', 'token', 'language', 'Name', 'NCName', 'NMTOKEN')
-_PATTERNS = {
+STRING_PATTERNS = {
     'normalizedString': re.compile(r'[^\t\n\r]*'),
     'token': re.compile(r'(?:[^ \t\n\r]+(?: [^ \t\n\r]+)*)?'),
     'language': re.compile(r'[a-zA-Z]{1,8}(?:-[a-zA-Z0-9]{1,8})*'),
@@ -66,6 +55,7 @@ _PATTERNS = {
     'NCName': re.compile(r'[^\W\d][\w.\-]*'),
     'NMTOKEN': re.compile(r'[\w.:\-]+'),
 }
+"""The types of strings but xsd:string itself, and what is in them."""
 
 
 def _number(text: str) -> int | Fraction:
@@ -129,8 +119,8 @@ def parse_value(literal: Literal) -> Value:
             if (low is not None and number < low) or (high is not None and number > high):
                 raise ValueError
             return number
-        if name in _STRINGS:
-            pattern = _PATTERNS.get(name)
+        if name == 'string' or name in STRING_PATTERNS:
+            pattern = STRING_PATTERNS.get(name)
             if pattern is not None and not pattern.fullmatch(text):
                 raise ValueError
             return text
@@ -237,59 +227,7 @@ def _terminating(number: Fraction) -> str | None:
     return f'{sign}{digits[:-places]}.{digits[-places:]}' if places else sign + digits
 
 
-# --- data ranges ---
-
-Test: TypeAlias = Callable[[Value], bool]
-
-
-def _numeric(value: Value) -> bool:
-    return isinstance(value, (int, Fraction))
-
-
-def _space(name: str) -> Test:
-    return lambda value: isinstance(value, tuple) and value[0] == name
-
-
-def _datatype_test(datatype: str) -> Test | None:
-    if datatype in (RDFS + 'Literal', OWL + 'topDataProperty'):
-        return lambda value: True
-    if datatype in (OWL + 'real', OWL + 'rational', XSD + 'decimal'):
-        if datatype == XSD + 'decimal':
-            return lambda value: (
-                isinstance(value, int)
-                or (isinstance(value, Fraction) and _terminating(value) is not None)
-            )
-        return _numeric
-    if datatype == RDF + 'langString':
-        return _space('langString')
-    if datatype == RDF + 'PlainLiteral':
-        return lambda value: (
-            isinstance(value, str) or (isinstance(value, tuple) and value[0] == 'langString')
-        )
-    if not datatype.startswith(XSD):
-        return None
-    name = datatype[len(XSD) :]
-    if name in BOUNDS:
-        low, high = BOUNDS[name]
-        if low is None and high is None:
-            return lambda value: isinstance(value, int)
-        if high is None:
-            return lambda value: isinstance(value, int) and value >= low  # type: ignore[operator]
-        if low is None:
-            return lambda value: isinstance(value, int) and value <= high
-        return lambda value: isinstance(value, int) and low <= value <= high
-    if name in _STRINGS:
-        pattern = _PATTERNS.get(name)
-        if pattern is None:
-            return lambda value: isinstance(value, str)
-        return lambda value: isinstance(value, str) and pattern.fullmatch(value) is not None
-    if name == 'dateTimeStamp':
-        return lambda value: (
-            isinstance(value, tuple) and value[0] == 'dateTime' and value[1] == 'utc'
-        )
-    if name in ('boolean', 'float', 'double', 'dateTime', 'anyURI', 'hexBinary', 'base64Binary'):
-        return _space(name)
-    return None
+# --- order and text ---
 
 
 def comparable(value: Value) -> tuple[str, Any]:
@@ -324,42 +262,6 @@ def order(first: Value, second: Value) -> int | None:
     if kind != other or key != key or other_key != other_key:
         return None
     return int(key > other_key) - int(key < other_key)
-
-
-_ORDERS: dict[str, tuple[int, ...]] = {
-    'minInclusive': (0, 1),
-    'maxInclusive': (0, -1),
-    'minExclusive': (1,),
-    'maxExclusive': (-1,),
-}
-
-
-def facet_test(facet: str, bound: Literal) -> Test | None:
-    """Return a predicate on values for one facet; None when the facet is not supported."""
-    name = facet[len(XSD) :] if facet.startswith(XSD) else facet
-    limit = value_of(bound)
-    if name in _ORDERS:
-        orders = _ORDERS[name]
-        return lambda value: order(value, limit) in orders
-    if name in ('length', 'minLength', 'maxLength') and isinstance(limit, int):
-
-        def sized(value: Value) -> bool:
-            if isinstance(value, tuple) and value[0] in ('hexBinary', 'base64Binary'):
-                length = len(value[1])  # In octets.
-            else:
-                length = len(lexical_of(value))
-            if name == 'length':
-                return length == limit
-            return length >= limit if name == 'minLength' else length <= limit
-
-        return sized
-    if name == 'pattern':
-        try:
-            pattern = schema_pattern(bound.lexical)
-        except ValueError:
-            return None
-        return lambda value: pattern.match(lexical_of(value)) is not None
-    return None
 
 
 def lexical_of(value: Value) -> str:
@@ -408,55 +310,3 @@ def _bracketed(pattern: str) -> str:
         depth += (part == '[') - (part == ']')
         parts.append(f'[{part}]' if not depth and re.fullmatch(r'\\[sSdDwWiIcC]', part) else part)
     return ''.join(parts)
-
-
-@cache
-def range_test(data_range: DataRange) -> Test | None:
-    """Return a predicate on values for a data range; None when the range is not supported."""
-    if isinstance(data_range, str):
-        return _datatype_test(data_range)
-    if isinstance(data_range, DataOneOf):
-        values = frozenset(value_of(literal) for literal in data_range.literals)
-        return lambda value: value in values
-    if isinstance(data_range, DataComplementOf):
-        inner = range_test(data_range.operand)
-        return None if inner is None else lambda value: not inner(value)
-    if isinstance(data_range, DatatypeRestriction):
-        tests = [range_test(data_range.datatype)]
-        tests += [facet_test(facet, bound) for facet, bound in data_range.facets]
-    else:
-        tests = [range_test(operand) for operand in data_range.operands]
-    if any(test is None for test in tests):
-        return None
-    known: list[Test] = [test for test in tests if test is not None]
-    if isinstance(data_range, DataUnionOf):
-        return lambda value: any(test(value) for test in known)
-    assert isinstance(data_range, (DataIntersectionOf, DatatypeRestriction))
-    return lambda value: all(test(value) for test in known)
-
-
-def unfolded(
-    data_range: DataRange, definitions: Mapping[str, DataRange], seen: tuple[str, ...] = ()
-) -> DataRange:
-    """Return a data range with the ranges in place of the datatypes that are defined by them.
-
-    Args:
-        data_range: The range.
-        definitions: The ranges of defined datatypes, by name.
-        seen: The datatypes whose definitions it stands in.
-
-    Raises:
-        ValueError: A datatype is defined by itself.
-    """
-    if isinstance(data_range, str):
-        if data_range not in definitions:
-            return data_range
-        if data_range in seen:
-            raise ValueError(f'the datatype {local_name(data_range)} is defined by itself')
-        return unfolded(definitions[data_range], definitions, (*seen, data_range))
-    if isinstance(data_range, (DataIntersectionOf, DataUnionOf)):
-        kind = type(data_range)
-        return kind(tuple(unfolded(each, definitions, seen) for each in data_range.operands))
-    if isinstance(data_range, DataComplementOf):
-        return DataComplementOf(unfolded(data_range.operand, definitions, seen))
-    return data_range

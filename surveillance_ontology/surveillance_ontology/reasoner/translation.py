@@ -50,10 +50,10 @@ from surveillance_ontology.reasoner.clauses import (
     property_atom,
     turned,
 )
-from surveillance_ontology.reasoner.datatypes import unfolded, value_of
+from surveillance_ontology.reasoner.datatypes import value_of
 from surveillance_ontology.reasoner.normal_form import is_positive, normal_form
 from surveillance_ontology.reasoner.swrl_builtins import builtin
-from surveillance_ontology.reasoner.value_sets import EVERY, ValueSet, value_set
+from surveillance_ontology.reasoner.value_sets import EVERY, ValueSet, unfolded, value_set
 
 _Directed = tuple[str, bool]
 

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 import struct
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cache, cached_property
@@ -21,14 +21,16 @@ from typing import Any, NamedTuple, TypeAlias
 
 from surveillance_ontology.owl import expressions as ex
 from surveillance_ontology.owl.expressions import DataRange
-from surveillance_ontology.owl.vocabulary import OWL, RDF, TOP_LITERAL, XSD
+from surveillance_ontology.owl.vocabulary import OWL, RDF, TOP_LITERAL, XSD, local_name
 from surveillance_ontology.reasoner.datatypes import (
     BOUNDS,
+    STRING_PATTERNS,
     Value,
     comparable,
-    facet_test,
     is_decimal,
-    range_test,
+    lexical_of,
+    order,
+    schema_pattern,
     value_of,
 )
 from surveillance_ontology.reasoner.moments import LARGEST_OFFSET
@@ -196,11 +198,22 @@ def _not(space: str, part: _Part) -> _Part:
 
 
 def _passes(value: Value, tests: Iterable[tuple[DataRange, bool]]) -> bool:
-    for data_range, inside in tests:
-        test = range_test(data_range)
-        if test is None or test(value) != inside:
-            return False
-    return True
+    return all(_test(data_range)(value) == inside for data_range, inside in tests)
+
+
+@cache
+def _test(data_range: DataRange) -> Callable[[Value], bool]:
+    """Return the predicate of a type of strings, or of the facet of a range."""
+    if isinstance(data_range, str):
+        types = STRING_PATTERNS[data_range.removeprefix(XSD)]
+        return lambda value: isinstance(value, str) and types.fullmatch(value) is not None
+    assert isinstance(data_range, ex.DatatypeRestriction)
+    ((facet, bound),) = data_range.facets
+    if facet == XSD + 'pattern':
+        pattern = schema_pattern(bound.lexical)
+        return lambda value: pattern.match(lexical_of(value)) is not None
+    orders, limit = _ORDERS[facet.removeprefix(XSD)], value_of(bound)
+    return lambda value: order(value, limit) in orders
 
 
 def _impossible(tests: frozenset[tuple[DataRange, bool]]) -> bool:
@@ -455,7 +468,7 @@ def _datatype(datatype: str) -> ValueSet | None:
     if datatype in (RDF + 'langString', RDF + 'PlainLiteral'):
         parts = {'langString': _ANY}
         return ValueSet({}, parts if datatype == RDF + 'langString' else {**parts, 'string': _ANY})
-    if range_test(datatype) is None:
+    if not datatype.startswith(XSD):
         return None
     name = datatype.removeprefix(XSD)
     if name in BOUNDS:
@@ -469,9 +482,9 @@ def _datatype(datatype: str) -> ValueSet | None:
         return ValueSet(dict.fromkeys(layers_of_moments, _EVERY), {})
     if name == 'boolean':
         return ValueSet({}, {'boolean': _listed(_BOOLEANS)})
-    if name in _PLAIN:
+    if name in ('string', 'anyURI', *_OCTETS):
         return ValueSet({}, {name: _ANY})
-    return ValueSet({}, {'string': _tested(datatype)})
+    return ValueSet({}, {'string': _tested(datatype)}) if name in STRING_PATTERNS else None
 
 
 _ENDS: dict[str, Callable[[Any], tuple[_End, _End]]] = {
@@ -480,6 +493,15 @@ _ENDS: dict[str, Callable[[Any], tuple[_End, _End]]] = {
     'maxInclusive': lambda key: (_LOW, _above(key)),
     'maxExclusive': lambda key: (_LOW, _below(key)),
 }
+
+
+_ORDERS: dict[str, tuple[int, ...]] = {
+    'minInclusive': (0, 1),
+    'maxInclusive': (0, -1),
+    'minExclusive': (1,),
+    'maxExclusive': (-1,),
+}
+"""How a value may compare with the bound of a facet."""
 
 
 def _facet(datatype: str, facet: str, bound: ex.Literal) -> ValueSet | None:
@@ -494,24 +516,30 @@ def _facet(datatype: str, facet: str, bound: ex.Literal) -> ValueSet | None:
             if isinstance(value, (int, Fraction)):
                 return ValueSet(dict.fromkeys(_NUMBERS, (ends(key),)), {})
             space = value[0]
-            test = facet_test(facet, bound)
             zero = (space, 0.0, '-')
-            others = [zero] if test is not None and test(zero) else []
+            others = [zero] if order(zero, value) in _ORDERS[name] else []
             return ValueSet({space: (ends(key),)}, {'other': _listed(others)})
         if kind == 'dateTime':
             return _moments(name, key)
     values = _datatype(datatype)
-    if facet_test(facet, bound) is None or values is None:
-        return None
-    if 'boolean' in values.parts or (ends is None and values.intervals):
+    if values is None or 'boolean' in values.parts or (ends is None and values.intervals):
         return None  # Truth values have no facets, numbers and moments no patterns and lengths.
     if name in ('length', 'minLength', 'maxLength'):
         size = value_of(bound)
+        if not isinstance(size, int):
+            return None
         low = _below(size) if name != 'maxLength' else _LENGTHS[0][0]
         high = _above(size) if name != 'minLength' else _HIGH
         given = (_Conjunction(lengths=_common(((low, high),), _LENGTHS)),)
         return ValueSet({}, {space: _both(space, _ANY, given) for space in _WITH_LENGTH})
-    tested = _tested(ex.DatatypeRestriction(datatype, ((facet, bound),)))
+    if name == 'pattern':
+        try:
+            schema_pattern(bound.lexical)
+        except ValueError:
+            return None
+    elif ends is None:
+        return None
+    tested = _tested(ex.DatatypeRestriction(datatype, ((XSD + name, bound),)))
     return ValueSet({}, {space: tested for space in _PLAIN if space != 'boolean'})
 
 
@@ -565,3 +593,30 @@ def _combined(sets: Iterator[ValueSet], any_of: bool) -> ValueSet:
     for other in sets:
         result = result | other if any_of else result & other
     return result
+
+
+def unfolded(
+    data_range: DataRange, definitions: Mapping[str, DataRange], seen: tuple[str, ...] = ()
+) -> DataRange:
+    """Return a data range with the ranges in place of the datatypes that are defined by them.
+
+    Args:
+        data_range: The range.
+        definitions: The ranges of defined datatypes, by name.
+        seen: The datatypes whose definitions it stands in.
+
+    Raises:
+        ValueError: A datatype is defined by itself.
+    """
+    if isinstance(data_range, str):
+        if data_range not in definitions:
+            return data_range
+        if data_range in seen:
+            raise ValueError(f'the datatype {local_name(data_range)} is defined by itself')
+        return unfolded(definitions[data_range], definitions, (*seen, data_range))
+    if isinstance(data_range, (ex.DataIntersectionOf, ex.DataUnionOf)):
+        kind = type(data_range)
+        return kind(tuple(unfolded(each, definitions, seen) for each in data_range.operands))
+    if isinstance(data_range, ex.DataComplementOf):
+        return ex.DataComplementOf(unfolded(data_range.operand, definitions, seen))
+    return data_range
