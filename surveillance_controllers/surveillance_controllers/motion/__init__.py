@@ -6,15 +6,14 @@ These need no ROS:
 - `localisation` says where the robot is, `place_regions` in which place that is;
 - `tracking` finds what moves, `obstacle_memory` what stands and is not on the map;
 - `driving` is a drive along a path with its recoveries. It steers by `path_following`, and by the
-  local planner of `sampled_planning` while somebody moves nearby;
-- `sensor_age` says how fast a robot may be that heard nothing new.
+  local planner of `sampled_planning` while somebody moves nearby.
 
 These are the ROS side:
 
 - `arrival` says what a way to move the robot offers (`Motion`). There are `navigation_motion`, with
-  `base_interface` between topics and navigator, and `nav2`; `docking` docks at the end of either;
-- `command_publisher` publishes velocities, `transforms` frames, `place_recording` places;
-- `robot_parameters` has what the robot is told about itself.
+  a navigator of its own, and `nav2`, which has the docking at the end of either, too;
+- `command_publisher` publishes velocities, as fast as the age of the last messages allows;
+- `transforms` reads scans by where the lidar sits, `place_recording` tells the robot's place.
 
 They are imported from their modules, for the libraries behind them take their time.
 """
