@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import random
+import signal
 import socket
+import subprocess
 import threading
 import time
 from pathlib import Path
@@ -149,6 +151,26 @@ def test_a_query_is_stopped_at_its_time(service: ArmorService, built: ArmorClien
     answer = asker(service)('QUERY SPARQL', ENDLESS, '300')
     assert (answer.success, answer.timeout) == (False, True)
     assert answer.error_description == 'QUERY SPARQL: stopped after 300 ms'
+    assert built.query.sparql(PREFIX + 'SELECT ?x { :Robot1 :isIn ?x }'), 'the next one runs'
+
+
+def test_a_query_process_that_is_stopped_costs_its_query_alone(
+    service: ArmorService, built: ArmorClient, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    started: list[subprocess.Popen[bytes]] = []
+
+    def start(*args: Any, **options: Any) -> subprocess.Popen[bytes]:
+        started.append(popen(*args, **options))
+        return started[-1]
+
+    popen = subprocess.Popen
+    monkeypatch.setattr(subprocess, 'Popen', start)
+    ask = asker(service)
+    assert built.query.sparql(PREFIX + 'SELECT ?x { :Robot1 :isIn ?x }'), 'its process is kept'
+    started[0].send_signal(signal.SIGSTOP)
+    answer = ask('QUERY SPARQL', PREFIX + 'SELECT ?x { :Robot1 :isIn ?x }', '300')
+    assert (answer.success, answer.timeout) == (False, True)
+    assert started[0].poll() is not None
     assert built.query.sparql(PREFIX + 'SELECT ?x { :Robot1 :isIn ?x }'), 'the next one runs'
 
 

@@ -40,6 +40,8 @@ from surveillance_ontology.owl.vocabulary import NOTHING, THING
 
 MEMORY = 2 * 1024**3
 """Bytes that a query's process may use."""
+GRACE = 1.0
+"""Seconds after which a process that did not end itself at its time is killed."""
 OUT_OF_MEMORY = 3
 """Exit code of a process that needed more memory."""
 IDLE = 2
@@ -204,22 +206,30 @@ class _Worker:
         return self._exchange({'query': query, 'rows': rows}, deadline)
 
     def _exchange(self, request: dict[str, Any], deadline: float, payload: bytes = b'') -> Any:
-        """Return the answer to a request; the process ends itself when its time is over."""
+        """Return the answer to a request.
+
+        The process ends itself when its time is over; one that cannot, since it is stopped or hangs
+        while it starts, is killed.
+        """
         seconds = deadline - time.monotonic()
         if seconds <= 0:
             raise TimeoutError('the query ran into its time limit')
         assert self._process.stdin is not None
         assert self._process.stdout is not None
         answer = b''
+        guard = threading.Timer(seconds + GRACE, self._process.kill)
+        guard.daemon = True
+        guard.start()
         with contextlib.suppress(BrokenPipeError):
             line = json.dumps({**request, 'seconds': seconds}).encode() + b'\n'
             self._process.stdin.write(line + payload)
             self._process.stdin.flush()
             answer = self._process.stdout.readline()
+        guard.cancel()
         if answer.endswith(b'\n'):
             return json.loads(answer)
         code = self._process.wait()
-        if code == -signal.SIGALRM:
+        if code == -signal.SIGALRM or time.monotonic() >= deadline:
             raise TimeoutError('the query ran into its time limit')
         raise DirectiveError(f'QUERY SPARQL: {_why_ended(code)}')
 
