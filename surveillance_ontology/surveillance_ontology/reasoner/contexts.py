@@ -6,8 +6,7 @@ for every individual that is in all classes of its core; its tokens are what suc
 besides. An existential adds an edge to the context of the individual it requires; what must hold of
 that individual because of its neighbour goes into the edge's core, so two different neighbours
 never share what one of them causes. Contexts are shared by core, so there are finitely many and the
-calculus ends without a bound on depth or number. Where a bound may be reached by several
-requirements together, what follows is left to reasoning by cases.
+calculus ends without a bound on depth or number.
 
 A token is a class predicate, ('is', individual), ('has', property, turned, individual),
 ('value', property, value) or ('self', property).
@@ -588,7 +587,7 @@ class Contexts:
                 continue
             if condition.n != 1:
                 if any(role in other.roles for other in target.edges):
-                    self._gap(context, condition.origin, _CASES, condition)
+                    self._case_gap(context, condition)
                 continue
             for other in target.edges:
                 if role in other.roles and _holds(condition.filler, other.target.tokens):
@@ -666,30 +665,70 @@ class Contexts:
     def _count(self, context: Context) -> None:
         conditions: list[AtLeast | AtMost] = [*self._at_least, *self._at_most]
         for condition in conditions:
+            needed = condition.n if isinstance(condition, AtLeast) else condition.n + 1
             if isinstance(condition, AtLeast):
                 if condition.head in context.derived:
                     continue
             elif condition.n == 1 or not _holds(condition.label, context.tokens):
                 continue
             role = (condition.prop, condition.inverse)
-            counts = [
-                edge.count
+            counted = [
+                edge
                 for edge in context.edges
                 if role in edge.roles and _holds(condition.filler, edge.target.tokens)
             ]
-            self._bound(context, condition, counts)
+            if sum(edge.count for edge in counted) < needed:
+                continue
+            counted = [edge for edge in counted if not _is_redundant(edge, counted)]
+            if sum(edge.count for edge in counted) < needed:
+                continue
+            if self._most_different(context, counted) >= needed:
+                if isinstance(condition, AtLeast):
+                    self._add(context, condition.head)
+                else:
+                    self._clash(context)
+            else:
+                self._case_gap(context, condition)
 
-    def _bound(self, context: Context, condition: AtLeast | AtMost, counts: list[int]) -> None:
-        """Apply a bound to what counts: so many by one requirement, so many by another."""
-        reached = condition.n if isinstance(condition, AtLeast) else condition.n + 1
-        if sum(counts) < reached:
-            return
-        if max(counts) < reached:
-            self._gap(context, condition.origin, _CASES, condition)
-        elif isinstance(condition, AtLeast):
-            self._add(context, condition.head)
-        else:
-            self._clash(context)
+    def _most_different(self, context: Context, edges: list[_Edge]) -> int:
+        """Return how many individuals pairwise known to be different some of the edges lead to."""
+        order = sorted(edges, key=lambda edge: -edge.count)
+        apart = {
+            (one, other): self._different(context, one, other)
+            for one, other in combinations(order, 2)
+        }
+        best = 0
+        chosen: list[_Edge] = []
+
+        def extend(place: int, total: int) -> None:
+            nonlocal best
+            best = max(best, total)
+            for next_place in range(place, len(order)):
+                edge = order[next_place]
+                if all(apart[one, edge] for one in chosen):
+                    chosen.append(edge)
+                    extend(next_place + 1, total + edge.count)
+                    chosen.pop()
+
+        extend(0, 0)
+        return best
+
+    def _different(self, context: Context, one: _Edge, other: _Edge) -> bool:
+        roles = one.roles | other.roles
+        both = self._open(frozenset(one.core | other.core))
+        both.users[context] = None
+        tokens = both.tokens
+        return both.clash or any(
+            rule.head == ('clash',)
+            and rule.roles <= roles
+            and rule.xs <= context.tokens
+            and rule.ys <= tokens
+            for role in roles
+            for rule in self.edge_rules.get(role, ())
+        )
+
+    def _case_gap(self, context: Context, condition: AtLeast | AtMost) -> None:
+        self._gap(context, condition.origin, _CASES, condition)
 
     def _gap(
         self,
@@ -715,7 +754,11 @@ class Contexts:
         for least in self._at_least_values:
             if least.head not in context.derived:
                 counted = self._counted_values(context, least)
-                self._bound(context, least, [held.count for held in counted])
+                if sum(held.count for held in counted) >= least.n:
+                    if self._most_distinct(counted) >= least.n:
+                        self._add(context, least.head)
+                    else:
+                        self._case_gap(context, least)
         for held in context.values:
             if held.values.size < held.count:
                 self._clash(context)
@@ -774,8 +817,21 @@ class Contexts:
                 kept.count = max(kept.count, other.count)
                 context.values.remove(other)
                 self._changed = True
-            counted = counted[:1]
-        self._bound(context, condition, [held.count for held in counted])
+            if counted and counted[0].count > 1:
+                self._clash(context)
+        elif sum(held.count for held in counted) > condition.n:
+            if self._most_distinct(counted) > condition.n:
+                self._clash(context)
+            else:
+                self._case_gap(context, condition)
+
+    def _most_distinct(self, counted: list[_Values]) -> int:
+        best = 0
+        for size in range(len(counted), 0, -1):
+            for chosen in combinations(counted, size):
+                if all((a.values & b.values).is_empty for a, b in combinations(chosen, 2)):
+                    best = max(best, sum(held.count for held in chosen))
+        return best
 
 
 def _key(term: Any) -> Any:
@@ -789,3 +845,14 @@ def _holds(token: Any, tokens: set[Token]) -> bool:
 
 def _is_name(token: Token) -> TypeGuard[tuple[Any, ...]]:
     return isinstance(token, tuple) and token[0] == 'is'
+
+
+def _is_redundant(edge: _Edge, others: list[_Edge]) -> bool:
+    """Tell whether an individual that another edge leads to serves for this edge as well."""
+    for other in others:
+        if other is not edge and edge.count <= other.count and edge.roles <= other.roles:
+            mine, theirs = edge.target.tokens, other.target.tokens
+            equal = mine == theirs and edge.roles == other.roles and edge.count == other.count
+            if mine <= theirs and not (equal and others.index(edge) < others.index(other)):
+                return True
+    return False

@@ -223,6 +223,21 @@ def test_the_one_neighbour_is_what_must_exist() -> None:
     assert kb.types(j) == {B}
 
 
+def test_different_toppings_are_counted_however_many_individuals_there_are() -> None:
+    # The pizza ontology's InterestingPizza, beside more assertions than cases are tried for.
+    toppings = [some(P, topping) for topping in (C, D, E)]
+    kb = reasoned(
+        EquivalentClasses((A, ObjectMinCardinality(3, P))),
+        *(SubClassOf(B, topping) for topping in toppings),
+        DisjointClasses((C, D, E)),
+        ClassAssertion(B, i),
+        *(ClassAssertion(C, f'x:topping{number}') for number in range(20_001)),
+    )
+    assert B in kb.subclasses(A)
+    assert A in kb.types(i)
+    assert kb.unsupported == ()
+
+
 def test_chains_run_over_known_and_unknown_individuals() -> None:
     kb = reasoned(
         TransitiveObjectProperty(P),
