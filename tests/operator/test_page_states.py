@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterator
 from dataclasses import replace
 
@@ -170,6 +171,13 @@ def test_what_is_empty_says_so(hub: Hub, viewer: Viewer) -> None:
     show(hub, viewer, 'hostile')
     assert visible(viewer, '#map')
     assert not visible(viewer, '#map-section [data-without]')
+
+
+def test_an_event_has_its_time_of_the_day_in_old_recordings_too(hub: Hub, viewer: Viewer) -> None:
+    show(hub, viewer, 'begins')
+    noon = time.mktime((2026, 1, 1, 12, 0, 0, 0, 0, -1))
+    hub.show_parts({'events': [['11:59:58', 'arrived in A'], [noon, 'left A']]}, 0.0, whole=False)
+    viewer.until(lambda: viewer.text('#events') == '12:00:00left A11:59:58arrived in A')
 
 
 def test_no_name_becomes_markup_and_each_is_read(hub: Hub, viewer: Viewer) -> None:

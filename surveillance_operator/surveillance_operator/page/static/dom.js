@@ -23,8 +23,9 @@ export function age(seconds) {
   return `${Math.floor(minutes / 60)}:${String(minutes % 60).padStart(2, '0')}:${rest}`;
 }
 
-// The time of the day of a moment, seconds since 1970, where the viewer is.
-export const timeOfDay = (at) => new Date(1000 * at).toLocaleTimeString('en-GB');
+// The time of the day of a moment, seconds since 1970, where the viewer is. In old recordings events
+// have this text itself.
+export const timeOfDay = (at) => typeof at === 'string' ? at : new Date(1000 * at).toLocaleTimeString('en-GB');
 
 // Names in the order in which a person counts: R2 before R10.
 export const names = (things) => Object.keys(things ?? {}).sort((a, b) => a.localeCompare(b, 'en', {numeric: true}));
