@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import math
+import subprocess
+import sys
+from pathlib import Path
 from typing import Any
 
 import cv2
@@ -247,6 +250,18 @@ def test_images_taken_while_the_arm_moves_are_not_read(graph: Any) -> None:
 def test_wrong_parameters_are_refused_at_the_start(graph: Any, wrong: dict[str, Any]) -> None:
     with pytest.raises(ParameterError, match=next(iter(wrong))):
         graph.add(ArucoDetector, parameters=wrong)
+
+
+def test_a_place_s_file_is_looked_at_without_opencv() -> None:
+    """Every process of a mission does so; most have no use for it."""
+    code = (
+        'import sys\n'
+        'from surveillance_runtime.configuration import Configuration, file_layer\n'
+        'Configuration((file_layer("config/patrol_world.yaml"),)).check()\n'
+        'sys.exit("cv2" in sys.modules)'
+    )
+    root = Path(__file__).parents[2]
+    assert subprocess.run([sys.executable, '-c', code], cwd=root, check=False).returncode == 0
 
 
 def test_marker_server_answers_from_its_file(graph: Any) -> None:

@@ -32,11 +32,7 @@ from surveillance_perception.detection.candidates import (
 )
 from surveillance_perception.detection.cell_differences import CellReadings
 from surveillance_perception.detection.decoding import MarkerReader, Readings
-from surveillance_perception.detection.dictionaries import (
-    MarkerCodes,
-    dictionary_expected,
-    dictionary_named,
-)
+from surveillance_perception.detection.dictionaries import MarkerCodes, dictionary_named
 from surveillance_perception.detection.image_sampling import (
     Array,
     Grey,
@@ -92,7 +88,6 @@ class DetectorSettings:
         'DICT_5X5_100',
         "One of OpenCV's marker dictionaries, or a file in OpenCV's form.",
         name='marker_dictionary',
-        check=dictionary_expected,
     )
     known_ids: frozenset[int] | None = converted(
         lambda ids: frozenset(ids) or None,

@@ -52,15 +52,6 @@ def dictionary_named(name: str) -> cv2.aruco.Dictionary:
     )
 
 
-def dictionary_expected(name: str) -> str | None:
-    """Ask for a dictionary by a name that `dictionary_named` takes."""
-    try:
-        dictionary_named(name)
-    except ValueError as error:
-        return str(error)
-    return None
-
-
 def _dictionary_in(path: Path) -> cv2.aruco.Dictionary:
     what = f'marker dictionary {path}'
     try:

@@ -56,7 +56,7 @@ class StreamSettings:
         known_frames: Images that must show an id of the known list before it is confirmed.
 
     Raises:
-        ValueError: A known id is not in the dictionary.
+        ValueError: There is no such dictionary, or a known id is not in it.
     """
 
     detector: DetectorSettings = parameters(DetectorSettings)
@@ -79,9 +79,14 @@ class StreamSettings:
     )
 
     def __post_init__(self) -> None:
-        known = self.detector.known_ids or ()
+        # Not a `check` of the parameter: every process calls those that a place's file gives, and
+        # would import OpenCV.
         try:
-            MarkerCodes.of(dictionary_named(self.detector.dictionary), known)
+            dictionary = dictionary_named(self.detector.dictionary)
+        except ValueError as error:
+            raise ValueError(f'marker_dictionary: {error}') from None
+        try:
+            MarkerCodes.of(dictionary, self.detector.known_ids or ())
         except ValueError as error:
             raise ValueError(f'known_ids: {error}') from None
 
