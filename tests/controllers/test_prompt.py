@@ -112,6 +112,22 @@ def test_a_file_is_read_like_a_pipe(tmp_path: Path) -> None:
     assert lines == ['battery set 5', 'move 1 0']
 
 
+def test_no_line_of_a_file_is_taken_after_a_stop(tmp_path: Path) -> None:
+    commands = tmp_path / 'commands'
+    commands.write_text('one\nexit\ntwo\n')
+    lines: list[str] = []
+
+    def take(line: str) -> None:
+        lines.append(line)
+        if line == 'exit':
+            console.stop()
+
+    with commands.open() as source:
+        console = Console('test', take, lambda _: [], source=source)
+        assert console.run() == 'stopped'
+    assert lines == ['one', 'exit']
+
+
 def test_one_console_addresses_every_controller(graph: Any, operator: Any, capfd: Any) -> None:
     silent = {'execution_mode': 'MANUAL', 'console': False}
     graph.add(BatteryController, silent)

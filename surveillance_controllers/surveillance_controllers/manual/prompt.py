@@ -109,6 +109,8 @@ class Console:
                 if not chunk and buffer:
                     lines.append(buffer)
                 for line in lines:
+                    if self._stopped:  # by the line before, perhaps
+                        return 'stopped'
                     self._on_line(line.decode(errors='replace').rstrip('\r'))
                 if not chunk:
                     return 'end of input'
