@@ -543,13 +543,13 @@ class Container(State):
     def _execute_as_root(self, parent_ud: Any) -> Any:
         """Begin a run of its own, and watch it to its end."""
         control, wakeup = self.control, Interrupt()
-        control.fsm_begin(self.fsm_clock, self._preempt_timeout)
-        thread = ExecutionThread(control, self.fsm_path, wakeup)
 
         def body() -> Any:
             return self._enter(thread, this_thread.stack, parent_ud)
 
+        control.fsm_begin(self.fsm_clock, self._preempt_timeout)
         try:
+            thread = ExecutionThread(control, self.fsm_path, wakeup)
             if self._preempt_timeout is None and not self.fsm_has_limits():
                 return thread.run_here(body)
             thread.start(body)

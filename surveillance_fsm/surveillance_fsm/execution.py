@@ -243,18 +243,20 @@ class Control:
         with self.condition:
             if self.running:
                 raise InvalidStateError(f"'{self._name()}' is running already")
-            self.running, self.steps = True, 0
+            # First what may fail, as with a clock that is none.
             self._set_up(clock, preempt_timeout)
+            self.running, self.steps = True, 0
 
     def fsm_end(self) -> None:
         """Note that the execution has ended."""
         with self.condition:
-            self.running = False
+            # The next one may go by another clock.
+            now, self.running = self.now, False
             self.condition.notify_all()
         # Others may end their reports in this moment.
         trace = self.trace
         if trace is not None:
-            trace(Noted(self._name(), '', '', '', self.now(), {}, 'end'))
+            trace(Noted(self._name(), '', '', '', now(), {}, 'end'))
 
 
 # Threads.

@@ -329,7 +329,7 @@ class State:
         return {}
 
     def fsm_suspend(self) -> None:
-        """Ask the state to make way for an interrupt; under the run's condition."""
+        """Ask the state to make way for an interrupt; under the machine's condition."""
         self.request_preempt()
 
     def fsm_forget(self) -> None:

@@ -286,3 +286,25 @@ def test_reports_may_end_in_the_moment_in_which_the_machine_ends(monkeypatch):
     ends_when_it_was_read = property(lambda _: traces.pop() if traces else None)
     monkeypatch.setattr(Control, 'trace', ends_when_it_was_read, raising=False)
     control.fsm_end()
+
+
+# Beginning and ending.
+
+
+def test_a_machine_whose_execution_could_not_begin_runs_when_the_fault_is_gone(monkeypatch):
+    machine = fsm.StateMachine(['done'])
+    with machine:
+        fsm.StateMachine.add('ONLY', Answer('done'))
+    machine.set_clock(None)
+    with pytest.raises(AttributeError, match='now'):
+        machine.execute()
+    machine.set_clock(fsm.WallClock())
+
+    def interrupted(*_):
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr('surveillance_fsm.container.ExecutionThread', interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            machine.execute()
+    assert machine.execute() == 'done'
