@@ -12,7 +12,12 @@ from std_srvs.srv import Trigger
 from surveillance_fsm.history import Transition
 from surveillance_fsm.ros import ServiceCaller
 from surveillance_fsm.ros.conversions import transition_message
-from surveillance_interfaces.msg import FsmStatus, FsmStructure, FsmTransition
+from surveillance_interfaces.msg import (
+    FsmStatus,
+    FsmStructure,
+    FsmTransition,
+    SmachContainerStatus,
+)
 from surveillance_interfaces.srv import ForceOutcome, SetInitialState
 
 from .ros_servers import introspected
@@ -105,6 +110,7 @@ def test_a_preempt_goes_through_a_pause(graph, watched):
 
 def test_the_initial_state_is_set_with_userdata(graph, watched):
     root, waiter = watched
+    smach = graph.listen(SmachContainerStatus, 'robot/smach/container_status', LATCHED)
     answer = call(
         graph,
         SetInitialState,
@@ -114,6 +120,9 @@ def test_the_initial_state_is_set_with_userdata(graph, watched):
         userdata='{"level": 50}',
     )
     assert answer.success, answer.message
+    # Viewers of SMACH's topics see it, too.
+    told = ('/PATROL', ['INNER'])
+    graph.until(lambda: told in [(each.path, each.initial_states) for each in smach])
     run = Background(root)
     began(waiter)
     assert root['FIRST'].runs == 0

@@ -46,9 +46,6 @@ STATUS_TOPIC = '/smach/container_status'
 INIT_STATUS_TOPIC = '/smach/container_init'
 """The names of SMACH's topics below the server's."""
 
-INITIAL_STATE_SET = 'initial state set'
-"""What a status says when a message has set where its container begins."""
-
 CONTAINERS = 1000
 """Containers of which SMACH's topics keep the last message for a viewer that comes late."""
 
@@ -174,23 +171,20 @@ class IntrospectionServer:
                 self._smach_status.publish(message)
 
     def _on_initial_state(self, message: SmachContainerInitialStatusCmd) -> None:
-        path = message.path.strip('/')
         try:
-            container = self._set_initial(path, message.initial_states, message.local_data)
+            self._set_initial(message.path.strip('/'), message.initial_states, message.local_data)
         except (fsm.SmachError, KeyError) as error:
             self._node.get_logger().warn(f'{INIT_STATUS_TOPIC}: {_said(error)}')
-            return
-        self._publish_smach(
-            [each for each in self._containers.values() if each.container is container],
-            INITIAL_STATE_SET,
-        )
 
-    def _set_initial(self, path: str, labels: Sequence[str], userdata: str) -> fsm.Container:
+    def _set_initial(self, path: str, labels: Sequence[str], userdata: str) -> None:
         container = state_at(self._root, path)
         if not isinstance(container, fsm.Container):
             raise fsm.InvalidStateError(f"'{path}' is not a container")
         container.set_initial_state(list(labels), userdata_from(userdata))
-        return container
+        self._publish_smach(
+            [each for each in self._containers.values() if each.container is container],
+            'initial state set',
+        )
 
     def _serve(self, action: Callable[[Any], object], request: Any, response: Any) -> Any:
         """Do what a request asks for, and answer whether it was done, or why not."""
