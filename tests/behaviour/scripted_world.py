@@ -250,6 +250,9 @@ class World:
             if not self.clock.sleep(1.0, interrupt):
                 raise CallInterruptedError
 
+    def decided(self, decision: Decision) -> None:
+        self.decisions.append(decision)
+
     def say(self, text: str, *, warning: bool = False) -> None:
         self.said.append(text)
 
@@ -275,7 +278,7 @@ class World:
             self.battery,
             experience,
             warn=self.said.append,
-            announce=self.decisions.append,
+            announce=self.decided,
         )
         self.decider.world_of_test = self  # type: ignore[attr-defined]
         ports = Ports(

@@ -41,8 +41,8 @@ THRESHOLD = 40.0
 class CheckedWorld(World):
     """A world that holds each decision against what the ontology said and the battery showed."""
 
-    def decision(self, decision: Decision) -> None:
-        super().decision(decision)
+    def decided(self, decision: Decision) -> None:
+        super().decided(decision)
         self.check(decision)
 
     def check(self, decision: Decision) -> None:

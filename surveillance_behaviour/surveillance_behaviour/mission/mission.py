@@ -133,7 +133,7 @@ class Mission:
         self.say(f'going on: {before}')
 
     def decide(self, interrupt: Interrupt, *, to_charge: bool = False) -> Decision:
-        """Have it decided where to go next; record and announce it.
+        """Have it decided where to go next, and record it; who decides announces it.
 
         Args:
             interrupt: Ends it.
