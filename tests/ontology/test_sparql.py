@@ -27,7 +27,7 @@ from surveillance_ontology.knowledge_base import KnowledgeBase
 from surveillance_ontology.owl.axioms import ObjectPropertyAssertion
 from surveillance_ontology.owl.vocabulary import OWL
 
-from .seven_rooms import IRI, asker, build_seven_rooms
+from .seven_rooms import IRI, ONTOLOGY, asker, build_seven_rooms
 
 PREFIX = f'PREFIX : <{IRI}#> '
 ENDLESS = PREFIX + 'SELECT (COUNT(*) AS ?n) { ?a ?b ?c . ?d ?e ?f . ?g ?h ?i . ?j ?k ?l }'
@@ -325,6 +325,28 @@ def test_a_graph_that_is_kept_up_to_date_is_the_one_that_a_new_process_gets(
         service.sparql.note('map', None)
         assert kept == graph_of(client), step
     assert wholes.count(False) > 20, 'most changes were told as a difference'
+    service.close()
+
+
+@pytest.mark.parametrize('lazy', [True, False])
+def test_what_comes_below_a_class_that_only_individuals_named_is_told(lazy: bool) -> None:
+    service = ArmorService(warn=lambda _: None)
+    client = ArmorClient('c', 'map', InProcessTransport(service))
+    client.utils.load_ref_from_file(ONTOLOGY, IRI, not lazy, 'PELLET', lazy)
+    change = client.manipulation
+    if lazy:  # what waits for REASON
+        change.add_class('LOWER', 'UPPER')
+        graph_of(client)
+        change.add_ind_to_class('E', 'UPPER')
+    else:  # what waits for APPLY in an ontology that contradicts itself
+        change.add_class('ROOM', 'DOOR')
+        client.utils.sync_buffered_reasoner()
+        change.add_class('UPPER')
+        graph_of(client)
+        client.utils.apply_buffered_changes()
+    kept = graph_of(client)
+    service.sparql.note('map', None)
+    assert kept == graph_of(client)
     service.close()
 
 

@@ -322,6 +322,9 @@ class _Log:
     oldest: int = 0
     """A graph of this sequence or a later one can be brought up to date by differences."""
     touched: deque[tuple[int, Fact]] = field(default_factory=deque)
+    hierarchy: frozenset[SubClassOf] = frozenset()
+    """Which class is below which in the graphs of `hierarchy_since` and later."""
+    hierarchy_since: tuple[int, int] = (0, 0)
 
 
 class GraphChanges:
@@ -367,8 +370,7 @@ class GraphChanges:
         axioms: list[Axiom] = list(ref.kb.axioms())
         if derived:
             axioms += ref.kb.derived_facts()
-            classes = ref.kb.subclasses(THING) | {THING}
-            axioms += (SubClassOf(sub, cls) for cls in classes for sub in ref.kb.subclasses(cls))
+            axioms += self._hierarchy(ref, log, now)
         return GraphUpdate(now, True, ref.kb.iri, axioms)
 
     def _difference(
@@ -378,22 +380,36 @@ class GraphChanges:
         if ref.origin.reasoner or known.sequence < log.oldest:
             return None
         touched = dict.fromkeys(fact for at, fact in log.touched if at > known.sequence)
-        if now.derived:
-            if now.classified != known.classified or any(
-                isinstance(fact, SubClassOf) and fact.sup != THING for fact in touched
-            ):
-                return None  # Many classes may have come to be below others.
+        before = hierarchy = log.hierarchy
+        ordered = now.classified != known.classified or any(
+            isinstance(fact, SubClassOf)
             # A class that assertions alone name is below owl:Thing as long as they do.
-            named = {str(f.cls) for f in touched if isinstance(f, ClassAssertion)} - {THING}
-            touched.update((SubClassOf(cls, THING), None) for cls in named)
+            or (isinstance(fact, ClassAssertion) and not ref.kb.superclasses(str(fact.cls)))
+            for fact in touched
+        )
+        if now.derived and ordered:
+            since = log.hierarchy_since
+            if known.sequence < since[0] or known.classified < since[1]:
+                return None
+            hierarchy = self._hierarchy(ref, log, now)
+            touched.update(dict.fromkeys(before ^ hierarchy))
         added: list[Axiom] = []
         removed: list[Axiom] = []
         for fact in touched:
-            (added if _holds(ref.kb, fact, now.derived) else removed).append(fact)
+            there = fact in hierarchy or _holds(ref.kb, fact, now.derived)
+            (added if there else removed).append(fact)
         gone = (iri for fact in removed for kind, iri in entities_of(fact) if kind != 'individual')
         if any(next(ref.kb.axioms_about(iri), None) is None for iri in gone):
             return None  # The declaration of a class or property goes with its last axiom.
         return added, removed
+
+    def _hierarchy(self, ref: Reference, log: _Log, now: Version) -> frozenset[SubClassOf]:
+        """Return which class is below which now, and remember it."""
+        classes = ref.kb.subclasses(THING) | {THING}
+        below = frozenset(SubClassOf(sub, cls) for cls in classes for sub in ref.kb.subclasses(cls))
+        if below != log.hierarchy:
+            log.hierarchy, log.hierarchy_since = below, (now.sequence, now.classified)
+        return below
 
     def _log(self, ref: Reference) -> _Log:
         log = self._logs.get(ref.name)
@@ -417,10 +433,8 @@ def _is_plain(axiom: Axiom) -> bool:
 def _holds(kb: KnowledgeBase, fact: Fact, derived: bool) -> bool:
     if fact in kb:
         return True
-    if not derived:
+    if not derived or isinstance(fact, SubClassOf):
         return False
-    if isinstance(fact, SubClassOf):
-        return fact.sub in kb.subclasses(str(fact.sup))
     if isinstance(fact, ClassAssertion):
         return fact.cls in kb.types(fact.individual)
     if isinstance(fact, ObjectPropertyAssertion):
