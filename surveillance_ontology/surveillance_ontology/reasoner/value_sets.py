@@ -260,6 +260,8 @@ class ValueSet:
     def __and__(self, other: ValueSet) -> ValueSet:
         if other is self or other is EVERY:
             return self
+        if self is EVERY:
+            return other
         return ValueSet(
             {
                 name: _common(found, other.intervals[name])
