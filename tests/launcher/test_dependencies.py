@@ -80,7 +80,7 @@ def test_the_set_up_itself_needs_the_standard_library_alone(tmp_path):
     # A Python without any package, in a copy without those that need one.
     for part in ('launcher', 'surveillance_runtime', 'surveillance_fsm'):
         shutil.copytree(ROOT / part, tmp_path / part)
-    modules = ('cli', 'options', 'environment', 'instance_lock', 'progress', 'system')
+    modules = ('cli', 'run', 'environment', 'instance_lock', 'progress', 'system')
     program = ';'.join(f'import launcher.{module}' for module in modules)
     words = [sys.executable, '-S', '-E', '-c', program]
     done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, timeout=60)

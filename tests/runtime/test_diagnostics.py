@@ -43,7 +43,6 @@ class Watched:
 def watched(graph: Any, monkeypatch: pytest.MonkeyPatch) -> Iterator[Watched]:
     monkeypatch.setattr(diagnostics, 'PERIOD', 0.05)
     monkeypatch.setattr(diagnostics, 'RECENT', 0.3)
-    monkeypatch.setattr(diagnostics, 'RECENT', 0.3)
     monkeypatch.setenv(RESTARTS, '2')
     made = Watched(graph)
     yield made
