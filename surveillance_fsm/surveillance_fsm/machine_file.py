@@ -411,8 +411,8 @@ def _kind_data(container: Container, path: str) -> dict[str, Any]:
             if not isinstance(value, list | tuple | range | str):
                 raise MachineFileError(f"'{path}' has items that are no list")
             value = list(value)
-        if value or key in _NEEDED:
-            data[key] = _plain(f'{key} of {path!r}', value)
+        if value or key != 'outcome_map':
+            data[key] = _plain(f'a value in {key} of {path!r}', value)
     if isinstance(container, Concurrence):
         if container.outcome_cb is not None or container.child_termination_cb is not None:
             raise MachineFileError(f"'{path}' has callbacks, which have no form as data")

@@ -116,6 +116,16 @@ def test_what_is_written_back_builds_the_same_machine(tmp_path):
     assert second.execute() == 'finished'
 
 
+def test_an_iterator_is_written_whole_although_its_items_and_their_key_are_empty():
+    each = fsm.Iterator(['done'], [], [], it=[], it_label='', exhausted_outcome='all')
+    each.set_state('DO', fsm.CBState(charge, outcomes=['done']))
+    data = to_data(each)
+    assert (data['items'], data['item_key'], data['exhausted_outcome']) == ([], '', 'all')
+    each.items = [object()]
+    with pytest.raises(MachineFileError, match="in items of 'Iterator' is a object"):
+        to_data(each)
+
+
 @pytest.mark.parametrize(
     ('old', 'new', 'words'),
     [
