@@ -13,7 +13,7 @@ from action_msgs.msg import GoalStatus
 from geometry_msgs.msg import Point
 from rclpy.task import Future
 from rosgraph_msgs.msg import Clock
-from std_srvs.srv import Trigger
+from std_srvs.srv import SetBool, Trigger
 
 from surveillance_fsm import Interrupt
 from surveillance_fsm.ros import (
@@ -237,6 +237,29 @@ def test_service_call_in_a_callback_is_awaited(graph, server):
     graph.node.create_service(Trigger, 'relay', relay)
     graph.until(inner.is_ready)
     assert outer.call(Trigger.Request(), timeout=60.0).message == 'y'
+
+
+def test_awaited_calls_go_out_in_the_order_in_which_they_are_made(graph, server, monkeypatch):
+    asked, held = [], []
+
+    def on_ask(request, response):
+        asked.append(request.data)
+        return response
+
+    server.create_service(SetBool, 'ask', on_ask)
+    caller = ServiceCaller(graph.node, SetBool, 'ask')
+    graph.until(caller.is_ready)
+    monkeypatch.setattr(graph.node, 'spawn', lambda work, _name: held.append(work))
+    wanted = [True, True, False, False, True]
+    awaited = [caller.call_async(SetBool.Request(data=data), timeout=60.0) for data in wanted]
+    for each in awaited:
+        each.send(None)
+    for work in reversed(held):
+        threading.Thread(target=work, daemon=True).start()
+    graph.until(lambda: len(asked) == len(wanted))
+    assert asked == wanted
+    for each in awaited:
+        each.close()
 
 
 def test_awaited_call_times_out(graph, server):

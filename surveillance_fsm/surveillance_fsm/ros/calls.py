@@ -219,19 +219,34 @@ class ServiceCaller:
         await_ready(self.is_ready, found_by, interrupt, self._what)
         if discovery is None:
             deadline += self.round_trips.deadline(timeout) - timeout
+        return self._send(request, measured=discovery is None)(deadline, interrupt)
+
+    def _send(
+        self, request: Any, *, measured: bool = True
+    ) -> Callable[[float, Interrupt | None], Any]:
+        """Send a request; return what waits for its answer, on a worker thread.
+
+        Args:
+            request: The request message.
+            measured: How long the answer takes counts for later deadlines.
+        """
         look = self._servers.look_for_loss(DOUBTFUL_SECONDS)
         future = self._client.call_async(request)
-        try:
-            with nullcontext() if discovery is not None else self.round_trips.measured():
-                answer = block_on(future, deadline, interrupt, self._what, look)
-        except CallError:
-            self._client.remove_pending_request(future)
-            raise
-        _show(self._node, self.name, self.round_trips)
-        return answer
+
+        def await_answer(deadline: float, interrupt: Interrupt | None) -> Any:
+            try:
+                with self.round_trips.measured() if measured else nullcontext():
+                    answer = block_on(future, deadline, interrupt, self._what, look)
+            except CallError:
+                self._client.remove_pending_request(future)
+                raise
+            _show(self._node, self.name, self.round_trips)
+            return answer
+
+        return await_answer
 
     async def call_async(self, request: Any, timeout: float) -> Any:
-        """Call from a callback with `await`, on a thread of its own; otherwise as `call`.
+        """Call from a callback with `await`, which a thread waits for; otherwise as `call`.
 
         Raises:
             UnavailableError: The server is not there when the call is made, or went away before it
@@ -241,10 +256,13 @@ class ServiceCaller:
         """
         if not self.is_ready():
             raise UnavailableError(f'{self._what}: no server', self.is_ready)
+        timeout = self.round_trips.deadline(timeout)
+        # Here, so that requests go out in the order in which they are made.
+        await_answer = self._send(request)
 
         def work() -> tuple[Any, CallError | None]:
             try:
-                return self.call(request, timeout, stopping_of(self._node)), None
+                return await_answer(time.monotonic() + timeout, stopping_of(self._node)), None
             except CallError as error:
                 return None, error
 
