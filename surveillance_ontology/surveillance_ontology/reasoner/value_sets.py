@@ -116,7 +116,7 @@ class _Conjunction:
             return value in self.listed
         if value in self.excluded or not _has_length(value, self.lengths):
             return False
-        return _passes(value, self.tests)
+        return not self.tests or _passes(value, self.tests)
 
 
 _Part: TypeAlias = 'tuple[_Conjunction, ...]'
@@ -301,10 +301,13 @@ class ValueSet:
 
     def contains(self, value: Value) -> bool:
         """Tell whether a value is in the set."""
+        # Rules ask it of each value: at once where all of its space, or none, is in the set.
         space, key = _place(value)
-        if space in _ORDERED:
-            return _is_in(key, self.intervals.get(space, ()))
-        return any(one.admits(value) for one in self.parts.get(space, ()))
+        intervals = self.intervals.get(space)
+        if intervals is not None:
+            return intervals is _EVERY or _is_in(key, intervals)
+        part = self.parts.get(space)
+        return part is _ANY or (part is not None and any(one.admits(value) for one in part))
 
     @property
     def is_empty(self) -> bool:
@@ -448,10 +451,12 @@ def point(value: Value) -> ValueSet:
 
 def _place(value: Value) -> tuple[str, Any]:
     """Return the space, or the layer of it, that a value is in, and its key if that is ordered."""
-    if isinstance(value, (int, Fraction)):
-        return _layer_of(value), value
+    if isinstance(value, int):
+        return 'whole', value
     if isinstance(value, str):
         return 'string', None
+    if isinstance(value, Fraction):
+        return _layer_of(value), value
     space = value[0]
     if space in ('float', 'double') and len(value) == 2 and value[1] != 'NaN':
         return space, value[1]
