@@ -227,7 +227,7 @@ def write_timeline(path: Path, hours: float) -> None:
     parts = {
         'pose': [1.0, 2.0, 0.5],
         'places': {f'R{n}': {'at': [n, n], 'visited': 5.0, 'urgent': False} for n in range(10)},
-        'events': [['12:00:00', 'arrived in a place']] * 50,
+        'events': [[START, 'arrived in a place']] * 50,
         'trail': [[1.0, 2.0]] * 600,
     }
     with open(path, 'w', encoding='utf-8') as file:
