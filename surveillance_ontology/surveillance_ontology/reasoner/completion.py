@@ -42,7 +42,7 @@ from surveillance_ontology.reasoner.engine import Engine
 from surveillance_ontology.reasoner.joins import compile_call
 from surveillance_ontology.reasoner.normal_form import is_positive
 from surveillance_ontology.reasoner.property_chains import chains_take_cases
-from surveillance_ontology.reasoner.value_sets import EVERY, NONE, ValueSet, point
+from surveillance_ontology.reasoner.value_sets import EVERY, ValueSet, point
 
 _MOST_ASSERTIONS = 20_000
 _MOST_COMPARED = 20_000
@@ -490,34 +490,38 @@ class _OpenValue(NamedTuple):
     asking: list[_Asking]
 
 
-def _open_values(program: Program) -> Iterator[_OpenValue]:
+def _open_values(program: Program, rules: bool) -> Iterator[_OpenValue]:
     """Yield the existentials of which it may matter which value there is.
 
     It does not where a value is left that nothing asks for: then what follows of it follows of any.
     What all the values fit follows in any case. Ranges are taken together, whoever they hold for.
+    `rules`: whether rules and keys count among what asks.
     """
     unknown = [one for one in program.existentials if one.prop.kind == 'data']
     if not unknown:
         return
     above: dict[Predicate, list[Predicate]] = {}
-    excluded: dict[Predicate, ValueSet] = {}
+    excluding: list[_Asking] = []
     asking: list[_Asking] = []
     for one in _asking(program):
+        if one.is_named and not rules:
+            continue
         head = None if one.clause is None else one.clause.head
         prop = one.atom.predicate
         if isinstance(head, PredicateAtom) and head.terms[1:] == one.atom.terms[1:]:
             above.setdefault(prop, []).append(head.predicate)
         contradicts = isinstance(head, PredicateAtom) and head.predicate is program.nothing
         if contradicts and not one.is_named and not one.is_joined:
-            excluded[prop] = excluded.get(prop, NONE) | one.values
+            excluding.append(one)
         else:
             asking.append(one)
     for existential in unknown:
         assert isinstance(existential.filler, ValueSet)
         filler = left = existential.filler
         props = closure(existential.prop, lambda sub: above.get(sub, ()))
-        for prop in props:
-            left &= ~excluded.get(prop, NONE)
+        for one in excluding:
+            if one.atom.predicate in props and not filler.within(one.values):
+                left &= ~one.values
         few = left.size <= _MOST_COMPARED
         fitting = [
             one
@@ -534,7 +538,7 @@ def _open_values(program: Program) -> Iterator[_OpenValue]:
 
 def _values_may_split(program: Program) -> bool:
     """Tell whether it may matter, to more than rules and keys, which value somebody has."""
-    return any(not one.is_named for value in _open_values(program) for one in value.asking)
+    return next(_open_values(program, rules=False), None) is not None
 
 
 class _Unknown(NamedTuple):
@@ -552,7 +556,7 @@ class _Unknown(NamedTuple):
 
 def _unknowns(program: Program) -> Iterator[_Unknown]:
     """Yield the rules and keys for which it may matter which value there is."""
-    values = list(_open_values(program))
+    values = list(_open_values(program, rules=True))
     filled = {prop for value in values for prop in value.props}
     for existential, _, asking in values:
         assert isinstance(existential.filler, ValueSet)

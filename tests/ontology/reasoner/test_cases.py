@@ -352,6 +352,25 @@ def test_a_value_that_nobody_asks_for_needs_no_cases(monkeypatch: pytest.MonkeyP
     assert kb.holds(SubClassOf(A, NOTHING))
 
 
+def test_a_rule_that_computes_with_known_values_needs_no_cases(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr('surveillance_ontology.reasoner.completion.CaseReasoner', None)
+    x, v, w = map(ex.Variable, 'xvw')
+    following = (ex.DataPropertyAtom(S, x, v), ex.BuiltinAtom(SWRLB + 'add', (w, v, whole(1))))
+    adult = ex.DatatypeRestriction(XSD + 'integer', ((XSD + 'minInclusive', whole(18)),))
+    kb = reasoned(
+        SubClassOf(A, ex.DataSomeValuesFrom(S, XSD + 'integer')),
+        SubClassOf(ex.DataSomeValuesFrom(S, adult), B),
+        ax.Rule(following, (ex.DataPropertyAtom(T, x, w),)),
+        ClassAssertion(A, i),
+        ax.DataPropertyAssertion(S, i, whole(20)),
+    )
+    assert kb.instances(B) == {i}
+    assert kb.data_values(T, i) == {whole(21)}
+    assert kb.unsupported == ()
+
+
 def test_a_join_that_takes_too_long_is_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
     few_steps = partial(CaseReasoner, most_steps=200)
     monkeypatch.setattr('surveillance_ontology.reasoner.completion.CaseReasoner', few_steps)
