@@ -9,6 +9,8 @@ from collections.abc import Iterable
 _MOST = 16
 _ALIKE = 0.65
 _SHARED_WORD = 0.8
+_BEGUN_WORD = 0.7
+_SHORTEST_BEGINNING = 3
 
 
 def nearest(name: str, known: Iterable[str]) -> str:
@@ -19,8 +21,8 @@ def nearest(name: str, known: Iterable[str]) -> str:
         known: The names there are.
 
     Returns:
-        The nearest name, in quotes, where one is like it, whatever the case of its letters, or
-        has it as one of its words, and the only name; else the names, at most sixteen of them.
+        The nearest name, in quotes, where one is like it, whatever the case of its letters, begins
+        with it or has it as one of its words, and the only name; else the names, at most sixteen.
     """
     names = list(dict.fromkeys(known))
     if len(names) == 1 or (likest := like(name, names)):
@@ -36,7 +38,11 @@ def like(name: str, known: Iterable[str]) -> str:
 
 
 def _likeness(given: str, name: str) -> float:
-    """Return 0 to 1, whatever the case; a name that has it as one of its words is much like it."""
+    """Return 0 to 1, whatever the case; a name with it as a word, or its beginning, is like it."""
     given, name = given.casefold().lstrip('-'), name.casefold().lstrip('-')
     ratio = difflib.SequenceMatcher(None, name, given).ratio()
-    return max(ratio, _SHARED_WORD) if given in re.split(r'[._/ -]', name) else ratio
+    if given in re.split(r'[._/ -]', name):
+        return max(ratio, _SHARED_WORD)
+    if len(given) >= _SHORTEST_BEGINNING and name.startswith(given):
+        return max(ratio, _BEGUN_WORD)
+    return ratio

@@ -15,6 +15,7 @@ NAMES = ['folder', 'execution_mode', 'policy', 'KITCHEN', 'robot_speed']
         ('polcy', "'policy'"),
         ('kitchen', "'KITCHEN'"),
         ('mode', "'execution_mode'"),
+        ('exec', "'execution_mode'"),
         ('xxxx', 'one of folder, execution_mode, policy, KITCHEN, robot_speed'),
     ],
 )
