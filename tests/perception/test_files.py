@@ -63,12 +63,12 @@ def test_detect_names_each_file_that_is_no_image_and_goes_on(tmp_path, capsys, i
     cv2.imwrite(str(good), image)
     bad.write_bytes(b'not an image')
     assert (
-        main([str(bad), str(tmp_path / 'none.png'), str(good), '--out', str(tmp_path / 'o')]) == 1
+        main([str(bad), str(tmp_path / 'goood.png'), str(good), '--out', str(tmp_path / 'o')]) == 1
     )
     captured = capsys.readouterr()
     assert captured.err.splitlines() == [
         f'detect: {bad} is no image that OpenCV can decode',
-        f'detect: {tmp_path / "none.png"}: No such file or directory, expected {str(good)!r}',
+        f'detect: {tmp_path / "goood.png"}: No such file or directory, expected {str(good)!r}',
     ]
     assert '2 markers' in captured.out
     assert (tmp_path / 'o' / 'good_markers.png').exists()
