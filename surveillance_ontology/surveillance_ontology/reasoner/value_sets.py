@@ -37,7 +37,8 @@ from surveillance_ontology.reasoner.moments import LARGEST_OFFSET
 
 _NUMBERS = ('whole', 'decimal', 'rational', 'real')
 _MOMENTS = ('utc', 'local')
-_ORDERED = (*_NUMBERS, 'float', 'double', *_MOMENTS)
+_FLOATS = ('float', 'double')
+_ORDERED = (*_NUMBERS, *_FLOATS, *_MOMENTS)
 _OCTETS = ('hexBinary', 'base64Binary')
 _WITH_LENGTH = ('string', 'langString', 'anyURI', *_OCTETS)
 _PLAIN = (*_WITH_LENGTH, 'boolean', 'other')
@@ -520,12 +521,12 @@ def _facet(datatype: str, facet: str, bound: ex.Literal) -> ValueSet | None:
         if kind == 'number':
             if key != key:
                 return NONE
-            if isinstance(value, (int, Fraction)):
-                return ValueSet(dict.fromkeys(_NUMBERS, (ends(key),)), {})
-            space = value[0]
-            zero = (space, 0.0, '-')
-            others = [zero] if order(zero, value) in _ORDERS[name] else []
-            return ValueSet({space: (ends(key),)}, {'other': _listed(others)})
+            # A bound of one type may be given for another: as `double[>= 2]` is often written.
+            intervals: dict[str, _Intervals] = dict.fromkeys(_NUMBERS, (ends(key),))
+            intervals.update((space, (_float_ends(space, name, key),)) for space in _FLOATS)
+            zeros = [(space, 0.0, '-') for space in _FLOATS]
+            others = [zero for zero in zeros if order(zero, value) in _ORDERS[name]]
+            return ValueSet(intervals, {'other': _listed(others)})
         if kind == 'dateTime':
             return _moments(name, key)
     values = _datatype(datatype)
@@ -548,6 +549,20 @@ def _facet(datatype: str, facet: str, bound: ex.Literal) -> ValueSet | None:
         return None
     tested = _tested(ex.DatatypeRestriction(datatype, ((XSD + name, bound),)))
     return ValueSet({}, {space: tested for space in _PLAIN if space != 'boolean'})
+
+
+def _float_ends(space: str, facet: str, key: int | Fraction | float) -> tuple[_End, _End]:
+    """Return the ends of an interval of floats, beside one of them also where the bound is none."""
+    try:
+        near: float = float(key)
+        if space == 'float':
+            near = struct.unpack('<f', struct.pack('<f', near))[0]
+    except OverflowError:
+        near = math.inf if key > 0 else -math.inf
+    if near == key:
+        return _ENDS[facet](near)
+    end = _below(near) if near > key else _above(near)
+    return (end, _HIGH) if facet.startswith('min') else (_LOW, end)
 
 
 def _moments(facet: str, bound: tuple[Any, ...]) -> ValueSet:

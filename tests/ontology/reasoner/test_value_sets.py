@@ -18,7 +18,7 @@ from surveillance_ontology.owl.expressions import (
 )
 from surveillance_ontology.owl.vocabulary import OWL, RDF, XSD
 from surveillance_ontology.reasoner.datatypes import Value, lexical_of, order, value_of
-from surveillance_ontology.reasoner.value_sets import ValueSet, value_set
+from surveillance_ontology.reasoner.value_sets import NONE, ValueSet, value_set
 
 LITERALS = [
     *(Literal(str(number), XSD + 'integer') for number in range(-2, 5)),
@@ -150,6 +150,31 @@ def test_sets_agree_with_single_values(seed: int, count: int) -> None:
             assert all(is_in(value, one) for value in first.members())
             assert len(set(first.members())) == first.size
         assert not (first.within(second) and mine - theirs)
+
+
+@pytest.mark.parametrize('space', ['float', 'double'])
+@pytest.mark.parametrize(
+    ('bound', 'of'), [('2', 'integer'), ('1.1', 'decimal'), ('-0.3', 'decimal'), ('0.1', 'double')]
+)
+def test_a_bound_of_another_type_of_numbers_is_compared_by_value(
+    space: str, bound: str, of: str
+) -> None:
+    limit = Literal(bound, XSD + of)
+    near = Literal(bound, XSD + space)
+    values = {
+        facet: values_of(DatatypeRestriction(XSD + space, ((XSD + facet, limit),)))
+        for facet in ('minInclusive', 'minExclusive', 'maxInclusive', 'maxExclusive')
+    }
+    for text in (bound, '-INF', '-2', '0', '1', '3', 'INF', 'NaN'):
+        value = value_of(Literal(text, XSD + space))
+        for facet, found in values.items():
+            assert found.contains(value) == passes(value, facet, limit)
+    is_exact = order(value_of(near), value_of(limit)) == 0
+    at_bound = values['minInclusive'] & values['maxInclusive']
+    assert list(at_bound.members()) == ([value_of(near)] if is_exact else [])
+    assert (values['minExclusive'] & values['maxExclusive']).is_empty
+    assert ~values['minExclusive'] & values_of(XSD + space) != NONE
+    assert values['minInclusive'].within(values['minExclusive']) != is_exact
 
 
 def test_facets_that_are_not_supported_are_named() -> None:
