@@ -112,8 +112,7 @@ class RobotBehavior(PatrolNode):
         self._introspection.stop()
 
     def _run(self) -> None:
-        # Under use_sim_time nothing has a time before the first clock message.
-        if not self._mission_clock.now() and not self._mission_clock.sleep(1e-9, self.stopping):
+        if not self._mission_clock.wait_for_time(self.stopping):
             return
         try:
             while not self.stopping.is_set():

@@ -192,6 +192,27 @@ def test_ros_time_that_jumps_back_does_not_delay_a_sleep(graph):
     assert wait.elapsed() - before == pytest.approx(6.0, abs=0.01)
 
 
+def test_the_first_moment_of_ros_time_is_waited_for_and_not_the_second(graph):
+    from rosgraph_msgs.msg import Clock as ClockMessage
+
+    node = graph.add(Plain, node_name='timed', parameters={'use_sim_time': True})
+    wait, publisher = ClockWait(node), graph.node.create_publisher(ClockMessage, '/clock', 10)
+    begun: list[bool] = []
+    waiter = threading.Thread(target=lambda: begun.append(wait.wait_for_time(fsm.Interrupt())))
+    waiter.start()
+    graph.until(lambda: publisher.get_subscription_count() > 0)
+    assert not begun
+    message = ClockMessage()
+    message.clock.sec = 1
+    publisher.publish(message)
+    waiter.join(60.0)
+    assert begun == [True]
+    assert wait.wait_for_time(fsm.Interrupt()), 'time stands, and has begun'
+    stopped = fsm.Interrupt()
+    stopped.set()
+    assert not wait.wait_for_time(stopped)
+
+
 # SMACH's introspection.
 
 

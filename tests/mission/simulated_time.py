@@ -26,8 +26,6 @@ CARRIES_ON = ('surveillance', 'patrol', 'machine', ' goal', '_recharge')
 
 STEP = 0.5
 """Time passes in steps of at least this many seconds; sleeps may last that much longer."""
-MOMENT = 1e-6
-"""Sleeps shorter than this wait for nothing that time would bring, seconds."""
 PATIENCE = 60.0
 """How long a node may take to follow the clock, and a sleeper to wake up, seconds of real time."""
 START = 1.0
@@ -199,9 +197,6 @@ def simulated_time(graph: Any, monkeypatch: pytest.MonkeyPatch) -> Iterator[Simu
     sleep = ClockWait.sleep
 
     def watched(self: ClockWait, seconds: float, interrupt: Any = None) -> bool:
-        if seconds < MOMENT:
-            # It only waits for time to begin.
-            return sleep(self, seconds, interrupt)
         ended_by = interrupt or Interrupt()
         told = _ToldOf(ended_by, lambda: driver.fell_asleep(self.now() + seconds, ended_by))
         in_time = False

@@ -80,6 +80,12 @@ class MissionClock(ClockWait):
         self._announce(self.now() + seconds + MARGIN)
         return super().sleep(seconds, interrupt)
 
+    def wait_for_time(self, interrupt: fsm.Interrupt) -> bool:
+        """Wait for the clock's first message; return False when the interrupt came first."""
+        if not self.now():
+            self._announce(MARGIN)
+        return super().wait_for_time(interrupt)
+
     def wait_for_event(self) -> None:
         """Say that what comes next ends by an event, whenever that is."""
         self._announce(0.0)

@@ -155,6 +155,20 @@ class ClockWait:
             if remove is not None:
                 remove()
 
+    def wait_for_time(self, interrupt: Interrupt) -> bool:
+        """Block until the clock has a time: under `use_sim_time` it is 0 before the first message.
+
+        Returns:
+            True when it has one, False when the interrupt came first.
+        """
+        remove = interrupt.subscribe(self._wake)
+        try:
+            with self._changed:
+                self._changed.wait_for(lambda: self.now() or interrupt.is_set())
+        finally:
+            remove()
+        return not interrupt.is_set()
+
     def _follows_topic(self) -> bool:
         return bool(self._clock.clock_type == ClockType.ROS_TIME and self._clock.ros_time_is_active)
 
