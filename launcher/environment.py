@@ -85,6 +85,7 @@ class Journal:
             return cls()
 
     def write(self, venv: Path) -> None:
+        """Keep the journal in `venv`."""
         replace_text(venv / JOURNAL, json.dumps(asdict(self), indent=1) + '\n')
 
 
