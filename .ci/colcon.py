@@ -20,8 +20,8 @@ CHECKOUT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(CHECKOUT))
 
 from launcher.environment import (  # noqa: E402
+    FOLDERS,
     INTERFACES,
-    PACKAGES,
     clean_environ,
     requirements,
 )
@@ -77,7 +77,7 @@ def build(folder: Path, python: Path) -> None:
     environ = clean_environ()
     environ['PATH'] = f'{python.parent}{os.pathsep}{environ["PATH"]}'
     words = ['colcon', 'build', '--base-paths']
-    words += [str(CHECKOUT / package) for package in (INTERFACES, *PACKAGES)]
+    words += [str(CHECKOUT / folder) for folder in (INTERFACES, *FOLDERS)]
     # The interpreter that a find_package finds first is not always the environment's.
     words += ['--cmake-args', f'-DPython3_EXECUTABLE={python}']
     run([str(python), '-m', *words], cwd=folder, environ=environ)

@@ -142,7 +142,7 @@ def single_calls(client: Any) -> dict[str, Callable[[], Any]]:
 
 def inside(rounds: int) -> list[Row]:
     """Return the service without ROS, without and with the store."""
-    from surveillance_ontology.armor.store import Store
+    from armor_service.store import Store
 
     rows = _service_rows('in process', None, rounds)
     with tempfile.TemporaryDirectory() as directory:
@@ -151,10 +151,9 @@ def inside(rounds: int) -> list[Row]:
 
 
 def _service_rows(label: str, store: Any, rounds: int) -> list[Row]:
-    from surveillance_ontology.armor.access import DATA
-    from surveillance_ontology.armor.client import ArmorClient, InProcessTransport
-    from surveillance_ontology.armor.service import ArmorService
-    from surveillance_ontology.patrol_ontology import PatrolOntology
+    from armor_service.client import ArmorClient, InProcessTransport
+    from armor_service.service import ArmorService
+    from surveillance_ontology.patrol_ontology import DATA, PatrolOntology
     from surveillance_runtime.place import read_place_file
 
     service = ArmorService(store=store)
@@ -175,7 +174,7 @@ class MappedVisit:
 
     def __init__(self, client: Any, places: int, folder: Path) -> None:
         from benchmarks.ontology import Patrol, schema
-        from surveillance_ontology import write_ontology
+        from owl_reasoner import write_ontology
 
         self._client, self._patrol = client, Patrol(places)
         file = folder / f'{places}.nt'
@@ -234,7 +233,7 @@ def through_ros(rounds: int) -> list[Row]:
     import rclpy
     from std_srvs.srv import Trigger
 
-    from surveillance_fsm.ros import ServiceCaller
+    from state_machines.ros import ServiceCaller
     from surveillance_interfaces.srv import ReferenceName
     from surveillance_ontology.armor_client import ArmorClient
     from surveillance_runtime.node import PatrolNode
@@ -406,7 +405,7 @@ def write_large(path: Path, axioms: int) -> None:
 
 def large(axioms: int, rounds: int) -> list[Row]:
     """Call inside the server on a large ontology."""
-    from surveillance_ontology.armor import ArmorClient, ArmorService, InProcessTransport, Settings
+    from armor_service import ArmorClient, ArmorService, InProcessTransport, Settings
 
     def resident() -> float:
         return int(Path('/proc/self/statm').read_text().split()[1]) * 4096 / 1e6

@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from surveillance_perception import CameraModel
+from marker_detection import CameraModel
 
 Array = npt.NDArray[np.float64]
 

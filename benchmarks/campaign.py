@@ -56,7 +56,7 @@ from std_msgs.msg import UInt32
 
 from benchmarks.hosts import Host, Network, may_be_made
 from benchmarks.machine_faults import SmallDisk, SteppedClock
-from surveillance_fsm.ros import ServiceCaller
+from state_machines.ros import ServiceCaller
 from surveillance_interfaces.srv import ArmorDirective
 from surveillance_runtime.discovery import prefer_quick_discovery
 from surveillance_runtime.place import read_place_file

@@ -31,21 +31,21 @@ ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
 from benchmarks.java_reasoner import KINDS, JavaReasoner, JavaReasonerError, absent
-from surveillance_ontology import (
+from owl_reasoner import (
     KnowledgeBase,
     OntologyFileError,
     read_ontology,
     write_ontology,
 )
-from surveillance_ontology.owl.axioms import (
+from owl_reasoner.owl.axioms import (
     Annotation,
     Axiom,
     Declaration,
     Import,
 )
-from surveillance_ontology.owl.entities import entities_of
-from surveillance_ontology.owl.vocabulary import NOTHING, THING
-from surveillance_ontology.reasoner.cases import UnsupportedError
+from owl_reasoner.owl.entities import entities_of
+from owl_reasoner.owl.vocabulary import NOTHING, THING
+from owl_reasoner.reasoner.cases import UnsupportedError
 
 BASE = 'http://example.org/'
 ENDINGS = ('.owl', '.rdf', '.ttl', '.ofn', '.owx', '.nt')

@@ -9,9 +9,9 @@ import cv2
 import numpy as np
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 
+from marker_detection import CameraModel, MarkerDetector, pose_of
+from marker_detection.image_sampling import Array
 from surveillance_perception.conversions import camera_from_ros, camera_to_ros, image_from_any
-from surveillance_perception.detection import CameraModel, MarkerDetector, pose_of
-from surveillance_perception.detection.image_sampling import Array
 from surveillance_perception.stream.encodings import ENCODING_NAMES
 
 MAX_PIXELS = 100_000

@@ -29,9 +29,9 @@ from geometry_msgs.msg import PoseStamped
 from sensor_msgs.msg import BatteryState
 from whole_stack import ROOT, Stack
 
+from state_machines.ros import ServiceCaller
 from surveillance_behaviour.mission.mission_log import Event, read_all, summarize
 from surveillance_controllers.battery import BatteryParameters
-from surveillance_fsm.ros import ServiceCaller
 from surveillance_interfaces.msg import FactChanges
 from surveillance_interfaces.srv import (
     DrainBattery,

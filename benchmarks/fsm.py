@@ -29,11 +29,11 @@ from pathlib import Path
 from typing import Any
 
 CHECKOUT = Path(__file__).resolve().parent.parent
-sys.path.insert(0, str(CHECKOUT / 'surveillance_fsm'))
+sys.path.insert(0, str(CHECKOUT / 'state_machines'))
 
-import surveillance_fsm as fsm
-from surveillance_fsm import history
-from surveillance_fsm.verify import verify
+import state_machines as fsm
+from state_machines import history
+from state_machines.verify import verify
 
 RING = 3
 LEVELS = 3

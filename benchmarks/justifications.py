@@ -23,17 +23,17 @@ sys.path.insert(0, str(ROOT))
 
 from benchmarks.java_reasoner import JavaReasoner, JavaReasonerError, absent
 from benchmarks.random_agreement import IRI, drawn_axioms, spelt_out, words_for
-from surveillance_ontology import KnowledgeBase, read_ontology, write_ontology
-from surveillance_ontology.owl.axiom_text import axiom_text
-from surveillance_ontology.owl.axioms import (
+from owl_reasoner import KnowledgeBase, read_ontology, write_ontology
+from owl_reasoner.owl.axiom_text import axiom_text
+from owl_reasoner.owl.axioms import (
     Axiom,
     Declaration,
     Import,
     SameIndividual,
     SubClassOf,
 )
-from surveillance_ontology.owl.entities import entities_of
-from surveillance_ontology.owl.vocabulary import THING
+from owl_reasoner.owl.entities import entities_of
+from owl_reasoner.owl.vocabulary import THING
 
 COLUMNS = ('facts', 'sufficient', 'minimal', 'not judged')
 

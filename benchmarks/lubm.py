@@ -24,18 +24,18 @@ ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
 from benchmarks.java_reasoner import KINDS, JavaReasoner, JavaReasonerError, absent
-from surveillance_ontology import (
+from owl_reasoner import (
     KnowledgeBase,
     read_ontology,
     write_ontology,
 )
-from surveillance_ontology.owl.axioms import (
+from owl_reasoner.owl.axioms import (
     Axiom,
     ClassAssertion,
     DataPropertyAssertion,
     ObjectPropertyAssertion,
 )
-from surveillance_ontology.owl.expressions import Literal
+from owl_reasoner.owl.expressions import Literal
 
 UB = 'http://swat.cse.lehigh.edu/onto/univ-bench.owl#'
 STAFF = (('FullProfessor', 7, 10), ('AssociateProfessor', 10, 14), ('AssistantProfessor', 8, 11))

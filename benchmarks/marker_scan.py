@@ -18,11 +18,11 @@ from pathlib import Path
 
 import numpy as np
 
+from marker_detection import MarkerStream, StreamSettings
 from surveillance_behaviour.map_from_markers.assembly import PlaceNote, SurveyReport
 from surveillance_behaviour.map_from_markers.initial_scan import InitialScan
 from surveillance_perception.arm.scan import ScanPlan, aim_at, from_nearer_end
 from surveillance_perception.arm.trajectory import ArmState, motion_to
-from surveillance_perception.detection import MarkerStream, StreamSettings
 from surveillance_perception.marker_registry import read_registry
 from surveillance_runtime.robot_arm import ARM
 from surveillance_simulation import Camera, Conditions, Renderer, read_world

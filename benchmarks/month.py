@@ -30,12 +30,12 @@ ROOT = Path(__file__).resolve().parents[1]
 if str(ROOT) not in sys.path:
     sys.path.insert(0, str(ROOT))
 
+from armor_service.access import Settings
+from armor_service.client import ArmorClient, InProcessTransport
+from armor_service.service import ArmorService
+from armor_service.store import Store
 from surveillance_behaviour.mission import mission_log
-from surveillance_ontology.armor.access import DATA, Settings
-from surveillance_ontology.armor.client import ArmorClient, InProcessTransport
-from surveillance_ontology.armor.service import ArmorService
-from surveillance_ontology.armor.store import Store
-from surveillance_ontology.patrol_ontology import PatrolOntology
+from surveillance_ontology.patrol_ontology import DATA, PatrolOntology
 from surveillance_runtime.place import read_place_file
 
 DAY = 86400.0

@@ -33,17 +33,17 @@ sys.path.insert(0, str(ROOT))
 
 from benchmarks.java_reasoner import KINDS, JavaReasoner, JavaReasonerError, absent
 from benchmarks.tables import table
-from surveillance_ontology.documents.reading import read_ontology
-from surveillance_ontology.documents.writing import write_ontology
-from surveillance_ontology.knowledge_base import KnowledgeBase
-from surveillance_ontology.owl.axioms import (
+from owl_reasoner.documents.reading import read_ontology
+from owl_reasoner.documents.writing import write_ontology
+from owl_reasoner.knowledge_base import KnowledgeBase
+from owl_reasoner.owl.axioms import (
     Axiom,
     DataPropertyAssertion,
     DifferentIndividuals,
     ObjectPropertyAssertion,
 )
-from surveillance_ontology.owl.expressions import Literal
-from surveillance_ontology.owl.vocabulary import XSD
+from owl_reasoner.owl.expressions import Literal
+from owl_reasoner.owl.vocabulary import XSD
 
 IRI = 'http://bnc/exp-rob-lab/2022-23'
 SCHEMA = ROOT / 'surveillance_ontology' / 'surveillance_ontology' / 'data' / 'surveillance.owl'

@@ -40,14 +40,14 @@ from patrolling_sim import read_patrolling_sim
 from rule_bound import rule_bound
 from tables import table
 
-from surveillance_behaviour.decision import Rules
-from surveillance_behaviour.policy.graph import (
+from patrol_policy.decision import Rules
+from patrol_policy.graph import (
     GraphError,
     PatrolGraph,
     graph_of_places,
 )
-from surveillance_behaviour.policy.policies import DEFAULT_POLICY
-from surveillance_behaviour.policy.simulation import (
+from patrol_policy.policies import DEFAULT_POLICY
+from patrol_policy.simulation import (
     Patrol,
     PatrolRun,
     SimulatedBattery,

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
-from surveillance_behaviour.policy.graph import GraphError, PatrolGraph
+from patrol_policy.graph import GraphError, PatrolGraph
 
 
 def read_patrolling_sim(path: str | Path, speed: float = 1.0, dwell: float = 0.0) -> PatrolGraph:

@@ -42,11 +42,11 @@ import numpy.typing as npt
 from benchmarks.backdrops import BACKDROPS, backdrop_of
 from benchmarks.photographs import AS_TAKEN, VARIATIONS, Photograph, photographs_in
 from benchmarks.tables import table
-from surveillance_perception.detection.camera_model import CameraModel
-from surveillance_perception.detection.detector import DetectorSettings, MarkerDetector
-from surveillance_perception.detection.dictionaries import dictionary_named
-from surveillance_perception.detection.preprocessing import grey_of
-from surveillance_perception.testing.marker_scene import (
+from marker_detection.camera_model import CameraModel
+from marker_detection.detector import DetectorSettings, MarkerDetector
+from marker_detection.dictionaries import dictionary_named
+from marker_detection.preprocessing import grey_of
+from marker_detection.testing.marker_scene import (
     Degradation,
     Glare,
     ImageArray,

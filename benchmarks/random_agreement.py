@@ -3,7 +3,7 @@
     python benchmarks/random_agreement.py [--number 1000] [--first 0] [--cases 0.2] [--special 0]
     python benchmarks/random_agreement.py --dense
 
-Each ontology is drawn by `tests/ontology/reasoner/wide_ontologies.py` from its number as seed:
+Each ontology is drawn by `libs/owl_reasoner/tests/wide_ontologies.py` from its number as seed:
 every construct of OWL 2 DL, nested to depth 4; `--cases` says how likely a union, an enumeration or
 a complement is drawn. With `--dense` names and kinds of axioms are few, so that they meet, and
 there are rules. The Java reasoner (a copy that owlready2 brings: HermiT 1.3.8, Pellet 2.3.1) stays
@@ -28,8 +28,9 @@ ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
 from benchmarks.java_reasoner import KINDS, JavaReasoner, JavaReasonerError, absent
-from surveillance_ontology import KnowledgeBase, write_ontology
-from surveillance_ontology.owl.axioms import (
+from libs.owl_reasoner.tests.wide_ontologies import DenseOntology, WideOntology
+from owl_reasoner import KnowledgeBase, write_ontology
+from owl_reasoner.owl.axioms import (
     Axiom,
     ClassAssertion,
     DataPropertyAssertion,
@@ -42,9 +43,8 @@ from surveillance_ontology.owl.axioms import (
     SameIndividual,
     SubClassOf,
 )
-from surveillance_ontology.owl.expressions import ObjectUnionOf
-from surveillance_ontology.owl.vocabulary import NOTHING
-from tests.ontology.reasoner.wide_ontologies import DenseOntology, WideOntology
+from owl_reasoner.owl.expressions import ObjectUnionOf
+from owl_reasoner.owl.vocabulary import NOTHING
 
 IRI = 'http://example.org/wide'
 COLUMNS = ('ontologies', 'refused', 'no answer', 'inconsistent', 'questions', 'right', 'settled')

@@ -24,8 +24,8 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from surveillance_behaviour.policy.graph import PatrolGraph
-from surveillance_behaviour.policy.rollout import RuleMap
+from patrol_policy.graph import PatrolGraph
+from patrol_policy.rollout import RuleMap
 
 CORE_UP_TO = 20
 """The largest core of a map that is searched, in places: its table takes 84 MB and 4 s."""

@@ -27,12 +27,12 @@ from pathlib import Path
 from types import FrameType
 from typing import Any
 
+from state_machines.ros import ServiceCaller
 from surveillance_behaviour.charging import BatteryMonitor
 from surveillance_behaviour.machines.surveillance_machine import ChooseRoomTask, RechargeTask
 from surveillance_behaviour.reasoner_node import Reasoner
 from surveillance_behaviour.robot_behavior_node import RobotBehavior
 from surveillance_controllers.battery_controller_node import BatteryController
-from surveillance_fsm.ros import ServiceCaller
 from surveillance_interfaces.msg import MissionStatus, RobotPlace
 from surveillance_interfaces.srv import ConsoleCommand, Reason, ReferenceName
 from surveillance_ontology.armor_client import ArmorClient

@@ -11,9 +11,9 @@ from __future__ import annotations
 from collections.abc import Iterable
 from pathlib import Path
 
-from surveillance_ontology.armor.directives import TABLE, Kind
-from surveillance_ontology.armor.protocol import ExitCode
-from surveillance_ontology.armor.rendering import TYPES
+from armor_service.directives import TABLE, Kind
+from armor_service.protocol import ExitCode
+from armor_service.rendering import TYPES
 
 BEGIN = '<!-- begin: written by docs/armor_directives.py -->'
 END = '<!-- end -->'

@@ -17,20 +17,20 @@ from pathlib import Path
 from typing import Any
 
 CHECKOUT = Path(__file__).resolve().parent.parent
-sys.path.insert(0, str(CHECKOUT / 'surveillance_fsm'))
+sys.path.insert(0, str(CHECKOUT / 'libs' / 'state_machines'))
 
 PAGE = CHECKOUT / 'docs' / 'fsm_reference.md'
 MODULES = {
-    'surveillance_fsm': None,
-    'surveillance_fsm.execution': ['Control'],
-    'surveillance_fsm.verify': ['verify', 'Finding'],
-    'surveillance_fsm.export': [
+    'state_machines': None,
+    'state_machines.execution': ['Control'],
+    'state_machines.verify': ['verify', 'Finding'],
+    'state_machines.export': [
         'to_ascii',
         'to_mermaid',
         'to_graphviz',
     ],
-    'surveillance_fsm.machine_file': ['load_machine', 'machine_from', 'to_yaml'],
-    'surveillance_fsm.history': [
+    'state_machines.machine_file': ['load_machine', 'machine_from', 'to_yaml'],
+    'state_machines.history': [
         'Transition',
         'TransitionFeed',
         'Recorder',
@@ -42,8 +42,8 @@ MODULES = {
         'capture',
         'restore',
     ],
-    'surveillance_fsm.testing': ['FakeClock', 'script', 'watching', 'Watched'],
-    'surveillance_fsm.ros': None,
+    'state_machines.testing': ['FakeClock', 'script', 'watching', 'Watched'],
+    'state_machines.ros': None,
 }
 """The modules, and the names that are meant for users; None for all that the module exports."""
 

@@ -29,7 +29,7 @@ from sensor_msgs.msg import Image, JointState
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 from whole_stack import Stack
 
-from surveillance_fsm.ros import ServiceCaller
+from state_machines.ros import ServiceCaller
 from surveillance_interfaces.srv import PlaceObstacle, SetDoor, SetMarker
 from surveillance_operator import map_command
 from surveillance_operator.watch.view import KEY_NOTE, MissionView

@@ -26,20 +26,20 @@ from rclpy.parameter import Parameter
 from sensor_msgs.msg import Image
 
 from benchmarks.backdrops import backdrop_of
-from surveillance_fsm.ros import ServiceCaller
-from surveillance_interfaces.srv import MarkerRoutine, PointCamera
-from surveillance_perception.arm_controller_node import ArmController
-from surveillance_perception.aruco_detector_node import ArucoDetector
-from surveillance_perception.conversions import image_from_ros
-from surveillance_perception.detection.annotation import annotated
-from surveillance_perception.detection.camera_model import CameraModel
-from surveillance_perception.detection.detector import DetectorSettings, MarkerDetector
-from surveillance_perception.detection.dictionaries import dictionary_named
-from surveillance_perception.testing.marker_scene import (
+from marker_detection.annotation import annotated
+from marker_detection.camera_model import CameraModel
+from marker_detection.detector import DetectorSettings, MarkerDetector
+from marker_detection.dictionaries import dictionary_named
+from marker_detection.testing.marker_scene import (
     Degradation,
     Panel,
     image_of,
 )
+from state_machines.ros import ServiceCaller
+from surveillance_interfaces.srv import MarkerRoutine, PointCamera
+from surveillance_perception.arm_controller_node import ArmController
+from surveillance_perception.aruco_detector_node import ArucoDetector
+from surveillance_perception.conversions import image_from_ros
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.process import ExecutorThread
 from surveillance_runtime.qos import SENSOR_QOS

@@ -40,7 +40,7 @@ _TEST_HELP = """\
 usage: launch.py test [pytest arguments]
 
 Runs the whole test suite on five processes. Further words go to pytest:
-  python3 launch.py test tests/fsm -k preempt
+  python3 launch.py test libs/state_machines/tests -k preempt
   python3 launch.py test -n 0 -x tests/launcher
 All that pytest takes: .venv/bin/python -m pytest --help"""
 

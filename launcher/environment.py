@@ -21,17 +21,25 @@ from collections.abc import Iterable, Iterator, MutableMapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
+from typing import Any
 
 from launcher import system
 from launcher.progress import Output, Step
-from surveillance_fsm.files import parse_json
+from state_machines.files import parse_json
 from surveillance_runtime.files import replace_text
 from surveillance_runtime.launch_protocol import NotNowError
 
 CHECKOUT = Path(__file__).resolve().parent.parent
+LIBRARIES = (
+    'owl_reasoner',
+    'armor_service',
+    'state_machines',
+    'marker_detection',
+    'patrol_policy',
+)
+"""In `libs/`: of use without a robot and without ROS."""
 PACKAGES = (
     'surveillance_runtime',
-    'surveillance_fsm',
     'surveillance_ontology',
     'surveillance_behaviour',
     'surveillance_controllers',
@@ -39,6 +47,8 @@ PACKAGES = (
     'surveillance_simulation',
     'surveillance_operator',
 )
+FOLDERS = (*(f'libs/{name}' for name in LIBRARIES), *PACKAGES)
+"""Where the packages lie in the checkout, libraries first."""
 JOURNAL = 'surveillance-setup.json'
 INTERFACES = 'surveillance_interfaces'
 SPACE = 900_000_000
@@ -90,12 +100,19 @@ class Journal:
 
 
 def requirements(checkout: Path, extras: Iterable[str]) -> list[str]:
-    """Return the project's dependencies with those of the named extras, as pip takes them."""
-    project = tomllib.loads((checkout / 'pyproject.toml').read_text(encoding='utf-8'))['project']
-    wanted = list(project['dependencies'])
+    """Return what the robot and its libraries depend on, with the named extras, as pip takes it."""
+    project = _project(checkout)
+    wanted = dict.fromkeys(project['dependencies'])
     for extra in extras:
-        wanted += project['optional-dependencies'][extra]
-    return wanted
+        wanted |= dict.fromkeys(project['optional-dependencies'][extra])
+    for name in LIBRARIES:  # imported from the checkout: what they need themselves is installed
+        wanted |= dict.fromkeys(_project(checkout / 'libs' / name)['dependencies'])
+    return [line for line in wanted if line.partition('=')[0] not in LIBRARIES]
+
+
+def _project(folder: Path) -> dict[str, Any]:
+    found = tomllib.loads((folder / 'pyproject.toml').read_text(encoding='utf-8'))
+    return dict(found['project'])
 
 
 def complete(checkout: Path, extras: Iterable[str]) -> Journal:
@@ -282,7 +299,7 @@ class Environment:
 
     def _write_path_file(self) -> None:
         """Make the packages importable where they lie: an edit needs no installation."""
-        lines = [str(self.checkout / package) for package in PACKAGES]
+        lines = [str(self.checkout / folder) for folder in FOLDERS]
         (self._site_packages() / PATH_FILE).write_text('\n'.join(lines) + '\n', encoding='utf-8')
 
     def _remove_half_installed(self) -> None:

@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from launcher.run import NOT_RECORDED, Run
-from surveillance_fsm.files import parse_json
+from state_machines.files import parse_json
 from surveillance_runtime.launch_protocol import NotNowError
 from surveillance_runtime.suggestions import like
 

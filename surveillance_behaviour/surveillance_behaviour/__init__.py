@@ -1,36 +1,7 @@
-"""Patrol policies, missions and the state machines of the robot.
+"""The robot's mission: what it does next, and why.
 
-What stands here needs no ROS: ``decide(world, battery, settings)`` chooses where a robot goes next,
-and `why_not` says why not somewhere else. Maps are `PatrolGraph`; the module `policy.simulation`
-patrols one in simulated time.
+- `robot_behavior_node`: the mission's state machine as a node; begin there;
+- `machines`: the states; `mission`: what they work on, its record, its recovery from failures;
+- `reasoner_node`, `decider`: the decision, made by the library `patrol_policy`;
+- `peers`: what the states ask of other nodes, and how; `map_from_markers`: the first look around.
 """
-
-from __future__ import annotations
-
-from surveillance_behaviour.decision import (
-    DecisionSettings,
-    NowhereToGoError,
-    Rules,
-    WhyNot,
-    decide,
-    why_not,
-)
-from surveillance_behaviour.policy.battery_reserve import Battery, BatteryLimits
-from surveillance_behaviour.policy.graph import GraphError, PatrolGraph, graph_of_places
-from surveillance_behaviour.policy.world import Decision, World
-
-__all__ = [
-    'Battery',
-    'BatteryLimits',
-    'Decision',
-    'DecisionSettings',
-    'GraphError',
-    'NowhereToGoError',
-    'PatrolGraph',
-    'Rules',
-    'WhyNot',
-    'World',
-    'decide',
-    'graph_of_places',
-    'why_not',
-]

@@ -11,9 +11,9 @@ import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-from surveillance_behaviour.policy.battery_reserve import Battery
-from surveillance_fsm import Clock, Interrupt
-from surveillance_fsm.exceptions import CallError, CallInterruptedError
+from patrol_policy.battery_reserve import Battery
+from state_machines import Clock, Interrupt
+from state_machines.exceptions import CallError, CallInterruptedError
 
 LONG = 1e6
 """One wait without a limit, seconds; it is repeated as long as need be."""

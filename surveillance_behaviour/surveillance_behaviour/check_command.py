@@ -10,14 +10,14 @@ import importlib
 import sys
 from collections.abc import Callable, Sequence
 
+from state_machines import Container
+from state_machines.clock import WALL_CLOCK
+from state_machines.export import to_ascii, to_graphviz, to_mermaid
+from state_machines.verify import Finding, verify
 from surveillance_behaviour.charging import BatteryMonitor
 from surveillance_behaviour.machines import MACHINES
 from surveillance_behaviour.mission.mission import Mission, MissionSettings
 from surveillance_behaviour.peers.ports import Ports
-from surveillance_fsm import Container
-from surveillance_fsm.clock import WALL_CLOCK
-from surveillance_fsm.export import to_ascii, to_graphviz, to_mermaid
-from surveillance_fsm.verify import Finding, verify
 from surveillance_runtime.command_line import CommandParser
 from surveillance_runtime.suggestions import nearest
 

@@ -8,8 +8,8 @@ from typing import Any
 
 from sensor_msgs.msg import BatteryState
 
+from patrol_policy.world import Decision
 from surveillance_behaviour.map_from_markers.assembly import PlaceNote
-from surveillance_behaviour.policy.world import Decision
 from surveillance_interfaces.msg import Decision as DecisionMessage
 from surveillance_interfaces.msg import OntologyMap, OntologyPlace, RoomConnection
 from surveillance_runtime.conversions import point_message, seconds_of

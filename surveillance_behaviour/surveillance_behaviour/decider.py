@@ -17,8 +17,8 @@ import threading
 from collections.abc import Callable
 from dataclasses import replace
 
-from surveillance_behaviour.charging import BatteryMonitor
-from surveillance_behaviour.decision import (
+from patrol_policy.battery_reserve import Battery
+from patrol_policy.decision import (
     RECHARGE,
     DecisionSettings,
     RequestError,
@@ -30,14 +30,14 @@ from surveillance_behaviour.decision import (
     why_charge,
     why_not,
 )
+from patrol_policy.graph import GraphError, PatrolGraph
+from patrol_policy.plan import LEG_CHANGE
+from patrol_policy.world import Decision, PolicyMemory, World
+from state_machines import Interrupt
+from state_machines.exceptions import CallError
+from surveillance_behaviour.charging import BatteryMonitor
 from surveillance_behaviour.experience import Experience
 from surveillance_behaviour.peers.ports import Ontology, Places, Point, UnknownPlaceError
-from surveillance_behaviour.policy.battery_reserve import Battery
-from surveillance_behaviour.policy.graph import GraphError, PatrolGraph
-from surveillance_behaviour.policy.plan import LEG_CHANGE
-from surveillance_behaviour.policy.world import Decision, PolicyMemory, World
-from surveillance_fsm import Interrupt
-from surveillance_fsm.exceptions import CallError
 from surveillance_ontology.patrol_ontology import Snapshot
 from surveillance_runtime.suggestions import nearest
 

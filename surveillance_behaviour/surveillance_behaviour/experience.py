@@ -18,8 +18,8 @@ from pathlib import Path
 from statistics import fmean
 from typing import Any
 
+from patrol_policy.battery_reserve import LEARNED_FALL, Draw
 from surveillance_behaviour.mission.mission_log import account_of, on_present_clock, read
-from surveillance_behaviour.policy.battery_reserve import LEARNED_FALL, Draw
 from surveillance_runtime.files import FileError, KeptFile
 
 SIMULTANEOUS = 1.0

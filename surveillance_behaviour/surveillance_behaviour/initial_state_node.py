@@ -15,6 +15,7 @@ from nav_msgs.msg import Odometry
 from rclpy.callback_groups import ReentrantCallbackGroup
 from std_srvs.srv import Empty
 
+from state_machines.ros import CallError, ServiceCaller
 from surveillance_behaviour.conversions import map_message
 from surveillance_behaviour.map_from_markers.assembly import (
     PlaceNote,
@@ -24,7 +25,6 @@ from surveillance_behaviour.map_from_markers.assembly import (
 )
 from surveillance_behaviour.map_from_markers.initial_scan import InitialScan, Progress
 from surveillance_behaviour.map_from_markers.scan_peers import CameraScanner, MarkerInquiry
-from surveillance_fsm.ros import CallError, ServiceCaller
 from surveillance_interfaces.msg import OntologyMap
 from surveillance_interfaces.srv import ReferenceName
 from surveillance_runtime.files import KeptFile

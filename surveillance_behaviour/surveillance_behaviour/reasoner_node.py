@@ -17,16 +17,16 @@ from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.parameter import Parameter
 from rclpy.task import Future
 
+from patrol_policy.decision import DecisionSettings, NowhereToGoError
+from state_machines.exceptions import CallError, CallInterruptedError
+from state_machines.ros import ClockWait
 from surveillance_behaviour.charging import BatteryMonitor
-from surveillance_behaviour.decision import DecisionSettings, NowhereToGoError
 from surveillance_behaviour.peers.deciding import (
     MemorySettings,
     decider_of,
     offer_decision_services,
 )
 from surveillance_behaviour.peers.ros_ports import Deadlines, RosPlaces, hear_battery, ros_ontology
-from surveillance_fsm.exceptions import CallError, CallInterruptedError
-from surveillance_fsm.ros import ClockWait
 from surveillance_interfaces.msg import MissionStatus
 from surveillance_interfaces.srv import Reason
 from surveillance_runtime.conversions import seconds_of

@@ -14,10 +14,10 @@ from typing import Any
 
 from sensor_msgs.msg import BatteryState
 
-import surveillance_fsm as fsm
+import state_machines as fsm
+from patrol_policy.decision import DecisionSettings
 from surveillance_behaviour import conversions
 from surveillance_behaviour.charging import BatteryMonitor
-from surveillance_behaviour.decision import DecisionSettings
 from surveillance_behaviour.machines import MACHINES
 from surveillance_behaviour.mission.mission import Mission, MissionSettings
 from surveillance_behaviour.mission.mission_log import MissionRecord
@@ -38,8 +38,8 @@ from surveillance_behaviour.peers.ros_ports import (
     hear_battery,
     ros_ontology,
 )
-from surveillance_fsm.ros import IntrospectionServer
 from surveillance_runtime.files import FileError
+from surveillance_runtime.introspection import IntrospectionServer
 from surveillance_runtime.launch_protocol import NotNowError
 from surveillance_runtime.node import JOIN_SECONDS, PatrolNode
 from surveillance_runtime.process import run_node

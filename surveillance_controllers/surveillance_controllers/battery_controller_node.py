@@ -20,6 +20,7 @@ from std_msgs.msg import Bool, Float32, UInt8
 from std_srvs.srv import Empty
 from trajectory_msgs.msg import JointTrajectory
 
+from state_machines.ros import ClockWait
 from surveillance_controllers import conversions, stimuli
 from surveillance_controllers.battery import Battery, BatteryInUse
 from surveillance_controllers.controller_parameters import (
@@ -28,7 +29,6 @@ from surveillance_controllers.controller_parameters import (
 )
 from surveillance_controllers.manual.commands import BATTERY, BATTERY_SET, ParsedCommand
 from surveillance_controllers.manual.requests import CommandConsole
-from surveillance_fsm.ros import ClockWait
 from surveillance_runtime.conversions import (
     pose_of_serialized,
     trajectory_from,

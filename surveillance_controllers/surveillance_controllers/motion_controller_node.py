@@ -12,6 +12,7 @@ import math
 from collections.abc import Callable, Sequence
 from typing import Any, TextIO
 
+from state_machines.ros import GoalAbortedError, GoalRun, GoalServer
 from surveillance_controllers import conversions, geometry, stimuli
 from surveillance_controllers.controller_parameters import MotionSettings
 from surveillance_controllers.geometry import Points
@@ -22,7 +23,6 @@ from surveillance_controllers.map_knowledge import MapKnowledge
 from surveillance_controllers.motion.arrival import Motion, MotionFailedError, place_reached
 from surveillance_controllers.motion.place_recording import PlaceRecorder
 from surveillance_controllers.stimuli import glide
-from surveillance_fsm.ros import GoalAbortedError, GoalRun, GoalServer
 from surveillance_interfaces.action import Control, FollowPath
 from surveillance_ontology.patrol_ontology import OntologyNotReadyError
 from surveillance_runtime.conversions import FARTHEST, point_message

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, TextIO
 import numpy as np
 from nav_msgs.msg import Path
 
+from state_machines.ros import GoalAbortedError, GoalRun, GoalServer
 from surveillance_controllers import conversions, geometry, stimuli
 from surveillance_controllers.controller_parameters import PlannerSettings
 from surveillance_controllers.geometry import Points
@@ -21,7 +22,6 @@ from surveillance_controllers.manual import commands
 from surveillance_controllers.manual.commands import PLANNER, ParsedCommand, Point3
 from surveillance_controllers.manual.requests import CommandConsole
 from surveillance_controllers.map_knowledge import MapKnowledge
-from surveillance_fsm.ros import GoalAbortedError, GoalRun, GoalServer
 from surveillance_interfaces.action import ComputePath, Plan
 from surveillance_ontology.patrol_ontology import OntologyNotReadyError
 from surveillance_runtime.conversions import point_messages

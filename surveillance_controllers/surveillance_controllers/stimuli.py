@@ -10,10 +10,10 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from state_machines.ros import GoalRun
 from surveillance_controllers import geometry
 from surveillance_controllers.geometry import Points
 from surveillance_controllers.manual.commands import Point3
-from surveillance_fsm.ros import GoalRun
 
 VIA_POINTS = (0, 4)
 """Fewest and most random points between a path's start and its goal."""

@@ -11,7 +11,7 @@ import rclpy
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 
-from surveillance_ontology.armor import client
+from armor_service import client
 from surveillance_ontology.armor_client import RosTransport
 from surveillance_runtime.discovery import prefer_quick_discovery
 from surveillance_runtime.process import ExecutorThread

@@ -1,6 +1,6 @@
 """The exceptions of armor_py_api: `msg` says what went wrong, `code` is ARMOR's exit code."""
 
-from surveillance_ontology.armor.client import (
+from armor_service.client import (
     ArmorError,
     ArmorServiceCallError,
     ArmorServiceInternalError,

@@ -1,6 +1,6 @@
 """The manipulation methods of a client, under armor_py_api's name."""
 
-from surveillance_ontology.armor.client import Manipulation
+from armor_service.client import Manipulation
 
 ArmorManipulationClient = Manipulation
 

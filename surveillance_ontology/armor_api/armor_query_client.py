@@ -1,6 +1,6 @@
 """The query methods of a client, under armor_py_api's name."""
 
-from surveillance_ontology.armor.client import Query
+from armor_service.client import Query
 
 ArmorQueryClient = Query
 

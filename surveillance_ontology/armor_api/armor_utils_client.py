@@ -1,6 +1,6 @@
 """The utils methods of a client, under armor_py_api's name."""
 
-from surveillance_ontology.armor.client import Utils
+from armor_service.client import Utils
 
 ArmorUtilsClient = Utils
 

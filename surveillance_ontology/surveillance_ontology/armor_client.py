@@ -19,24 +19,24 @@ from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
-from surveillance_fsm import Interrupt
-from surveillance_fsm.ros import CallError, CallTimeoutError, ServiceCaller
-from surveillance_interfaces.msg import FactChanges
-from surveillance_interfaces.srv import ArmorDirective, ArmorDirectiveList
-from surveillance_ontology.armor import client
-from surveillance_ontology.armor.client import (
+from armor_service import client
+from armor_service.client import (
     ArmorServiceCallError,
     ArmorServiceInternalError,
     Batch,
 )
-from surveillance_ontology.armor.facts import FactSet, ShortFact
-from surveillance_ontology.armor.protocol import (
+from armor_service.facts import FactSet, ShortFact
+from armor_service.protocol import (
     DirectiveRequest,
     DirectiveResponse,
     ListResponse,
     name_in,
     value_in,
 )
+from state_machines import Interrupt
+from state_machines.ros import CallError, CallTimeoutError, ServiceCaller
+from surveillance_interfaces.msg import FactChanges
+from surveillance_interfaces.srv import ArmorDirective, ArmorDirectiveList
 from surveillance_ontology.conversions import (
     changes_from_ros,
     request_to_ros,

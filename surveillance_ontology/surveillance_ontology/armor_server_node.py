@@ -17,18 +17,18 @@ from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.clock import Clock, ClockType
 from rclpy.event_handler import PublisherEventCallbacks
 
-from surveillance_fsm.ros.waiting import reported
+from armor_service.access import Settings, state_folder
+from armor_service.changes import ChangeFeed, NumberedChange
+from armor_service.protocol import DirectiveRequest, DirectiveResponse, StoreError
+from armor_service.service import ArmorService
+from armor_service.store import Store
+from armor_service.turns import Backlog, Turns
+from state_machines.ros.waiting import reported
 from surveillance_interfaces.msg import ArmorDirectiveRes, FactChanges
 from surveillance_interfaces.srv import ArmorDirective, ArmorDirectiveList
-from surveillance_ontology.armor.access import Settings, state_folder
-from surveillance_ontology.armor.changes import ChangeFeed, NumberedChange
-from surveillance_ontology.armor.protocol import DirectiveRequest, DirectiveResponse
-from surveillance_ontology.armor.service import ArmorService
-from surveillance_ontology.armor.store import Store
-from surveillance_ontology.armor.turns import Backlog, Turns
 from surveillance_ontology.armor_client import CHANGES_TOPIC
 from surveillance_ontology.conversions import changes_to_ros, fill_response, request_from_ros
-from surveillance_runtime.files import FileError
+from surveillance_ontology.patrol_ontology import DATA
 from surveillance_runtime.launch_protocol import NotNowError
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.process import run_node
@@ -234,7 +234,7 @@ def _service(node: PatrolNode, keep: bool) -> ArmorService:
         ParameterError: A parameter is of the wrong type or out of range.
         NotNowError: The store cannot be used.
     """
-    settings = node.declare_fields(Settings())
+    settings = node.declare_fields(Settings(read_only_directories=(DATA,)))
     stored = node.parameter(
         'store',
         'auto' if keep else 'none',
@@ -254,7 +254,7 @@ def _service(node: PatrolNode, keep: bool) -> ArmorService:
             kept = ', '.join(service.references.names()) or 'empty'
             log.info(f'store {folder} ({kept}); "-p store:=none" turns it off')
         return service
-    except FileError as error:
+    except StoreError as error:
         raise NotNowError(f'{node.get_name()}: parameter store: {error}') from None
 
 

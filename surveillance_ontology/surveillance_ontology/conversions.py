@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from armor_service import protocol
+from armor_service.facts import ShortFact
+from armor_service.protocol import DirectiveRequest, DirectiveResponse
 from surveillance_interfaces.msg import (
     ArmorDirectiveReq,
     ArmorDirectiveRes,
@@ -14,14 +17,11 @@ from surveillance_interfaces.msg import (
     OntologyPlace,
     QueryItem,
 )
-from surveillance_ontology.armor import protocol
-from surveillance_ontology.armor.facts import ShortFact
-from surveillance_ontology.armor.protocol import DirectiveRequest, DirectiveResponse
 from surveillance_ontology.map_keeper import RoomNote
 from surveillance_runtime.conversions import point_from
 
 if TYPE_CHECKING:
-    from surveillance_ontology.armor.changes import NumberedChange  # A client needs none of it.
+    from armor_service.changes import NumberedChange  # A client needs none of it.
 
 
 def request_from_ros(msg: ArmorDirectiveReq) -> DirectiveRequest:

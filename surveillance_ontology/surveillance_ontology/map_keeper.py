@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from surveillance_ontology.armor.client import (
+from armor_service.client import (
     ArmorError,
     ArmorServiceCallError,
     ArmorServiceInternalError,

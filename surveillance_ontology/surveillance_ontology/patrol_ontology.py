@@ -26,11 +26,11 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Protocol
 
-from surveillance_ontology.armor.client import (
+from armor_service.client import (
     ArmorClient,
     ArmorServiceInternalError,
 )
-from surveillance_ontology.armor.protocol import (
+from armor_service.protocol import (
     DirectiveRequest,
     DirectiveResponse,
     ExitCode,
@@ -39,7 +39,9 @@ from surveillance_ontology.armor.protocol import (
 )
 from surveillance_runtime.place import Place, PlaceError
 
-ONTOLOGY = Path(__file__).parent / 'data' / 'surveillance.owl'
+DATA = Path(__file__).resolve().parent / 'data'
+"""The ontologies that come with this package."""
+ONTOLOGY = DATA / 'surveillance.owl'
 """The ontology that a patrol starts from."""
 ROBOT = 'Robot1'
 """The robot's name where nobody gives another one."""

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from textwrap import wrap
 from typing import TYPE_CHECKING
 
+from state_machines.exceptions import CallError, UnavailableError
 from surveillance_controllers.manual.commands import (
     BATTERY,
     EXIT,
@@ -23,7 +24,6 @@ from surveillance_controllers.manual.commands import (
     Grammar,
     number,
 )
-from surveillance_fsm.exceptions import CallError, UnavailableError
 from surveillance_runtime.configuration import declared, read_schema
 from surveillance_runtime.parameters import ParameterSpec, shown
 from surveillance_runtime.suggestions import nearest

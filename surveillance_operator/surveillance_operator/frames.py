@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from surveillance_behaviour.policy.policies import POLICIES
+from patrol_policy.policies import POLICIES
 from surveillance_operator.regions import regions
 from surveillance_operator.snapshot import NO_POINTS, TRAIL_STEP, Health, Snapshot
 from surveillance_runtime.place.occupancy_grid import Grid

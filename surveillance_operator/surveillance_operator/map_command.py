@@ -9,8 +9,8 @@ from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 
+from patrol_policy.graph import PatrolGraph
 from surveillance_behaviour.mission import mission_log
-from surveillance_behaviour.policy.graph import PatrolGraph
 from surveillance_ontology.patrol_ontology import checked_names
 from surveillance_runtime.command_line import EXIT_BAD_INPUT, CommandParser
 from surveillance_runtime.files import RECORD, FileError

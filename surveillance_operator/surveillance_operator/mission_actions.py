@@ -16,8 +16,9 @@ from rcl_interfaces.srv import GetParameters, ListParameters, SetParameters
 from rclpy.parameter import Parameter, parameter_value_to_python
 from std_srvs.srv import Trigger
 
-from surveillance_fsm.exceptions import CallError, CallInterruptedError
-from surveillance_fsm.ros import ServiceCaller, UnavailableError
+from armor_service.facts import parse_fact
+from state_machines.exceptions import CallError, CallInterruptedError
+from state_machines.ros import ServiceCaller, UnavailableError
 from surveillance_interfaces.srv import (
     AddRoom,
     ConsoleCommand,
@@ -31,7 +32,6 @@ from surveillance_interfaces.srv import (
     SetDoor,
     WhyNot,
 )
-from surveillance_ontology.armor.facts import parse_fact
 from surveillance_ontology.armor_client import (
     ArmorClient,
     ArmorServiceCallError,

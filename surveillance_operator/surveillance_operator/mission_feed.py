@@ -19,9 +19,9 @@ from rcl_interfaces.srv import GetParameters, ListParameters
 from rclpy.qos import QoSCompatibility, qos_check_compatible
 from rosgraph_msgs.msg import Clock as ClockMessage
 
-from surveillance_fsm.ros import CallError, ServiceCaller
+from armor_service.facts import ShortFact
+from state_machines.ros import CallError, ServiceCaller
 from surveillance_interfaces.srv import ReferenceName, RoomPosition
-from surveillance_ontology.armor.facts import ShortFact
 from surveillance_ontology.armor_client import ArmorClient, FactSubscription
 from surveillance_ontology.patrol_ontology import CONNECTIONS, PLACES, URGENT_PLACES, VISITS
 from surveillance_operator.polled_subscription import PolledSubscription, await_message

@@ -24,6 +24,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState, LaserScan, PointCloud2
 from std_msgs.msg import Bool, String, UInt8
 
+from armor_service.facts import ShortFact, parse_fact
 from surveillance_behaviour.conversions import decision_from
 from surveillance_interfaces.action import Control, FollowPath, ScanSurroundings
 from surveillance_interfaces.msg import (
@@ -35,7 +36,6 @@ from surveillance_interfaces.msg import (
     MarkerDetectionArray,
     MissionStatus,
 )
-from surveillance_ontology.armor.facts import ShortFact, parse_fact
 from surveillance_ontology.armor_client import value_in
 from surveillance_ontology.patrol_ontology import CONNECTIONS, URGENT_PLACES, VISITS
 from surveillance_operator.snapshot import (

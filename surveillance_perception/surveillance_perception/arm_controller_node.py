@@ -15,7 +15,8 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, Header
 from trajectory_msgs.msg import JointTrajectory
 
-from surveillance_fsm.ros import GoalAbortedError, GoalRun, GoalServer, work_aside
+from marker_detection.fusion import FusedPositions
+from state_machines.ros import GoalAbortedError, GoalRun, GoalServer, work_aside
 from surveillance_interfaces.action import ScanSurroundings
 from surveillance_interfaces.msg import MarkerDetectionArray
 from surveillance_interfaces.srv import MarkerRoutine, PointCamera
@@ -31,7 +32,6 @@ from surveillance_perception.conversions import (
     scan_result_to_ros,
     trajectory_to_ros,
 )
-from surveillance_perception.detection.fusion import FusedPositions
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.parameters import converted, parameter
 from surveillance_runtime.process import run_node

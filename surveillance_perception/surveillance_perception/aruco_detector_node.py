@@ -13,6 +13,9 @@ from rclpy.time import Time
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 from std_msgs.msg import Bool, Int32
 
+from marker_detection.annotation import annotated
+from marker_detection.camera_model import CameraModel
+from marker_detection.marker_stream import MarkerStream, StreamSettings
 from surveillance_interfaces.msg import MarkerDetectionArray
 from surveillance_perception.conversions import (
     camera_from_ros,
@@ -22,9 +25,6 @@ from surveillance_perception.conversions import (
     poses_to_ros,
     transforms_to_ros,
 )
-from surveillance_perception.detection.annotation import annotated
-from surveillance_perception.detection.camera_model import CameraModel
-from surveillance_perception.detection.marker_stream import MarkerStream, StreamSettings
 from surveillance_perception.stream.image_subscription import IMAGES_QOS, ImageSubscription, Latest
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.parameters import parameter

@@ -14,15 +14,15 @@ from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 from std_msgs.msg import Header
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
+from marker_detection.camera_model import DISTORTION_MODELS, Array, CameraModel
+from marker_detection.fusion import FusedPosition, FusedPositions, is_measured
+from marker_detection.marker_stream import Sighting
+from marker_detection.pose import MarkerPose
 from surveillance_interfaces.action import ScanSurroundings
 from surveillance_interfaces.msg import MarkerDetection, MarkerDetectionArray, RoomConnection
 from surveillance_interfaces.srv import RoomInformation
 from surveillance_perception.arm.scan import ScanOutcome, ScanPlan, View
 from surveillance_perception.arm.trajectory import ArmTrajectory
-from surveillance_perception.detection.camera_model import DISTORTION_MODELS, Array, CameraModel
-from surveillance_perception.detection.fusion import FusedPosition, FusedPositions, is_measured
-from surveillance_perception.detection.marker_stream import Sighting
-from surveillance_perception.detection.pose import MarkerPose
 from surveillance_perception.marker_registry import MarkedPlace
 from surveillance_perception.stream.encodings import image_of_pixels, printable
 from surveillance_perception.stream.image_files import ImageArray, decode_image

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import cv2
 
-from surveillance_fsm.files import replace_file
-from surveillance_perception.detection.annotation import annotated
-from surveillance_perception.detection.detector import DetectorSettings, MarkerDetector
+from marker_detection.annotation import annotated
+from marker_detection.detector import DetectorSettings, MarkerDetector
+from state_machines.files import replace_file
 from surveillance_perception.stream.image_files import read_image
 from surveillance_runtime.command_line import CommandParser
 from surveillance_runtime.files import in_one_line

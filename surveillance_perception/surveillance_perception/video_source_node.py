@@ -10,9 +10,9 @@ from typing import Any
 from sensor_msgs.msg import CameraInfo, Image
 from std_msgs.msg import Header
 
-from surveillance_fsm.ros import ClockWait
+from marker_detection.camera_model import CameraModel
+from state_machines.ros import ClockWait
 from surveillance_perception.conversions import camera_to_ros, image_to_ros
-from surveillance_perception.detection.camera_model import CameraModel
 from surveillance_perception.stream.image_files import ImageArray, ImageError
 from surveillance_perception.stream.image_subscription import IMAGES_QOS
 from surveillance_perception.stream.video import FrameSource, open_source

@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from surveillance_fsm import files
+from state_machines import files
 from surveillance_runtime.suggestions import like
 
 RECORD, PLACE = 'mission.jsonl', 'place.yaml'

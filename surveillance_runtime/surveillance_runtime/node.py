@@ -38,8 +38,8 @@ from rclpy.service import Service
 from rclpy.subscription import Subscription
 from rclpy.timer import Timer
 
-from surveillance_fsm import Interrupt
-from surveillance_fsm.ros.waiting import CLIENT_QOS, SERVICE_QOS
+from state_machines import Interrupt
+from state_machines.ros.waiting import CLIENT_QOS, SERVICE_QOS
 from surveillance_runtime.configuration import (
     Configuration,
     RosArguments,

@@ -9,11 +9,6 @@ MOST_TILT = 0.1
 """A lidar that is tilted by more than this does not look along the floor, rad."""
 
 
-def not_empty(values: Sequence[str]) -> str | None:
-    """Ask for one entry at least, and for none that is empty."""
-    return None if values and all(values) else 'at least one name'
-
-
 def pose(values: Sequence[float]) -> str | None:
     """Ask for a place and a direction."""
     return None if len(values) == 3 else 'three numbers: x, y, yaw'
@@ -37,9 +32,3 @@ def rectangle(values: Sequence[float]) -> str | None:
     """Ask for the sides of an upright rectangle."""
     good = len(values) == 4 and values[0] < values[1] and values[2] < values[3]
     return None if good else 'four numbers [x_min, x_max, y_min, y_max], each pair rising'
-
-
-def odd_numbers(values: Sequence[int]) -> str | None:
-    """Ask for the sides of neighbourhoods around a pixel."""
-    good = values and all(each >= 3 and each % 2 for each in values)
-    return None if good else 'odd numbers from 3'

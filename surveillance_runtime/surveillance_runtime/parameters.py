@@ -12,6 +12,9 @@ A record of settings declares its fields where it defines them, and a node decla
         latency: float = 0.3  # no parameter
 
     drive = node.declare_fields(DriveSettings(), prefix='drive.')
+
+The records of the libraries in `libs/` declare theirs in the same way, as plain metadata of their
+fields, without knowing of nodes: `marker_detection.settings` says what stands there.
 """
 
 from __future__ import annotations
@@ -181,20 +184,18 @@ def parameter(
         **more: Other attributes of `ParameterSpec`; `name` where the parameter's is not the
             field's behind the prefix.
     """
-    spec = _field_spec(default, description, minimum, maximum, **more)
-    declared: T = field(default=default, metadata={'parameter': spec})
+    spec = {'description': description, 'minimum': minimum, 'maximum': maximum, **more}
+    declared: T = field(default=default, metadata={'parameter': {'default': default, **spec}})
     return declared
 
 
 def converted(make: Callable[[Any], T], default: Any, description: str, **more: Any) -> T:
     """Return as `parameter` a field whose value is made from the parameter's."""
-    metadata = {'parameter': _field_spec(default, description, **more), 'make': make}
-    declared: T = field(default_factory=lambda: make(default), metadata=metadata)
+    spec = {'default': default, 'description': description, **more}
+    declared: T = field(
+        default_factory=lambda: make(default), metadata={'parameter': spec, 'make': make}
+    )
     return declared
-
-
-def _field_spec(*declared: Any, name: str = '', **more: Any) -> ParameterSpec:
-    return ParameterSpec(name, *declared, **more)
 
 
 def parameters(record: Callable[[], T], prefix: str = '') -> T:
@@ -220,9 +221,10 @@ def specs_of(
         if (inner := each.metadata.get('parameters')) is not None:
             yield from specs_of(value, prefix + inner, without)
         elif spec := each.metadata.get('parameter'):
-            default = spec.default if 'make' in each.metadata else value
+            default = spec['default'] if 'make' in each.metadata else value
             default = list(default) if isinstance(default, tuple) else default
-            yield replace(spec, name=spec.name or prefix + each.name, default=default)
+            name = spec.get('name') or prefix + each.name
+            yield ParameterSpec(**{**spec, 'name': name, 'default': default})
 
 
 def with_values(record: Record, values: Mapping[str, Any], prefix: str = '') -> Record:
@@ -242,9 +244,9 @@ def with_values(record: Record, values: Mapping[str, Any], prefix: str = '') -> 
         spec = each.metadata.get('parameter')
         if (inner := each.metadata.get('parameters')) is not None:
             changed[each.name] = with_values(getattr(record, each.name), values, prefix + inner)
-        elif spec and (name := spec.name or prefix + each.name) in values:
+        elif spec and (name := spec.get('name') or prefix + each.name) in values:
             value = values[name]
-            make = each.metadata.get('make') or (tuple if spec.element else None)
+            make = each.metadata.get('make') or (tuple if isinstance(value, list) else None)
             changed[each.name] = make(value) if make else value
     try:
         return replace(record, **changed)

@@ -1,4 +1,4 @@
-"""The quality-of-service profiles of topics; those of services are in `surveillance_fsm.ros`."""
+"""The quality-of-service profiles of topics; those of services are in `state_machines.ros`."""
 
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 from rclpy.time import Time
 
-from surveillance_fsm import Interrupt
-from surveillance_fsm.ros import ClockWait
+from state_machines import Interrupt
+from state_machines.ros import ClockWait
 from surveillance_interfaces.msg import MarkerDetectionArray
 from surveillance_runtime.node import PatrolNode
 

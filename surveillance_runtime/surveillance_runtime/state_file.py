@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-from surveillance_fsm import Interrupt
+from state_machines import Interrupt
 from surveillance_runtime.files import KeptFile
 from surveillance_runtime.node import PatrolNode
 

@@ -1,6 +1,6 @@
 """What callbacks of a `PatrolNode` await while the executor goes on: work in order, and events.
 
-What any node can wait for is in `surveillance_fsm.ros`.
+What any node can wait for is in `state_machines.ros`.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from typing import Any
 
 from rclpy.task import Future
 
-from surveillance_fsm.ros.waiting import reported, wake_executor
+from state_machines.ros.waiting import reported, wake_executor
 from surveillance_runtime.node import PatrolNode
 
 

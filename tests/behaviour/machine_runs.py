@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from surveillance_behaviour.decision import DecisionSettings
+from patrol_policy.decision import DecisionSettings
+from state_machines.testing import watching
 from surveillance_behaviour.experience import Experience
 from surveillance_behaviour.machines import MACHINES
 from surveillance_behaviour.mission.mission import Mission, MissionSettings
 from surveillance_behaviour.mission.mission_log import (
     MissionRecord,
 )
-from surveillance_fsm.testing import watching
 
 from .scripted_world import World
 

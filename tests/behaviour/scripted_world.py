@@ -11,16 +11,16 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
+from patrol_policy.decision import NowhereToGoError
+from patrol_policy.world import Decision
+from state_machines import Interrupt
+from state_machines.exceptions import CallError, CallInterruptedError, UnavailableError
 from surveillance_behaviour.charging import BatteryMonitor
 from surveillance_behaviour.decider import Decider
-from surveillance_behaviour.decision import NowhereToGoError
 from surveillance_behaviour.experience import Experience
 from surveillance_behaviour.mission.mission import Mission, MissionSettings
 from surveillance_behaviour.mission.mission_log import MissionRecord
 from surveillance_behaviour.peers.ports import Point, Ports, UnknownPlaceError
-from surveillance_behaviour.policy.world import Decision
-from surveillance_fsm import Interrupt
-from surveillance_fsm.exceptions import CallError, CallInterruptedError, UnavailableError
 from surveillance_ontology.patrol_ontology import Snapshot
 from tests.seven_rooms import SEVEN_ROOMS
 

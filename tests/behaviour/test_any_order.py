@@ -16,12 +16,12 @@ from hypothesis.stateful import (
     run_state_machine_as_test,
 )
 
-from surveillance_behaviour.decision import DecisionSettings
+from patrol_policy.decision import DecisionSettings
+from patrol_policy.world import Decision
+from state_machines.exceptions import CallError, UnavailableError
 from surveillance_behaviour.machines import MACHINES
 from surveillance_behaviour.mission.mission import MissionSettings
 from surveillance_behaviour.mission.mission_log import MissionRecord, read
-from surveillance_behaviour.policy.world import Decision
-from surveillance_fsm.exceptions import CallError, UnavailableError
 
 from .scripted_world import World
 

@@ -6,17 +6,16 @@ from pathlib import Path
 
 import pytest
 
-from surveillance_behaviour.peers.armor_knowledge import ArmorKnowledge, Whereabouts
-from surveillance_fsm import Interrupt
-from surveillance_fsm.exceptions import CallError, CallInterruptedError
-from surveillance_ontology.armor.access import DATA
-from surveillance_ontology.armor.client import (
+from armor_service.client import (
     ArmorClient,
     ArmorServiceCallError,
     InProcessTransport,
 )
-from surveillance_ontology.armor.service import ArmorService
-from surveillance_ontology.patrol_ontology import PatrolOntology, Snapshot
+from armor_service.service import ArmorService
+from state_machines import Interrupt
+from state_machines.exceptions import CallError, CallInterruptedError
+from surveillance_behaviour.peers.armor_knowledge import ArmorKnowledge, Whereabouts
+from surveillance_ontology.patrol_ontology import DATA, PatrolOntology, Snapshot
 from surveillance_runtime.place import read_place_file
 
 PLACE = read_place_file(Path(__file__).parents[2] / 'config' / 'seven_rooms.yaml').place

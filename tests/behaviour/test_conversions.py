@@ -10,8 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from sensor_msgs.msg import BatteryState
 
+from patrol_policy.world import Decision
 from surveillance_behaviour import conversions
-from surveillance_behaviour.policy.world import Decision
 from surveillance_interfaces.msg import Decision as DecisionMessage
 from surveillance_runtime.conversions import point_from, point_message, point_messages
 

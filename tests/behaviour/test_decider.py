@@ -12,11 +12,11 @@ from pathlib import Path
 
 import pytest
 
+from patrol_policy.decision import REQUEST, DecisionSettings, NowhereToGoError
+from state_machines import Interrupt
 from surveillance_behaviour.decider import Decider
-from surveillance_behaviour.decision import REQUEST, DecisionSettings, NowhereToGoError
 from surveillance_behaviour.experience import Experience
 from surveillance_behaviour.mission.mission_log import MissionRecord
-from surveillance_fsm import Interrupt
 
 from .scripted_world import World
 

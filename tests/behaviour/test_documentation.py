@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from state_machines.export import to_mermaid
 from surveillance_behaviour.machines import MACHINES
-from surveillance_fsm.export import to_mermaid
 
 from .scripted_world import World
 

@@ -7,9 +7,9 @@ from collections.abc import Callable, Iterator
 
 import pytest
 
-import surveillance_fsm as fsm
+import state_machines as fsm
+from state_machines.exceptions import CallError
 from surveillance_behaviour.machines import MACHINES
-from surveillance_fsm.exceptions import CallError
 
 from .machine_runs import CALLS, Run
 from .scripted_world import World, fails, started_again

@@ -8,7 +8,8 @@ from typing import Any
 
 import pytest
 
-from surveillance_behaviour.decision import Rules
+from patrol_policy.decision import Rules
+from state_machines.exceptions import CallError, UnavailableError
 from surveillance_behaviour.experience import Experience
 from surveillance_behaviour.mission.mission_log import (
     MissionRecord,
@@ -16,7 +17,6 @@ from surveillance_behaviour.mission.mission_log import (
     read_all,
     summarize,
 )
-from surveillance_fsm.exceptions import CallError, UnavailableError
 
 from .machine_runs import Killed, Run, settings
 from .scripted_world import SEVEN_ROOMS, World

@@ -5,9 +5,9 @@ from __future__ import annotations
 import threading
 from typing import Any
 
-from surveillance_behaviour.policy.world import Decision
+from patrol_policy.world import Decision
+from state_machines.exceptions import CallError, CallInterruptedError
 from surveillance_behaviour.reasoner_node import Reasoner
-from surveillance_fsm.exceptions import CallError, CallInterruptedError
 from surveillance_interfaces.srv import Reason
 
 

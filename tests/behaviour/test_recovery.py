@@ -7,9 +7,9 @@ from itertools import pairwise
 
 import pytest
 
-import surveillance_fsm as fsm
+import state_machines as fsm
+from state_machines.exceptions import CallError, UnavailableError
 from surveillance_behaviour.peers.ports import Point
-from surveillance_fsm.exceptions import CallError, UnavailableError
 
 from .machine_runs import CALLS, Run, visited
 from .scripted_world import POSITIONS, SEVEN_ROOMS, World, fails, started_again

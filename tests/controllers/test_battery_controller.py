@@ -12,8 +12,8 @@ from sensor_msgs.msg import BatteryState
 from std_msgs.msg import Bool, UInt8
 from std_srvs.srv import Empty
 
+from state_machines.ros import ServiceCaller
 from surveillance_controllers.battery_controller_node import BatteryController
-from surveillance_fsm.ros import ServiceCaller
 from surveillance_interfaces.srv import ConsoleCommand
 from surveillance_runtime.qos import STATE_QOS
 

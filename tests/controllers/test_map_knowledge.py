@@ -8,9 +8,9 @@ from typing import Any
 import pytest
 from geometry_msgs.msg import Point
 
+from state_machines import Interrupt
+from state_machines.ros import ServiceCaller
 from surveillance_controllers.map_knowledge import MapKnowledge
-from surveillance_fsm import Interrupt
-from surveillance_fsm.ros import ServiceCaller
 from surveillance_interfaces.srv import AddRoom
 from surveillance_ontology.armor_server_node import ArmorServer
 from surveillance_ontology.ontology_map_builder_node import OntologyMapBuilder

@@ -16,12 +16,12 @@ from builtin_interfaces.msg import Time
 from geometry_msgs.msg import PoseWithCovarianceStamped
 from nav_msgs.msg import OccupancyGrid
 
+from state_machines import Interrupt
+from state_machines.ros import CallInterruptedError, GoalCaller, GoalEnd, UnavailableError
 from surveillance_controllers.controller_parameters import MotionSettings
 from surveillance_controllers.motion import nav2 as nav2_motion
 from surveillance_controllers.motion.arrival import MotionFailedError
 from surveillance_controllers.motion_controller_node import MotionController
-from surveillance_fsm import Interrupt
-from surveillance_fsm.ros import CallInterruptedError, GoalCaller, GoalEnd, UnavailableError
 from surveillance_interfaces.action import FollowPath
 from surveillance_runtime.conversions import point_messages
 from surveillance_runtime.node import PatrolNode

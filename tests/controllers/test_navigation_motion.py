@@ -13,10 +13,10 @@ import pytest
 from geometry_msgs.msg import Point, PoseStamped
 from std_msgs.msg import UInt32
 
+from state_machines import Interrupt
+from state_machines.ros import CallInterruptedError, GoalCaller, ServiceCaller
 from surveillance_controllers.motion_controller_node import MotionController
 from surveillance_controllers.planner_controller_node import PlannerController
-from surveillance_fsm import Interrupt
-from surveillance_fsm.ros import CallInterruptedError, GoalCaller, ServiceCaller
 from surveillance_interfaces.action import ComputePath, Control, FollowPath, Plan
 from surveillance_interfaces.msg import OntologyMap, OntologyPlace, RoomConnection
 from surveillance_interfaces.srv import PlaceObstacle, PushRobot, ReferenceName, SetDoor

@@ -15,6 +15,7 @@ from geometry_msgs.msg import PoseWithCovarianceStamped, Quaternion, TransformSt
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import LaserScan
 
+from state_machines import Interrupt
 from surveillance_controllers.controller_parameters import MotionSettings
 from surveillance_controllers.geometry import Mount, Scan, composed
 from surveillance_controllers.motion.arrival import MotionFailedError
@@ -24,7 +25,6 @@ from surveillance_controllers.motion.navigation_motion import NavigationMotion
 from surveillance_controllers.motion.navigator import Navigator
 from surveillance_controllers.motion.path_following import Velocity
 from surveillance_controllers.motion.transforms import ScanReader
-from surveillance_fsm import Interrupt
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.parameters import ParameterError
 from surveillance_runtime.qos import SENSOR_QOS

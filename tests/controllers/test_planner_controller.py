@@ -9,9 +9,9 @@ import pytest
 from geometry_msgs.msg import Point
 from std_msgs.msg import String
 
+from state_machines import Interrupt
+from state_machines.ros import CallInterruptedError, GoalCaller, ServiceCaller
 from surveillance_controllers.planner_controller_node import PlannerController
-from surveillance_fsm import Interrupt
-from surveillance_fsm.ros import CallInterruptedError, GoalCaller, ServiceCaller
 from surveillance_interfaces.action import ComputePath
 from surveillance_interfaces.srv import ConsoleCommand
 from surveillance_runtime.qos import STATE_QOS

@@ -18,12 +18,12 @@ from prompt_toolkit.input.vt100 import Vt100Input
 from prompt_toolkit.output import DummyOutput
 from std_msgs.msg import String, UInt8
 
+from state_machines.ros import GoalCaller
 from surveillance_controllers.battery_controller_node import BatteryController
 from surveillance_controllers.manual.commands import BATTERY, Grammar
 from surveillance_controllers.manual.prompt import Console
 from surveillance_controllers.manual.terminal import TerminalLines, WordCompleter
 from surveillance_controllers.planner_controller_node import PlannerController
-from surveillance_fsm.ros import GoalCaller
 from surveillance_interfaces.action import ComputePath
 from surveillance_operator.console_node import ConsoleNode
 from surveillance_runtime.logging import LINES_AT_ONCE

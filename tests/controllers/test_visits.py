@@ -9,9 +9,9 @@ import pytest
 from geometry_msgs.msg import Point
 from std_msgs.msg import String
 
+from state_machines.ros import GoalCaller, ServiceCaller
 from surveillance_controllers.motion_controller_node import MotionController
 from surveillance_controllers.planner_controller_node import PlannerController
-from surveillance_fsm.ros import GoalCaller, ServiceCaller
 from surveillance_interfaces.action import Control, Plan
 from surveillance_interfaces.msg import RobotPlace
 from surveillance_interfaces.srv import ConsoleCommand, ReferenceName

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 CHECKOUT = Path(__file__).resolve().parents[2]
-EXAMPLES = sorted((CHECKOUT / 'examples').glob('[0-9]*.py'))
+EXAMPLES = sorted([*CHECKOUT.glob('examples/*.py'), *CHECKOUT.glob('libs/*/examples/*.py')])
 
 
 @pytest.mark.parametrize('script', EXAMPLES, ids=lambda script: script.stem)

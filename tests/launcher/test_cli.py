@@ -37,7 +37,7 @@ from tests.launcher.conftest import ROOT
         (['--policy', 'x'], "unknown option '--policy': expected one of --help, --mode"),
         (['--behavior', 'patrol'], "unknown option '--behavior': expected '--behaviour'"),
         (['--web', '8123'], "unexpected word '8123'"),
-        (['test', '-x', 'tests/fsm/test_stat.py::test_x'], "expected '"),
+        (['test', '-x', 'libs/state_machines/tests/test_stat.py::test_x'], "expected '"),
         (['wacth'], "unknown command 'wacth': expected 'watch'"),
     ],
 )

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from launcher.environment import PACKAGES
+from launcher.environment import LIBRARIES, PACKAGES, requirements
 from tests.launcher.conftest import ROOT
 
 # Names under which distributions are imported, where they differ.
@@ -51,16 +51,14 @@ def imports(folder: Path) -> dict[str, Path]:
 
 
 def installed() -> set[str]:
-    project = tomllib.loads((ROOT / 'pyproject.toml').read_text())['project']
-    lists = [project['dependencies'], project['optional-dependencies']['test']]
-    return {
-        re.split(r'[\[<>=!~ ]', line)[0].lower().replace('_', '-')
-        for part in lists
-        for line in part
-    }
+    return {name_of(line) for line in requirements(ROOT, ('test',))}
 
 
-OWN = ('surveillance_interfaces', 'armor_api', 'launcher', 'tests')
+def name_of(line: str) -> str:
+    return re.split(r'[\[<>=!~ ]', line)[0].lower().replace('_', '-')
+
+
+OWN = (*LIBRARIES, 'surveillance_interfaces', 'armor_api', 'launcher', 'tests', 'libs')
 """What the checkout holds beside its packages."""
 
 
@@ -76,9 +74,35 @@ def test_every_import_is_installed_by_the_set_up(folder):
         assert distribution in known, f'{path} imports {name}'
 
 
+def needs(library: str) -> list[str]:
+    project = tomllib.loads((ROOT / 'libs' / library / 'pyproject.toml').read_text())['project']
+    return list(project['dependencies'])
+
+
+@pytest.mark.parametrize('library', LIBRARIES)
+def test_a_library_imports_only_what_its_own_project_names(library):
+    known = {library, *(name_of(line) for line in needs(library))}
+    known |= {name.replace('-', '_') for name in known}
+    for name, path in imports(ROOT / 'libs' / library / library).items():
+        if name in sys.stdlib_module_names or name in TYPES:
+            continue
+        if library == 'state_machines' and (path.parent.name == 'ros' or name == 'yaml'):
+            continue  # its extras
+        distribution = DISTRIBUTIONS.get(name, name).lower()
+        assert distribution in known, f'{path} imports {name}'
+
+
+def test_one_range_of_versions_serves_the_robot_and_all_libraries():
+    lines = [*requirements(ROOT, ()), *(line for name in LIBRARIES for line in needs(name))]
+    ranges: dict[str, set[str]] = {}
+    for line in lines:
+        ranges.setdefault(name_of(line), set()).add(line)
+    assert [found for found in ranges.values() if len(found) > 1] == []
+
+
 def test_the_set_up_itself_needs_the_standard_library_alone(tmp_path):
     # A Python without any package, in a copy without those that need one.
-    for part in ('launcher', 'surveillance_runtime', 'surveillance_fsm'):
+    for part in ('launcher', 'surveillance_runtime', 'libs/state_machines'):
         shutil.copytree(ROOT / part, tmp_path / part)
     modules = ('cli', 'run', 'environment', 'instance_lock', 'progress', 'system')
     program = ';'.join(f'import launcher.{module}' for module in modules)

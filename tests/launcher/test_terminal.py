@@ -19,7 +19,7 @@ from pathlib import Path
 import pytest
 from geometry_msgs.msg import Point
 
-from surveillance_fsm.ros import GoalCaller
+from state_machines.ros import GoalCaller
 from surveillance_interfaces.action import ComputePath, FollowPath
 from tests.launcher.conftest import USER_ENVIRON
 

@@ -10,8 +10,8 @@ import numpy as np
 from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped
 from nav_msgs.msg import OccupancyGrid
 
+from state_machines.ros import GoalAbortedError, GoalRun, GoalServer
 from surveillance_controllers.geometry import equally_spaced
-from surveillance_fsm.ros import GoalAbortedError, GoalRun, GoalServer
 from surveillance_runtime.conversions import pose_estimate, pose_from, pose_message
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.place import occupancy_grid, read_place_file

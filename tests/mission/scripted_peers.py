@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from geometry_msgs.msg import Point
 
+from state_machines.ros import GoalAbortedError, GoalRun, GoalServer
 from surveillance_controllers.map_knowledge import MapKnowledge
 from surveillance_controllers.motion.place_recording import PlaceRecorder
-from surveillance_fsm.ros import GoalAbortedError, GoalRun, GoalServer
 from surveillance_interfaces.action import ComputePath, Control, FollowPath, Plan
 from surveillance_runtime.node import PatrolNode
 

@@ -18,8 +18,8 @@ from typing import Any, NamedTuple
 import pytest
 from rosgraph_msgs.msg import Clock
 
-from surveillance_fsm.clock import Interrupt
-from surveillance_fsm.ros import ClockWait
+from state_machines.clock import Interrupt
+from state_machines.ros import ClockWait
 
 CARRIES_ON = ('surveillance', 'patrol', 'machine', ' goal', '_recharge')
 """Ends of the names of threads whose sleep means that nothing else is under way."""

@@ -10,8 +10,8 @@ from typing import Any
 
 import pytest
 
-from surveillance_fsm.clock import Interrupt
-from surveillance_fsm.ros import ClockWait
+from state_machines.clock import Interrupt
+from state_machines.ros import ClockWait
 from surveillance_runtime.node import PatrolNode
 
 from . import simulated_time as module

@@ -20,12 +20,11 @@ from armor_api.armor_exceptions import (
 from armor_api.armor_manipulation_client import ArmorManipulationClient
 from armor_api.armor_query_client import ArmorQueryClient
 from armor_api.armor_utils_client import ArmorUtilsClient
-from surveillance_ontology.armor import client
-from surveillance_ontology.armor.client import InProcessTransport
-from surveillance_ontology.armor.protocol import DirectiveRequest, DirectiveResponse
+from armor_service import client
+from armor_service.client import InProcessTransport
+from armor_service.protocol import DirectiveRequest, DirectiveResponse
+from libs.armor_service.tests.seven_rooms import FIXTURES, ONTOLOGY
 from surveillance_ontology.armor_server_node import ArmorServer
-
-from .seven_rooms import FIXTURES, ONTOLOGY
 
 FOUR_CLASSES = FIXTURES / 'four_classes.owl'
 BASE = 'http://www.semanticweb.org/emarolab/pyarmor/test'

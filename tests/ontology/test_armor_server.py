@@ -9,10 +9,11 @@ from typing import Any
 import pytest
 from rclpy.task import Future
 
+from armor_service.protocol import DirectiveRequest
+from libs.armor_service.tests.seven_rooms import IRI, ONTOLOGY, build_seven_rooms, reach
 from surveillance_interfaces.srv import (
     ArmorDirective,
 )
-from surveillance_ontology.armor.protocol import DirectiveRequest
 from surveillance_ontology.armor_client import (
     ArmorClient,
     ArmorServiceCallError,
@@ -22,8 +23,6 @@ from surveillance_ontology.armor_client import (
 from surveillance_ontology.armor_server_node import ArmorServer
 from surveillance_runtime.launch_protocol import NotNowError
 from surveillance_runtime.node import PatrolNode
-
-from .seven_rooms import IRI, ONTOLOGY, build_seven_rooms, reach
 
 
 def test_directives_travel_both_ways(graph: Any, tmp_path: Path) -> None:

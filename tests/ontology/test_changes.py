@@ -7,12 +7,13 @@ import threading
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from armor_service.changes import LARGE, ChangeFeed
+from armor_service.client import ArmorClient, InProcessTransport
+from armor_service.facts import FactSet, ShortFact, parse_fact
+from armor_service.service import ArmorService
+from armor_service.store import decode, encode
+from libs.armor_service.tests.seven_rooms import IRI, ONTOLOGY, asker, build_seven_rooms
 from surveillance_interfaces.msg import ArmorDirectiveRes
-from surveillance_ontology.armor.changes import LARGE, ChangeFeed
-from surveillance_ontology.armor.client import ArmorClient, InProcessTransport
-from surveillance_ontology.armor.facts import FactSet, ShortFact, parse_fact
-from surveillance_ontology.armor.service import ArmorService
-from surveillance_ontology.armor.store import decode, encode
 from surveillance_ontology.conversions import (
     changes_from_ros,
     changes_to_ros,
@@ -21,8 +22,6 @@ from surveillance_ontology.conversions import (
     request_to_ros,
     response_from_ros,
 )
-
-from .seven_rooms import IRI, ONTOLOGY, asker, build_seven_rooms
 
 
 def test_changes_are_numbered_and_say_what_is_derived(

@@ -7,8 +7,8 @@ import inspect
 import re
 from pathlib import Path
 
-from surveillance_ontology.armor.access import Settings
-from surveillance_ontology.armor.client import Manipulation, Operation, Query, Utils
+from armor_service.access import Settings
+from armor_service.client import Manipulation, Operation, Query, Utils
 
 DOCS = Path(__file__).parents[2] / 'docs'
 MANUAL = (DOCS / 'armor.md').read_text(encoding='utf-8')

@@ -11,19 +11,18 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from surveillance_ontology.armor.client import (
+from armor_service.client import (
     ArmorClient,
     ArmorServiceCallError,
     Batch,
     InProcessTransport,
 )
-from surveillance_ontology.armor.protocol import DirectiveRequest
-from surveillance_ontology.armor.service import ArmorService
+from armor_service.protocol import DirectiveRequest
+from armor_service.service import ArmorService
+from libs.armor_service.tests.seven_rooms import IRI, ONTOLOGY, SEVEN_ROOMS
 from surveillance_ontology.map_keeper import MapKeeper, Reports, RoomNote, Source, extended
 from surveillance_ontology.patrol_ontology import PatrolOntology, closed_doors, shown_doors
 from surveillance_runtime.place import Place, PlaceError, description_of, make_place
-
-from .seven_rooms import IRI, ONTOLOGY, SEVEN_ROOMS
 
 ROOMS = [*SEVEN_ROOMS, 'N1', 'N2']
 DOORS = [*sorted({door for doors in SEVEN_ROOMS.values() for door in doors}), 'X1', 'X2']

@@ -7,7 +7,8 @@ from typing import Any
 
 import pytest
 
-from surveillance_fsm.ros import ServiceCaller
+from libs.armor_service.tests.seven_rooms import SEVEN_ROOMS, reach
+from state_machines.ros import ServiceCaller
 from surveillance_interfaces.msg import OntologyMap, OntologyPlace, RoomConnection
 from surveillance_interfaces.srv import (
     AddRoom,
@@ -26,8 +27,6 @@ from surveillance_ontology.patrol_ontology import PatrolOntology
 from surveillance_runtime.conversions import point_message
 from surveillance_runtime.parameters import ParameterError
 from surveillance_runtime.qos import STATE_QOS
-
-from .seven_rooms import SEVEN_ROOMS, reach
 
 PLACE: dict[str, Any] = {
     **{f'map.{room}': doors for room, doors in SEVEN_ROOMS.items()},

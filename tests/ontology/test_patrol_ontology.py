@@ -9,19 +9,18 @@ from pathlib import Path
 
 import pytest
 
-from surveillance_ontology.armor.client import (
+from armor_service.client import (
     ArmorClient,
     ArmorServiceInternalError,
     InProcessTransport,
 )
-from surveillance_ontology.armor.service import ArmorService
+from armor_service.service import ArmorService
+from libs.armor_service.tests.seven_rooms import IRI, ONTOLOGY
 from surveillance_ontology.patrol_ontology import (
     OntologyNotReadyError,
     PatrolOntology,
 )
 from surveillance_runtime.place import read_place_file
-
-from .seven_rooms import IRI, ONTOLOGY
 
 PLACE = read_place_file(Path(__file__).parents[2] / 'config' / 'seven_rooms.yaml').place
 RULES = ('URGENT', 'CORRIDOR', 'ROOM')

@@ -9,9 +9,8 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from libs.armor_service.tests.seven_rooms import build_seven_rooms
 from surveillance_ontology.armor_client import ArmorClient, ArmorServiceCallError
-
-from .seven_rooms import build_seven_rooms
 
 
 def start(store: Path) -> subprocess.Popen[bytes]:

@@ -12,9 +12,9 @@ from rcl_interfaces.srv import SetParameters
 from rclpy.parameter import Parameter
 from std_srvs.srv import Trigger
 
-from surveillance_behaviour.decision import DecisionSettings
+from patrol_policy.decision import DecisionSettings
+from state_machines.exceptions import CallError
 from surveillance_behaviour.reasoner_node import Reasoner
-from surveillance_fsm.exceptions import CallError
 from surveillance_interfaces.srv import GoTo, MarkerRoutine, PlaceObstacle, SetDoor, WhyNot
 from surveillance_ontology.armor_server_node import ArmorServer
 from surveillance_ontology.ontology_map_builder_node import OntologyMapBuilder

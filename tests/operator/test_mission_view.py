@@ -13,8 +13,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from rich.console import Console
 
-from surveillance_behaviour.policy.world import Decision
-from surveillance_fsm import Interrupt
+from patrol_policy.world import Decision
+from state_machines import Interrupt
 from surveillance_operator.snapshot import Health, Snapshot, Status, changes
 from surveillance_operator.watch import raster
 from surveillance_operator.watch.raster import Frame, rasterise

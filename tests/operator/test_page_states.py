@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from surveillance_behaviour.policy.world import Decision
+from patrol_policy.world import Decision
 from surveillance_operator.page.hub import Hub
 from surveillance_operator.page.server import Page
 from surveillance_operator.snapshot import (

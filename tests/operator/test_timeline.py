@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from surveillance_behaviour.policy.world import Decision
+from patrol_policy.world import Decision
 from surveillance_operator.frames import Framer
 from surveillance_operator.recording.timeline import Timeline, TimelineWriter
 from surveillance_operator.snapshot import Snapshot, Status

@@ -12,9 +12,9 @@ from builtin_interfaces.msg import Time
 from geometry_msgs.msg import PoseWithCovarianceStamped
 from sensor_msgs.msg import JointState
 
+from armor_service.facts import parse_fact
 from surveillance_interfaces.action import ScanSurroundings
 from surveillance_interfaces.msg import MarkerDetection, MarkerDetectionArray
-from surveillance_ontology.armor.facts import parse_fact
 from surveillance_operator import mission_feed
 from surveillance_operator.mission_feed import MissionFeed
 from surveillance_operator.snapshot import Snapshot

@@ -19,16 +19,16 @@ from nav_msgs.msg import Odometry
 from sensor_msgs.msg import CompressedImage, Image
 from std_msgs.msg import Header
 
-from surveillance_perception import conversions
-from surveillance_perception.arm.trajectory import ArmState, motion_to
-from surveillance_perception.detection.camera_model import CameraModel
-from surveillance_perception.detection.pose import pose_of
-from surveillance_perception.stream.image_files import ImageError, decode_image
-from surveillance_perception.testing.marker_scene import (
+from marker_detection.camera_model import CameraModel
+from marker_detection.pose import pose_of
+from marker_detection.testing.marker_scene import (
     Panel,
     corners_in_camera,
     corners_in_image,
 )
+from surveillance_perception import conversions
+from surveillance_perception.arm.trajectory import ArmState, motion_to
+from surveillance_perception.stream.image_files import ImageError, decode_image
 from surveillance_runtime.robot_arm import ARM
 
 CAMERA = CameraModel.from_field_of_view(640, 480, math.radians(60))

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from benchmarks.damaged_messages import damaged, taken
-from surveillance_perception import MarkerDetector
+from marker_detection import MarkerDetector
 
 
 @pytest.mark.parametrize('seed', range(4))

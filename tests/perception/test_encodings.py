@@ -8,8 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from surveillance_perception import MarkerDetector
-from surveillance_perception.detection import dictionary_named
+from marker_detection import MarkerDetector, dictionary_named
 from surveillance_perception.stream.encodings import ENCODING_NAMES, image_of_pixels, printable
 from surveillance_perception.stream.image_files import ImageError, decode_image
 

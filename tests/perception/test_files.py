@@ -11,17 +11,17 @@ import numpy as np
 import pytest
 
 from benchmarks.backdrops import backdrop_of
-from surveillance_perception.detect_command import main
-from surveillance_perception.detection.camera_model import CameraModel
-from surveillance_perception.detection.dictionaries import dictionary_named
-from surveillance_perception.marker_registry import read_registry
-from surveillance_perception.stream.image_files import ImageError, decode_image, read_image
-from surveillance_perception.stream.video import open_source
-from surveillance_perception.testing.marker_scene import (
+from marker_detection.camera_model import CameraModel
+from marker_detection.dictionaries import dictionary_named
+from marker_detection.testing.marker_scene import (
     Degradation,
     Panel,
     image_of,
 )
+from surveillance_perception.detect_command import main
+from surveillance_perception.marker_registry import read_registry
+from surveillance_perception.stream.image_files import ImageError, decode_image, read_image
+from surveillance_perception.stream.video import open_source
 from surveillance_runtime.files import FileError
 
 CONFIG = Path(__file__).parents[2] / 'config'

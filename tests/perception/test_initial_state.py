@@ -12,9 +12,9 @@ from rcl_interfaces.msg import Log
 from std_msgs.msg import Int32
 from std_srvs.srv import Empty
 
+from state_machines.ros import GoalServer
 from surveillance_behaviour.initial_state_node import InitialState
 from surveillance_behaviour.map_from_markers import scan_peers
-from surveillance_fsm.ros import GoalServer
 from surveillance_interfaces.action import ScanSurroundings
 from surveillance_interfaces.msg import MarkerDetectionArray, OntologyMap
 from surveillance_interfaces.srv import MarkerRoutine, ReferenceName

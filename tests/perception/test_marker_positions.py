@@ -15,19 +15,19 @@ from sensor_msgs.msg import Image, JointState
 from std_msgs.msg import Header
 
 from benchmarks.backdrops import backdrop_of
+from marker_detection.camera_model import CameraModel
+from marker_detection.dictionaries import dictionary_named
+from marker_detection.testing.marker_scene import (
+    Degradation,
+    Panel,
+    image_of,
+)
 from surveillance_interfaces.msg import MarkerDetection, MarkerDetectionArray
 from surveillance_perception import aruco_detector_node
 from surveillance_perception.arm_controller_node import ArmController
 from surveillance_perception.aruco_detector_node import ArucoDetector
 from surveillance_perception.conversions import image_to_ros
-from surveillance_perception.detection.camera_model import CameraModel
-from surveillance_perception.detection.dictionaries import dictionary_named
 from surveillance_perception.marker_server_node import MarkerServer
-from surveillance_perception.testing.marker_scene import (
-    Degradation,
-    Panel,
-    image_of,
-)
 from surveillance_runtime.qos import SENSOR_QOS
 from surveillance_runtime.robot_arm import ARM
 

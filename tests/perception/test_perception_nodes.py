@@ -20,22 +20,22 @@ from std_msgs.msg import Bool, Header, Int32
 from trajectory_msgs.msg import JointTrajectory
 
 from benchmarks.backdrops import backdrop_of
-from surveillance_fsm import Interrupt
-from surveillance_fsm.ros import CallInterruptedError, GoalCaller, ServiceCaller
+from marker_detection.camera_model import CameraModel
+from marker_detection.dictionaries import dictionary_named
+from marker_detection.testing.marker_scene import (
+    Degradation,
+    Panel,
+    image_of,
+)
+from state_machines import Interrupt
+from state_machines.ros import CallInterruptedError, GoalCaller, ServiceCaller
 from surveillance_interfaces.action import ScanSurroundings
 from surveillance_interfaces.msg import MarkerDetectionArray
 from surveillance_interfaces.srv import MarkerRoutine, PointCamera, RoomInformation
 from surveillance_perception.arm_controller_node import ArmController
 from surveillance_perception.aruco_detector_node import IDS_QOS, ArucoDetector
 from surveillance_perception.conversions import camera_to_ros, image_to_ros
-from surveillance_perception.detection.camera_model import CameraModel
-from surveillance_perception.detection.dictionaries import dictionary_named
 from surveillance_perception.marker_server_node import MarkerServer
-from surveillance_perception.testing.marker_scene import (
-    Degradation,
-    Panel,
-    image_of,
-)
 from surveillance_perception.video_source_node import VideoSource
 from surveillance_runtime.parameters import ParameterError
 from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS

@@ -11,8 +11,8 @@ from rclpy.parameter import Parameter
 from std_msgs.msg import Int32
 from std_srvs.srv import Empty
 
+from state_machines.ros import ServiceCaller
 from surveillance_behaviour.initial_state_node import InitialState
-from surveillance_fsm.ros import ServiceCaller
 from surveillance_interfaces.msg import OntologyMap
 from surveillance_interfaces.srv import ReferenceName, RoomPosition, SetMarker
 from surveillance_ontology.armor_client import ArmorClient

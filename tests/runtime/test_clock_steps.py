@@ -14,7 +14,7 @@ from benchmarks.machine_faults import SteppedClock
 ROOT = Path(__file__).resolve().parents[2]
 WAITS = """
 import sys, threading, time
-from surveillance_fsm.ros import ClockWait
+from state_machines.ros import ClockWait
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.process import ExecutorThread
 import rclpy

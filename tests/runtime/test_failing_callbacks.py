@@ -13,8 +13,8 @@ from rclpy.qos import QoSProfile
 from std_msgs.msg import Int32
 from std_srvs.srv import Trigger
 
-from surveillance_fsm.ros import ServiceCaller
-from surveillance_fsm.ros.waiting import CLIENT_QOS
+from state_machines.ros import ServiceCaller
+from state_machines.ros.waiting import CLIENT_QOS
 from surveillance_runtime.logging import (
     LINES_AT_ONCE,
     LINES_PER_SECOND,

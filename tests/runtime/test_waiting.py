@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 
-from surveillance_fsm.ros import work_aside
+from state_machines.ros import work_aside
 from surveillance_runtime.waiting import AwaitedEvent, AwaitedWork
 
 

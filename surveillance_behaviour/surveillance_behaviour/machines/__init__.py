@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-import surveillance_fsm as fsm
+import state_machines as fsm
 from surveillance_behaviour.machines.patrol_machine import patrol_machine
 from surveillance_behaviour.machines.surveillance_machine import surveillance_machine
 from surveillance_behaviour.mission.mission import Mission

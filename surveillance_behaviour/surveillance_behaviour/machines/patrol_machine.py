@@ -12,8 +12,8 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
-import surveillance_fsm as fsm
-from surveillance_behaviour.decision import RECHARGE
+import state_machines as fsm
+from patrol_policy.decision import RECHARGE
 from surveillance_behaviour.machines.shared_states import (
     FAILED,
     PREEMPTED,

@@ -7,12 +7,12 @@ import math
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
-import surveillance_fsm as fsm
-from surveillance_behaviour.decision import NowhereToGoError
+import state_machines as fsm
+from patrol_policy.decision import NowhereToGoError
+from state_machines.exceptions import CallError, CallInterruptedError, UnavailableError
 from surveillance_behaviour.mission.mission import Mission
 from surveillance_behaviour.mission.recovery import Failure, Step
 from surveillance_behaviour.peers.ports import Point
-from surveillance_fsm.exceptions import CallError, CallInterruptedError, UnavailableError
 
 PREEMPTED = 'preempted'
 FAILED = 'failed'

@@ -9,7 +9,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
-import surveillance_fsm as fsm
+import state_machines as fsm
+from state_machines.clock import elapsed_of
 from surveillance_behaviour.machines.shared_states import (
     FAILED,
     PREEMPTED,
@@ -23,7 +24,6 @@ from surveillance_behaviour.machines.shared_states import (
 from surveillance_behaviour.mission.mission import Mission
 from surveillance_behaviour.mission.recovery import Step
 from surveillance_behaviour.peers.ports import Point
-from surveillance_fsm.clock import elapsed_of
 
 NOTE_SECONDS = 1.0
 """The shortest time between two notes of how far a place is explored, seconds."""

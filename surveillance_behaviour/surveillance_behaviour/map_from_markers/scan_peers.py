@@ -9,10 +9,10 @@ from typing import Any
 
 from std_msgs.msg import Int32
 
+from state_machines import Interrupt
+from state_machines.ros import CallError, ClockWait, GoalCaller, ServiceCaller, await_ready
 from surveillance_behaviour.conversions import place_note_from
 from surveillance_behaviour.map_from_markers.assembly import Survey, SurveyReport
-from surveillance_fsm import Interrupt
-from surveillance_fsm.ros import CallError, ClockWait, GoalCaller, ServiceCaller, await_ready
 from surveillance_interfaces.action import ScanSurroundings
 from surveillance_interfaces.msg import MarkerDetectionArray
 from surveillance_interfaces.srv import MarkerRoutine, RoomInformation

@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
+from patrol_policy.battery_reserve import Battery
+from patrol_policy.decision import DecisionSettings
+from patrol_policy.world import Decision
+from state_machines import Clock, Interrupt
+from state_machines.exceptions import CallError
 from surveillance_behaviour.charging import BatteryMonitor, charge
-from surveillance_behaviour.decision import DecisionSettings
 from surveillance_behaviour.mission.mission_log import MissionRecord, is_other_simulation
 from surveillance_behaviour.mission.recovery import Failure, Recovery, RecoveryLimits
 from surveillance_behaviour.peers.ports import Point, Ports
-from surveillance_behaviour.policy.battery_reserve import Battery
-from surveillance_behaviour.policy.world import Decision
-from surveillance_fsm import Clock, Interrupt
-from surveillance_fsm.exceptions import CallError
 from surveillance_runtime.files import FileError
 from surveillance_runtime.parameters import parameter, parameters
 

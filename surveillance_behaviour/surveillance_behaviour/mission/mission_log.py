@@ -44,8 +44,8 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from surveillance_behaviour.decision import RECHARGE
-from surveillance_fsm.files import parse_json
+from patrol_policy.decision import RECHARGE
+from state_machines.files import parse_json
 from surveillance_runtime.files import FileError, LineFile, read_file
 
 EVENTS: Mapping[str, tuple[str, ...]] = {

@@ -7,15 +7,15 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 
-import surveillance_fsm as fsm
-from surveillance_fsm.exceptions import CallError, CallInterruptedError, UnavailableError
-from surveillance_ontology.armor.client import (
+import state_machines as fsm
+from armor_service.client import (
     ArmorClient,
     ArmorError,
     ArmorServiceCallError,
     ArmorServiceInternalError,
     Transport,
 )
+from state_machines.exceptions import CallError, CallInterruptedError, UnavailableError
 from surveillance_ontology.patrol_ontology import OntologyNotReadyError, PatrolOntology, Snapshot
 
 

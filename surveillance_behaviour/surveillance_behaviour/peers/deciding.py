@@ -9,14 +9,14 @@ from typing import Any
 
 from rclpy.callback_groups import ReentrantCallbackGroup
 
+from patrol_policy.decision import DecisionSettings
+from patrol_policy.world import Decision
+from state_machines.exceptions import CallError
 from surveillance_behaviour import conversions
 from surveillance_behaviour.charging import BatteryMonitor
 from surveillance_behaviour.decider import Decider
-from surveillance_behaviour.decision import DecisionSettings
 from surveillance_behaviour.experience import Experience
 from surveillance_behaviour.peers.ports import Ontology, Places
-from surveillance_behaviour.policy.world import Decision
-from surveillance_fsm.exceptions import CallError
 from surveillance_interfaces.msg import Decision as DecisionMessage
 from surveillance_interfaces.srv import GoTo, WhyNot
 from surveillance_runtime.node import PatrolNode

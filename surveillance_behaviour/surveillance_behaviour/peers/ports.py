@@ -12,9 +12,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
-from surveillance_behaviour.policy.world import Decision
-from surveillance_fsm import Interrupt
-from surveillance_fsm.exceptions import CallError
+from patrol_policy.world import Decision
+from state_machines import Interrupt
+from state_machines.exceptions import CallError
 from surveillance_ontology.patrol_ontology import Snapshot
 
 Point = tuple[float, float, float]

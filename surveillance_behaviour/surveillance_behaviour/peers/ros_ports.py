@@ -17,17 +17,11 @@ from builtin_interfaces.msg import Time
 from std_msgs.msg import Bool, UInt8
 from std_srvs.srv import Empty
 
-import surveillance_fsm as fsm
-from surveillance_behaviour import conversions
-from surveillance_behaviour.charging import BatteryMonitor
-from surveillance_behaviour.decision import ANY, RECHARGE
-from surveillance_behaviour.mission.mission import Mission
-from surveillance_behaviour.mission.recovery import WAITING_FOR_HELP
-from surveillance_behaviour.peers.armor_knowledge import ArmorKnowledge, Whereabouts
-from surveillance_behaviour.peers.ports import Decisions, Ontology, Point, UnknownPlaceError
-from surveillance_behaviour.policy.world import Decision
-from surveillance_fsm import Interrupt
-from surveillance_fsm.ros import (
+import state_machines as fsm
+from patrol_policy.decision import ANY, RECHARGE
+from patrol_policy.world import Decision
+from state_machines import Interrupt
+from state_machines.ros import (
     CallError,
     CallInterruptedError,
     CallTimeoutError,
@@ -35,7 +29,13 @@ from surveillance_fsm.ros import (
     GoalCaller,
     ServiceCaller,
 )
-from surveillance_fsm.structure import Structure
+from state_machines.structure import Structure
+from surveillance_behaviour import conversions
+from surveillance_behaviour.charging import BatteryMonitor
+from surveillance_behaviour.mission.mission import Mission
+from surveillance_behaviour.mission.recovery import WAITING_FOR_HELP
+from surveillance_behaviour.peers.armor_knowledge import ArmorKnowledge, Whereabouts
+from surveillance_behaviour.peers.ports import Decisions, Ontology, Point, UnknownPlaceError
 from surveillance_interfaces.action import ComputePath, Control, FollowPath, Plan
 from surveillance_interfaces.msg import Decision as DecisionMessage
 from surveillance_interfaces.msg import MissionStatus, RobotPlace

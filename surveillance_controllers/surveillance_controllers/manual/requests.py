@@ -16,6 +16,7 @@ from typing import Any, Generic, TextIO, TypeVar
 
 from std_msgs.msg import String
 
+from state_machines import Interrupt
 from surveillance_controllers.manual.commands import (
     EXIT,
     HELP,
@@ -26,7 +27,6 @@ from surveillance_controllers.manual.commands import (
     ParsedCommand,
 )
 from surveillance_controllers.manual.prompt import Console
-from surveillance_fsm import Interrupt
 from surveillance_interfaces.srv import ConsoleCommand
 from surveillance_runtime.logging import print_lines
 from surveillance_runtime.node import PatrolNode

@@ -8,9 +8,9 @@ from typing import Protocol
 
 import numpy as np
 
+from state_machines.ros import GoalRun
 from surveillance_controllers.geometry import Points
 from surveillance_controllers.manual import commands
-from surveillance_fsm.ros import GoalRun
 
 
 class Motion(Protocol):

@@ -21,6 +21,7 @@ import numpy as np
 from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped
 from nav_msgs.msg import OccupancyGrid
 
+from state_machines.ros import CallError, CallInterruptedError, GoalCaller, GoalRun
 from surveillance_controllers import conversions
 from surveillance_controllers.controller_parameters import (
     MotionSettings,
@@ -32,7 +33,6 @@ from surveillance_controllers.map_knowledge import MapKnowledge
 from surveillance_controllers.motion.arrival import Motion, MotionFailedError, expect_place
 from surveillance_controllers.motion.place_recording import PlaceRecorder
 from surveillance_controllers.motion.place_regions import PlaceMap
-from surveillance_fsm.ros import CallError, CallInterruptedError, GoalCaller, GoalRun
 from surveillance_runtime.conversions import pose_from, pose_message
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.parameters import ParameterError

@@ -17,6 +17,8 @@ from geometry_msgs.msg import PoseWithCovarianceStamped
 from nav_msgs.msg import OccupancyGrid, Odometry
 from sensor_msgs.msg import LaserScan, PointCloud2
 
+from state_machines import Interrupt
+from state_machines.ros import CallError, GoalCaller, GoalRun
 from surveillance_controllers import conversions
 from surveillance_controllers.controller_parameters import (
     MotionSettings,
@@ -34,8 +36,6 @@ from surveillance_controllers.motion.path_following import DriveParameters, Velo
 from surveillance_controllers.motion.place_recording import PlaceRecorder
 from surveillance_controllers.motion.transforms import MapFrame, ScanReader
 from surveillance_controllers.planning.grid_planning import NoPathError
-from surveillance_fsm import Interrupt
-from surveillance_fsm.ros import CallError, GoalCaller, GoalRun
 from surveillance_interfaces.action import ComputePath
 from surveillance_interfaces.msg import DoorStates
 from surveillance_runtime.conversions import (

@@ -9,10 +9,10 @@ import time
 from builtin_interfaces.msg import Time
 from std_msgs.msg import Header
 
+from state_machines import Interrupt
 from surveillance_controllers.geometry import Points
 from surveillance_controllers.map_knowledge import MapKnowledge, answered, keep_up
 from surveillance_controllers.motion.arrival import nearest_place
-from surveillance_fsm import Interrupt
 from surveillance_interfaces.msg import OntologyMap, RobotPlace
 from surveillance_ontology.armor_client import FactSubscription
 from surveillance_runtime.conversions import nanoseconds_of

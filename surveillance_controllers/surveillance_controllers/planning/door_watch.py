@@ -9,9 +9,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from state_machines import Interrupt
+from state_machines.ros import ServiceCaller
 from surveillance_controllers.map_knowledge import MapKnowledge, keep_up
-from surveillance_fsm import Interrupt
-from surveillance_fsm.ros import ServiceCaller
 from surveillance_interfaces.msg import DoorStates
 from surveillance_interfaces.srv import SetDoor
 from surveillance_ontology.patrol_ontology import OntologyNotReadyError

@@ -14,6 +14,8 @@ from nav_msgs.msg import OccupancyGrid
 from numpy.typing import ArrayLike, NDArray
 from sensor_msgs.msg import PointCloud2
 
+from state_machines import Interrupt
+from state_machines.ros import GoalAbortedError, GoalRun
 from surveillance_controllers import conversions
 from surveillance_controllers.controller_parameters import door_segments
 from surveillance_controllers.geometry import Points, Pose, point_of
@@ -24,8 +26,6 @@ from surveillance_controllers.planning.grid_planning import (
     NoPathError,
     PlanningParameters,
 )
-from surveillance_fsm import Interrupt
-from surveillance_fsm.ros import GoalAbortedError, GoalRun
 from surveillance_runtime.conversions import (
     points_from_cloud,
     pose_of_serialized,

@@ -32,8 +32,8 @@ from starlette.routing import Mount, Route
 from starlette.staticfiles import StaticFiles
 from starlette.types import ASGIApp, Receive, Scope, Send
 
-from surveillance_fsm.exceptions import CallError
-from surveillance_fsm.files import parse_json
+from state_machines.exceptions import CallError
+from state_machines.files import parse_json
 from surveillance_operator.page.hub import Hub
 
 STATIC = Path(__file__).with_name('static')

@@ -14,7 +14,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from surveillance_fsm.files import parse_json
+from state_machines.files import parse_json
 from surveillance_operator.frames import Framer, Parts, lengthen
 from surveillance_operator.snapshot import Snapshot
 from surveillance_runtime.files import FileError, LineFile

@@ -26,7 +26,7 @@ from rich.segment import Segment
 from rich.style import Style
 from rich.text import Text
 
-from surveillance_fsm import Interrupt
+from state_machines import Interrupt
 from surveillance_operator.frames import health
 from surveillance_operator.snapshot import Snapshot, why
 from surveillance_operator.watch import raster

@@ -15,7 +15,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from surveillance_runtime.image_effects import Light, glare, shadow, streak, vignette
+from marker_detection.testing.image_effects import Light, glare, shadow, streak, vignette
 from surveillance_runtime.parameters import parameter
 
 Array = npt.NDArray[np.float64]

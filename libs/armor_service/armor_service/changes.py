@@ -1,0 +1,260 @@
+"""Changes of an ontology: what is to change, what was asserted when, and who is told of it.
+
+A change that a directive asks for is a value: it waits in a buffer, is applied, and goes into the
+journal. What it changed is told by the knowledge base; `History` keeps it to go back by, and
+`ChangeFeed` until it is sent to subscribers.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections import deque
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+from armor_service.facts import FactChange
+from armor_service.rendering import short_facts
+from owl_reasoner.knowledge_base import Changes, KnowledgeBase
+from owl_reasoner.owl.axioms import (
+    Axiom,
+    DataPropertyAssertion,
+    ObjectPropertyAssertion,
+)
+
+AHEAD = 1.0
+"""Seconds by which the clock of who asks for the past may be ahead of the server's."""
+LARGE = 2000
+"""Facts in one change from which on it is only counted."""
+KEPT = 100
+"""Changes that wait for subscribers at most; older ones are dropped, which leaves a gap."""
+
+
+@dataclass(frozen=True, slots=True)
+class AddAxiom:
+    """Assert an axiom; nothing happens when it is asserted already."""
+
+    axiom: Axiom
+
+
+@dataclass(frozen=True, slots=True)
+class RemoveAxiom:
+    """Retract an axiom; nothing happens when it is not asserted."""
+
+    axiom: Axiom
+
+
+@dataclass(frozen=True, slots=True)
+class SetAssertion:
+    """Assert a value as the only one that the individual has for the property."""
+
+    axiom: ObjectPropertyAssertion | DataPropertyAssertion
+
+    def others(self, kb: KnowledgeBase) -> list[Axiom]:
+        """Return the assertions of other values."""
+        axiom = self.axiom
+        found = kb.axioms_about(axiom.subject)
+        return [
+            other
+            for other in found
+            if type(other) is type(axiom)
+            and (other.prop, other.subject) == (axiom.prop, axiom.subject)
+            and other != axiom
+        ]
+
+
+@dataclass(frozen=True, slots=True)
+class RenameEntity:
+    """Give an entity another IRI everywhere; merges with an entity that has it already."""
+
+    kind: str
+    old: str
+    new: str
+
+
+@dataclass(frozen=True, slots=True)
+class RemoveEntity:
+    """Retract whatever is asserted of an entity."""
+
+    kind: str
+    iri: str
+
+
+Change = AddAxiom | RemoveAxiom | SetAssertion | RenameEntity | RemoveEntity
+
+
+def apply_all(kb: KnowledgeBase, changes: Iterable[Change]) -> None:
+    """Carry out changes in order; retractions and the assertions behind them are one batch."""
+    removed: list[Axiom] = []
+    added: list[Axiom] = []
+    for change in changes:
+        if isinstance(change, AddAxiom):
+            added.append(change.axiom)
+            continue
+        if added or not isinstance(change, RemoveAxiom):
+            kb.change(added, removed)
+            added, removed = [], []
+        if isinstance(change, RemoveAxiom):
+            removed.append(change.axiom)
+        elif isinstance(change, SetAssertion):
+            added, removed = [change.axiom], change.others(kb)
+        elif isinstance(change, RenameEntity):
+            kb.rename(change.kind, change.old, change.new)
+        else:
+            kb.remove_entity(change.kind, change.iri)
+    kb.change(added, removed)
+
+
+@dataclass(frozen=True, slots=True)
+class PastChange:
+    """One change of what is asserted.
+
+    Attributes:
+        time: When, seconds since the epoch by the server's clock.
+        added: Axioms that came.
+        removed: Axioms that went.
+    """
+
+    time: float
+    added: tuple[Axiom, ...]
+    removed: tuple[Axiom, ...]
+
+
+class History:
+    """The changes of one ontology, as many as fit.
+
+    Args:
+        since: From when on all changes are known, seconds since the epoch.
+        most: Axioms that are kept, all changes together; the oldest changes go first.
+
+    Attributes:
+        since: From when on all changes are known.
+        changes: The changes, oldest first.
+    """
+
+    def __init__(self, since: float = 0.0, most: int = 20_000) -> None:
+        self.since = since
+        self.changes: deque[PastChange] = deque()
+        self._most = most
+        self._count = 0
+
+    def note(self, time: float, changes: Changes) -> None:
+        """Take in what a knowledge base tells; derived facts follow from the asserted ones."""
+        added = tuple(axiom for axiom, derived in changes.added if not derived)
+        removed = tuple(axiom for axiom, derived in changes.removed if not derived)
+        if added or removed:
+            self.append(PastChange(time, added, removed))
+
+    def append(self, change: PastChange) -> None:
+        """Take in a change; what is there was before it, whatever the clock said."""
+        self.tell_time(change.time)
+        self.changes.append(change)
+        self._count += len(change.added) + len(change.removed)
+        while self._count > self._most:
+            oldest = self.changes.popleft()
+            self._count -= len(oldest.added) + len(oldest.removed)
+            self.since = oldest.time
+
+    def tell_time(self, now: float) -> None:
+        """Take what is kept with a clock that was set back: it is as long ago as it was."""
+        ahead = (self.changes[-1].time if self.changes else self.since) - now
+        if ahead > 0.0:
+            self.since -= ahead
+            moved = [replace(change, time=change.time - ahead) for change in self.changes]
+            self.changes = deque(moved)
+
+    def at(self, time: float, present: Iterable[Axiom], now: float) -> list[Axiom]:
+        """Return what was asserted at a time.
+
+        Args:
+            time: When, seconds since the epoch by the server's clock.
+            present: What is asserted now.
+            now: The server's clock.
+
+        Raises:
+            ValueError: The time is before `since`, lies ahead, or is no number.
+        """
+        self.tell_time(now)
+        if time > now + AHEAD:
+            raise ValueError(f'{time:.3f} lies ahead of the server, whose clock says {now:.3f}')
+        if not time >= self.since:
+            raise ValueError(f'{time:.3f} is before {self.since:.3f}, since when changes are kept')
+        axioms = dict.fromkeys(present)
+        for change in reversed(self.changes):
+            if change.time <= time:
+                break
+            for axiom in change.added:
+                axioms.pop(axiom, None)
+            axioms.update(dict.fromkeys(change.removed))
+        return list(axioms)
+
+
+class NumberedChange(NamedTuple):
+    """What one manipulation or reasoning changed.
+
+    Attributes:
+        reference_name: Where.
+        sequence: Counts from 1 for each reference; 0 says that it was loaded or dropped.
+        added: Axioms that came, each with whether it is derived.
+        removed: Axioms that went, likewise.
+        is_consistent: As of the last reasoning.
+    """
+
+    reference_name: str
+    sequence: int
+    added: Sequence[tuple[Axiom, bool]]
+    removed: Sequence[tuple[Axiom, bool]]
+    is_consistent: bool
+
+    def facts(self) -> list[FactChange]:
+        """Return the facts that went and came; other axioms are left out."""
+        return [
+            (fact, came, derived)
+            for came, batch in ((False, self.removed), (True, self.added))
+            for axiom, derived in batch
+            for fact in short_facts(axiom)
+        ]
+
+
+class ChangeFeed:
+    """Changes of facts on their way to subscribers: numbered for each reference, kept until taken.
+
+    A subscriber that sees a gap in the numbers asks the server anew. So a change that is too large
+    for a message (a whole ontology that was loaded) is only counted, and only the last changes are
+    kept while nobody listens.
+
+    Args:
+        announce: Called, in any thread, when there is something to take and was nothing before.
+    """
+
+    def __init__(self, announce: Callable[[], None]) -> None:
+        self._announce = announce
+        self._lock = threading.Lock()
+        self._waiting: deque[NumberedChange] = deque(maxlen=KEPT)
+        self._sequences: dict[str, int] = {}
+
+    def take(self) -> list[NumberedChange]:
+        """Take what waits, oldest first."""
+        with self._lock:
+            taken = list(self._waiting)
+            self._waiting.clear()
+        return taken
+
+    def note(self, name: str, changes: Changes | None) -> None:
+        """Take in a change of a reference; None: it was loaded or dropped."""
+        with self._lock:
+            first = not self._waiting
+            if changes is None:
+                self._sequences[name] = 0
+                self._waiting.append(NumberedChange(name, 0, (), (), False))
+            else:
+                large = len(changes.added) + len(changes.removed) > LARGE
+                number = self._sequences.get(name, 0) + (2 if large else 1)
+                self._sequences[name] = number
+                added = () if large else changes.added
+                removed = () if large else changes.removed
+                self._waiting.append(
+                    NumberedChange(name, number, added, removed, changes.consistent)
+                )
+        if first:
+            self._announce()

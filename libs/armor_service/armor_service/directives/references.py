@@ -1,0 +1,420 @@
+"""The directives about references, files and logging, and APPLY and REASON."""
+
+from __future__ import annotations
+
+import threading
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from armor_service.access import LOG_ENDINGS, ONTOLOGY_ENDINGS, Settings
+from armor_service.changes import History
+from armor_service.directives.table import control, flag, text, utility
+from armor_service.protocol import (
+    DirectiveError,
+    DirectiveRequest,
+    DirectiveResponse,
+    ExitCode,
+)
+from armor_service.reference import (
+    NATIVE,
+    NOBODY,
+    Origin,
+    Reference,
+    knowledge_base,
+)
+from armor_service.rendering import parse_entity, shown
+from owl_reasoner import memory
+from owl_reasoner.documents.reading import read_ontology
+from owl_reasoner.documents.xml_reading import OntologyFileError
+from owl_reasoner.knowledge_base import KnowledgeBase
+from owl_reasoner.owl.axioms import Axiom
+from owl_reasoner.reasoner.java_reasoning import JavaKnowledgeBase, JavaReasonerError
+
+if TYPE_CHECKING:
+    from armor_service.service import ArmorService
+
+RELEASE_AFTER = 0.2
+WRITTEN = {
+    'turtle': 'ntriples',
+    'jsonld': 'ntriples',
+    'owlxml': 'rdfxml',
+    'functional': 'rdfxml',
+}
+"""What SAVE writes for formats that are only read: N-Triples is Turtle as well."""
+WEB_TIMEOUT = 20.0
+FIRST = 10
+"""How many times as long as the next one the first reasoning is taken to need."""
+MAX_NAMED = 5
+"""How many unsupported statements a description names."""
+
+_LOAD = (
+    text('iri'),
+    flag('buffered manipulation'),
+    text('reasoner'),
+    flag('buffered reasoner'),
+)
+_LOAD_SUMMARY = (
+    'Loads an ontology under the reference name. With buffered manipulation changes wait until '
+    'APPLY or REASON; with a buffered reasoner derived facts follow at REASON only. A name that is '
+    'loaded already stays as it is, except for the first flag.'
+)
+_LOAD_DIFFERS = (
+    'Only files in the ontologies folder and the directories that may be read. A file that cannot '
+    'be loaded leaves no reference behind. While another client is mounted, refused with 102 if it '
+    'were to change the first flag. What the reasoner does not support is named in the '
+    'description. Switching buffering off applies what waits.'
+)
+_WEB_DIFFERS = 'Refused unless the parameter allow_web is set.'
+
+
+@utility(
+    'LOAD WEB MOUNTED',
+    *(text('url'), *_LOAD),
+    summary='LOAD WEB, then MOUNT.',
+    differs=_WEB_DIFFERS,
+    slow=True,
+)
+@utility(
+    'LOAD WEB',
+    *(text('url'), *_LOAD),
+    summary='LOAD FILE with a document from the web.',
+    differs=_WEB_DIFFERS,
+    slow=True,
+)
+@utility(
+    'LOAD FILE MOUNTED',
+    *(text('path'), *_LOAD),
+    summary='LOAD FILE, then MOUNT. When mounting is refused the ontology stays loaded.',
+    slow=True,
+)
+@utility('LOAD FILE', text('path'), *_LOAD, summary=_LOAD_SUMMARY, differs=_LOAD_DIFFERS, slow=True)
+def _load(
+    service: ArmorService,
+    request: DirectiveRequest,
+    source: str,
+    iri: str,
+    buffered: bool,
+    reasoner: str,
+    lazy: bool,
+) -> DirectiveResponse:
+    name = request.reference_name
+    notes = [f'{name} is loaded already']
+    if not _rebuffer(service, request, buffered):
+        with memory.uncollected():
+            ref, found = _read_document(service, request, source, iri, reasoner)
+            memory.settle(len(ref.kb))
+        ref.buffered_manipulation, ref.buffered_reasoner = buffered, lazy
+        ref.history = History(service.clock(), service.settings.history)
+        with service.entering:
+            entered = name not in service.references
+            if entered:
+                if service.store:
+                    service.store.loaded(ref)
+                service.register(ref)
+        if entered:
+            notes = found
+            for note in notes:
+                service.warn(f'{name}: {note}')
+        else:
+            _rebuffer(service, request, buffered)
+    if request.secondary:
+        _mount(service, request)
+    return DirectiveResponse(error_description='; '.join(notes))
+
+
+def _rebuffer(service: ArmorService, request: DirectiveRequest, buffered: bool) -> bool:
+    """Give a loaded reference the buffering of a further LOAD; False when there is none."""
+    with service.references.locked_if_there(request.reference_name) as ref:
+        if ref is None:
+            return False
+        if ref.buffered_manipulation != buffered:
+            service.check_free(ref, request.client_name)
+            if service.store:
+                service.store.buffered(ref.name, buffered, service.clock())
+            ref.buffer(buffered)
+    return True
+
+
+@utility(
+    'DROP',
+    summary='Forgets the reference; success also when there is none.',
+    differs='Refused with 102 while another client is mounted.',
+    slow=True,
+)
+def _drop(service: ArmorService, request: DirectiveRequest) -> DirectiveResponse:
+    with service.references.locked_if_there(request.reference_name) as ref:
+        if ref is not None:
+            service.check_free(ref, request.client_name)
+            if service.store:
+                service.store.dropped(ref.name)
+            service.references.remove(ref)
+            service.tell(ref.name, None)
+            # Not yet: this directive and those that wait for the lock still refer to it.
+            release = threading.Timer(RELEASE_AFTER, _release, args=(service, ref))
+            release.daemon = True
+            release.start()
+    return DirectiveResponse()
+
+
+def _release(service: ArmorService, ref: Reference) -> None:
+    """Give back an ontology's memory; of a large one also that of those who know its graph."""
+    if len(ref.kb) > memory.LARGE:
+        service.sparql.forget()
+    with ref.lock:  # The last of those who found it before it was dropped.
+        parts = ref.kb.give_up()
+        ref.kb, ref.history = KnowledgeBase(ref.kb.iri), History()
+    memory.release(parts, service.references.hold_more_than(memory.LARGE))
+
+
+@utility(
+    'SAVE INFERENCE',
+    text('path', ''),
+    summary='SAVE with the derived facts.',
+    differs='The live ontology stays as it is; ARMOR asserts every derived fact for good.',
+    slow=True,
+)
+@utility(
+    'SAVE',
+    text('path', ''),
+    summary='Writes the asserted axioms in the format that was loaded, to a file below the '
+    'ontologies folder that ends as ontologies do.',
+    differs='Without a path it is refused unless the parameter overwrite_loaded is set: ARMOR '
+    'writes over the file that was loaded. Refused with 102 while another client is mounted. '
+    'Written beside the file and renamed, so that a crash leaves the old file whole; it keeps its '
+    'rights, and a read-only one is refused. '
+    'Turtle and JSON-LD are written as N-Triples, OWL/XML and functional syntax as RDF/XML; a path '
+    'that ends in .nt gets N-Triples, which hold names that RDF/XML cannot.',
+    slow=True,
+)
+def _save(service: ArmorService, request: DirectiveRequest, path: str) -> DirectiveResponse:
+    # Late, as what LOAD WEB needs: a server that starts again is to be back at once.
+    from owl_reasoner.documents.writing import write_ontology
+
+    with service.references.locked(request.reference_name) as first:
+        service.check_free(first, request.client_name)
+        chosen = path or _loaded_file(service, first)
+    # While nobody waits for the reference: the disk may not answer.
+    target = service.paths.to_write(chosen, ONTOLOGY_ENDINGS)
+    with service.references.locked(request.reference_name) as ref, memory.uncollected():
+        service.check_free(ref, request.client_name)
+        if ref is not first and not path:
+            # Its own file is another one.
+            raise DirectiveError(f'SAVE: {ref.name} was loaded again meanwhile')
+        taken = next(service.states)
+        axioms = list(ref.kb.axioms())
+        if request.primary:
+            axioms = list(dict.fromkeys([*axioms, *ref.kb.facts()]))
+        iri, origin = ref.kb.iri, ref.origin
+    form = 'ntriples' if target.suffix.lower() == '.nt' else origin.format
+    with service.saving(target):
+        if taken < service.saved.get(target, 0):
+            return DirectiveResponse()  # A newer state is there already.
+        try:
+            with memory.uncollected():
+                write_ontology(axioms, iri, target, form, origin.prefixes)
+        except OntologyFileError as error:
+            raise DirectiveError(f'SAVE: {error}') from None
+        service.saved[target] = taken
+    return DirectiveResponse()
+
+
+def _loaded_file(service: ArmorService, ref: Reference) -> str:
+    if not ref.origin.file:
+        raise DirectiveError(f'SAVE: {ref.name} was loaded from {ref.origin.path}; expected a path')
+    if not service.settings.overwrite_loaded:
+        raise DirectiveError(
+            f'SAVE: expected a path; the parameter overwrite_loaded permits writing over '
+            f'{ref.origin.file}, which was loaded'
+        )
+    return str(ref.origin.file)
+
+
+@utility(
+    'MOUNT',
+    summary='From now on only this client may change the ontology; 203 when another is mounted or '
+    'the reference is unknown.',
+    differs='Enforced, unless the parameter enforce_mount is off; ARMOR reports 102 and carries '
+    'the manipulation out.',
+    slow=True,
+)
+def _mount(service: ArmorService, request: DirectiveRequest) -> DirectiveResponse:
+    client, name = request.client_name, request.reference_name
+    refusal = f'{client} cannot be mounted on {name}.'
+    with service.references.locked_if_there(name) as ref:
+        if ref is None:
+            raise DirectiveError(f'{refusal} Unknown reference.', ExitCode.MOUNT_REFUSED)
+        if not ref.is_free_for(client):
+            problem = f'{refusal} Another client is already mounted on it.'
+            raise DirectiveError(problem, ExitCode.MOUNT_REFUSED)
+        note = f'{client} is mounted already' if ref.mounted == client != NOBODY else ''
+        if service.store and ref.mounted != client:
+            service.store.mounted(name, client)
+        ref.mounted = client
+    return DirectiveResponse(error_description=note)
+
+
+@utility(
+    'UNMOUNT',
+    summary='Ends MOUNT; a client that is not mounted changes nothing by it.',
+    slow=True,
+)
+def _unmount(service: ArmorService, request: DirectiveRequest) -> DirectiveResponse:
+    with service.references.locked(request.reference_name) as ref:
+        if ref.mounted != request.client_name:
+            note = f'{request.client_name} is not mounted on {ref.name}'
+            return DirectiveResponse(error_description=note)
+        if service.store:
+            service.store.mounted(ref.name, NOBODY)
+        ref.mounted = NOBODY
+    return DirectiveResponse()
+
+
+@utility('GET ALL REFS', summary='The names of all references.')
+def _get_all(service: ArmorService, _: DirectiveRequest) -> DirectiveResponse:
+    return DirectiveResponse(queried_objects=service.references.names())
+
+
+@utility(
+    'GET REF CLIENT',
+    text('reference'),
+    summary='The client mounted on a reference, `none` when there is none.',
+    differs='An unknown reference is answered with 205.',
+)
+def _get_client(service: ArmorService, _: DirectiveRequest, name: str) -> DirectiveResponse:
+    return DirectiveResponse(queried_objects=[service.references.find(name).mounted])
+
+
+@utility(
+    'LOG FILE ON',
+    text('path'),
+    summary='Appends each directive with its answer to a file.',
+    differs='Only to .log and .txt files below the ontologies folder; closed at 64 MiB.',
+    slow=True,
+)
+def _log_file_on(service: ArmorService, _: DirectiveRequest, path: str) -> DirectiveResponse:
+    service.log.open(service.paths.to_write(path, LOG_ENDINGS))
+    return DirectiveResponse()
+
+
+@utility('LOG FILE OFF', summary='Ends LOG FILE ON.', slow=True)
+def _log_file_off(service: ArmorService, _: DirectiveRequest) -> DirectiveResponse:
+    service.log.close()
+    return DirectiveResponse()
+
+
+@utility('LOG SCREEN ON', summary='Writes each directive with its answer to the console.')
+def _log_screen_on(service: ArmorService, _: DirectiveRequest) -> DirectiveResponse:
+    service.log.on_screen = True
+    return DirectiveResponse()
+
+
+@utility('LOG SCREEN OFF', summary='Ends LOG SCREEN ON.')
+def _log_screen_off(service: ArmorService, _: DirectiveRequest) -> DirectiveResponse:
+    service.log.on_screen = False
+    return DirectiveResponse()
+
+
+@utility('INVALID COMMAND', summary='Always answered with 205; for tests of clients.')
+def _invalid(_: ArmorService, __: DirectiveRequest) -> DirectiveResponse:
+    raise DirectiveError('Invalid command.', ExitCode.INVALID_COMMAND)
+
+
+@control('APPLY', summary='Applies the changes that wait; derived facts follow only at REASON.')
+def _apply(ref: Reference) -> None:
+    ref.flush()
+
+
+@control(
+    'REASON',
+    summary='Applies the changes that wait and brings the derived facts up to date.',
+    differs='Recovers from an inconsistent ontology once its cause is retracted; ARMOR does not '
+    'with buffering.',
+)
+def _reason(ref: Reference) -> None:
+    ref.reason()
+
+
+def _read_document(
+    service: ArmorService, request: DirectiveRequest, source: str, iri: str, reasoner: str
+) -> tuple[Reference, list[str]]:
+    """Read an ontology and reason over it.
+
+    Args:
+        service: The service.
+        request: LOAD FILE or LOAD WEB.
+        source: Path or URL.
+        iri: What local names are completed with.
+        reasoner: ARMOR's word for the reasoner, any case.
+
+    Returns:
+        The reference, and what the client should know: another reasoner than asked for, statements
+        that the reasoner does not support, an inconsistency.
+
+    Raises:
+        DirectiveError: It cannot be loaded.
+    """
+    try:
+        base = parse_entity(f'<{iri}>', '').rstrip('#')
+    except ValueError as error:
+        raise DirectiveError(f'LOAD: argument iri {error}') from None
+    notes: list[str] = []
+    found: Path | bytes
+    try:
+        if request.primary.upper() == 'WEB':
+            path, found = source, _fetch(source, service.settings)
+        else:
+            with memory.collected():
+                found = service.paths.to_read(source)
+            path = str(found)
+        limit = service.settings.max_file_bytes
+        document = read_ontology(found, base, size_limit=limit, may_read=service.paths.may_read)
+    except OntologyFileError as error:
+        raise DirectiveError(f'LOAD: {error}') from None
+    if document.iri and document.iri.rstrip('#') != base:
+        notes.append(f'the document is of {document.iri}, names are completed with {base}')
+    begin = time.thread_time()
+    kb = _reasoned(base, document.axioms, reasoner, notes)
+    took = (time.thread_time() - begin) / FIRST
+    if not kb.consistent:
+        notes.append('the ontology is inconsistent')
+    unsupported = [*document.unsupported, *kb.unsupported]
+    if unsupported:
+        more = f' and {len(unsupported) - MAX_NAMED} more' if len(unsupported) > MAX_NAMED else ''
+        named = '; '.join(unsupported[:MAX_NAMED])
+        notes.append(f'{len(unsupported)} statements not supported by the reasoner: {named}{more}')
+    used = reasoner if isinstance(kb, JavaKnowledgeBase) else ''
+    form = WRITTEN.get(document.format, document.format)
+    origin = Origin(path, form, document.prefixes, used)
+    return Reference(request.reference_name, kb, origin, took=took), notes
+
+
+def _reasoned(base: str, axioms: list[Axiom], reasoner: str, notes: list[str]) -> KnowledgeBase:
+    kb = knowledge_base(base, axioms, reasoner)
+    try:
+        kb.reason()
+    except JavaReasonerError as error:
+        notes.append(f'reasoner {shown(reasoner)} cannot be used, the native one is: {error}')
+        kb = KnowledgeBase(base, axioms)
+        kb.reason()
+    else:
+        if reasoner.upper() not in NATIVE and not isinstance(kb, JavaKnowledgeBase):
+            notes.append(f'reasoner {shown(reasoner)} is not available, the native one is used')
+    return kb
+
+
+def _fetch(url: str, settings: Settings) -> bytes:
+    import urllib.error
+    import urllib.request
+
+    if not settings.allow_web:
+        raise DirectiveError('LOAD WEB is not allowed; the parameter allow_web permits it')
+    if not url.lower().startswith(('http://', 'https://')):
+        raise DirectiveError(f'LOAD WEB: {shown(url)} is not an http address')
+    try:
+        with memory.collected(), urllib.request.urlopen(url, timeout=WEB_TIMEOUT) as answer:
+            data: bytes = answer.read(settings.max_file_bytes + 1)
+    except (OSError, ValueError) as error:
+        reason = error.reason if isinstance(error, urllib.error.URLError) else error
+        raise DirectiveError(f'LOAD WEB: {shown(url)}: {reason}') from None
+    return data

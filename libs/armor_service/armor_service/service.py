@@ -1,0 +1,299 @@
+"""The directive service: several ontologies under reference names, and what directives do to them.
+
+    service = ArmorService()
+    request = DirectiveRequest('me', 'map', 'QUERY', 'IND', 'CLASS', ('ROOM',))
+    service.execute(request).queried_objects
+
+Threads may share a service: each reference has a lock, held for one directive or for a whole batch.
+Nothing that a client sends makes it raise.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import itertools
+import threading
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any, TypeAlias
+
+from armor_service.access import SafePaths, Settings
+from armor_service.changes import Change
+from armor_service.directive_log import DirectiveLog
+from armor_service.directives import Directive, Kind, look_up
+from armor_service.protocol import (
+    DirectiveError,
+    DirectiveRequest,
+    DirectiveResponse,
+    ExitCode,
+    ListResponse,
+    StoreError,
+)
+from armor_service.reference import Reference, Registry
+from armor_service.rendering import one_line, shown
+from armor_service.sparql import SparqlEngine
+from armor_service.store import Store
+from owl_reasoner import memory
+from owl_reasoner.knowledge_base import Changes
+from owl_reasoner.reasoner.java_reasoning import JavaReasonerError
+
+LONG_ARGUMENTS = 1000
+"""Arguments from which on a directive is not quick."""
+LARGE = 1000
+"""Axioms from which on a query that gathers from all of them is not quick."""
+
+Watcher: TypeAlias = Callable[[str, Changes | None], None]
+"""Told of a reference's name and what changed in it; None: it was loaded or dropped."""
+
+
+class ArmorService:
+    """Carries out directives, and is what they act on.
+
+    Args:
+        settings: What is allowed.
+        screen: Writes a line of LOG SCREEN.
+        warn: Told in one line of what went wrong inside and of what a client should know.
+        store: Makes references durable; those it holds are there at once.
+        clock: Seconds since the epoch, for QUERY AT.
+
+    Raises:
+        StoreError: What is in the store cannot be read.
+
+    Attributes:
+        settings: What is allowed.
+        clock: Seconds since the epoch.
+        paths: Which files may be read and written.
+        log: The log of directives.
+        sparql: Runs SPARQL queries.
+        references: What is loaded.
+        entering: Held while what was loaded gets its name.
+        store: Makes references durable; None: they end with the process.
+        states: Numbers the states that are taken to be saved.
+        saved: The newest state that each file holds.
+    """
+
+    def __init__(
+        self,
+        settings: Settings | None = None,
+        screen: Callable[[str], None] = print,
+        warn: Callable[[str], None] = print,
+        store: Store | None = None,
+        clock: Callable[[], float] = time.time,
+    ) -> None:
+        self.settings = settings or Settings()
+        readable = (*self.settings.directories, *self.settings.read_only_directories)
+        self.paths = SafePaths(self.settings.writable, readable)
+        self.log = DirectiveLog(screen, self.settings.max_file_bytes)
+        self.sparql = SparqlEngine(self.settings)
+        self.references = Registry()
+        self.entering = threading.Lock()
+        self.clock = clock
+        self.store = store
+        self.states = itertools.count(1)
+        self.saved: dict[Path, int] = {}
+        self._saving: dict[Path, threading.Lock] = {}
+        self._warn = warn
+        self._watchers: list[Watcher] = [self.sparql.note]
+        if store:
+            store.warn = self.warn
+            with memory.uncollected():
+                for ref in store.recover(self.settings.history):
+                    self.register(ref)
+                    memory.settle(len(ref.kb))
+            for note in store.notes:
+                warn(note)
+
+    def warn(self, text: str) -> None:
+        """Write a line for the operator."""
+        self._warn(one_line(text))
+
+    def watch(self, watcher: Watcher) -> None:
+        """Tell a watcher of every change of asserted and derived facts.
+
+        It is called inside the directive that caused the change and must be quick.
+        """
+        self._watchers.append(watcher)
+
+    def tell(self, name: str, changes: Changes | None) -> None:
+        """Tell the watchers of a change."""
+        for watcher in self._watchers:
+            watcher(name, changes)
+
+    def register(self, ref: Reference) -> None:
+        """Make a reference known under its name, and its changes to the watchers."""
+
+        def on_changes(changes: Changes) -> None:
+            ref.history.note(self.clock(), changes)
+            self.tell(ref.name, changes)
+
+        ref.kb.subscribe(on_changes)
+        self.references.add(ref)
+        self.tell(ref.name, None)
+
+    def saving(self, path: Path) -> threading.Lock:
+        """Return what is held while a state is written to a file."""
+        return self._saving.setdefault(path, threading.Lock())
+
+    def check_free(self, ref: Reference, client: str) -> None:
+        """Check that no other client is mounted on a reference.
+
+        Raises:
+            DirectiveError: 102, there is one.
+        """
+        if self.settings.enforce_mount and not ref.is_free_for(client):
+            raise DirectiveError(
+                f'{client} cannot connect to {ref.name}. Another client is already mounted on it.',
+                ExitCode.REFERENCE_BUSY,
+            )
+
+    def execute(self, request: DirectiveRequest) -> DirectiveResponse:
+        """Carry out one directive; never raises for what a client sent."""
+        try:
+            response = self._execute(request)
+        except DirectiveError as error:
+            response = error.response
+        except StoreError as error:
+            response = _refusal(f'{request.words}: nothing was done: {error}')
+        except JavaReasonerError as error:
+            response = _refusal(f'{request.words}: {error}; native derivations only')
+        except Exception as error:
+            problem = f'{request.words}: internal error, {type(error).__name__}: {error}'
+            self.warn(problem)
+            response = _refusal(problem)
+        if not response.error_description.isprintable():
+            response.error_description = one_line(response.error_description)
+        ref = self.references.get(request.reference_name)
+        if ref is not None:
+            response.is_consistent = ref.kb.consistent
+        if self.log.enabled:
+            self.log.write(request, response, is_loaded=ref is not None)
+        return response
+
+    def execute_at_once(self, request: DirectiveRequest) -> DirectiveResponse | None:
+        """Carry out a directive that will be quick.
+
+        Returns:
+            The response; None when it may take long or would have to wait for another thread. Then
+            nothing was done, and the caller takes it to `execute` on a thread that may block.
+        """
+        try:
+            directive = look_up(request)
+        except DirectiveError:
+            return self.execute(request)
+        writes = self.store is not None and directive.kind.may_reason
+        if writes or directive.slow or directive.schema or len(request.args) > LONG_ARGUMENTS:
+            return None
+        ref = self.references.get(request.reference_name)
+        if ref is None:
+            return self.execute(request)
+        if not ref.lock.acquire(blocking=False):
+            return None
+        try:
+            slow = directive.kind.may_reason and ref.is_slow
+            if slow or (directive.gathers and len(ref.kb) > LARGE):
+                return None
+            return self.execute(request)
+        finally:
+            ref.lock.release()
+
+    def execute_list(self, requests: Sequence[DirectiveRequest]) -> ListResponse:
+        """Carry out directives in order; no other client's directive comes in between.
+
+        A failure does not end the batch: each directive has its own answer.
+        """
+        if len(requests) > self.settings.max_batch:
+            problem = f'{len(requests)} directives in a list, at most {self.settings.max_batch}'
+            return ListResponse(False, False, [_refusal(problem)])
+        names = {request.reference_name for request in requests}
+        with self.references.held(names):
+            try:
+                with self.store.batch() if self.store else contextlib.nullcontext():
+                    responses = [self.execute(request) for request in requests]
+            except StoreError as error:
+                problem = f'lost at the next start: {error}'
+                return ListResponse(False, False, [_refusal(problem) for _ in requests])
+        return ListResponse(
+            success=all(response.success for response in responses),
+            is_consistent=responses[-1].is_consistent if responses else False,
+            responses=responses,
+        )
+
+    def close(self) -> None:
+        """End helper processes and close files."""
+        self.sparql.close()
+        if self.store:
+            self.store.close()
+        self.log.close()
+
+    def _execute(self, request: DirectiveRequest) -> DirectiveResponse:
+        if not request.reference_name:
+            raise DirectiveError(
+                'Invalid request. No reference name specified.', ExitCode.NO_REFERENCE_NAME
+            )
+        directive = look_up(request)
+        self._check_size(request)
+        if directive.kind is Kind.UTILITY:
+            _check_name(request.reference_name)
+            values = directive.read(request.args, '')
+            response: DirectiveResponse = directive.run(self, request, *values)
+            return response
+        ref = self.references.find(request.reference_name)
+        if directive.slow:
+            response = directive.run(self, ref, *self._values(directive, request, ref))
+        else:
+            # Plainly: `Registry.locked` costs a quarter of a quick query.
+            with ref.lock:
+                if ref.dropped:
+                    return self._execute(request)
+                if directive.kind is Kind.QUERY:
+                    response = directive.run(ref, *self._values(directive, request, ref))
+                else:
+                    remark = self._change(directive, request, ref)
+                    response = DirectiveResponse(error_description=remark)
+        if self.store and directive.kind.may_reason:
+            self.store.compact_if_large(self.references.held_briefly)
+        return response
+
+    def _change(self, directive: Directive, request: DirectiveRequest, ref: Reference) -> str:
+        """Carry out a manipulation; return what a client should know of it."""
+        self.check_free(ref, request.client_name)
+        if directive.kind is Kind.CONTROL:
+            if self.store and ref.queue:
+                self.store.flushed(ref.name, self.clock())
+            directive.run(ref)
+            return ''
+        changes: list[Change] = directive.run(ref, *self._values(directive, request, ref))
+        if self.store and changes:
+            self.store.changed(ref.name, changes, self.clock())
+        ref.heavy |= directive.schema
+        remark = ref.missing(changes)
+        if not changes:
+            waiting = f'; {len(ref.queue)} changes wait for APPLY' if ref.queue else ''
+            remark = f'{request.words}: nothing to change{waiting}'
+        ref.submit(changes)
+        return remark
+
+    def _values(self, directive: Directive, request: DirectiveRequest, ref: Reference) -> list[Any]:
+        return directive.read(request.args, ref.kb.iri, narrow_doubles=self.settings.narrow_doubles)
+
+    def _check_size(self, request: DirectiveRequest) -> None:
+        args = request.args
+        if len(args) > self.settings.max_arguments:
+            raise DirectiveError(f'{len(args)} arguments, at most {self.settings.max_arguments}')
+        characters = sum(map(len, args))
+        if characters > self.settings.max_characters:
+            raise DirectiveError(
+                f'{characters} characters of arguments, at most {self.settings.max_characters}'
+            )
+
+
+def _refusal(problem: str) -> DirectiveResponse:
+    return DirectiveError(problem).response
+
+
+def _check_name(name: str) -> None:
+    if len(name) > 256 or not name.isprintable():
+        raise DirectiveError(
+            f'reference name {shown(name)}: expected at most 256 printable characters'
+        )

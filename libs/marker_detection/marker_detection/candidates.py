@@ -1,0 +1,415 @@
+"""Four-sided dark outlines in a grey image: where a marker could be.
+
+A marker's black border is one dark blob on its white margin, so its outline is found by local
+thresholding and the convex hull of each dark blob is cut down to the smallest quadrilateral around
+it. Hulls survive what breaks polygon approximation on small and oblique markers: the corners are a
+few tenths of a pixel wrong, which `template_fit` repairs, but they are there. `EdgeFit` moves the
+sides of those that are wrong by up to a cell.
+
+Of the hundreds of dark outlines in a textured image only a few pass `BorderCheck`, and every marker
+that can be read does. A candidate costs 97 samples there and some thousands in `template_fit`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+from scipy.spatial import cKDTree
+
+from marker_detection.image_sampling import (
+    Array,
+    Grey,
+    ImagePyramid,
+    homographies_of,
+    levels_for,
+)
+
+Quads = npt.NDArray[np.float64]
+Outline = npt.NDArray[np.int32]
+Indices = npt.NDArray[np.int64]
+
+# pixels across the narrowest blob
+_LEAST_WIDTH = 2.0
+# how far from a parallelogram's scatter outlines are looked at in a crowd, and how scattered one
+# may be elsewhere: those of small markers touch something or miss a corner
+_QUAD_DEVIATION, _MOST_SCATTER = 0.35, 8.0
+# an outline runs through the middles of the outermost dark pixels
+_INSET = 0.5
+# sine between sides below which a corner is not moved further: it would leave the image
+_LEAST_SINE = 0.3
+# neighbourhood in pixels from which the halved image does
+_WIDE_WINDOW = 21
+# blobs with one box to so many pixels, and quadrilaterals with one size to this share, are the same
+_SAME_BOX, _SAME_SIZE = 3, 0.06
+# places that `BorderCheck` looks at along each side, and along each side of the code
+_PER_SIDE, _INNER = 6, 5
+# image pixels a cell has at most where borders are looked at
+_CELL_PIXELS = 6.0
+# what passes: correlation of border and margin, contrast of the two worst sides as shares of all,
+# and deviation within the code: beyond a missing margin may lie what is far brighter than print,
+# or a thin one half darker
+_LEAST_CORRELATION = 0.68
+_LEAST_SIDE, _WORST_SIDE = 0.15, 0.5
+_LEAST_INNER_DEVIATION, _MOST_INNER_DEVIATION = 0.1, 2.0
+# of `EdgeFit`: places along a side, steps across it, and how far it looks, in cells
+_PLACES, _STEPS, _REACH = 10, 13, 1.2
+# cells from a side's line at which a place counts half, and the steepest slope of that line
+_STRAIGHTNESS, _STEEPEST = 0.15, 0.5
+
+
+def dark_masks(
+    image: Grey, windows: Sequence[int], contrast: float, bridges: Sequence[int]
+) -> Iterator[tuple[Grey, int]]:
+    """Masks of what is dark, the most telling first, and the factor by which each is smaller.
+
+    Args:
+        image: (height, width) grey levels.
+        windows: Sides in pixels of the neighbourhoods that a border is compared with, odd; one
+            mask for each, in their order. Wide ones, which only large markers need, are taken
+            from the halved image.
+        contrast: How many grey levels darker.
+        bridges: Lengths in pixels of gaps to close in the narrowest window's mask, along columns
+            and along rows, each in a mask of its own: a marker seen at a flat angle has a border
+            thinner than a pixel, which breaks at white rows of its code. A wider window would not
+            part it from the wall beyond its margin.
+
+    Yields:
+        A mask for each window; one of what is darker than a quarter of white, and one split where
+        the image's grey levels part best: a shadow's edge, which is dark beside the light, is
+        still brighter than ink in the light. Then the masks with gaps closed.
+    """
+    halved = cv2.resize(
+        image,
+        (max(1, image.shape[1] // 2), max(1, image.shape[0] // 2)),
+        interpolation=cv2.INTER_AREA,
+    )
+    white = float(np.percentile(halved[::4, ::4], 98.0))
+    yield cv2.threshold(image, white / 4.0, 255, cv2.THRESH_BINARY_INV)[1], 1
+    full_size: list[Grey] = []
+    for window in windows:
+        wide = window >= _WIDE_WINDOW and window > min(windows)
+        if wide:
+            yield _darker_than_around(halved, max(3, window // 4 * 2 + 1), contrast), 2
+        else:
+            full_size.append(_darker_than_around(image, window, contrast))
+            yield full_size[-1], 1
+    split, _ = cv2.threshold(halved, 0, 255, cv2.THRESH_BINARY_INV + cv2.THRESH_OTSU)
+    yield cv2.threshold(halved, split, 255, cv2.THRESH_BINARY_INV)[1], 2
+    for length in bridges:
+        for dark in full_size:
+            for shape in ((length, 1), (1, length)):
+                yield cv2.morphologyEx(dark, cv2.MORPH_CLOSE, np.ones(shape, np.uint8)), 1
+
+
+def _darker_than_around(image: Grey, window: int, contrast: float) -> Grey:
+    """Return where an image is darker than the mean of its neighbourhood, without specks.
+
+    Blobs of one or two pixels are noise, and each would cost an outline.
+    """
+    mask = cv2.boxFilter(image, -1, (window, window), borderType=cv2.BORDER_REPLICATE)
+    cv2.subtract(mask, image, dst=mask)
+    cv2.threshold(mask, contrast - 0.5, 255, cv2.THRESH_BINARY, dst=mask)
+    # each pixel of a larger blob has two more of its pixels within two steps
+    near = cv2.boxFilter(mask, -1, (5, 5))
+    cv2.threshold(near, 2.5 * 255 / 25, 255, cv2.THRESH_BINARY, dst=near)
+    return np.asarray(cv2.bitwise_and(mask, near, dst=near))
+
+
+def quads_around(
+    masks: Iterable[tuple[Grey, int]],
+    *,
+    min_length: float = 8.0,
+    limit: float = math.inf,
+) -> Quads:
+    """Quadrilaterals around the blobs of masks.
+
+    Args:
+        masks: Images (height, width), blobs are not 0, and by how much each is smaller than the
+            image itself. A blob with the same upright box as one before is left out.
+        min_length: Longer side in pixels of the smallest blob's upright box.
+        limit: Once so many blobs were looked at, in the first mask or in all others, only those
+            with a parallelogram's moments are; after the others, no further mask.
+
+    Returns:
+        (n, 4, 2) corners in pixels, clockwise as seen.
+    """
+    found: list[Quads] = []
+    seen: set[bytes] = set()
+    for order, (mask, scale) in enumerate(masks):
+        if order == 1:
+            seen.clear()
+        if len(seen) > limit:
+            break
+        blobs = _blobs_in(mask, min_length / scale, _LEAST_WIDTH)
+        if blobs is None:
+            continue
+        outlines, boxes, scatter = blobs
+        unlike = np.abs(scatter - 1.0)
+        kept = np.argsort(unlike)
+        kept = kept[scatter[kept] < _MOST_SCATTER]
+        quads = []
+        # as bytes: tuples of numbers take four times as long
+        places = (boxes[kept] * scale // _SAME_BOX).view('V32').ravel().tolist()
+        for index, blob in zip(kept.tolist(), places, strict=True):
+            if len(seen) > limit and unlike[index] > _QUAD_DEVIATION:
+                break
+            if blob in seen:
+                continue
+            seen.add(blob)
+            quad = _quad_around(outlines[index])
+            if quad is not None:
+                quads.append(quad)
+        if quads:
+            # a pixel's middle has whole coordinates, in a halved image as well
+            grown = _grown(_clockwise(np.array(quads, dtype=float)), _INSET)
+            found.append((grown + 0.5) * scale - 0.5)
+    return np.concatenate(found) if found else np.zeros((0, 4, 2))
+
+
+class _Blobs(NamedTuple):
+    """Outlines of a mask's blobs and of the holes in them.
+
+    Attributes:
+        outlines: (n, 1, 2) points of each.
+        boxes: (k, 4) left, top, right, bottom of each.
+        scatter: (k,) 1 for a parallelogram, 0.91 for an ellipse, 1.33 for a triangle, the more,
+            the further a blob's parts lie from its middle; far above these for a hole. It is the
+            first affine moment invariant (Flusser and Suk, "Pattern recognition by affine moment
+            invariants", Pattern Recognition 26(1), 1993), relative to a parallelogram's.
+    """
+
+    outlines: list[Outline]
+    boxes: Indices
+    scatter: Array
+
+
+def _blobs_in(mask: Grey, length: float, width: float) -> _Blobs | None:
+    """Return a mask's blobs of at least a length and a width in pixels, measured all at once.
+
+    One with far more corners than its box has pixels around it is no quadrilateral.
+    """
+    # in one pass over the rows; it traces blobs and holes in opposite directions
+    outlines, _ = cv2.findContoursLinkRuns(mask)
+    if not outlines:
+        return None
+    counts = np.fromiter(map(len, outlines), np.int64, len(outlines))
+    x, y = np.concatenate(outlines)[:, 0].T.copy()
+    starts = counts.cumsum() - counts
+    left, right = np.minimum.reduceat(x, starts), np.maximum.reduceat(x, starts)
+    top, bottom = np.minimum.reduceat(y, starts), np.maximum.reduceat(y, starts)
+    wide, high = right - left + 1, bottom - top + 1
+    large = (np.maximum(wide, high) >= length) & (np.minimum(wide, high) >= width)
+    large &= (counts >= 4) & (counts <= 3 * (wide + high))
+    if not large.any():
+        return None
+    within = large.repeat(counts)
+    boxes = np.stack([left, top, right + 1, bottom + 1], axis=1)[large].astype(np.int64)
+    return _Blobs(
+        [outlines[index] for index in np.flatnonzero(large).tolist()],
+        boxes,
+        _scatter(
+            x[within] - left.repeat(counts)[within],
+            y[within] - top.repeat(counts)[within],
+            counts[large],
+        ),
+    )
+
+
+def _scatter(x: Indices, y: Indices, counts: Indices) -> Array:
+    """Return the scatter (k,) of polygons with so many corners (k,) each, (n,) in all.
+
+    An outline of a hole has a negative area, which is taken for a small one.
+    """
+    starts = counts.cumsum() - counts
+    x, y = x.astype(np.float32), y.astype(np.float32)
+    u, v = np.roll(x, -1), np.roll(y, -1)
+    u[starts + counts - 1], v[starts + counts - 1] = x[starts], y[starts]
+    # moments of polygons by Green's theorem
+    cross = x * v - u * y
+    # in double precision: what is divided by the 1 of a large hole has squares beyond single
+    area = np.maximum(np.add.reduceat(cross, starts) / 2.0, 1.0).astype(float)
+    terms = (x + u, y + v, x * x + (x + u) * u, y * y + (y + v) * v)
+    mean_x, mean_y, xx, yy = (np.add.reduceat(cross * term, starts) / area for term in terms)
+    xy = np.add.reduceat(cross * (2.0 * (x * y + u * v) + x * v + u * y), starts) / area
+    spread_x, spread_y = xx / 12.0 - (mean_x / 6.0) ** 2, yy / 12.0 - (mean_y / 6.0) ** 2
+    spread_xy = xy / 24.0 - mean_x * mean_y / 36.0
+    return np.asarray(144.0 * (spread_x * spread_y - spread_xy**2) / area**2)
+
+
+def distinct(quads: Quads, distance: float) -> npt.NDArray[np.int64]:
+    """Return the indices of the quads whose middle and size are not those of an earlier one.
+
+    Args:
+        quads: (m, 4, 2) corners in pixels, the best first.
+        distance: How near middles are taken for the same, pixels.
+    """
+    middles = quads.mean(axis=1)
+    sizes = np.linalg.norm(quads - middles[:, None], axis=2).mean(axis=1)
+    # only neighbours are compared: a crowd has thousands of quads
+    pairs = cKDTree(middles).query_pairs(distance, np.inf, output_type='ndarray')
+    first, second = pairs[np.argsort(pairs[:, 0])].T
+    alike = np.abs(sizes[first] - sizes[second]) < np.maximum(distance, _SAME_SIZE * sizes[second])
+    kept = [True] * len(quads)
+    for better, other in zip(first[alike].tolist(), second[alike].tolist(), strict=True):
+        if kept[better]:
+            kept[other] = False
+    return np.flatnonzero(kept)
+
+
+def _quad_around(outline: Outline) -> npt.NDArray[np.float32] | None:
+    """Return the smallest quadrilateral (4, 2) around an outline; None where it is none."""
+    hull = cv2.convexHull(outline)
+    if len(hull) < 4:
+        return None
+    quad = cv2.approxPolyN(hull.astype(np.float32), 4, None, -1.0, False)[0]
+    return quad if len(quad) == 4 else None
+
+
+def _clockwise(quads: Quads) -> Quads:
+    first, second = quads[:, 1] - quads[:, 0], quads[:, 2] - quads[:, 1]
+    reversed_ = first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0] < 0
+    quads[reversed_] = quads[reversed_, ::-1]
+    return quads
+
+
+def _grown(quads: Quads, distance: float) -> Quads:
+    """Quads (n, 4, 2), clockwise, with each side moved outwards by a distance in pixels."""
+    along = np.roll(quads, -1, axis=1) - quads
+    along /= np.maximum(np.linalg.norm(along, axis=2, keepdims=True), 1e-9)
+    before = np.roll(along, 1, axis=1)
+    sine = before[..., 0] * along[..., 1] - before[..., 1] * along[..., 0]
+    # where both moved sides meet; a corner nearly straight or sharp is not moved without bound
+    shift = (before - along) / np.maximum(sine, _LEAST_SINE)[..., None]
+    return np.asarray(quads + distance * shift)
+
+
+class BorderCheck:
+    """Samples around the border of a marker of `side` cells along its black square."""
+
+    def __init__(self, side: int) -> None:
+        self._side = side
+        along = np.linspace(-0.85, 0.85, _PER_SIDE)
+        inner = np.linspace(-1.0, 1.0, _INNER) * (1.0 - 3.0 / side)
+        cell = 2.0 / side
+        points = [_border(along, 1.0 + cell * part) for part in (0.2, 0.5)]
+        points.append(_border(along, 1.0 - cell * 0.5))
+        points.append(np.stack([each.ravel() for each in np.meshgrid(inner, inner)]))
+        flat = np.concatenate(points, axis=1)
+        self._grid = np.vstack([flat, np.ones(flat.shape[1])]).astype(np.float32)
+
+    def correlation(
+        self, pyramid: ImagePyramid, homographies: Array, least_contrast: float
+    ) -> Array:
+        """Return how well white margin and black border correlate with the image.
+
+        Args:
+            pyramid: The image.
+            homographies: (m, 3, 3) from marker coordinates to pixels.
+            least_contrast: Grey levels from black to white below which nothing is taken for a
+                marker.
+
+        Returns:
+            (m,) 0 to 1; -1 where it can be no marker.
+        """
+        levels = levels_for(homographies, self._side, _CELL_PIXELS)
+        values = pyramid.sample(homographies, self._grid, levels)
+        count = 4 * _PER_SIDE
+        near, far, border = (values[:, k * count : (k + 1) * count] for k in range(3))
+        deviation = values[:, 3 * count :].std(axis=1)
+        # a white margin may be thinner than half a cell
+        thin = near.mean(axis=1) > far.mean(axis=1)
+        margin = np.where(thin[:, None], near, far)
+        contrast = margin.mean(axis=1) - border.mean(axis=1)
+        variance = (margin.var(axis=1) + border.var(axis=1)) / 2.0
+        correlation = contrast / np.sqrt(contrast**2 + 4.0 * variance + 1e-6)
+        by_side = np.sort((margin - border).reshape(-1, 4, _PER_SIDE).mean(axis=2), axis=1)
+        passed = (
+            (contrast > least_contrast)
+            & (correlation > _LEAST_CORRELATION)
+            & (by_side[:, 1] > _LEAST_SIDE * contrast)
+            & (by_side[:, 0] > -_WORST_SIDE * contrast)
+            & (deviation > _LEAST_INNER_DEVIATION * contrast)
+            & (deviation < _MOST_INNER_DEVIATION * contrast)
+        )
+        return np.where(passed, correlation, -1.0)
+
+
+def _border(along: npt.NDArray[np.float64], radius: float) -> Array:
+    across = np.full_like(along, radius)
+    sides = [(along, -across), (across, along), (along, across), (-across, along)]
+    return np.concatenate([np.stack(side) for side in sides], axis=1)
+
+
+class EdgeFit:
+    """Moves the sides of quadrilaterals onto the outer edges of a border of `side` cells.
+
+    A hull is wrong by up to a cell where something dark touches the marker, or light ate a corner.
+    Across each side the steepest rise from dark to light is looked for at some places, and a line
+    laid through them; places far from the line count less (iteratively reweighted least squares).
+    """
+
+    def __init__(self, side: int) -> None:
+        self._side = side
+        self._along = np.linspace(-0.9, 0.9, _PLACES)
+        self._across = np.linspace(-_REACH, _REACH, _STEPS) * 2.0 / side
+        along, across = (
+            each.ravel() for each in np.meshgrid(self._along, self._across, indexing='ij')
+        )
+        out = 1.0 + across
+        sides = [(along, -out), (out, along), (along, out), (-out, along)]
+        points = np.concatenate([np.stack(side) for side in sides], axis=1)
+        self._grid = np.vstack([points, np.ones(points.shape[1])]).astype(np.float32)
+
+    def fitted(self, pyramid: ImagePyramid, quads: Quads) -> Quads:
+        """Return quads (m, 4, 2) with their sides on the edges nearest to them."""
+        homographies = homographies_of(quads)
+        levels = levels_for(homographies, self._side, _CELL_PIXELS)
+        values = pyramid.sample(homographies, self._grid, levels)
+        values = values.reshape(len(quads), 4, _PLACES, _STEPS)
+        rise = np.maximum(values[..., 2:] - values[..., :-2], 0.0)
+        steepest = rise.max(axis=3)
+        near = np.square(rise * (rise > 0.5 * steepest[..., None])) + 1e-9
+        # where each place's edge is, in marker units outwards
+        found = (near * self._across[1:-1]).sum(axis=3) / near.sum(axis=3)
+        weight = steepest / np.maximum(steepest.max(axis=2, keepdims=True), 1e-6) + 1e-3
+        spread = 2.0 / self._side * _STRAIGHTNESS
+        shift, slope = _line(self._along, found, weight)
+        for _ in range(2):
+            residual = found - shift[..., None] - slope[..., None] * self._along
+            shift, slope = _line(self._along, found, weight / (1.0 + np.square(residual / spread)))
+        return _corners_between(homographies, 1.0 + shift, np.clip(slope, -_STEEPEST, _STEEPEST))
+
+
+def _line(x: Array, y: Array, weight: Array) -> tuple[Array, Array]:
+    """Return a weighted straight line through y (..., n) over x (n,): value at 0, and slope."""
+    total = weight.sum(axis=-1)
+    middle = (weight * x).sum(axis=-1) / total
+    height = (weight * y).sum(axis=-1) / total
+    centred = x - middle[..., None]
+    variance = np.maximum((weight * centred * centred).sum(axis=-1), 1e-9)
+    slope = (weight * centred * (y - height[..., None])).sum(axis=-1) / variance
+    return height - slope * middle, slope
+
+
+def _corners_between(homographies: Array, out: Array, slope: Array) -> Quads:
+    """Corners (m, 4, 2) in pixels where sides meet, given as `out + slope * along` (m, 4)."""
+    top, right, bottom, left = range(4)
+    corners = np.empty((len(out), 4, 3))
+    for index, (level, upright) in enumerate(
+        [(top, left), (top, right), (bottom, right), (bottom, left)]
+    ):
+        # y = down (out + slope x), x = across (out + slope y)
+        down = -1.0 if level == top else 1.0
+        across = -1.0 if upright == left else 1.0
+        first, second = down * out[:, level], down * slope[:, level]
+        third, fourth = across * out[:, upright], across * slope[:, upright]
+        x = (third + fourth * first) / (1.0 - fourth * second)
+        corners[:, index] = np.stack([x, first + second * x, np.ones_like(x)], axis=1)
+    pixels = corners @ homographies.transpose(0, 2, 1)
+    depth = np.where(np.abs(pixels[..., 2:]) < 1e-6, 1e-6, pixels[..., 2:])
+    return np.asarray(pixels[..., :2] / depth)

@@ -1,0 +1,144 @@
+"""ArUco dictionaries by name, and their codes as cells for matching.
+
+A marker of `bits` x `bits` is drawn with one black cell around it. `MarkerCodes` adds the white
+margin every printed marker needs, so that a code is a square of `bits + 4` cells, +1 for white
+and -1 for black, once for each id and quarter turn.
+"""
+
+from __future__ import annotations
+
+import difflib
+import errno
+import os
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+import yaml
+
+_FILE_SUFFIXES = ('.yaml', '.yml', '.json')
+_LARGEST_FILE = 10_000_000
+_MOST_MARKERS = 100_000
+_SMALLEST_SIDE, _LARGEST_SIDE = 3, 16
+
+Cells = npt.NDArray[np.float32]
+
+DICTIONARY_NAMES: tuple[str, ...] = tuple(
+    sorted(name for name in dir(cv2.aruco) if name.startswith('DICT_'))
+)
+
+
+def dictionary_named(name: str) -> cv2.aruco.Dictionary:
+    """Return a predefined dictionary by its name, such as `DICT_5X5_100`, or one of the user's own.
+
+    Args:
+        name: One of `DICTIONARY_NAMES`, or the path of a YAML or JSON file as OpenCV writes and
+            reads them: `nmarkers`, `markersize`, `maxCorrectionBits`, `marker_0`, `marker_1`, ...
+
+    Raises:
+        ValueError: OpenCV has no dictionary of that name, and there is no usable file.
+    """
+    if name in DICTIONARY_NAMES:
+        return cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, name))
+    if Path(name).suffix.lower() in _FILE_SUFFIXES:
+        return _dictionary_in(Path(name))
+    near = difflib.get_close_matches(name, DICTIONARY_NAMES, 1, 0.0)
+    raise ValueError(
+        f"unknown marker dictionary '{name[:60]}', did you mean {near[0]}? Expected one of "
+        f'{", ".join(DICTIONARY_NAMES)}, or a file of OpenCV ({", ".join(_FILE_SUFFIXES)})'
+    )
+
+
+def _dictionary_in(path: Path) -> cv2.aruco.Dictionary:
+    what = f'marker dictionary {path}'
+    try:
+        if not path.is_file():  # a pipe or a device may have no end
+            reason = 'expected a file' if path.exists() else os.strerror(errno.ENOENT)
+            raise ValueError(f'{what}: {reason}')
+        if path.stat().st_size > _LARGEST_FILE:
+            raise ValueError(f'{what}: larger than {_LARGEST_FILE} bytes')
+        text = path.read_text(encoding='utf-8')
+    except OSError as error:
+        raise ValueError(f'{what}: {error.strerror}') from None
+    except UnicodeDecodeError as error:
+        raise ValueError(f'{what} is no text') from error
+    expected = "expected OpenCV's form: nmarkers, markersize, maxCorrectionBits, marker_0, ..."
+    if text.startswith('%YAML'):
+        # OpenCV's first line is no YAML of any version
+        text = text.partition('\n')[2]
+    try:
+        values = yaml.load(text, yaml.BaseLoader)
+    except (yaml.YAMLError, RecursionError) as error:
+        raise ValueError(f'{what} is not valid YAML, {expected}') from error
+    try:
+        count, side, correction = (
+            int(values[key]) for key in ('nmarkers', 'markersize', 'maxCorrectionBits')
+        )
+        codes = [str(values[f'marker_{index}']) for index in range(min(count, _MOST_MARKERS))]
+    except KeyError as error:
+        raise ValueError(f'{what} lacks {error.args[0]}, {expected}') from error
+    except (TypeError, ValueError) as error:
+        raise ValueError(f'{what} cannot be read, {expected}') from error
+    if not 1 <= count == len(codes) or not _SMALLEST_SIDE <= side <= _LARGEST_SIDE:
+        raise ValueError(f'{what} has {count} markers of {side}x{side} cells, {expected}')
+    if not 0 <= correction <= side * side:
+        raise ValueError(f'{what}: maxCorrectionBits must be 0 to {side * side}, got {correction}')
+    for index, code in enumerate(codes):
+        if len(code) != side * side or set(code) - {'0', '1'}:
+            raise ValueError(f'{what}: marker_{index} must be {side * side} digits 0 or 1')
+    bits = np.array([list(code) for code in codes]).astype(np.uint8).reshape(count, side, side)
+    stored = np.concatenate([cv2.aruco.Dictionary.getByteListFromBits(each) for each in bits])
+    return cv2.aruco.Dictionary(stored, side, correction)
+
+
+@dataclass(frozen=True)
+class MarkerCodes:
+    """The codes a decoder may choose from.
+
+    Attributes:
+        bits: Cells along a side of the code, without border.
+        ids: (k,) marker id of each entry.
+        turns: (k,) quarter turns clockwise by which the entry's image is turned.
+        cells: (k, bits + 4, bits + 4) +1 white, -1 black, with border and margin.
+    """
+
+    bits: int
+    ids: npt.NDArray[np.int64]
+    turns: npt.NDArray[np.int64]
+    cells: Cells
+
+    @property
+    def side(self) -> int:
+        """Cells along the marker's black square."""
+        return self.bits + 2
+
+    @classmethod
+    def of(
+        cls, dictionary: cv2.aruco.Dictionary, known_ids: Iterable[int] | None = None
+    ) -> MarkerCodes:
+        """Codes of a dictionary, all of them or those of `known_ids`.
+
+        Raises:
+            ValueError: A known id is not in the dictionary.
+        """
+        count = int(dictionary.bytesList.shape[0])
+        chosen = range(count) if known_ids is None else sorted(set(known_ids))
+        beyond = [each for each in chosen if not 0 <= each < count]
+        if beyond:
+            raise ValueError(
+                f'known id {beyond[0]} is not in the dictionary, expected 0 to {count - 1}'
+            )
+        bits = int(dictionary.markerSize)
+        cells = np.ones((len(chosen) * 4, bits + 4, bits + 4), np.float32)
+        cells[:, 1:-1, 1:-1] = -1.0
+        for index, marker_id in enumerate(chosen):
+            drawn = dictionary.generateImageMarker(marker_id, bits + 2, borderBits=1)
+            code = np.where(drawn[1:-1, 1:-1] > 127, 1.0, -1.0)
+            for turn in range(4):
+                cells[index * 4 + turn, 2:-2, 2:-2] = np.rot90(code, -turn)
+        ids = np.repeat(np.array(list(chosen), np.int64), 4)
+        turns = np.tile(np.arange(4), len(chosen))
+        return cls(bits, ids, turns, cells)

@@ -1,0 +1,10 @@
+"""Where colcon looks for the package; all else is in pyproject.toml."""
+
+from setuptools import setup
+
+setup(
+    data_files=[
+        ('share/ament_index/resource_index/packages', ['resource/marker_detection']),
+        ('share/marker_detection', ['package.xml']),
+    ]
+)

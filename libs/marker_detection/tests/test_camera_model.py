@@ -1,0 +1,90 @@
+"""Cameras: which descriptions are taken, and where their pixels look."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import pytest
+
+from marker_detection import CameraModel
+
+K = np.array([[500.0, 0.0, 320.0], [0.0, 510.0, 240.0], [0.0, 0.0, 1.0]])
+PIXELS = np.array([[320.0, 240.0], [100.0, 60.0], [600.0, 100.0], [40.0, 460.0]])
+MODELS = {
+    'plumb_bob': [-0.3, 0.1, 0.001, -0.002, 0.0],
+    'rational_polynomial': [0.5, 0.1, 0.001, 0.0, 0.02, 0.8, 0.3, 0.05],
+    'equidistant': [0.02, -0.01, 0.003, 0.0],
+}
+
+
+@pytest.mark.parametrize('model', MODELS)
+def test_rays_of_pixels_project_back_onto_them(model):
+    camera = CameraModel(640, 480, K, np.array(MODELS[model]), model)
+    rays = camera.rays(PIXELS)
+    project = cv2.fisheye.projectPoints if model == 'equidistant' else cv2.projectPoints
+    points = np.column_stack([rays, np.ones(4)]).reshape(-1, 1, 3)
+    again = project(points, np.zeros(3), np.zeros(3), K, camera.distortion)[0].reshape(-1, 2)
+    assert np.allclose(again, PIXELS, atol=0.05)
+
+
+def test_equidistant_is_no_plumb_bob():
+    numbers = np.array([0.1, 0.01, 0.0, 0.0])
+    fisheye = CameraModel(640, 480, K, numbers, 'equidistant').rays(PIXELS)
+    plumb_bob = CameraModel(640, 480, K, numbers, 'plumb_bob').rays(PIXELS)
+    assert np.abs(fisheye - plumb_bob).max() > 0.01
+
+
+def test_distortion_that_cannot_be_taken_back_gives_no_rays():
+    assert CameraModel(640, 480, K, np.array([-90.0, 5.0, 0.0, 0.0, 0.0])).rays(PIXELS) is None
+
+
+def test_every_camera_that_is_taken_has_images_of_other_sizes():
+    for exponent in range(12):
+        matrix = np.diag([10.0**exponent, 10.0**exponent, 1.0])
+        try:
+            camera = CameraModel(640, 480, matrix)
+        except ValueError:
+            continue
+        assert camera.scaled_to(6400, 4800).width == 6400
+
+
+@pytest.mark.parametrize(('model', 'numbers'), MODELS.items())
+def test_zeros_beyond_the_coefficients_of_a_model_say_nothing(model, numbers):
+    # ros_gz copies as many numbers as come, whatever the model
+    padded = np.array([*numbers, *[0.0] * (20 - len(numbers))])
+    camera = CameraModel(640, 480, K, padded, model)
+    expected = CameraModel(640, 480, K, np.array(numbers), model)
+    assert camera.rays(PIXELS) == pytest.approx(expected.rays(PIXELS))
+    padded[-1] = 0.01
+    with pytest.raises(ValueError, match='20 distortion coefficients'):
+        CameraModel(640, 480, K, padded, model)
+
+
+@pytest.mark.parametrize(
+    ('changes', 'reason'),
+    [
+        ({'matrix': np.zeros((3, 3))}, 'not calibrated'),
+        ({'matrix': K * np.array([[1, 1, 1], [1, 1, 1], [1, 1, 0]])}, 'must have the form'),
+        ({'matrix': K + np.array([[0, 0, np.nan], [0, 0, 0], [0, 0, 0]])}, 'finite'),
+        ({'distortion': np.zeros(3)}, '3 distortion coefficients, expected 0 or 4 or 5'),
+        ({'distortion': np.ones(6)}, '6 distortion coefficients'),
+        ({'distortion': np.array([np.nan, 0, 0, 0, 0])}, 'must be finite'),
+        (
+            {'distortion': np.ones(5), 'distortion_model': 'equidistant'},
+            'expected 4 for equidistant',
+        ),
+        ({'width': 0}, 'no area'),
+    ],
+)
+def test_description_that_is_none_is_refused(changes, reason):
+    with pytest.raises(ValueError, match=reason):
+        CameraModel(**({'width': 640, 'height': 480, 'matrix': K} | changes))
+
+
+def test_camera_scales_with_its_images():
+    half = CameraModel(640, 480, K).scaled_to(320, 240)
+    assert half.matrix[0, 0] == pytest.approx(250.0)
+    assert half.rays(np.array([[79.75, 59.75]])) == pytest.approx(
+        CameraModel(640, 480, K).rays(np.array([[160.0, 120.0]]))
+    )
+    assert CameraModel(640, 480, K).scaled_to(640, 360) is None

@@ -1,0 +1,67 @@
+"""Positions of markers, fused over views."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from marker_detection import FusedPositions
+
+LONG_SIGHT = np.diag([1e-4, 1e-4, 0.09])
+
+
+def from_side(degrees: float, distance: float) -> np.ndarray:
+    """Return the camera's pose (4, 4) that sees the origin `distance` ahead, from a direction."""
+    angle = np.radians(degrees)
+    pose = np.eye(4)
+    pose[:3, :3] = [
+        [np.cos(angle), 0, np.sin(angle)],
+        [0, 1, 0],
+        [-np.sin(angle), 0, np.cos(angle)],
+    ]
+    pose[:3, 3] = -distance * pose[:3, 2]
+    return pose
+
+
+def test_views_from_two_sides_are_surer_than_each() -> None:
+    fused = FusedPositions()
+    for degrees, error in ((0.0, 0.3), (90.0, -0.3)):
+        seen = np.array([0.0, 0.0, 3.0 + error])
+        assert fused.add(7, from_side(degrees, 3.0), seen, LONG_SIGHT, 0.1)
+    at = fused.position_of(7)
+    assert at is not None
+    assert at.views == 2
+    assert np.linalg.norm(at.position) < 0.03
+    assert np.sqrt(np.diag(at.covariance)).max() < 0.05
+    assert at.distance_to(np.zeros(3)) < 1.0
+    assert at.distance_to(np.array([0.5, 0.0, 0.0])) > 4.0
+
+
+@pytest.mark.parametrize(
+    ('position', 'covariance', 'ambiguity'),
+    [
+        ([0.0, 0.0, np.nan], LONG_SIGHT, 0.0),
+        ([0.0, 0.0, 3.0], np.full((3, 3), np.inf), 0.0),
+        ([0.0, 0.0, 3.0], LONG_SIGHT, 0.99),
+        ([0.0, 0.0, 3.0], -np.eye(3), 0.0),
+        ([0.0, 0.0, 3.0], -4e-4 * np.eye(3), 0.0),
+    ],
+)
+def test_views_that_say_nothing_do_not_count(
+    position: list[float], covariance: np.ndarray, ambiguity: float
+) -> None:
+    fused = FusedPositions()
+    assert not fused.add(7, np.eye(4), np.array(position), covariance, ambiguity)
+    assert fused.position_of(7) is None
+
+
+def test_one_wrong_view_is_left_out_and_a_moved_marker_is_followed() -> None:
+    fused = FusedPositions()
+    here, there = np.array([0.0, 0.0, 2.0]), np.array([1.0, 0.0, 2.0])
+    for _ in range(3):
+        fused.add(7, np.eye(4), here, np.eye(3) * 1e-4, 0.0)
+    assert not fused.add(7, np.eye(4), there, np.eye(3) * 1e-4, 0.0)
+    assert fused.position_of(7).position == pytest.approx(here)
+    for _ in range(5):
+        fused.add(7, np.eye(4), there, np.eye(3) * 1e-4, 0.0)
+    assert fused.position_of(7).position == pytest.approx(there)

@@ -1,0 +1,54 @@
+"""Poses of markers: how sure they are, and whether they could be their mirror image."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from marker_detection import CameraModel, pose_of
+from marker_detection.testing.marker_scene import Panel, corners_in_camera, corners_in_image
+
+CAMERA = CameraModel.from_field_of_view(640, 480, math.radians(60))
+
+
+def test_covariance_tells_the_spread_of_poses_from_noisy_corners():
+    generator = np.random.default_rng(1)
+    panel = Panel(0, 2.0, turn=0.7, offset=(80.0, 40.0))
+    corners = corners_in_image(panel, CAMERA)
+    poses = [
+        pose_of(corners + generator.normal(0.0, 0.15, (4, 2)), 0.2, CAMERA) for _ in range(300)
+    ]
+    middle = corners_in_camera(panel, CAMERA).mean(axis=0)
+    offsets = np.array([pose.position - middle for pose in poses])
+    expected = pose_of(corners, 0.2, CAMERA).covariance[:3, :3]
+    assert np.allclose(offsets.std(axis=0), np.sqrt(np.diag(expected)), rtol=0.3)
+
+
+def test_small_far_marker_is_ambiguous_and_a_near_oblique_one_is_not():
+    far = pose_of(corners_in_image(Panel(0, 8.0, turn=0.4), CAMERA), 0.2, CAMERA)
+    noisy = corners_in_image(Panel(0, 8.0, turn=0.4), CAMERA)
+    noisy += np.random.default_rng(2).normal(0.0, 0.2, (4, 2))
+    near = pose_of(corners_in_image(Panel(0, 1.0, turn=0.9), CAMERA), 0.2, CAMERA)
+    assert pose_of(noisy, 0.2, CAMERA).ambiguity > 0.3
+    assert near.ambiguity < 0.01
+    assert 0.0 <= far.ambiguity <= 1.0
+
+
+def test_pose_is_the_same_through_a_distorting_lens():
+    import cv2
+
+    distortion = np.array([-0.25, 0.08, 0.0, 0.0, 0.0])
+    lens = CameraModel(640, 480, CAMERA.matrix, distortion)
+    points = corners_in_camera(Panel(0, 1.2, turn=0.5, offset=(150.0, 90.0)), CAMERA)
+    seen = cv2.projectPoints(points, np.zeros(3), np.zeros(3), lens.matrix, distortion)[0]
+    pose = pose_of(seen.reshape(4, 2), 0.2, lens)
+    assert pose.position == pytest.approx(points.mean(axis=0), abs=2e-3)
+
+
+def test_camera_matrix_beyond_all_numbers_gives_no_pose_and_no_warning(recwarn):
+    matrix = np.array([[1e-170, 0.0, 320.0], [0.0, 1e-170, 240.0], [0.0, 0.0, 1.0]])
+    corners = corners_in_image(Panel(0, 1.0), CAMERA)
+    assert pose_of(corners, 0.2, CameraModel(640, 480, matrix)) is None
+    assert not recwarn.list

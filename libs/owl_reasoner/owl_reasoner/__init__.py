@@ -1,0 +1,45 @@
+"""OWL 2 DL in plain Python: documents, an incremental reasoner, rules, explanations.
+
+    from owl_reasoner import KnowledgeBase, read_ontology
+
+    document = read_ontology('map.owl', iri)
+    kb = KnowledgeBase(iri, document.axioms)
+    kb.reason()
+    kb.instances(iri + '#URGENT')
+
+Nothing here needs Java. Each name is imported when it is first used. The
+axioms themselves are in `owl_reasoner.owl`.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from owl_reasoner.documents.reading import OntologyDocument as OntologyDocument
+    from owl_reasoner.documents.reading import read_ontology as read_ontology
+    from owl_reasoner.documents.writing import ontology_bytes as ontology_bytes
+    from owl_reasoner.documents.writing import write_ontology as write_ontology
+    from owl_reasoner.documents.xml_reading import OntologyFileError as OntologyFileError
+    from owl_reasoner.knowledge_base import Changes as Changes
+    from owl_reasoner.knowledge_base import KnowledgeBase as KnowledgeBase
+    from owl_reasoner.reasoner.explanation import Explanation as Explanation
+
+_HOME = {
+    'Changes': 'knowledge_base',
+    'Explanation': 'reasoner.explanation',
+    'KnowledgeBase': 'knowledge_base',
+    'OntologyDocument': 'documents.reading',
+    'OntologyFileError': 'documents.xml_reading',
+    'ontology_bytes': 'documents.writing',
+    'read_ontology': 'documents.reading',
+    'write_ontology': 'documents.writing',
+}
+__all__ = list(_HOME)
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME:
+        raise AttributeError(f'module {__name__!r} has no attribute {name!r}')
+    return getattr(importlib.import_module(f'{__name__}.{_HOME[name]}'), name)

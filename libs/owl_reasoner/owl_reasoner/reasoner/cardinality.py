@@ -1,0 +1,303 @@
+"""Cardinalities: counting what is known, with difference decided by `Difference`.
+
+`AtLeastCounter` derives membership in `min n`; `AtMostCounter` finds contradictions with `max n`
+and functional properties, and the individuals that must be the same because only one is allowed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from itertools import combinations, islice, product
+from typing import Any
+
+from owl_reasoner.owl.axioms import Axiom
+from owl_reasoner.owl.vocabulary import is_anonymous
+from owl_reasoner.reasoner.clauses import (
+    AtLeast,
+    AtMost,
+    Fact,
+    Key,
+    Predicate,
+    Premises,
+)
+from owl_reasoner.reasoner.difference import Difference, clique, cliques
+from owl_reasoner.reasoner.value_sets import ValueSet
+
+Emit = Callable[[Fact], None]
+MergeRequest = Callable[[str, str, Axiom | None, Premises], None]
+_MAX_CHOICES = 50
+
+
+class _Counter:
+    """What the two have in common: who is related to whom, and who is in the filler."""
+
+    def __init__(self, condition: AtLeast | AtMost, difference: Difference) -> None:
+        self.prop = condition.prop
+        self.inverse = condition.inverse
+        self.n = condition.n
+        self.origin = condition.origin
+        self.is_data = condition.prop.kind == 'data'
+        self.difference = difference
+        self.succ: dict[Any, dict[Any, None]] = self.prop.pred if self.inverse else self.prop.succ
+        self.pred: dict[Any, dict[Any, None]] = self.prop.succ if self.inverse else self.prop.pred
+        filler = condition.filler
+        self.filler = filler if isinstance(filler, Predicate) else None
+        self.values = filler if isinstance(filler, ValueSet) else None
+        self._hooks: list[tuple[list[Any], Any]] = []
+
+    def hook(self, place: list[Any], what: Any) -> None:
+        """Add to a list what `detach` takes out of it."""
+        place.append(what)
+        self._hooks.append((place, what))
+
+    def detach(self) -> None:
+        """Count no more."""
+        for place, what in self._hooks:
+            place.remove(what)
+        self._hooks.clear()
+
+    def related(self, z: str) -> list[Any]:
+        """Return what counts for `z`."""
+        values = self.succ.get(z, ())
+        if self.filler is not None:
+            members = self.filler.members
+            return [y for y in values if y in members]
+        if self.values is not None:
+            return list(filter(self.values.contains, values))
+        return list(values)
+
+    def facts(self, z: str, values: list[Any]) -> Premises:
+        """Return the facts by which the values count for `z`."""
+        prop, filler = self.prop, self.filler
+        facts: list[Fact] = [(prop, y, z) if self.inverse else (prop, z, y) for y in values]
+        if filler is not None:
+            facts += [(filler, y) for y in values]
+        return tuple(facts)
+
+    def choices(self, values: list[Any], size: int) -> Iterator[list[Any]]:
+        """Ways to choose `size` different ones, some dozens at most."""
+        if len(values) < size:
+            return
+        if self.is_data:
+            found: Iterator[list[Any]] = map(list, combinations(sorted(values, key=repr), size))
+        else:
+            found = cliques(sorted(values), size, self.difference.different)
+        yield from islice(found, _MAX_CHOICES)
+
+    def differences(self, values: list[str]) -> Premises:
+        """Return the facts by which the values are pairwise different; values of data just are."""
+        if self.is_data:
+            return ()
+        predicate = self.difference.predicate
+        return tuple((predicate, *pair) for pair in combinations(values, 2))
+
+    def _subjects(self, act: Callable[[str], None]) -> Callable[..., None]:
+        return (lambda y, z: act(z)) if self.inverse else (lambda z, y: act(z))
+
+    def _each_subject(self, act: Callable[[str], None]) -> Callable[[str], None]:
+        pred = self.pred
+
+        def visit(y: str) -> None:
+            for z in tuple(pred.get(y, ())):
+                act(z)
+
+        return visit
+
+
+class AtLeastCounter(_Counter):
+    """Keeps the members of one `min n` expression."""
+
+    def __init__(
+        self, condition: AtLeast, difference: Difference, enqueue: Emit, overdelete: Emit
+    ) -> None:
+        super().__init__(condition, difference)
+        self.head = condition.head
+        self._enqueue, self._overdelete = enqueue, overdelete
+        self.prop.on_insert.append(self._subjects(self.gain))
+        self.prop.on_delete.append(self._subjects(self.lose))
+        if self.filler is not None:
+            self.filler.on_insert.append(self._each_subject(self.gain))
+            self.filler.on_delete.append(self._each_subject(self.lose))
+        self.head.supports.append((self.supports, self.origin))
+        self.touch_insert = self._each_subject(self.gain)
+        self.touch_delete = self._each_subject(self.lose)
+
+    def gain(self, z: str) -> None:
+        """Count again after something came."""
+        if z in self.head.members or len(self.succ.get(z, ())) < self.n:
+            return
+        values = self.related(z)
+        if len(values) >= self.n and (
+            self.is_data or clique(values, self.n, self.difference.different) is not None
+        ):
+            self._enqueue((self.head, z))
+
+    def lose(self, z: str) -> None:
+        """Something that counted is about to go."""
+        if z in self.head.members:
+            self._overdelete((self.head, z))
+
+    def supports(self, z: str) -> Iterator[Premises]:
+        """Yield facts by which `z` has enough."""
+        for chosen in self.choices(self.related(z), self.n):
+            yield self.facts(z, chosen) + self.differences(chosen)
+
+
+class AtMostCounter(_Counter):
+    """Watches one `max n` expression or functional property."""
+
+    def __init__(
+        self,
+        condition: AtMost,
+        difference: Difference,
+        nothing: Predicate,
+        enqueue: Emit,
+        overdelete: Emit,
+        merge: MergeRequest,
+    ) -> None:
+        super().__init__(condition, difference)
+        self.condition = condition
+        self.label = condition.label
+        self._nothing = nothing
+        self._enqueue, self._overdelete, self._merge = enqueue, overdelete, merge
+        self.recheck: set[str] = set()
+        self.hook(self.prop.on_insert, self._subjects(self.gain))
+        self.hook(self.prop.on_delete, self._subjects(self.lose))
+        if self.label is not None:
+            self.hook(self.label.on_insert, self.gain)
+            self.hook(self.label.on_delete, self.lose)
+        if self.filler is not None:
+            self.hook(self.filler.on_insert, self._each_subject(self.gain))
+            self.hook(self.filler.on_delete, self._each_subject(self.lose))
+        self.hook(nothing.supports, (self.supports, self.origin))
+        self.touch_insert = self._each_subject(self.gain)
+        self.touch_delete = self._each_subject(self.lose)
+
+    def gain(self, z: str) -> None:
+        """Look again after something came."""
+        values = self.succ.get(z)
+        if values is None or len(values) <= self.n:
+            return
+        if self.label is not None and z not in self.label.members:
+            return
+        related = self.related(z)
+        if len(related) <= self.n:
+            return
+        different = self.difference.different
+        if self.is_data or clique(related, self.n + 1, different) is not None:
+            if z not in self._nothing.members:
+                self._enqueue((self._nothing, z))
+            return
+        facts = self._label_fact(z) + self.facts(z, related)
+        for one, other in self._forced(related):
+            apart = self.differences(related) if self.n > 1 else ()
+            rest = tuple(fact for fact in apart if {one, other} != {*fact[1:]})
+            self._merge(one, other, self.origin, facts + rest)
+
+    def _forced(self, related: list[str]) -> Iterator[tuple[str, str]]:
+        """Pairs that must be the same for the rest to fit."""
+        different = self.difference.different
+        related = sorted(related)
+        if self.n == 1:
+            for other in related[1:]:
+                yield related[0], other
+        elif len(related) == self.n + 1:
+            pairs = [pair for pair in combinations(related, 2) if not different(*pair)]
+            if len(pairs) == 1:
+                yield pairs[0]
+
+    def lose(self, z: str) -> None:
+        """Something that counted is about to go."""
+        if z in self._nothing.members:
+            self._overdelete((self._nothing, z))
+            self.recheck.add(z)
+
+    def _label_fact(self, z: str) -> Premises:
+        return () if self.label is None else ((self.label, z),)
+
+    def supports(self, z: str) -> Iterator[Premises]:
+        """Yield facts by which `z` has too many."""
+        values = self.succ.get(z)
+        if values is None or len(values) <= self.n:
+            return
+        if self.label is not None and z not in self.label.members:
+            return
+        for chosen in self.choices(self.related(z), self.n + 1):
+            yield self._label_fact(z) + self.facts(z, chosen) + self.differences(chosen)
+
+    # --- as evidence that two individuals differ: together they would have too many ---
+
+    def premises(self, x: str, y: str) -> Iterator[Premises]:
+        first, second = self.succ.get(x), self.succ.get(y)
+        if not first or not second:
+            return
+        label = self.label
+        marks: list[Premises] = [()]
+        if label is not None:
+            marks = [((label, z),) for z in (x, y) if z in label.members]
+            if not marks:
+                return
+        if self.is_data:
+            union = {*self.related(x), *self.related(y)}
+            if len(union) <= self.n:
+                return
+            for chosen in self.choices(list(union), self.n + 1):
+                mine = [value for value in chosen if value in first]
+                rest = [value for value in chosen if value not in first]
+                facts = self.facts(x, mine) + self.facts(y, rest)
+                for mark in marks:
+                    yield mark + facts
+            return
+        different = self.difference.different
+        for one, other in self.pairs(x, y):
+            if different(one, other):
+                facts = self.facts(x, [one]) + self.facts(y, [other])
+                for mark in marks:
+                    yield mark + facts + ((self.difference.predicate, one, other),)
+
+    def pairs(self, x: str, y: str) -> Iterator[tuple[str, str]]:
+        """Yield where one is allowed: pairs of values that must be the same if `x` and `y` are."""
+        if x not in self.succ or y not in self.succ or self.n != 1:
+            return
+        members = None if self.label is None else self.label.members
+        if members is None or x in members or y in members:
+            yield from product(self.related(x), self.related(y))
+
+
+class KeyWatcher:
+    """Finds named members of a class that share a value, a named one, of every key property."""
+
+    def __init__(self, key: Key, merge: MergeRequest) -> None:
+        self._key, self._merge = key, merge
+        if key.cls is not None:
+            key.cls.on_insert.append(self.gain)
+        for prop, inverse in key.props:
+            prop.on_insert.append(
+                (lambda y, x: self.gain(x)) if inverse else (lambda x, y: self.gain(x))
+            )
+
+    def gain(self, x: str) -> None:
+        """Look for individuals that `x` now shares its key with."""
+        cls = self._key.cls
+        if is_anonymous(x) or (cls is not None and x not in cls.members):
+            return
+        shared: dict[str, list[Fact]] | None = None
+        for prop, inverse in self._key.props:
+            succ, pred = (prop.pred, prop.succ) if inverse else (prop.succ, prop.pred)
+            found: dict[str, list[Fact]] = {}
+            for value in succ.get(x, ()):
+                if prop.kind == 'object' and is_anonymous(value):
+                    continue
+                for y in pred.get(value, ()):
+                    if y != x and not is_anonymous(y) and (shared is None or y in shared):
+                        pair = [(prop, value, x), (prop, value, y)]
+                        if not inverse:
+                            pair = [(prop, x, value), (prop, y, value)]
+                        found[y] = pair if shared is None else shared[y] + pair
+            shared = found
+            if not shared:
+                return
+        for y, facts in (shared or {}).items():
+            if cls is None or y in cls.members:
+                marks = [] if cls is None else [(cls, x), (cls, y)]
+                self._merge(x, y, self._key.origin, tuple(marks + facts))

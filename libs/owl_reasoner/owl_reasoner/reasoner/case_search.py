@@ -1,0 +1,603 @@
+"""Searches a model by cases: the hypertableau calculus.
+
+A model (`case_model`) grows from named individuals: rules add concepts, related individuals and
+values; where a rule has several heads, one is tried after the other, and a contradiction goes back
+to the last choice that took part in it. Unnamed individuals that look like an earlier one need no
+successors of their own (anywhere blocking), which ends the search. Where no role is used backwards,
+one that is less than an earlier one needs no choices either: it can be what that one is, where the
+rules about whom it was made for admit that (core blocking). Sources: Motik, Shearer and Horrocks,
+"Hypertableau reasoning for description logics", Journal of Artificial Intelligence Research 36
+(2009); Glimm, Horrocks and Motik, "Optimized description logic reasoning via core blocking",
+IJCAR 2010.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from itertools import combinations
+from typing import Any, NamedTuple, TypeAlias
+
+from owl_reasoner.reasoner.case_joins import CaseJoins
+from owl_reasoner.reasoner.case_model import (
+    Alternative,
+    CaseModel,
+    Choices,
+    ClashError,
+    Has,
+    Root,
+    Same,
+    still_open,
+    total,
+)
+from owl_reasoner.reasoner.case_rules import (
+    ANYBODY,
+    CaseRules,
+    Count,
+    EdgeRule,
+    Heads,
+)
+from owl_reasoner.reasoner.case_values import CaseValues
+
+_Conditions: TypeAlias = 'tuple[frozenset[int], list[tuple[frozenset[int], frozenset[int]]]]'
+
+
+class _Choice:
+    """A disjunction that is being tried."""
+
+    __slots__ = ('alternatives', 'choices', 'mark', 'place', 'stated')
+
+    def __init__(self, mark: int, alternatives: list[Alternative], choices: Choices) -> None:
+        self.mark, self.alternatives, self.place = mark, alternatives, 0
+        self.stated = self.choices = choices
+
+
+class _Either(NamedTuple):
+    """A disjunction that was not tried yet."""
+
+    alternatives: tuple[Alternative, ...]
+    choices: Choices
+
+
+class _Always(NamedTuple):
+    """The disjunctions about everybody, for one individual, from a place on."""
+
+    x: int
+    place: int
+
+
+class CaseSearch:
+    """Completes a model.
+
+    Args:
+        rules: What must hold.
+        most_steps: After so many added facts the search ends.
+
+    Attributes:
+        model: What was found.
+        blocked: Unnamed individuals in the model that are what an earlier one is.
+        depends: Whether the last contradiction rests on choices that are held.
+    """
+
+    def __init__(self, rules: CaseRules, most_steps: int) -> None:
+        self.rules = rules
+        self.model = CaseModel(rules, most_steps)
+        self._values = CaseValues(self.model, self._either)
+        self._named = CaseJoins(self.model, self._either)
+        self.gaps = self._values.gaps
+        self._named.gaps = self.gaps
+        self.depends = False
+        self.blocked: dict[int, int] = {}
+        self._stack: list[_Choice] = []
+        self._held = 0
+        self._failures: dict[int, int] = {}
+        # Disjunctions by number; `_next` tells which was not looked at yet, `_put_off` has those
+        # about individuals that needed no choice; for those in `_chosen` one was made.
+        self._open: dict[int, _Either | _Always] = {}
+        self._next = {'first': 0, 'end': 0}
+        self._put_off: dict[int, tuple[int, ...]] = {}
+        self._chosen: dict[int, None] = {}
+        # Individuals and the concepts for which they may need others.
+        self._needs: dict[tuple[int, int], None] = {}
+        self._stated: dict[tuple[tuple[type, Alternative], ...], bool] = {}
+        self._signs: dict[int, frozenset[int]] = {}
+        self._known_conditions: dict[tuple[frozenset[int], tuple[int, ...]], _Conditions] = {}
+        self._functional: dict[int, Count] = {limit.role: limit for limit in rules.functional}
+
+    # --- asking for a model ---
+
+    def mark(self) -> int:
+        """Return a state to come back to."""
+        return self.model.mark()
+
+    def undo(self, mark: int) -> None:
+        """Go back to a state."""
+        self._back_to(mark)
+        while self._stack and self._stack[-1].mark >= mark:
+            self._stack.pop()
+        self._held = min(self._held, len(self._stack))
+
+    def hold(self) -> None:
+        """Keep to the choices of the model that was found, until `undo` takes them back."""
+        self._held = len(self._stack)
+
+    def _back_to(self, mark: int) -> None:
+        self.model.undo(mark)
+        self._signs.clear()
+
+    def attempt(self, state: Callable[[], None]) -> bool:
+        """State something; False where that is a contradiction at once."""
+        try:
+            state()
+        except ClashError as clash:
+            self.depends = bool(clash.choices)
+            return False
+        return True
+
+    def settle(self) -> bool:
+        """Derive what needs no cases; False on a contradiction."""
+        return self.attempt(self._saturate)
+
+    def solve(self) -> bool:
+        """Tell whether there is a model, which is then left in `model`."""
+        while True:
+            try:
+                self._saturate()
+                if not (self._branch() or self._expand() or self._resume()):
+                    return True
+            except ClashError as clash:
+                if not self._go_back(clash.choices):
+                    return False
+
+    def _saturate(self) -> None:
+        model = self.model
+        queue, recount, revalue, is_gone = model.queue, model.recount, model.revalue, model.is_gone
+        while queue or recount or revalue:
+            while queue:
+                # The newest first: a contradiction is met before all else that follows is.
+                event = queue.pop()
+                if is_gone(event[0]):
+                    continue
+                if len(event) == 2:
+                    self._on_concept(*event)
+                elif not is_gone(event[2]):
+                    self._on_relation(*event)
+            if recount:
+                x, _ = recount.popitem()
+                if not is_gone(x):
+                    self._count_all(x)
+            elif revalue:
+                x, _ = revalue.popitem()
+                if not is_gone(x):
+                    self._values.check(x)
+                    self._named.on_values(x)
+
+    # --- choices ---
+
+    def _either(self, alternatives: list[Alternative], choices: Choices) -> None:
+        """State that one of the alternatives holds."""
+        if not alternatives:
+            raise ClashError(choices)
+        if len(alternatives) == 1:
+            alternatives[0].apply(self.model, choices)
+            return
+        # Alternatives of two kinds may be equal as tuples.
+        key = tuple(dict.fromkeys((type(one), one) for one in alternatives))
+        distinct = tuple(one for _, one in key)
+        if key not in self._stated:
+            self.model.put(self._stated, key, True)
+            self._append(_Either(distinct, choices))
+
+    def _branch(self) -> bool:
+        """Try the first open disjunction; whether something was added."""
+        put, following = self.model.put, self._next
+        while following['first'] < following['end']:
+            number = following['first']
+            put(following, 'first', number + 1)
+            x = self._subject(number)
+            if x is not None and self._needs_no_choice(x):
+                put(self._put_off, x, (*self._put_off.get(x, ()), number))
+            elif self._decide(number):
+                return True
+        return False
+
+    def _resume(self) -> bool:
+        """Look again at the disjunctions about an individual that is not blocked after all."""
+        for x, numbers in tuple(self._put_off.items()):
+            if x not in self.blocked:
+                self.model.drop(self._put_off, x)
+                for number in numbers[1:]:
+                    self._append(self._open[number])
+                self._decide(numbers[0])
+                return True
+        return False
+
+    def _append(self, disjunction: _Either | _Always) -> None:
+        number = self._next['end']
+        self.model.put(self._open, number, disjunction)
+        self.model.put(self._next, 'end', number + 1)
+
+    def _subject(self, number: int) -> int | None:
+        """Return the unnamed individual that a disjunction is about, where it is about one."""
+        disjunction = self._open[number]
+        if isinstance(disjunction, _Always):
+            subjects = {disjunction.x}
+        else:
+            alternatives = disjunction.alternatives
+            subjects = {one.x if isinstance(one, Has) else 0 for one in alternatives}
+        if len(subjects) > 1 or 0 in subjects:
+            return None
+        x, _ = self.model.find(subjects.pop())
+        return None if x is None or self.model.parent[x] is None else x
+
+    def _decide(self, number: int) -> bool:
+        """Try a disjunction; False where it holds, or is about nobody that is there."""
+        disjunction = self._open[number]
+        if isinstance(disjunction, _Always):
+            return self._decide_always(number, *disjunction)
+        return self._try(*disjunction, self._subject(number))
+
+    def _decide_always(self, number: int, x: int, place: int) -> bool:
+        """Try the next disjunction of those that hold of everybody; the rest comes after it."""
+        labels, always = self.model.labels[x], self.rules.always
+        while not self.model.is_gone(x) and place < len(always):
+            heads = always[place]
+            place += 1
+            if not any(concept in labels for _, concept in heads):
+                self.model.put(self._open, number, _Always(x, place))
+                self.model.put(self._next, 'first', number)
+                return self._try(tuple(Has(x, concept) for _, concept in heads), 0, x)
+        return False
+
+    def _try(self, alternatives: tuple[Alternative, ...], choices: Choices, x: int | None) -> bool:
+        """Try alternatives, about one unnamed individual `x` where it is given."""
+        found = still_open(self.model, alternatives, choices)
+        if found is None:
+            return False
+        left, choices = found
+        if not left:
+            raise ClashError(choices)
+        self.model.step()
+        if len(left) > 1:
+            # What failed often is tried late, as HermiT does.
+            left.sort(key=self._failures_of)
+            if x is not None:
+                self.model.put(self._chosen, x, None)
+            self._stack.append(_Choice(self.mark(), left, choices))
+            choices |= 1 << len(self._stack) - 1
+        left[0].apply(self.model, choices)
+        return True
+
+    def _failures_of(self, alternative: Alternative) -> int:
+        return self._failures.get(alternative.concept, 0) if isinstance(alternative, Has) else 0
+
+    def _go_back(self, choices: Choices) -> bool:
+        """Take the next alternative of the last choice that took part; False: there is none."""
+        while len(self._stack) > self._held:
+            choice = self._stack[-1]
+            bit = 1 << len(self._stack) - 1
+            self._back_to(choice.mark)
+            if not choices & bit:
+                self._stack.pop()
+                continue
+            choice.choices |= choices & ~bit
+            failed = choice.alternatives[choice.place]
+            if isinstance(failed, Has):
+                self._failures[failed.concept] = self._failures.get(failed.concept, 0) + 1
+            choice.place += 1
+            stated = choice.stated | bit
+            if choice.place == len(choice.alternatives) - 1:
+                self._stack.pop()
+                stated = choice.choices
+            try:
+                choice.alternatives[choice.place].apply(self.model, stated)
+            except ClashError as clash:
+                choices = clash.choices
+                continue
+            return True
+        self.depends = bool(choices)
+        return False
+
+    # --- rules ---
+
+    def _one_of(self, heads: Heads, x: int, y: int, choices: Choices) -> None:
+        """State that one of the heads holds of x (place 0) or y."""
+        alternatives: list[Alternative] = []
+        for place, concept in heads:
+            one = y if place else x
+            if concept in self.model.labels[one]:
+                return
+            alternatives.append(Has(one, concept))
+        self._either(alternatives, choices)
+
+    def _on_concept(self, x: int, concept: int) -> None:
+        model, rules = self.model, self.rules
+        labels, is_gone = model.labels[x], model.is_gone
+        if concept in rules.nominals:
+            named, more = model.individual(rules.nominals[concept])
+            model.same(named, x, labels[concept] | more)
+            if is_gone(x):
+                return
+        for rule in rules.of_node.get(concept, ()):
+            choices = total(rule.body, labels)
+            if choices is not None:
+                self._one_of(rule.heads, x, x, choices)
+                if is_gone(x):
+                    return
+        for edge_rule in rules.by_source.get(concept, ()):
+            for y, roles in tuple(model.out[x].items()):
+                if edge_rule.role in roles:
+                    self._fire(edge_rule, x, y)
+        for edge_rule in rules.by_target.get(concept, ()):
+            for y, roles in tuple(model.out[x].items()):
+                if -edge_rule.role in roles:
+                    self._fire(edge_rule, y, x)
+        if concept == ANYBODY and rules.always:
+            self._append(_Always(x, 0))
+        if concept in rules.loops:
+            model.relate(x, rules.loops[concept], x, labels[concept])
+        if concept in rules.at_least:
+            model.put(self._needs, (x, concept), None)
+        if concept in rules.at_most:
+            model.recount[x] = None
+        limits = rules.counted_by.get(concept)
+        if limits is not None:
+            for y in model.out[x]:
+                if not limits.isdisjoint(model.labels[y]):
+                    model.recount[y] = None
+        if (
+            concept in rules.values_at_least
+            or concept in rules.values_at_most
+            or concept in rules.of_values
+        ):
+            model.revalue[x] = None
+        self._named.on_concept(x, concept)
+
+    def _on_relation(self, x: int, role: int, y: int) -> None:
+        model, rules = self.model, self.rules
+        roles = model.out[x].get(y)
+        if roles is None or role not in roles:
+            return
+        for other in rules.disjoint.get(role, ()):
+            if other in roles:
+                raise ClashError(roles[role] | roles[other])
+        if x == y:
+            for concept in rules.marks.get(abs(role), ()):
+                model.concept(x, concept, roles[role])
+        for rule in rules.by_role.get(role, ()):
+            self._fire(rule, x, y)
+        for rule in rules.by_role.get(-role, ()):
+            self._fire(rule, y, x)
+        for one, way in ((x, role), (y, -role)):
+            limited = not rules.at_most.keys().isdisjoint(model.labels[one])
+            if limited or way in self._functional:
+                model.recount[one] = None
+        self._named.on_relation(x, role, y)
+
+    def _fire(self, rule: EdgeRule, x: int, y: int) -> None:
+        model = self.model
+        if model.is_gone(x) or model.is_gone(y):
+            return
+        roles = model.out[x].get(y)
+        if roles is None or rule.role not in roles:
+            return
+        mine = total(rule.xs, model.labels[x])
+        if mine is None:
+            return
+        theirs = total(rule.ys, model.labels[y])
+        if theirs is not None:
+            self._one_of(rule.heads, x, y, mine | theirs | roles[rule.role])
+
+    # --- counting ---
+
+    def _related(self, x: int, counted: Count) -> list[int]:
+        """Return who counts for an individual."""
+        labels = self.model.labels
+        return [
+            y
+            for y, roles in self.model.out[x].items()
+            if counted.role in roles and counted.concept in labels[y]
+        ]
+
+    def _reasons(self, x: int, counted: Count, y: int) -> Choices:
+        """Return the choices by which somebody counts for an individual."""
+        return self.model.out[x][y][counted.role] | self.model.labels[y][counted.concept]
+
+    def _count_all(self, x: int) -> None:
+        model, rules = self.model, self.rules
+        limits = [(limit, 0) for limit in rules.functional]
+        for concept in rules.at_most.keys() & model.labels[x].keys():
+            limits.append((rules.at_most[concept], model.labels[x][concept]))
+        for limit, choices in limits:
+            self._limit(x, limit, choices)
+            if model.is_gone(x):
+                return
+
+    def _limit(self, x: int, limit: Count, choices: Choices) -> None:
+        model = self.model
+        related = self._related(x, limit)
+        if model.parent[x] is None:
+            unnamed = [y for y in related if model.parent[y] not in (None, x)]
+            for y in unnamed:
+                self._introduce(x, limit, y, choices, len(unnamed))
+            if model.is_gone(x) or any(map(model.is_gone, related)):
+                model.recount[x] = None
+                return
+        if len(related) <= limit.n:
+            return
+        related.sort(key=lambda y: (-model.count_of_differences(y), y))
+        chosen = related[: limit.n + 1]
+        for y in chosen:
+            choices |= self._reasons(x, limit, y)
+        pairs: list[Alternative] = []
+        for one, other in combinations(chosen, 2):
+            apart = model.different(one, other)
+            if apart is None:
+                pairs.append(Same(one, other))
+            else:
+                choices |= apart
+        self._either(pairs, choices)
+
+    def _introduce(self, x: int, limit: Count, y: int, choices: Choices, waiting: int) -> None:
+        """Make an unnamed individual that a named one counts one of so many.
+
+        ``waiting``: How many such there are. Each of them may take a number that none has yet, and
+        it is open which.
+        """
+        options: list[Alternative] = []
+        for number in range(limit.n):
+            key = (x, limit, number)
+            options.append(Root(y, key))
+            waiting -= key not in self.model.roots
+            if not waiting:
+                break
+        self._either(options, choices | self._reasons(x, limit, y))
+
+    def _is_met(self, x: int, needed: Count) -> bool:
+        found, different = self._related(x, needed), self.model.different
+
+        def extend(chosen: list[int], place: int) -> bool:
+            if len(chosen) == needed.n:
+                return True
+            for next_place in range(place, len(found) - (needed.n - len(chosen)) + 1):
+                y = found[next_place]
+                fits = all(different(one, y) is not None for one in chosen)
+                if fits and extend([*chosen, y], next_place + 1):
+                    return True
+            return False
+
+        return extend([], 0)
+
+    # --- individuals that must exist ---
+
+    def _expand(self) -> bool:
+        """Add the individuals that are still needed; whether there were any."""
+        model = self.model
+        self.blocked = self._find_blocked()
+        progress = False
+        for x, concept in tuple(self._needs):
+            if x in self.blocked:
+                continue
+            model.drop(self._needs, (x, concept))
+            needed = self.rules.at_least[concept]
+            if not model.is_gone(x) and not self._is_met(x, needed):
+                self._create(x, needed, model.labels[x][concept])
+                progress = True
+        return progress
+
+    def _create(self, x: int, needed: Count, choices: Choices) -> None:
+        model = self.model
+        iri = self.rules.nominals.get(needed.concept)
+        if iri is not None and needed.n == 1:
+            y, more = model.individual(iri)
+            model.relate(x, needed.role, y, choices | more)
+            return
+        made = [model.somebody(x) for _ in range(needed.n)]
+        if len(made) > 1:
+            model.differ(made, choices)
+        for y in made:
+            model.relate(x, needed.role, y, choices)
+            model.concept(y, needed.concept, choices)
+
+    # --- blocking ---
+
+    def _find_blocked(self) -> dict[int, int]:
+        """Return the unnamed individuals that need no successors, and in whose place they are."""
+        model = self.model
+        found: dict[int, int] = {}
+        seen: dict[Any, int] = {}
+        cores = {y: None for y in self._chosen if y not in self._put_off}
+        for x in model.alive():
+            parent = model.parent[x]
+            if parent is None:
+                continue
+            if parent in found:
+                found[x] = found[parent]
+                cores.pop(x, None)
+                continue
+            if x in self._put_off:
+                core = self._core_blocker(x, found, cores)
+                if core is not None:
+                    found[x] = core
+                continue
+            if self._is_its_own(x):
+                continue
+            sign: Any = self._sign(x)
+            if self.rules.is_pairwise:
+                roles = model.out[parent].get(x, {})
+                sign = sign, self._sign(parent), frozenset(roles)
+            first = seen.setdefault(sign, x)
+            if first != x:
+                found[x] = first
+                cores.pop(x, None)
+        return found
+
+    def _is_its_own(self, x: int) -> bool:
+        """Tell whether an individual was made for a named one, and so is nobody else.
+
+        The other may be related to that named individual as well, which numbers, and roles that
+        exclude each other, may not allow of one.
+        """
+        parent, rules = self.model.parent[x], self.rules
+        assert parent is not None
+        return self.model.parent[parent] is None and (rules.is_pairwise or bool(rules.disjoint))
+
+    def _needs_no_choice(self, x: int) -> bool:
+        """Tell whether an individual seems to be blocked, or its parent is."""
+        if self.rules.has_inverse:
+            return False
+        is_known = x in self._put_off or self.model.parent[x] in self.blocked
+        return is_known or self._core_blocker(x, self.blocked, self._chosen) is not None
+
+    def _core_blocker(self, x: int, blocked: dict[int, int], cores: Iterable[int]) -> int | None:
+        """Return an earlier individual, of these, that is all that x is, and that x may be."""
+        model, put_off, nominals = self.model, self._put_off, self.rules.nominals.keys()
+        own, known = model.labels[x].keys(), self.blocked.get(x)
+        parent = model.parent[x]
+        assert parent is not None
+        if self._is_its_own(x):
+            return None
+        unwanted, conditions = self._conditions(self._sign(parent), tuple(model.out[parent][x]))
+        for y in cores if known is None else (known, *cores):
+            if y in blocked or y in put_off or y >= x or model.is_gone(y):
+                continue
+            other = model.labels[y].keys()
+            # Nobody is like a named individual: it would be that individual.
+            if not own <= other or not nominals.isdisjoint(other):
+                continue
+            model.step()
+            if not unwanted & other <= own:
+                continue
+            for body, heads in conditions:
+                if body <= other and heads.isdisjoint(other):
+                    break
+            else:
+                return y
+        return None
+
+    def _conditions(self, above: frozenset[int], roles: tuple[int, ...]) -> _Conditions:
+        """Return what is asked of whoever is related, by these roles, to one with these concepts.
+
+        Returns:
+            Concepts that are counted, of which there may be no more; and pairs: who has all these
+            concepts must have one of those.
+        """
+        found = self._known_conditions.get((above, roles))
+        if found is None:
+            limits = [limit for one, limit in self.rules.at_most.items() if one in above]
+            pairs = [
+                (rule.ys, frozenset(head for place, head in rule.heads if place))
+                for role in roles
+                for rule in self.rules.by_role.get(role, ())
+                if rule.xs <= above
+                and not any(head in above for place, head in rule.heads if not place)
+            ]
+            unwanted = frozenset(limit.concept for limit in limits if limit.role in roles)
+            found = self._known_conditions[above, roles] = unwanted, pairs
+        return found
+
+    def _sign(self, x: int) -> frozenset[int]:
+        """Return the concepts of an individual, which only grow until something is taken back."""
+        known, labels = self._signs.get(x), self.model.labels[x]
+        if known is None or len(known) < len(labels):
+            known = self._signs[x] = frozenset(labels)
+        return known

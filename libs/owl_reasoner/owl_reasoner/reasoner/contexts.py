@@ -1,0 +1,858 @@
+"""What follows for an individual from the classes it is in, unknown individuals included.
+
+A consequence-based calculus for Horn description logics (Kazakov, "Consequence-driven reasoning
+for Horn SHIQ ontologies", IJCAI 2009; Simancik, Kazakov, Horrocks, IJCAI 2011). A *context* stands
+for every individual that is in all classes of its core; its tokens are what such an individual is
+besides. An existential adds an edge to the context of the individual it requires; what must hold of
+that individual because of its neighbour goes into the edge's core, so two different neighbours
+never share what one of them causes. Contexts are shared by core, so there are finitely many and the
+calculus ends without a bound on depth or number.
+
+A token is a class predicate, ('is', individual), ('has', property, turned, individual),
+('value', property, value) or ('self', property).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from itertools import combinations
+from typing import Any, TypeAlias, TypeGuard
+
+from owl_reasoner.owl.axiom_text import axiom_text
+from owl_reasoner.owl.axioms import Axiom
+from owl_reasoner.reasoner.clauses import (
+    AtLeast,
+    AtMost,
+    BodyAtom,
+    Clause,
+    Constant,
+    HeadAtom,
+    Predicate,
+    PredicateAtom,
+    Program,
+    RangeAtom,
+    SameAtom,
+    Term,
+    closure,
+    turned,
+)
+from owl_reasoner.reasoner.value_sets import EVERY, NONE, ValueSet, point
+
+Token: TypeAlias = 'Predicate | tuple[Any, ...]'
+Tokens: TypeAlias = frozenset[Token]
+Role: TypeAlias = tuple[Predicate, bool]
+_Gap: TypeAlias = tuple[Axiom | None, str]
+_CASES = 'which of the related individuals are the same would need reasoning by cases'
+_DATES = 'whether its values suit another range is not decided'
+_NOMINALS = 'facts about the individual are not used for classes and unnamed individuals'
+
+
+@dataclass(frozen=True, slots=True)
+class _EdgeRule:
+    """For x related to y by all roles, with tokens of both: a token of x or y, a role, or a clash.
+
+    `head` is ('x', token), ('y', token), ('role', role) or ('clash',).
+    """
+
+    roles: frozenset[Role]
+    xs: Tokens
+    ys: Tokens
+    head: tuple[Any, ...]
+    origin: Axiom | None
+
+
+@dataclass(frozen=True, slots=True)
+class _ValueRule:
+    """For x with a value in `values` by all properties: a token, a property, or a clash."""
+
+    props: frozenset[Predicate]
+    xs: Tokens
+    values: ValueSet
+    head: tuple[Any, ...]
+    origin: Axiom | None
+
+
+class _Edge:
+    """`count` individuals that the owner is related to by all roles and that are in the core."""
+
+    __slots__ = ('core', 'count', 'roles', 'seen', 'target')
+
+    def __init__(self, roles: set[Role], core: set[Token], count: int, target: Context) -> None:
+        self.roles, self.core, self.count, self.target = roles, core, count, target
+        self.seen: object = None
+        """What both ends and the roles were when the rules were last applied."""
+
+
+class _Values:
+    """`count` values that the owner has by all properties, in a set."""
+
+    __slots__ = ('count', 'props', 'values')
+
+    def __init__(self, props: set[Predicate], values: ValueSet, count: int) -> None:
+        self.props, self.values, self.count = props, values, count
+
+
+class Context:
+    """What an individual with all tokens of the core is.
+
+    Attributes:
+        tokens: All tokens, the core included.
+        clash: Whether there can be no such individual.
+        edges, values: What it must be related to.
+        names: The individuals that it is.
+        unclosed, unrelated: Tokens whose consequences are not drawn yet.
+        looped: How much was known when the rules were last applied to its loops.
+        begun: Whether what its tokens imply was drawn once.
+        derived: Tokens found by rules, whether the core had them already or not.
+        beyond: Tokens found by what it is related to, not by its classes alone.
+        users: Contexts with an edge to this one, or that wait for its clash.
+    """
+
+    __slots__ = (
+        *('bare', 'begun', 'beyond', 'clash', 'core', 'derived', 'done', 'edges', 'looped'),
+        *('loops', 'names', 'tokens', 'unclosed', 'unrelated', 'users', 'values'),
+    )
+
+    def __init__(self, core: Tokens, bare: bool) -> None:
+        self.core, self.bare = core, bare
+        self.tokens: set[Token] = set(core)
+        self.clash = self.begun = False
+        self.derived: set[Token] = set()
+        self.beyond: set[Token] = set()
+        self.edges: list[_Edge] = []
+        self.values: list[_Values] = []
+        self.loops: set[Role] = set()
+        self.looped = (0, 0)
+        self.users: dict[Context, None] = {}
+        self.done: set[object] = set()
+        self.names = [token[1] for token in core if _is_name(token)]
+        self.unclosed: list[Token] = list(core)
+        self.unrelated: list[Token] = list(core)
+
+
+class _Body:
+    """What a clause's body says of each term, and of each pair of terms.
+
+    Attributes:
+        tokens: What an individual is.
+        roles: How one is related to another, each pair in one direction.
+        datas: Whose value a value is, and by which properties.
+        values: The set that a value is in, where there is one.
+    """
+
+    def __init__(self) -> None:
+        self.tokens: dict[Any, set[Token]] = {}
+        self.roles: dict[tuple[Any, Any], set[Role]] = {}
+        self.datas: dict[Any, tuple[Any, set[Predicate]]] = {}
+        self.values: dict[Any, ValueSet] = {}
+
+    def takes(self, atom: BodyAtom) -> bool:
+        """Add an atom; return False for one that no context can use."""
+        if isinstance(atom, PredicateAtom):
+            return self._takes_fact(atom.predicate, atom.terms)
+        if isinstance(atom, SameAtom):
+            one, other = map(_key, atom.terms)
+            if isinstance(one, tuple):
+                one, other = other, one
+            self.tokens.setdefault(one, set()).add(other)
+            return isinstance(other, tuple)
+        if isinstance(atom, RangeAtom):
+            (v,) = atom.terms
+            self.values[v] = self.values.get(v, EVERY) & atom.values
+            return True
+        return False
+
+    def _takes_fact(self, predicate: Predicate, terms: tuple[Term, ...]) -> bool:
+        if predicate.kind == 'class':
+            self.tokens.setdefault(_key(terms[0]), set()).add(predicate)
+        elif predicate.kind == 'data':
+            x, v = terms
+            self.datas.setdefault(v, (x, set()))[1].add(predicate)
+            if isinstance(v, Constant):
+                self.values[v] = point(v.value)
+        elif predicate.kind == 'object':
+            one, other = map(_key, terms)
+            if one == other:
+                self.tokens.setdefault(one, set()).add(('self', predicate))
+            elif (other, one) in self.roles:
+                self.roles[other, one].add((predicate, True))
+            else:
+                self.roles.setdefault((one, other), set()).add((predicate, False))
+        else:
+            return False
+        return True
+
+
+class Contexts:
+    """Completes contexts of one program; rules of SWRL take no part."""
+
+    def __init__(self, program: Program) -> None:
+        self._program = program
+        self._gaps: dict[Context, dict[_Gap, AtLeast | AtMost | None]] = {}
+        self._known: dict[tuple[Tokens, bool], Context] = {}
+        self._opened: list[Context] = []
+        self._waiting: dict[Context, None] = {}
+        self._always: list[tuple[Token | None, Axiom | None]] = []
+        self._class_rules: dict[Token, list[tuple[Tokens, Token | None]]] = {}
+        self.edge_rules: dict[Role, list[_EdgeRule]] = {}
+        self._value_rules: dict[Predicate, list[_ValueRule]] = {}
+        for clause in program.clauses:
+            if not clause.named_only:
+                self._take(clause)
+        for predicate in program.predicates():
+            for other in predicate.disjoint:
+                self._class_rule(frozenset((predicate, other)), None, None)
+        self._existentials: dict[Token, list[Any]] = {}
+        for existential in program.existentials:
+            self._existentials.setdefault(existential.label, []).append(existential)
+        self._at_most = [c for c in program.at_most if c.prop.kind == 'object']
+        self._at_most_values = [c for c in program.at_most if c.prop.kind == 'data']
+        self._at_least = [c for c in program.at_least if c.prop.kind == 'object']
+        self._at_least_values = [c for c in program.at_least if c.prop.kind == 'data']
+
+    # --- rules ---
+
+    def _take(self, clause: Clause) -> None:
+        """Index a clause about one individual, or one and what it is directly related to.
+
+        Chains of properties are spelt out as steps by `classification`.
+        """
+        body = _Body()
+        if not all(map(body.takes, clause.body)):
+            return
+        for tokens in body.tokens.values():
+            tokens.discard(self._program.thing)
+        if body.datas:
+            self._take_values(clause, body.tokens, body.datas, body.values)
+        elif not body.roles:
+            self._take_class(clause, body.tokens)
+        elif len(body.roles) == 1:
+            (((one, other), roles),) = body.roles.items()
+            self._take_edge(clause, one, other, frozenset(roles), body.tokens)
+            self._take_edge(clause, other, one, frozenset(map(turned, roles)), body.tokens)
+
+    def _take_edge(
+        self,
+        clause: Clause,
+        x: Any,
+        y: Any,
+        roles: frozenset[Role],
+        tokens: dict[Any, set[Token]],
+    ) -> None:
+        """Index a clause as a rule about x and the y that it is related to."""
+        if isinstance(x, tuple):
+            return
+        xs, ys = frozenset(tokens.get(x, ())), set(tokens.get(y, ()))
+        if isinstance(y, tuple):
+            ys.add(y)
+        head = self._edge_head(clause, x, y)
+        if head is not None:
+            rule = _EdgeRule(roles, xs, frozenset(ys), head, clause.origin)
+            for role in roles:
+                self.edge_rules.setdefault(role, []).append(rule)
+
+    def _edge_head(self, clause: Clause, x: Any, y: Any) -> tuple[Any, ...] | None:
+        head = clause.head
+        if isinstance(head, PredicateAtom) and head.predicate.kind == 'object':
+            one, other = map(_key, head.terms)
+            if (one, other) == (x, y):
+                return 'role', (head.predicate, False)
+            if (one, other) == (y, x):
+                return 'role', (head.predicate, True)
+        place, token = self._token(head)
+        if token is None:
+            return ('clash',) if place is not None else None
+        if place == x:
+            return 'x', token
+        return ('y', token) if place == y else None
+
+    def _token(self, head: HeadAtom) -> tuple[Any, Token | None]:
+        """Return what a head says of one individual, as (place, token).
+
+        Without a token it is a clash, without a place nothing that a context can use.
+        """
+        if isinstance(head, SameAtom):
+            one, other = map(_key, head.terms)
+            if isinstance(one, tuple):
+                one, other = other, one
+            return (one, other) if isinstance(other, tuple) else (None, None)
+        predicate, terms = head.predicate, head.terms
+        if predicate is self._program.nothing:
+            return _key(terms[0]), None
+        if predicate.kind == 'class':
+            return _key(terms[0]), predicate
+        if predicate.kind == 'data':
+            value = terms[1]
+            if isinstance(value, Constant):
+                return terms[0], ('value', predicate, value.value)
+            return None, None
+        if predicate.kind != 'object':
+            return None, None
+        one, other = map(_key, terms)
+        if one == other:
+            return one, ('self', predicate)
+        if isinstance(other, tuple):
+            return one, ('has', predicate, False, other[1])
+        if isinstance(one, tuple):
+            return other, ('has', predicate, True, one[1])
+        return None, None
+
+    def _take_class(self, clause: Clause, tokens: dict[Any, set[Token]]) -> None:
+        place, token = self._token(clause.head)
+        if len(tokens) > 1 or place is None or isinstance(place, tuple):
+            return
+        body = frozenset(tokens.get(place, ()))
+        if set(tokens) <= {place}:
+            self._class_rule(body, token, clause.origin)
+
+    def _class_rule(self, body: Tokens, token: Token | None, origin: Axiom | None) -> None:
+        if not body:
+            self._always.append((token, origin))
+        for one in body:
+            self._class_rules.setdefault(one, []).append((body, token))
+
+    def _take_values(
+        self,
+        clause: Clause,
+        tokens: dict[Any, set[Token]],
+        datas: dict[Any, tuple[Any, set[Predicate]]],
+        values: dict[Any, ValueSet],
+    ) -> None:
+        if len(datas) != 1:
+            return
+        ((v, (x, props)),) = datas.items()
+        if isinstance(x, Constant) or not set(tokens) <= {x}:
+            return
+        head: tuple[Any, ...] | None = None
+        atom = clause.head
+        if isinstance(atom, PredicateAtom) and atom.predicate.kind == 'data' and atom.terms[1] == v:
+            head = ('prop', atom.predicate)
+        else:
+            place, token = self._token(atom)
+            if place == x:
+                head = ('clash',) if token is None else ('x', token)
+        if head is not None:
+            xs = frozenset(tokens.get(x, ()))
+            rule = _ValueRule(frozenset(props), xs, values.get(v, EVERY), head, clause.origin)
+            for prop in props:
+                self._value_rules.setdefault(prop, []).append(rule)
+
+    # --- questions ---
+
+    def context(self, core: Iterable[Token], bare: bool = False) -> Context:
+        """Return the completed context of a core; `bare`: without what classes alone imply."""
+        found = self._open(frozenset(core), bare)
+        while self._opened or self._waiting:
+            # What an individual is by itself comes before what its neighbours make of it.
+            self._complete(self._opened.pop() if self._opened else self._waiting.popitem()[0])
+        return found
+
+    def gaps(self, cores: Iterable[Tokens]) -> dict[str, None]:
+        """Return sentences about axioms whose consequences for these cores may be incomplete."""
+        found: dict[str, None] = {}
+        reached: dict[Context, None] = {}
+        for core in cores:
+            start = self.context(core)
+            if start not in reached:
+                reached.update(closure(start, lambda one: [edge.target for edge in one.edges]))
+        for context in reached:
+            if not context.clash:
+                for (origin, what), condition in self._gaps.get(context, {}).items():
+                    known = isinstance(condition, AtLeast) and condition.head in context.tokens
+                    if not known:
+                        subject = 'an assertion' if origin is None else axiom_text(origin)
+                        found[f'{subject}: {what}'] = None
+        return found
+
+    def roles_above(self, role: Role) -> frozenset[Role]:
+        """Return the role and every role that it implies by itself."""
+        return frozenset(closure(role, self._implied_roles))
+
+    def _implied_roles(self, role: Role) -> list[Role]:
+        return [
+            rule.head[1]
+            for rule in self.edge_rules.get(role, ())
+            if rule.head[0] == 'role' and not (rule.xs or rule.ys) and len(rule.roles) == 1
+        ]
+
+    def possible_roles(self, role: Role) -> list[Role]:
+        """Roles, turned ones too, that an edge with this one may come to have."""
+        heads = [r.head[1] for r in self.edge_rules.get(role, ()) if r.head[0] == 'role']
+        return [*heads, *map(turned, heads)]
+
+    def contradictions(self) -> list[frozenset[Role]]:
+        """Return sets of roles by all of which one individual cannot be related to another."""
+        found = {
+            rule.roles: None
+            for rules in self.edge_rules.values()
+            for rule in rules
+            if rule.head[0] == 'clash' and not (rule.xs or rule.ys)
+        }
+        return list(found)
+
+    def heads_of(self, context: Context) -> Iterator[HeadAtom]:
+        """Yield the tokens and edges of a context as heads of clauses about individual 0."""
+        for token in context.tokens:
+            if isinstance(token, Predicate):
+                yield PredicateAtom(token, (0,))
+            elif token[0] == 'is':
+                yield SameAtom((0, Constant(token[1])))
+            elif token[0] == 'self':
+                yield PredicateAtom(token[1], (0, 0))
+        for held in context.values:
+            if held.values.size == held.count:
+                for value in held.values.members():
+                    for prop in held.props:
+                        yield PredicateAtom(prop, (0, Constant(value, True)))
+        for edge in context.edges:
+            for name in edge.target.names:
+                for predicate, backwards in edge.roles:
+                    terms = (Constant(name), 0) if backwards else (0, Constant(name))
+                    yield PredicateAtom(predicate, terms)
+        yield from self._about_named(context)
+
+    def _about_named(self, context: Context) -> Iterator[HeadAtom]:
+        """Yield what named individuals are because of individuals that must exist."""
+        for one in closure(context, lambda one: [edge.target for edge in one.edges]):
+            for name in one.names:
+                for token in one.tokens:
+                    if isinstance(token, Predicate):
+                        yield PredicateAtom(token, (Constant(name),))
+                for edge in one.edges:
+                    for other in edge.target.names:
+                        for predicate, backwards in edge.roles:
+                            pair = Constant(name), Constant(other)
+                            yield PredicateAtom(predicate, pair[::-1] if backwards else pair)
+
+    # --- completion ---
+
+    def _open(self, core: Tokens, bare: bool = False) -> Context:
+        found = self._known.get((core, bare))
+        if found is None:
+            found = self._known[core, bare] = Context(core, bare)
+            found.clash = self._program.nothing in core
+            self._opened.append(found)
+        return found
+
+    def _complete(self, context: Context) -> None:
+        known = len(context.tokens) if context.begun else -1
+        self._changed = True
+        while self._changed and not context.clash:
+            self._changed = False
+            self._close(context)
+            self._relate(context)
+            for edge in tuple(context.edges):
+                if edge in context.edges:
+                    self._along(context, edge)
+            self._loops(context)
+            self._merge(context)
+            self._count(context)
+            self._evaluate(context)
+        context.begun = True
+        if context.clash or len(context.tokens) > known or context.edges:
+            for user in context.users:
+                self._enqueue_if_news(user, context)
+
+    def _enqueue_if_news(self, user: Context, context: Context) -> None:
+        size = sum(len(edge.roles) + len(edge.core) for edge in context.edges)
+        news = (context, len(context.tokens), context.clash, len(context.edges), size)
+        if news not in user.done:
+            user.done.add(news)
+            self._waiting[user] = None
+
+    def _clash(self, context: Context) -> None:
+        context.clash = self._changed = True
+
+    def _add(self, context: Context, token: Token, *, beyond: bool = True) -> None:
+        context.derived.add(token)
+        if token not in context.tokens:
+            if beyond:
+                context.beyond.add(token)
+            context.tokens.add(token)
+            context.unclosed.append(token)
+            context.unrelated.append(token)
+            if _is_name(token):
+                context.names.append(token[1])
+            self._changed = True
+
+    def _close(self, context: Context) -> None:
+        """Add what classes imply without relations."""
+        if context.bare:
+            return
+        tokens = context.tokens
+        for token, _ in self._always:
+            if token is None:
+                self._clash(context)
+            elif token not in tokens:
+                self._add(context, token, beyond=False)
+        while context.unclosed:
+            one = context.unclosed.pop()
+            for body, token in self._class_rules.get(one, ()):
+                if (token is None or token not in tokens) and body <= tokens:
+                    if token is None:
+                        self._clash(context)
+                        return
+                    self._add(context, token, beyond=False)
+
+    def _relate(self, context: Context) -> None:
+        """Add the edges and values that the tokens require."""
+        while context.unrelated:
+            token = context.unrelated.pop()
+            if isinstance(token, Predicate):
+                for existential in self._existentials.get(token, ()):
+                    filler = existential.filler
+                    if existential.prop.kind == 'data':
+                        self._value(context, existential.prop, filler, existential.n)
+                    else:
+                        role = (existential.prop, existential.inverse)
+                        core = set() if filler is None else {filler}
+                        self._edge(context, role, core, existential.n)
+            elif token[0] == 'has':
+                self._edge(context, (token[1], token[2]), {('is', token[3])}, 1)
+            elif token[0] == 'self':
+                context.loops |= {(token[1], False), (token[1], True)}
+                self._changed = True
+            elif token[0] == 'value':
+                self._value(context, token[1], point(token[2]), 1)
+
+    def _edge(self, context: Context, role: Role, core: set[Token], count: int) -> None:
+        target = self._open(frozenset(core))
+        target.users[context] = None
+        context.edges.append(_Edge({role}, core, count, target))
+        self._changed = True
+
+    def _value(self, context: Context, prop: Predicate, values: ValueSet, count: int) -> None:
+        context.values.append(_Values({prop}, values, count))
+        self._changed = True
+
+    def _retarget(self, context: Context, edge: _Edge) -> None:
+        edge.target = self._open(frozenset(edge.core))
+        edge.target.users[context] = None
+        self._changed = True
+
+    # --- edges ---
+
+    def _along(self, context: Context, edge: _Edge) -> None:
+        """Apply the rules that speak of both ends of an edge."""
+        target = edge.target
+        if target.clash:
+            self._clash(context)
+        elif target.begun:
+            tokens = context.tokens
+            seen = target, len(tokens), len(target.tokens), len(edge.roles)
+            if seen != edge.seen:
+                edge.seen = seen
+                size = len(edge.core)
+                for role in tuple(edge.roles):
+                    for rule in self.edge_rules.get(role, ()):
+                        if rule.xs <= tokens and rule.ys <= target.tokens:
+                            if rule.roles <= edge.roles:
+                                self._fire(context, edge, rule)
+                        elif rule.xs <= tokens and target.names:
+                            self._gap(context, rule.origin, _NOMINALS)
+                if len(edge.core) > size:
+                    self._retarget(context, edge)
+            self._join_parent(context, edge)
+
+    def _fire(self, context: Context, edge: _Edge, rule: _EdgeRule) -> None:
+        head = rule.head
+        if head[0] == 'clash':
+            self._clash(context)
+        elif head[0] == 'x':
+            self._add(context, head[1])
+        elif head[0] == 'role':
+            if head[1] not in edge.roles:
+                edge.roles.add(head[1])
+                self._changed = True
+        elif head[1] not in edge.target.tokens:
+            edge.core.add(head[1])
+
+    def _join_parent(self, context: Context, edge: _Edge) -> None:
+        """Where the other end may have one such neighbour only, and this is it."""
+        target = edge.target
+        if not target.edges and not target.names:
+            return
+        back = {turned(role) for role in edge.roles}
+        named = bool(target.names)
+        for condition in self._at_most:
+            role = (condition.prop, condition.inverse)
+            if role not in back:
+                continue
+            if named:
+                self._gap(context, condition.origin, _NOMINALS)
+            if not _holds(condition.label, target.tokens):
+                continue
+            if not _holds(condition.filler, context.tokens):
+                continue
+            if condition.n != 1:
+                if any(role in other.roles for other in target.edges):
+                    self._case_gap(context, condition)
+                continue
+            for other in target.edges:
+                if role in other.roles and _holds(condition.filler, other.target.tokens):
+                    if other.count > 1:
+                        self._clash(context)
+                        return
+                    for token in other.core:
+                        self._add(context, token)
+                    fresh = {turned(r) for r in other.roles} - edge.roles
+                    if fresh:
+                        edge.roles |= fresh
+                        self._changed = True
+
+    def _loops(self, context: Context) -> None:
+        """Apply the rules to what relates an individual to itself."""
+        looped = len(context.loops), len(context.tokens)
+        if not context.loops or looped == context.looped:
+            return
+        context.looped = looped
+        for role in tuple(context.loops):
+            for rule in self.edge_rules.get(role, ()):
+                if rule.roles <= context.loops and rule.xs | rule.ys <= context.tokens:
+                    head = rule.head
+                    if head[0] == 'clash':
+                        self._clash(context)
+                    elif head[0] == 'role':
+                        context.loops |= {head[1], turned(head[1])}
+                    else:
+                        self._add(context, head[1])
+        for predicate, _ in tuple(context.loops):
+            self._add(context, ('self', predicate))
+
+    # --- counting ---
+
+    def _merge(self, context: Context) -> None:
+        """Make one edge of those that must lead to the same individual."""
+        for condition in self._at_most:
+            if condition.n == 1 and _holds(condition.label, context.tokens):
+                role = (condition.prop, condition.inverse)
+                counted = [
+                    edge
+                    for edge in context.edges
+                    if role in edge.roles and _holds(condition.filler, edge.target.tokens)
+                ]
+                if role in context.loops and _holds(condition.filler, context.tokens):
+                    for edge in counted:
+                        self._into_itself(context, edge)
+                    counted = []
+                for other in counted[1:]:
+                    self._unite(context, counted[0], other)
+                if any(edge.count > 1 for edge in counted):
+                    self._clash(context)
+        named = [edge for edge in context.edges if edge.target.names]
+        if any(edge.count > 1 for edge in named):
+            self._clash(context)
+        for one, other in combinations(named, 2):
+            shared = set(one.target.names) & set(other.target.names)
+            if shared and one in context.edges and other in context.edges:
+                self._unite(context, one, other)
+
+    def _unite(self, context: Context, kept: _Edge, gone: _Edge) -> None:
+        kept.roles |= gone.roles
+        kept.core |= gone.core
+        kept.count = max(kept.count, gone.count)
+        context.edges.remove(gone)
+        self._retarget(context, kept)
+
+    def _into_itself(self, context: Context, edge: _Edge) -> None:
+        for token in edge.core:
+            self._add(context, token)
+        context.loops |= edge.roles | {turned(role) for role in edge.roles}
+        context.edges.remove(edge)
+        self._changed = True
+
+    def _count(self, context: Context) -> None:
+        conditions: list[AtLeast | AtMost] = [*self._at_least, *self._at_most]
+        for condition in conditions:
+            needed = condition.n if isinstance(condition, AtLeast) else condition.n + 1
+            if isinstance(condition, AtLeast):
+                if condition.head in context.derived:
+                    continue
+            elif condition.n == 1 or not _holds(condition.label, context.tokens):
+                continue
+            role = (condition.prop, condition.inverse)
+            counted = [
+                edge
+                for edge in context.edges
+                if role in edge.roles and _holds(condition.filler, edge.target.tokens)
+            ]
+            if sum(edge.count for edge in counted) < needed:
+                continue
+            counted = [edge for edge in counted if not _is_redundant(edge, counted)]
+            if sum(edge.count for edge in counted) < needed:
+                continue
+            if self._most_different(context, counted) >= needed:
+                if isinstance(condition, AtLeast):
+                    self._add(context, condition.head)
+                else:
+                    self._clash(context)
+            else:
+                self._case_gap(context, condition)
+
+    def _most_different(self, context: Context, edges: list[_Edge]) -> int:
+        """Return how many individuals pairwise known to be different some of the edges lead to."""
+        order = sorted(edges, key=lambda edge: -edge.count)
+        apart = {
+            (one, other): self._different(context, one, other)
+            for one, other in combinations(order, 2)
+        }
+        best = 0
+        chosen: list[_Edge] = []
+
+        def extend(place: int, total: int) -> None:
+            nonlocal best
+            best = max(best, total)
+            for next_place in range(place, len(order)):
+                edge = order[next_place]
+                if all(apart[one, edge] for one in chosen):
+                    chosen.append(edge)
+                    extend(next_place + 1, total + edge.count)
+                    chosen.pop()
+
+        extend(0, 0)
+        return best
+
+    def _different(self, context: Context, one: _Edge, other: _Edge) -> bool:
+        roles = one.roles | other.roles
+        both = self._open(frozenset(one.core | other.core))
+        both.users[context] = None
+        tokens = both.tokens
+        return both.clash or any(
+            rule.head == ('clash',)
+            and rule.roles <= roles
+            and rule.xs <= context.tokens
+            and rule.ys <= tokens
+            for role in roles
+            for rule in self.edge_rules.get(role, ())
+        )
+
+    def _case_gap(self, context: Context, condition: AtLeast | AtMost) -> None:
+        self._gap(context, condition.origin, _CASES, condition)
+
+    def _gap(
+        self,
+        context: Context,
+        origin: Axiom | None,
+        what: str,
+        condition: AtLeast | AtMost | None = None,
+    ) -> None:
+        """Note an axiom some of whose consequences in a context may be missing."""
+        self._gaps.setdefault(context, {})[origin, what] = condition
+
+    # --- values ---
+
+    def _evaluate(self, context: Context) -> None:
+        """Apply the rules about values and count them."""
+        if not context.values:
+            return
+        for held in tuple(context.values):
+            self._along_value(context, held)
+        for condition in self._at_most_values:
+            if _holds(condition.label, context.tokens):
+                self._limit_values(context, condition)
+        for least in self._at_least_values:
+            if least.head not in context.derived:
+                counted = self._counted_values(context, least)
+                if sum(held.count for held in counted) >= least.n:
+                    if self._most_distinct(counted) >= least.n:
+                        self._add(context, least.head)
+                    else:
+                        self._case_gap(context, least)
+        for held in context.values:
+            if held.values.size < held.count:
+                self._clash(context)
+
+    def _along_value(self, context: Context, held: _Values) -> None:
+        for prop in tuple(held.props):
+            for rule in self._value_rules.get(prop, ()):
+                if not rule.xs <= context.tokens:
+                    continue
+                head = rule.head
+                if head[0] == 'clash':
+                    rest = held.values & ~(
+                        rule.values & self._had(context, rule.props - held.props)
+                    )
+                    if rest != held.values:
+                        held.values = rest
+                        self._changed = True
+                elif not rule.props <= held.props:
+                    continue
+                elif held.values.within(rule.values):
+                    if head[0] == 'x':
+                        self._add(context, head[1])
+                    elif head[1] not in held.props:
+                        held.props.add(head[1])
+                        self._changed = True
+                elif not (held.values & rule.values).decided:
+                    self._gap(context, rule.origin, _DATES)
+
+    def _had(self, context: Context, props: frozenset[Predicate]) -> ValueSet:
+        """Return the values that an individual certainly has by all of some properties."""
+        found = EVERY
+        for prop in props:
+            certain = NONE
+            for held in context.values:
+                if prop in held.props and held.values.size == held.count:
+                    certain |= held.values
+            found &= certain
+        return found
+
+    def _counted_values(self, context: Context, condition: AtLeast | AtMost) -> list[_Values]:
+        admitted = condition.filler
+        assert not isinstance(admitted, Predicate)
+        return [
+            held
+            for held in context.values
+            if condition.prop in held.props and (admitted is None or held.values.within(admitted))
+        ]
+
+    def _limit_values(self, context: Context, condition: AtMost) -> None:
+        counted = self._counted_values(context, condition)
+        if condition.n == 1:
+            for other in counted[1:]:
+                kept = counted[0]
+                kept.props |= other.props
+                kept.values &= other.values
+                kept.count = max(kept.count, other.count)
+                context.values.remove(other)
+                self._changed = True
+            if counted and counted[0].count > 1:
+                self._clash(context)
+        elif sum(held.count for held in counted) > condition.n:
+            if self._most_distinct(counted) > condition.n:
+                self._clash(context)
+            else:
+                self._case_gap(context, condition)
+
+    def _most_distinct(self, counted: list[_Values]) -> int:
+        best = 0
+        for size in range(len(counted), 0, -1):
+            for chosen in combinations(counted, size):
+                if all((a.values & b.values).is_empty for a, b in combinations(chosen, 2)):
+                    best = max(best, sum(held.count for held in chosen))
+        return best
+
+
+def _key(term: Any) -> Any:
+    """Return a term of a clause: a variable's number, or ('is', individual)."""
+    return ('is', term.value) if isinstance(term, Constant) else term
+
+
+def _holds(token: Any, tokens: set[Token]) -> bool:
+    return token is None or token in tokens
+
+
+def _is_name(token: Token) -> TypeGuard[tuple[Any, ...]]:
+    return isinstance(token, tuple) and token[0] == 'is'
+
+
+def _is_redundant(edge: _Edge, others: list[_Edge]) -> bool:
+    """Tell whether an individual that another edge leads to serves for this edge as well."""
+    for other in others:
+        if other is not edge and edge.count <= other.count and edge.roles <= other.roles:
+            mine, theirs = edge.target.tokens, other.target.tokens
+            equal = mine == theirs and edge.roles == other.roles and edge.count == other.count
+            if mine <= theirs and not (equal and others.index(edge) < others.index(other)):
+                return True
+    return False

@@ -1,0 +1,828 @@
+"""Translates axioms into Horn clauses and counting conditions.
+
+A class expression that cannot be written in a clause's body (a cardinality, `only`, a complement)
+becomes a label: a predicate that holds of what is known to belong to the expression. What no Horn
+clause can express is reported, with the axiom, in `Program.unsupported`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import replace
+from itertools import permutations, product
+from typing import Any
+
+from owl_reasoner.owl import axioms as ax
+from owl_reasoner.owl import expressions as ex
+from owl_reasoner.owl.axiom_text import axiom_text, expression_text
+from owl_reasoner.owl.axioms import Axiom
+from owl_reasoner.owl.expressions import ClassExpression, Literal, PropertyExpression
+from owl_reasoner.owl.vocabulary import (
+    BOTTOM,
+    BOTTOM_DATA,
+    NOTHING,
+    OWL,
+    SWRLB,
+    THING,
+    TOP_LITERAL,
+    local_name,
+)
+from owl_reasoner.reasoner.clauses import (
+    AtLeast,
+    AtMost,
+    BodyAtom,
+    Clause,
+    ComputedAtom,
+    Constant,
+    DifferentAtom,
+    Existential,
+    HeadAtom,
+    Key,
+    Partial,
+    Predicate,
+    PredicateAtom,
+    Program,
+    RangeAtom,
+    SameAtom,
+    Term,
+    UnsupportedError,
+    closure,
+    property_atom,
+    turned,
+)
+from owl_reasoner.reasoner.datatypes import value_of
+from owl_reasoner.reasoner.normal_form import is_positive, normal_form
+from owl_reasoner.reasoner.swrl_builtins import builtin
+from owl_reasoner.reasoner.value_sets import EVERY, ValueSet, unfolded, value_set
+
+_Directed = tuple[str, bool]
+
+
+def directed(prop: PropertyExpression) -> _Directed:
+    """Return a property as (IRI, whether inverted)."""
+    return (prop, False) if isinstance(prop, str) else (prop.prop, True)
+
+
+def inclusions(axiom: Axiom) -> Iterator[tuple[_Directed, _Directed]]:
+    """Yield the pairs of properties, one included in the other, that an axiom states."""
+    if isinstance(axiom, (ax.SubObjectPropertyOf, ax.SubDataPropertyOf)):
+        yield directed(axiom.sub), directed(axiom.sup)
+    elif isinstance(axiom, (ax.EquivalentObjectProperties, ax.EquivalentDataProperties)):
+        yield from permutations(dict.fromkeys(map(directed, axiom.props)), 2)
+    elif isinstance(axiom, ax.InverseObjectProperties):
+        yield from permutations((directed(axiom.first), turned(directed(axiom.second))))
+    elif isinstance(axiom, ax.SymmetricObjectProperty):
+        yield directed(axiom.prop), turned(directed(axiom.prop))
+
+
+class PropertyHierarchy:
+    """The reflexive and transitive closure of the stated property inclusions."""
+
+    def __init__(self, axioms: Iterable[Axiom]) -> None:
+        self._above: dict[_Directed, set[_Directed]] = {}
+        self._functional: set[_Directed] = set()
+        for axiom in axioms:
+            for sub, sup in inclusions(axiom):
+                self._above.setdefault(sub, set()).add(sup)
+                self._above.setdefault(turned(sub), set()).add(turned(sup))
+            if isinstance(axiom, (ax.FunctionalObjectProperty, ax.FunctionalDataProperty)):
+                self._functional.add(directed(axiom.prop))
+            elif isinstance(axiom, ax.InverseFunctionalObjectProperty):
+                self._functional.add(turned(directed(axiom.prop)))
+
+    def above(self, prop: PropertyExpression) -> set[_Directed]:
+        """Return the property and everything it is included in."""
+        return set(closure(directed(prop), lambda one: self._above.get(one, ())))
+
+    def above_role(self, iri: str, inverted: bool) -> set[_Directed]:
+        """Return a directed property and everything it is included in."""
+        return self.above(ex.ObjectInverseOf(iri) if inverted else iri)
+
+    def is_functional(self, prop: PropertyExpression) -> bool:
+        """Tell whether an individual has at most one value, by this property or one above it."""
+        return not self._functional.isdisjoint(self.above(prop))
+
+
+Body = tuple[BodyAtom, ...]
+_X, _Y, _Z = 0, 1, 2
+_NEGATIVE = (
+    ex.ObjectComplementOf,
+    ex.ObjectAllValuesFrom,
+    ex.ObjectMaxCardinality,
+    ex.DataAllValuesFrom,
+    ex.DataMaxCardinality,
+)
+_RELATING = (
+    ex.ObjectSomeValuesFrom,
+    ex.ObjectMinCardinality,
+    ex.ObjectHasValue,
+    ex.ObjectHasSelf,
+    ex.DataSomeValuesFrom,
+    ex.DataMinCardinality,
+    ex.DataHasValue,
+)
+
+
+class RuleTerms:
+    """Numbers a rule's variables by `fresh`; tells individuals from values."""
+
+    def __init__(self, fresh: Callable[[], int]) -> None:
+        self._fresh = fresh
+        self._numbers: dict[ex.Variable, int] = {}
+        self.individuals: set[int] = set()
+        self.values: set[int] = set()
+
+    def individual(self, argument: ex.IndividualArgument) -> Term:
+        """Return the term of an argument that is an individual."""
+        if isinstance(argument, ex.Variable):
+            number = self._number(argument)
+            self.individuals.add(number)
+            return number
+        return Constant(argument)
+
+    def value(self, argument: ex.DataArgument) -> Term:
+        """Return the term of an argument that is a value.
+
+        Raises:
+            UnsupportedError: It is neither a literal nor a variable.
+        """
+        if isinstance(argument, ex.Variable):
+            number = self._number(argument)
+            self.values.add(number)
+            return number
+        if not isinstance(argument, Literal):
+            raise UnsupportedError(f'{argument} stands where a literal or a variable is expected')
+        return Constant(value_of(argument), True)
+
+    def _number(self, variable: ex.Variable) -> int:
+        number = self._numbers.get(variable)
+        if number is None:
+            number = self._numbers[variable] = self._fresh()
+        return number
+
+
+def computed_atom(atom: ex.BuiltinAtom, terms: RuleTerms) -> ComputedAtom:
+    """Return a rule's built-in.
+
+    Raises:
+        UnsupportedError: It is not known.
+    """
+    name = atom.builtin.removeprefix(SWRLB)
+    known = builtin(name, len(atom.arguments)) if atom.builtin.startswith(SWRLB) else None
+    if known is None:
+        count = len(atom.arguments)
+        raise UnsupportedError(
+            f'the built-in {local_name(atom.builtin)} with {count} arguments is not supported'
+        )
+    holds, solve = known
+    return ComputedAtom(name, holds, solve, tuple(map(terms.value, atom.arguments)))
+
+
+class Translation:
+    """Builds a `Program` from axioms that are not assertions.
+
+    Args:
+        axioms: The ontology's axioms; assertions and annotations among them are passed over.
+        asserted: Complex class expressions that individuals are asserted to belong to.
+        negated: Properties with negative assertions, as pairs (kind, IRI), kind 'object' or 'data'.
+
+    Attributes:
+        program: The result.
+        hierarchy: The property inclusions.
+    """
+
+    def __init__(
+        self,
+        axioms: Iterable[Axiom],
+        asserted: Iterable[ClassExpression] = (),
+        negated: Iterable[tuple[str, str]] = (),
+    ) -> None:
+        tbox = [axiom for axiom in axioms if not isinstance(axiom, (ax.Assertion, ax.Annotation))]
+        self.program = Program()
+        self._variables = _Y
+        self._described: set[ClassExpression] = set()
+        self._recognised: set[ClassExpression] = set()
+        self._counted: set[Predicate] = set()
+        self._complements: dict[str, Predicate] = {}
+        self._origin: Axiom | None = None
+        self._context = 'the ontology'
+        self._datatypes = {
+            axiom.datatype: axiom.range
+            for axiom in tbox
+            if isinstance(axiom, ax.DatatypeDefinition)
+        }
+        self.hierarchy = PropertyHierarchy(tbox)
+        for axiom in tbox:
+            self._origin = axiom
+            self._attempt(self._axiom, axiom)
+        self._origin = None
+        for expression in asserted:
+            self._context = f'assertions of {expression_text(expression)}'
+            self.required(expression)
+        for kind, iri in negated:
+            self._negate(kind, iri)
+        self._top_and_bottom()
+        self._complement_labels()
+        if any(
+            isinstance(clause.head, PredicateAtom) and clause.head.predicate is self.program.apart
+            for clause in self.program.clauses
+        ):
+            self.contradict((self._differs(_X, _X),), _X)
+        if self.program.uses_thing:
+            self._state_named()
+
+    def _state_named(self) -> None:
+        """State that the individuals which axioms name exist."""
+        program = self.program
+        atoms = (atom for clause in program.clauses for atom in (*clause.body, clause.head))
+        terms = dict.fromkeys(term for atom in atoms for term in atom.terms)
+        for term in terms:
+            if isinstance(term, Constant) and not term.is_value:
+                program.clauses.append(Clause((), PredicateAtom(program.thing, (term,))))
+
+    def report(self, reason: str) -> None:
+        """Note a part of the axiom at hand that is not used."""
+        text = self._sentence(reason)
+        if text not in self.program.unsupported:
+            self.program.unsupported.append(text)
+
+    def _sentence(self, reason: str) -> str:
+        subject = self._context if self._origin is None else axiom_text(self._origin)
+        return f'{subject}: {reason}'
+
+    def _attempt(self, add: Callable[..., object], *parts: Any) -> None:
+        """Add what can be added of an axiom; the rest is reported."""
+        try:
+            add(*parts)
+        except UnsupportedError as reason:
+            self.report(str(reason))
+
+    # --- clauses ---
+
+    def fresh(self) -> int:
+        self._variables += 1
+        return self._variables
+
+    def clause(self, body: Body, head: HeadAtom, defines: bool = False) -> None:
+        """Add a clause; one of a rule is about named individuals, unless it defines a label."""
+        program = self.program
+        bound = {term for atom in body for term in atom.terms if isinstance(term, int)}
+        loose = [term for term in head.terms if isinstance(term, int) and term not in bound]
+        for term in dict.fromkeys(loose):
+            program.uses_thing = True
+            body = (*body, PredicateAtom(program.thing, (term,)))
+        named_only = isinstance(self._origin, ax.Rule) and not defines
+        program.clauses.append(Clause(tuple(dict.fromkeys(body)), head, self._origin, named_only))
+
+    def _label(self, expression: ClassExpression) -> Predicate:
+        if isinstance(expression, str):
+            if expression == THING:
+                self.program.uses_thing = True
+                return self.program.thing
+            return self.program.nothing if expression == NOTHING else self.program.cls(expression)
+        label = self.program.labels.get(expression)
+        if label is None:
+            label = Predicate('class', expression_text(expression), expression)
+            self.program.labels[expression] = label
+        return label
+
+    def _recognise(self, expression: ClassExpression) -> Predicate:
+        """Return a label that holds of everything known to belong to the expression."""
+        label = self._label(expression)
+        if not isinstance(expression, str) and expression not in self._recognised:
+            self._recognised.add(expression)
+            for body in self.bodies(expression, _X):
+                if body != (PredicateAtom(label, (_X,)),):
+                    self.clause(body, PredicateAtom(label, (_X,)), defines=True)
+        return label
+
+    def _filler(self, expression: ClassExpression) -> Predicate | None:
+        expression = normal_form(expression)
+        return None if expression == THING else self._recognise(expression)
+
+    def _direction(self, prop: ex.PropertyExpression) -> tuple[Predicate, bool]:
+        if isinstance(prop, str):
+            return self.program.object(prop), False
+        return self.program.object(prop.prop), True
+
+    def _values(self, data_range: ex.DataRange) -> ValueSet | None:
+        """Return the values of a range, None where these are all that there are.
+
+        Raises:
+            UnsupportedError: The range is not supported.
+        """
+        try:
+            data_range = unfolded(data_range, self._datatypes)
+        except ValueError as error:
+            raise UnsupportedError(str(error)) from None
+        if data_range == TOP_LITERAL:
+            return None
+        values = value_set(data_range)
+        if values is None:
+            raise UnsupportedError(f'the data range {expression_text(data_range)} is not supported')
+        return values
+
+    # --- antecedents ---
+
+    def bodies(self, expression: ClassExpression, x: Term) -> list[Body]:
+        """Return the bodies each of which makes `x` a member."""
+        expression = normal_form(expression)
+        if expression == THING:
+            return [()]
+        fact = self._fact(expression, x)
+        if fact is not None:
+            return [(fact,)]
+        if isinstance(expression, ex.ObjectIntersectionOf):
+            return self._intersection(expression.operands, x)
+        if isinstance(expression, ex.ObjectUnionOf):
+            return [body for operand in expression.operands for body in self.bodies(operand, x)]
+        if isinstance(expression, ex.ObjectOneOf):
+            return [(SameAtom((x, Constant(name))),) for name in expression.individuals]
+        if isinstance(expression, ex.ObjectSomeValuesFrom):
+            return self._related(expression.prop, expression.filler, x)
+        if isinstance(expression, ex.DataSomeValuesFrom):
+            return [self._valued(expression.prop, expression.range, x)]
+        return self._labelled_bodies(expression, x)
+
+    def _fact(self, expression: ClassExpression, x: Term) -> PredicateAtom | None:
+        """Return the atom that says as much of `x` as the expression; None where no one does."""
+        if isinstance(expression, str):
+            return PredicateAtom(self._label(expression), (x,))
+        if isinstance(expression, ex.ObjectHasValue):
+            return self.property(expression.prop, x, Constant(expression.individual))
+        if isinstance(expression, ex.ObjectHasSelf):
+            return self.property(expression.prop, x, x)
+        if isinstance(expression, ex.DataHasValue):
+            value = Constant(value_of(expression.literal), True)
+            return PredicateAtom(self.program.data(expression.prop), (x, value))
+        return None
+
+    def property(self, prop: ex.PropertyExpression, x: Term, y: Term) -> PredicateAtom:
+        return property_atom(self.program, prop, x, y)
+
+    def _related(self, prop: ex.PropertyExpression, filler: ClassExpression, x: Term) -> list[Body]:
+        y = self.fresh()
+        return [(self.property(prop, x, y), *body) for body in self._simple_bodies(filler, y)]
+
+    def _simple_bodies(self, expression: ClassExpression, y: Term) -> list[Body]:
+        """Return the bodies that relate `y` to nothing: restrictions in the expression become
+        labels.
+
+        So every clause speaks of one individual and what it is directly related to, which is what
+        `classification` needs.
+        """
+        expression = normal_form(expression)
+        if isinstance(expression, (str, ex.ObjectOneOf)):
+            return self.bodies(expression, y)
+        if isinstance(expression, ex.ObjectIntersectionOf) and all(
+            isinstance(operand, str) for operand in expression.operands
+        ):
+            return self.bodies(expression, y)
+        if isinstance(expression, ex.ObjectUnionOf):
+            parts = [self._simple_bodies(operand, y) for operand in expression.operands]
+            return [body for part in parts for body in part]
+        return [(PredicateAtom(self._recognise(expression), (y,)),)]
+
+    def _intersection(self, operands: tuple[ClassExpression, ...], x: Term) -> list[Body]:
+        """Return the bodies for what is in every operand, at most one of which is spelt out as a
+        relation.
+        """
+        spelt_out = [one for one in operands if isinstance(one, (*_RELATING, ex.ObjectUnionOf))]
+        parts: list[list[Body]] = []
+        for operand in operands:
+            if len(spelt_out) > 1 and operand in spelt_out:
+                parts.append([(PredicateAtom(self._recognise(operand), (x,)),)])
+            else:
+                parts.append(self.bodies(operand, x))
+        return [tuple(atom for part in choice for atom in part) for choice in product(*parts)]
+
+    def _valued(self, prop: str, data_range: ex.DataRange, x: Term) -> Body:
+        v = self.fresh()
+        atom = PredicateAtom(self.program.data(prop), (x, v))
+        values = self._values(data_range)
+        return (atom,) if values is None else (atom, RangeAtom(values, (v,)))
+
+    def _labelled_bodies(self, expression: ClassExpression, x: Term) -> list[Body]:
+        """Return the bodies for an expression that needs a label beside them."""
+        functional = self.hierarchy.is_functional
+        if isinstance(expression, (ex.ObjectMaxCardinality, ex.DataMaxCardinality)) and (
+            functional(expression.prop)
+        ):
+            return [()]
+        label = self._label(expression)
+        bodies: list[Body] = [(PredicateAtom(label, (x,)),)]
+        decided_by: tuple[Predicate, int] | None = None
+        if isinstance(expression, (ex.ObjectMinCardinality, ex.DataMinCardinality)):
+            self._count(label, expression)
+        elif isinstance(expression, ex.ObjectAllValuesFrom):
+            if functional(expression.prop):
+                bodies += self._related(expression.prop, expression.filler, x)
+                prop, inverse = self._direction(expression.prop)
+                decided_by = prop, int(inverse)
+        elif isinstance(expression, ex.DataAllValuesFrom):
+            if functional(expression.prop):
+                bodies.append(self._valued(expression.prop, expression.range, x))
+                decided_by = self.program.data(expression.prop), 0
+        elif isinstance(expression, ex.ObjectComplementOf) and isinstance(expression.operand, str):
+            self._complements[expression.operand] = label
+        if isinstance(expression, _NEGATIVE):
+            text = self._sentence(
+                f'not all members of {expression_text(expression)} are recognised'
+            )
+            self.program.partial.append(Partial(label, text, decided_by))
+        return bodies
+
+    def _count(
+        self, label: Predicate, expression: ex.ObjectMinCardinality | ex.DataMinCardinality
+    ) -> None:
+        """Have a label recognised by counting."""
+        if label in self._counted:
+            return
+        self._counted.add(label)
+        condition = AtLeast(label, expression.n, *self._counts(expression), self._origin)
+        self.program.at_least.append(condition)
+
+    def _counts(
+        self,
+        expression: ex.ObjectMinCardinality
+        | ex.DataMinCardinality
+        | ex.ObjectMaxCardinality
+        | ex.DataMaxCardinality,
+    ) -> tuple[Predicate, bool, Predicate | ValueSet | None]:
+        """Return what is counted: by which property, whether backwards, and in which filler."""
+        if isinstance(expression, (ex.ObjectMinCardinality, ex.ObjectMaxCardinality)):
+            return *self._direction(expression.prop), self._filler(expression.filler)
+        return self.program.data(expression.prop), False, self._values(expression.range)
+
+    # --- consequents ---
+
+    def imply(self, body: Body, expression: ClassExpression, x: Term) -> None:
+        """Add the clauses by which the body makes `x` a member."""
+        expression = normal_form(expression)
+        if expression == THING:
+            return
+        fact = self._fact(expression, x)
+        if fact is not None:
+            self.clause(body, fact)
+        elif isinstance(expression, ex.ObjectIntersectionOf):
+            for operand in expression.operands:
+                self._attempt(self.imply, body, operand, x)
+        elif isinstance(expression, ex.ObjectUnionOf):
+            self._imply_union(body, expression, x)
+        elif isinstance(expression, ex.ObjectOneOf):
+            self.clause(body, SameAtom((x, Constant(expression.individuals[0]))))
+        else:
+            label = self._label(expression)
+            if body != (PredicateAtom(label, (x,)),):
+                self.clause(body, PredicateAtom(label, (x,)))
+            if expression not in self._described:
+                self._described.add(expression)
+                self._describe(label, expression)
+
+    def contradict(self, body: Body, x: Term) -> None:
+        self.clause(body, PredicateAtom(self.program.nothing, (x,)))
+
+    def _imply_union(self, body: Body, expression: ex.ObjectUnionOf, x: Term) -> None:
+        positive: list[ClassExpression] = []
+        for operand in expression.operands:
+            opposite = normal_form(operand, True)
+            if is_positive(opposite) and not is_positive(operand):
+                body = (*body, PredicateAtom(self._recognise(opposite), (x,)))
+            else:
+                positive.append(operand)
+        if len(positive) > 1:
+            raise UnsupportedError('a union on the right side needs reasoning by cases')
+        self.imply(body, positive[0] if positive else NOTHING, x)
+
+    def _describe(self, label: Predicate, expression: ClassExpression) -> None:
+        """Add what membership in a labelled expression implies."""
+        body = (PredicateAtom(label, (_X,)),)
+        if isinstance(expression, (ex.ObjectSomeValuesFrom, ex.ObjectMinCardinality)):
+            n = expression.n if isinstance(expression, ex.ObjectMinCardinality) else 1
+            filler = expression.filler
+            required = None if filler == THING else self.required(filler)
+            self._exist(label, n, self._direction(expression.prop), required)
+        elif isinstance(expression, (ex.DataSomeValuesFrom, ex.DataMinCardinality)):
+            n = expression.n if isinstance(expression, ex.DataMinCardinality) else 1
+            values = self._values(expression.range)
+            every = EVERY if values is None else values
+            self._exist(label, n, (self.program.data(expression.prop), False), every)
+        elif isinstance(expression, ex.ObjectAllValuesFrom):
+            y = self.fresh()
+            self.imply((*body, self.property(expression.prop, _X, y)), expression.filler, y)
+        elif isinstance(expression, ex.DataAllValuesFrom):
+            self.only(body, expression.prop, expression.range)
+        elif isinstance(expression, (ex.ObjectMaxCardinality, ex.DataMaxCardinality)):
+            most = AtMost(label, expression.n, *self._counts(expression), self._origin)
+            self.program.at_most.append(most)
+        elif isinstance(expression, ex.ObjectComplementOf):
+            self._describe_complement(label, expression.operand)
+
+    def _exist(
+        self,
+        label: Predicate,
+        n: int,
+        direction: tuple[Predicate, bool],
+        filler: Predicate | ValueSet | None,
+    ) -> None:
+        existential = Existential(label, n, *direction, filler, self._origin)
+        self.program.existentials.append(existential)
+
+    def _describe_complement(self, label: Predicate, operand: ClassExpression) -> None:
+        if isinstance(operand, str):
+            self._disjoint(label, self.program.cls(operand))
+            return
+        for other in self.bodies(operand, _X):
+            self.contradict((PredicateAtom(label, (_X,)), *other), _X)
+        if isinstance(operand, ex.ObjectOneOf):
+            for name in operand.individuals:
+                differs = self._differs(_X, Constant(name))
+                self.clause((PredicateAtom(label, (_X,)),), differs)
+
+    def only(self, body: Body, prop: str, data_range: ex.DataRange) -> None:
+        values = self._values(data_range)
+        if values is not None:
+            v = self.fresh()
+            atom = PredicateAtom(self.program.data(prop), (_X, v))
+            self.contradict((*body, atom, RangeAtom(~values, (v,))), _X)
+
+    def _disjoint(self, first: Predicate, second: Predicate) -> None:
+        if first is second:
+            self.contradict((PredicateAtom(first, (_X,)),), _X)
+        else:
+            first.disjoint.add(second)
+            second.disjoint.add(first)
+
+    def _top_and_bottom(self) -> None:
+        """Add the properties that OWL itself gives a meaning.
+
+        What relates nothing is always there: an assertion with it may come at any time.
+        """
+        program = self.program
+        for bottom in (program.object(BOTTOM), program.data(BOTTOM_DATA)):
+            self.contradict((PredicateAtom(bottom, (_X, _Y)),), _X)
+        for name, table in (('ObjectProperty', program.objects), ('DataProperty', program.datas)):
+            if f'{OWL}top{name}' in table:
+                text = f'owl:top{name}: it is used like any other property'
+                program.unsupported.append(text)
+
+    def _differs(self, x: Term, y: Term) -> PredicateAtom:
+        return PredicateAtom(self.program.apart, (x, y))
+
+    def _negate(self, kind: str, iri: str) -> None:
+        """Add a predicate for negative assertions, which contradict the positive."""
+        program = self.program
+        prop = program.object(iri) if kind == 'object' else program.data(iri)
+        negative = program.negatives[prop] = Predicate(kind, f'not {local_name(iri)}')
+        body = (PredicateAtom(prop, (_X, _Y)), PredicateAtom(negative, (_X, _Y)))
+        self.contradict(body, _X)
+
+    def required(self, expression: ClassExpression) -> Predicate:
+        """Return the label of an expression that an individual must belong to, with what that
+        implies.
+        """
+        label = self._label(expression)
+        if not isinstance(expression, str) and expression not in self.program.required:
+            self.program.required.add(expression)
+            self._attempt(self.imply, (PredicateAtom(label, (_X,)),), expression, _X)
+        return label
+
+    def _complement_labels(self) -> None:
+        """State that what is disjoint from a class belongs to its complement, where asked for."""
+        for iri, label in self._complements.items():
+            for other in self.program.cls(iri).disjoint:
+                if other is not label:
+                    head = PredicateAtom(label, (_X,))
+                    self.program.clauses.append(Clause((PredicateAtom(other, (_X,)),), head))
+
+    # --- axioms ---
+
+    def _axiom(self, axiom: Axiom) -> None:
+        if isinstance(axiom, ax.SubClassOf):
+            self._sub_class(axiom.sub, axiom.sup)
+        elif isinstance(axiom, ax.EquivalentClasses):
+            for sub in axiom.classes:
+                for sup in axiom.classes:
+                    if sub is not sup:
+                        self._attempt(self._sub_class, sub, sup)
+        elif isinstance(axiom, ax.DisjointClasses):
+            self._all_disjoint(axiom.classes)
+        elif isinstance(axiom, ax.DisjointUnion):
+            self._all_disjoint(axiom.classes)
+            for part in axiom.classes:
+                self._attempt(self._sub_class, part, axiom.cls)
+            self._attempt(self._sub_class, axiom.cls, ex.ObjectUnionOf(axiom.classes))
+        elif isinstance(axiom, ax.Rule):
+            self._rule(axiom)
+        elif isinstance(axiom, ax.Import):
+            raise UnsupportedError('imports are not followed')
+        elif isinstance(axiom, ax.HasKey):
+            self._key(axiom)
+        elif not isinstance(axiom, (ax.Declaration, ax.DatatypeDefinition)):
+            self._property_axiom(axiom)
+
+    def _sub_class(self, sub: ClassExpression, sup: ClassExpression) -> None:
+        sub, sup = normal_form(sub), normal_form(sup)
+        if isinstance(sub, ex.ObjectUnionOf):
+            for operand in sub.operands:
+                self._attempt(self._sub_class, operand, sup)
+            return
+        opposite = sup.operand if isinstance(sup, ex.ObjectComplementOf) else None
+        if isinstance(sub, str) and isinstance(opposite, str):
+            self._disjoint(self._label(sub), self._label(opposite))
+        for body in self.bodies(sub, _X):
+            self.imply(body, sup, _X)
+
+    def _all_disjoint(self, classes: tuple[ClassExpression, ...]) -> None:
+        for pair in ax.pairs_of(classes):
+            first, second = map(normal_form, pair)
+            if THING in (first, second):
+                self._attempt(self._sub_class, second if first == THING else first, NOTHING)
+            elif not is_positive(second):
+                self._attempt(self._sub_class, first, normal_form(second, True))
+            elif not is_positive(first):
+                self._attempt(self._sub_class, second, normal_form(first, True))
+            else:
+                self._disjoint(self._recognise(first), self._recognise(second))
+
+    def _key(self, axiom: ax.HasKey) -> None:
+        props = [self._direction(prop) for prop in axiom.object_props]
+        props += [(self.program.data(prop), False) for prop in axiom.data_props]
+        if props:
+            cls = self._filler(axiom.cls)
+            self.program.keys.append(Key(cls, tuple(props), axiom))
+
+    # --- property axioms ---
+
+    def _property_axiom(self, axiom: Axiom) -> None:
+        """Add the clauses of an axiom about properties."""
+        data = isinstance(axiom, (ax.SubDataPropertyOf, ax.EquivalentDataProperties))
+        link = self._data_link if data else self._object_link
+        for sub, sup in inclusions(axiom):
+            self.clause((link(*sub),), link(*sup))
+        if isinstance(axiom, (ax.DisjointObjectProperties, ax.DisjointDataProperties)):
+            data = isinstance(axiom, ax.DisjointDataProperties)
+            self._disjoint_properties(axiom.props, self._data_link if data else self._object_link)
+        elif isinstance(axiom, ax.ObjectPropertyDomain):
+            self.imply((self.property(axiom.prop, _X, _Y),), axiom.domain, _X)
+        elif isinstance(axiom, ax.ObjectPropertyRange):
+            self.imply((self.property(axiom.prop, _X, _Y),), axiom.range, _Y)
+        elif isinstance(axiom, ax.DataPropertyDomain):
+            self.imply((self._data_link(axiom.prop),), axiom.domain, _X)
+        elif isinstance(axiom, ax.DataPropertyRange):
+            self.only((), axiom.prop, axiom.range)
+        else:
+            self._characteristic(axiom)
+
+    def _characteristic(self, axiom: Axiom) -> None:
+        """Add the clauses of an axiom that says of what kind a property, or a chain, is."""
+        program, prop = self.program, self.property
+        if isinstance(axiom, ax.SubPropertyChainOf):
+            body = tuple(prop(part, place, place + 1) for place, part in enumerate(axiom.chain))
+            self.clause(body, prop(axiom.sup, 0, len(axiom.chain)))
+        elif isinstance(axiom, ax.TransitiveObjectProperty):
+            both = prop(axiom.prop, _X, _Y), prop(axiom.prop, _Y, _Z)
+            self.clause(both, prop(axiom.prop, _X, _Z))
+        elif isinstance(axiom, ax.ReflexiveObjectProperty):
+            self.clause((), prop(axiom.prop, _X, _X))
+        elif isinstance(axiom, ax.IrreflexiveObjectProperty):
+            program.irreflexive.append(prop(axiom.prop, _X, _X).predicate)
+            self.contradict((prop(axiom.prop, _X, _X),), _X)
+        elif isinstance(axiom, ax.AsymmetricObjectProperty):
+            program.asymmetric.append(prop(axiom.prop, _X, _Y).predicate)
+            self.contradict((prop(axiom.prop, _X, _Y), prop(axiom.prop, _Y, _X)), _X)
+        elif isinstance(axiom, (ax.FunctionalObjectProperty, ax.InverseFunctionalObjectProperty)):
+            atom = prop(axiom.prop, _X, _Y)
+            inverse = (atom.terms[0] == _Y) != isinstance(axiom, ax.InverseFunctionalObjectProperty)
+            program.at_most.append(AtMost(None, 1, atom.predicate, inverse, None, axiom))
+        elif isinstance(axiom, ax.FunctionalDataProperty):
+            program.at_most.append(AtMost(None, 1, program.data(axiom.prop), False, None, axiom))
+
+    def _disjoint_properties(
+        self, props: Iterable[PropertyExpression], link: Callable[..., PredicateAtom]
+    ) -> None:
+        for first, second in ax.pairs_of(props):
+            one, two = link(*directed(first)), link(*directed(second))
+            pair = (one.predicate, one.terms[0] == _Y, two.predicate, two.terms[0] == _Y)
+            self.program.disjoint_properties.append(pair)
+            self.contradict((one, two), _X)
+
+    def _object_link(self, iri: str, inverted: bool = False) -> PredicateAtom:
+        pair = (_Y, _X) if inverted else (_X, _Y)
+        return PredicateAtom(self.program.object(iri), pair)
+
+    def _data_link(self, iri: str, _: bool = False) -> PredicateAtom:
+        return PredicateAtom(self.program.data(iri), (_X, _Y))
+
+    # --- rules ---
+
+    def _rule(self, rule: ax.Rule) -> None:
+        """Add the clauses of one rule to the self's program."""
+        terms = RuleTerms(self.fresh)
+        alternatives: list[list[tuple[BodyAtom, ...]]] = []
+        for atom in rule.body:
+            if isinstance(atom, ex.ClassAtom):
+                # What it relates to need have no name: that is the label's matter.
+                term = terms.individual(atom.argument)
+                alternatives.append(self._simple_bodies(atom.cls, term))
+            elif isinstance(atom, ex.DataRangeAtom):
+                term, values = terms.value(atom.argument), self._values(atom.range)
+                if values is not None:
+                    alternatives.append([(RangeAtom(values, (term,)),)])
+            else:
+                alternatives.append([(self._rule_atom(atom, terms),)])
+        for parts in product(*alternatives):
+            body = tuple(atom for part in parts for atom in part)
+            self._heads(rule, self._bound(body, terms), terms)
+
+    def _rule_atom(
+        self, atom: ex.Atom, terms: RuleTerms
+    ) -> PredicateAtom | SameAtom | DifferentAtom | ComputedAtom:
+        """Return an atom that is not about a class or a data range."""
+        if isinstance(atom, ex.BuiltinAtom):
+            return computed_atom(atom, terms)
+        assert not isinstance(atom, (ex.ClassAtom, ex.DataRangeAtom))
+        first = terms.individual(atom.first)
+        if isinstance(atom, ex.DataPropertyAtom):
+            return PredicateAtom(self.program.data(atom.prop), (first, terms.value(atom.second)))
+        second = terms.individual(atom.second)
+        if isinstance(atom, ex.ObjectPropertyAtom):
+            return self.property(atom.prop, first, second)
+        kind = SameAtom if isinstance(atom, ex.SameIndividualAtom) else DifferentAtom
+        return kind((first, second))
+
+    def _bound(self, body: tuple[BodyAtom, ...], terms: RuleTerms) -> tuple[BodyAtom, ...]:
+        """Return the body, in which what stands in no fact is found by other means.
+
+        Such individuals are members of owl:Thing, such values are computed by a built-in. All other
+        built-ins only test: they take 3 and 3.0 as equal, the lookup of a computed value among the
+        facts would not, and the order of the join decides which of the two is done.
+
+        Raises:
+            UnsupportedError: A value is bound by nothing.
+        """
+        program = self.program
+        bound: set[Term] = set()
+        computing: set[BodyAtom] = set()
+        for atom in body:
+            if isinstance(atom, PredicateAtom):
+                bound.update(atom.terms)
+        free = [
+            term
+            for atom in body
+            for term in atom.terms
+            if isinstance(term, int) and term in terms.individuals and term not in bound
+        ]
+        for term in dict.fromkeys(free):
+            program.uses_thing = True
+            body = (*body, PredicateAtom(program.thing, (term,)))
+            bound.add(term)
+        waiting = [atom for atom in body if isinstance(atom, (ComputedAtom, RangeAtom))]
+        progress = True
+        while waiting and progress:
+            progress = False
+            for atom in tuple(waiting):
+                unbound = [
+                    term for term in atom.terms if isinstance(term, int) and term not in bound
+                ]
+                if unbound == [atom.terms[0]] and isinstance(atom, ComputedAtom) and atom.solve:
+                    computing.add(atom)
+                    unbound = []
+                if not unbound:
+                    bound.update(atom.terms)
+                    waiting.remove(atom)
+                    progress = True
+        if waiting:
+            name = waiting[0].builtin if isinstance(waiting[0], ComputedAtom) else 'a data range'
+            raise UnsupportedError(f'an argument of {name} is bound by no other atom')
+        return tuple(
+            replace(atom, solve=None)
+            if isinstance(atom, ComputedAtom) and atom not in computing
+            else atom
+            for atom in body
+        )
+
+    def _heads(self, rule: ax.Rule, body: tuple[BodyAtom, ...], terms: RuleTerms) -> None:
+        bound = {term for atom in body for term in atom.terms if isinstance(term, int)}
+        if not rule.head:
+            subject = next((term for term in sorted(bound) if term in terms.individuals), None)
+            self.contradict(body, Constant(NOTHING) if subject is None else subject)
+
+        def check(*arguments: Term) -> None:
+            if any(isinstance(term, int) and term not in bound for term in arguments):
+                raise UnsupportedError('a variable of the head does not stand in the body')
+
+        for atom in rule.head:
+            if isinstance(atom, ex.ClassAtom):
+                argument = terms.individual(atom.argument)
+                check(argument)
+                self.imply(body, atom.cls, argument)
+            elif isinstance(atom, (ex.DataRangeAtom, ex.BuiltinAtom)):
+                raise UnsupportedError('a built-in or data range in the head has no meaning here')
+            else:
+                head = self._rule_atom(atom, terms)
+                assert not isinstance(head, ComputedAtom)
+                check(*head.terms)
+                if isinstance(head, DifferentAtom):
+                    head = self._differs(*head.terms)
+                self.clause(body, head)

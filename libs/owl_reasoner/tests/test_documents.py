@@ -1,0 +1,346 @@
+"""Functional syntax, documents with ill-formed parts, and imports."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from owl_reasoner import KnowledgeBase, OntologyFileError, read_ontology
+from owl_reasoner.documents.reading import OntologyDocument
+from owl_reasoner.documents.writing import ontology_bytes
+from owl_reasoner.owl import axioms as ax
+from owl_reasoner.owl import expressions as ex
+from owl_reasoner.owl.expressions import Literal, Variable
+from owl_reasoner.owl.vocabulary import OWL, RDF, RDFS, THING, XSD
+
+IRI = 'http://x/'
+FUNCTIONAL = """
+# A comment.
+Prefix(:=<http://x/#>)
+Prefix(xsd:=<http://www.w3.org/2001/XMLSchema#>)
+Ontology(<http://x/> <http://x/1>
+Declaration(Class(:A))
+SubClassOf(Annotation(rdfs:comment "why \\"so\\""@EN) :A ObjectSomeValuesFrom(:p ObjectOneOf(:i)))
+EquivalentClasses(:B ObjectIntersectionOf(:A ObjectMinCardinality(2 ObjectInverseOf(:p) :C)))
+SubObjectPropertyOf(ObjectPropertyChain(:p :q) :r)
+TransitiveObjectProperty(:r)
+DataPropertyRange(:d DatatypeRestriction(xsd:integer xsd:minInclusive "1"^^xsd:integer))
+HasKey(:A (:p) (:d))
+NegativeDataPropertyAssertion(:d :i "5"^^xsd:long)
+ObjectPropertyAssertion(ObjectInverseOf(:p) :i :j)
+ClassAssertion(DataHasValue(:d "5"^^xsd:long) _:someone)
+DifferentIndividuals(:i :j :k)
+DLSafeRule(Body(ClassAtom(:A Variable(:x)) DataPropertyAtom(:d Variable(:x) Variable(:v)))
+           Head(DataPropertyAtom(:e Variable(:x) Variable(:v))))
+Nonsense(:A :B)
+SubClassOf(:A ObjectSomeValuesFrom(:p))
+)
+"""
+
+
+def test_functional_syntax_is_read() -> None:
+    document = read_ontology(FUNCTIONAL.encode(), IRI)
+    x = 'http://x/#'
+    some = ax.SubClassOf(x + 'A', ex.ObjectSomeValuesFrom(x + 'p', ex.ObjectOneOf((x + 'i',))))
+    note = Literal('why "so"', RDF + 'langString', 'en')
+    counted = ex.ObjectMinCardinality(2, ex.ObjectInverseOf(x + 'p'), x + 'C')
+    bound = (XSD + 'minInclusive', Literal('1', XSD + 'integer'))
+    five = Literal('5', XSD + 'long')
+    body = (
+        ex.ClassAtom(x + 'A', Variable(x + 'x')),
+        ex.DataPropertyAtom(x + 'd', Variable(x + 'x'), Variable(x + 'v')),
+    )
+    assert (document.format, document.iri) == ('functional', IRI)
+    assert document.axioms == [
+        ax.AnnotationAssertion(OWL + 'versionIRI', IRI, 'http://x/1'),
+        ax.Declaration('class', x + 'A'),
+        some,
+        ax.AxiomAnnotation(some, ((RDFS + 'comment', note),)),
+        ax.EquivalentClasses((x + 'B', ex.ObjectIntersectionOf((x + 'A', counted)))),
+        ax.SubPropertyChainOf((x + 'p', x + 'q'), x + 'r'),
+        ax.TransitiveObjectProperty(x + 'r'),
+        ax.DataPropertyRange(x + 'd', ex.DatatypeRestriction(XSD + 'integer', (bound,))),
+        ax.HasKey(x + 'A', (x + 'p',), (x + 'd',)),
+        ax.NegativeDataPropertyAssertion(x + 'd', x + 'i', five),
+        ax.ObjectPropertyAssertion(x + 'p', x + 'j', x + 'i'),
+        ax.ClassAssertion(ex.DataHasValue(x + 'd', five), '_:someone'),
+        ax.DifferentIndividuals(frozenset((x + 'i', x + 'j', x + 'k'))),
+        ax.Rule(body, (ex.DataPropertyAtom(x + 'e', Variable(x + 'x'), Variable(x + 'v')),)),
+    ]
+    unknown, incomplete = document.unsupported
+    assert unknown == 'line 19: Nonsense is not understood'
+    assert incomplete.startswith('line 20: SubClassOf is not understood: expected 2 parts')
+
+
+@pytest.mark.parametrize(
+    ('text', 'place', 'words'),
+    [
+        ('Ontology(<x> SubClassOf(:A :B))', (1, 25), "prefix of ':A' is not declared"),
+        ('Prefix(:=<x>)\nOntology(<x> SubClassOf(:A', (2, 27), 'ends inside'),
+        ('Ontology(<x> SubClassOf(] :A))', (1, 25), 'prefix of'),
+        ('Ontology(<x> "text)', (1, 14), 'unexpected'),
+    ],
+)
+def test_errors_in_functional_syntax_name_their_place(
+    text: str, place: tuple[int, int], words: str
+) -> None:
+    with pytest.raises(OntologyFileError) as caught:
+        read_ontology(text.encode(), IRI)
+    assert (caught.value.line, caught.value.column) == place
+    assert words in str(caught.value)
+
+
+HEAD = (
+    '<rdf:RDF xmlns:rdf="http://www.w3.org/1999/02/22-rdf-syntax-ns#"'
+    ' xmlns:rdfs="http://www.w3.org/2000/01/rdf-schema#"'
+    ' xmlns:owl="http://www.w3.org/2002/07/owl#" xml:base="http://x/">\n'
+)
+
+
+def test_an_ill_formed_restriction_costs_its_axiom_alone() -> None:
+    text = (
+        HEAD + '<owl:Class rdf:ID="A"><rdfs:subClassOf rdf:resource="#B"/>\n'
+        '<rdfs:subClassOf><owl:Restriction><owl:onProperty rdf:resource="#p"/>\n'
+        '</owl:Restriction></rdfs:subClassOf></owl:Class></rdf:RDF>'
+    )
+    document = read_ontology(text.encode(), IRI)
+    assert ax.SubClassOf('http://x/#A', 'http://x/#B') in document.axioms
+    (sentence,) = document.unsupported
+    assert 'line 3: a statement about A is left out: restriction on p states nothing' in sentence
+
+
+def test_a_negative_assertion_needs_no_type() -> None:
+    text = (
+        HEAD + '<rdf:Description><owl:sourceIndividual rdf:resource="#i"/>\n'
+        '<owl:assertionProperty rdf:resource="#p"/>'
+        '<owl:targetIndividual rdf:resource="#j"/></rdf:Description></rdf:RDF>'
+    )
+    document = read_ontology(text.encode(), IRI)
+    x = 'http://x/#'
+    assert document.axioms == [ax.NegativeObjectPropertyAssertion(x + 'p', x + 'i', x + 'j')]
+
+
+def test_a_restriction_with_a_name_defines_it() -> None:
+    text = (
+        HEAD + '<owl:Class rdf:ID="A"><owl:onProperty rdf:resource="#p"/>'
+        '<owl:someValuesFrom rdf:resource="http://www.w3.org/2002/07/owl#Thing"/></owl:Class>'
+        '</rdf:RDF>'
+    )
+    document = read_ontology(text.encode(), IRI)
+    definition = ex.ObjectSomeValuesFrom('http://x/#p', THING)
+    assert ax.EquivalentClasses(('http://x/#A', definition)) in document.axioms
+
+
+def test_imports_of_files_beside_the_document_are_followed(tmp_path: Path) -> None:
+    def written(name: str, body: str) -> Path:
+        path = tmp_path / name
+        path.write_text(f'Prefix(:=<http://x/#>)\nOntology(<http://x/{name}>\n{body})')
+        return path
+
+    written('upper.ofn', 'Import(<http://x/main>) SubClassOf(:B :C)')
+    main = written('main.ofn', 'Import(<http://x/upper>) Import(<http://y/away>) SubClassOf(:A :B)')
+    document = read_ontology(main, IRI)
+    assert document.unsupported == [
+        'owl:imports <http://y/away> is not followed: no such file beside the document'
+    ]
+    kb = KnowledgeBase(IRI, document.axioms)
+    kb.reason()
+    assert kb.superclasses('http://x/#A') == {'http://x/#B', 'http://x/#C'}
+
+
+@pytest.mark.parametrize('axiom', ['Declaration(:A)', 'DLSafeRule(Body(:A) Head())'])
+def test_an_axiom_with_a_name_for_a_construct_costs_itself_alone(axiom: str) -> None:
+    text = f'Prefix(:=<http://x/#>)\nOntology(<http://x/>\n{axiom}\nSubClassOf(:A :B))'
+    document = read_ontology(text.encode(), IRI)
+    assert document.axioms == [ax.SubClassOf('http://x/#A', 'http://x/#B')]
+    assert ['line 3: ' in sentence for sentence in document.unsupported] == [True]
+
+
+TURTLE = """@prefix : <http://x/#> . @prefix owl: <http://www.w3.org/2002/07/owl#> .
+@prefix rdf: <http://www.w3.org/1999/02/22-rdf-syntax-ns#> .
+@prefix rdfs: <http://www.w3.org/2000/01/rdf-schema#> .
+@prefix xsd: <http://www.w3.org/2001/XMLSchema#> . <http://x/> a owl:Ontology .
+"""
+
+
+def read_turtle(text: str) -> OntologyDocument:
+    return read_ontology((TURTLE + text).encode(), IRI)
+
+
+def test_an_undeclared_property_is_what_its_values_and_ranges_say() -> None:
+    document = read_turtle(
+        ':place a rdf:Property ; rdfs:range :Room , xsd:string . :near a rdf:Property .\n'
+        ':width a rdf:Property ; rdfs:range xsd:integer .\n'
+        ':deep a rdf:Property ; rdfs:subPropertyOf :depth .\n'
+        ':size a owl:DatatypeProperty . :depth a rdf:Property ; rdfs:subPropertyOf :size .\n'
+        ':i :place :hall , "the hall" ; :said "yes" , :j .'
+    )
+    x = 'http://x/#'
+    assert document.unsupported == []
+    kinds = {(a.iri, a.kind) for a in document.axioms if isinstance(a, ax.Declaration)}
+    assert kinds == {
+        (x + 'place', 'data_property'),
+        (x + 'place', 'object_property'),
+        (x + 'near', 'object_property'),
+        (x + 'width', 'data_property'),
+        (x + 'size', 'data_property'),
+        (x + 'depth', 'data_property'),
+        (x + 'deep', 'data_property'),
+    }
+    for axiom in (
+        ax.ObjectPropertyRange(x + 'place', x + 'Room'),
+        ax.DataPropertyRange(x + 'place', XSD + 'string'),
+        ax.ObjectPropertyAssertion(x + 'place', x + 'i', x + 'hall'),
+        ax.SubDataPropertyOf(x + 'depth', x + 'size'),
+        ax.SubDataPropertyOf(x + 'deep', x + 'depth'),
+        ax.DataPropertyAssertion(x + 'said', x + 'i', Literal('yes')),
+        ax.ObjectPropertyAssertion(x + 'said', x + 'i', x + 'j'),
+    ):
+        assert axiom in document.axioms
+
+
+def test_an_object_property_is_below_no_data_property_and_stays_what_it_is() -> None:
+    text = (
+        '<http://x/> a owl:Ontology ; :license "free" .\n'
+        ':license a owl:ObjectProperty ; rdfs:subPropertyOf :about .\n'
+        ':about a owl:DatatypeProperty .'
+    )
+    document = read_turtle(text)
+    assert document.unsupported == [
+        'a statement about license is left out: subPropertyOf of an object property and a data'
+        ' property, license and about'
+    ]
+    again = read_ontology(ontology_bytes(document.axioms, 'http://x/'), IRI)
+    assert set(again.axioms) == set(document.axioms)
+    assert again.unsupported == []
+
+
+def test_what_has_no_name_keeps_its_annotations_or_says_so() -> None:
+    document = read_turtle(
+        '[] a :Robot ; rdfs:label "someone" .\n'
+        ':A rdfs:subClassOf [ owl:unionOf ( :B :C ) ; rdfs:comment "either" ] .\n'
+        ':old a owl:DeprecatedClass . :i a "5"^^xsd:int .'
+    )
+    notes = {a.prop: a.value for a in document.axioms if isinstance(a, ax.AnnotationAssertion)}
+    assert notes == {
+        RDFS + 'label': Literal('someone'),
+        'http://www.w3.org/2002/07/owl#deprecated': Literal('true', XSD + 'boolean'),
+    }
+    assert document.unsupported == [
+        'comment of what has no name is not kept',
+        "a statement about i is left out: its type is the literal '5'",
+    ]
+
+
+def test_a_header_without_a_name_is_no_name() -> None:
+    text = '@prefix owl: <http://www.w3.org/2002/07/owl#> . [] a owl:Ontology ; owl:versionInfo 2 .'
+    document = read_ontology(text.encode(), IRI)
+    assert (document.iri, document.axioms) == ('', [])
+    assert document.unsupported == ['versionInfo of what has no name is not kept']
+
+
+@pytest.mark.parametrize(
+    'text',
+    [
+        '<http://x/##i> <http://x/##p> <http://x/##j> .\n<http://x/##i> <http://x/##q> 1 ;\n'
+        ' <http://x/##q> 2 .',
+        '@prefix : <http://x/##> . :i :p :j ; :q 1 , 2 .',
+    ],
+)
+def test_turtle_that_begins_as_n_triples_do_and_names_that_are_no_iris(text: str) -> None:
+    document = read_ontology(text.encode(), IRI)
+    x, integer = 'http://x/##', XSD + 'integer'
+    assert document.format == 'turtle'
+    assert document.axioms == [
+        ax.ObjectPropertyAssertion(x + 'p', x + 'i', x + 'j'),
+        ax.DataPropertyAssertion(x + 'q', x + 'i', Literal('1', integer)),
+        ax.DataPropertyAssertion(x + 'q', x + 'i', Literal('2', integer)),
+    ]
+
+
+def test_a_header_has_values_of_declared_properties() -> None:
+    document = read_turtle(
+        ':about a owl:ObjectProperty ; rdfs:range :Place . :since a owl:DatatypeProperty .\n'
+        '<http://x/> :about :Hall , "rooms" ; :since 2020 , :now ; :by "me" .'
+    )
+    x = 'http://x/#'
+    assert [axiom for axiom in document.axioms if hasattr(axiom, 'subject')] == [
+        ax.ObjectPropertyAssertion(x + 'about', 'http://x/', x + 'Hall'),
+        ax.AnnotationAssertion(x + 'about', 'http://x/', Literal('rooms')),
+        ax.DataPropertyAssertion(x + 'since', 'http://x/', Literal('2020', XSD + 'integer')),
+        ax.AnnotationAssertion(x + 'since', 'http://x/', x + 'now'),
+        ax.AnnotationAssertion(x + 'by', 'http://x/', Literal('me')),
+    ]
+    assert document.unsupported == []
+    kb = KnowledgeBase(IRI, document.axioms)
+    kb.reason()
+    assert kb.instances(x + 'Place') == {x + 'Hall'}
+    again = read_ontology(ontology_bytes(document.axioms, 'http://x/', 'rdfxml'), 'http://x/')
+    assert set(again.axioms) >= set(document.axioms)
+
+
+@pytest.mark.parametrize('form', ['rdfxml', 'ntriples'])
+def test_a_value_stays_one_where_the_header_has_its_property_too(form: str) -> None:
+    text = '<http://x/> :title "Rooms" . :i :title "Hall" .'
+    axioms = read_turtle(text).axioms
+    again = read_ontology(ontology_bytes(axioms, IRI, form), IRI).axioms
+    assert set(axioms) <= set(again)
+    assert ax.DataPropertyAssertion('http://x/#title', 'http://x/#i', Literal('Hall')) in again
+
+
+def test_what_an_import_declares_holds_in_the_document_that_imports_it(tmp_path: Path) -> None:
+    main, upper = tmp_path / 'main.ttl', tmp_path / 'upper.ttl'
+    upper.write_text(
+        TURTLE.replace('<http://x/>', '<http://x/upper>')
+        + ':size a owl:DatatypeProperty . :note a owl:AnnotationProperty .\n'
+        '_:b a :Wheel .'
+    )
+    main.write_text(
+        TURTLE + '<http://x/> owl:imports <http://x/upper> . :height rdfs:subPropertyOf :size .\n'
+        ':A rdfs:subClassOf [ owl:onProperty :size ; owl:maxCardinality 1 ] .\n'
+        ':i :note "new" . _:b a :Door .'
+    )
+    document = read_ontology(main, IRI)
+    x = 'http://x/#'
+    for axiom in (
+        ax.SubDataPropertyOf(x + 'height', x + 'size'),
+        ax.SubClassOf(x + 'A', ex.DataMaxCardinality(1, x + 'size', RDFS + 'Literal')),
+        ax.AnnotationAssertion(x + 'note', x + 'i', Literal('new')),
+    ):
+        assert axiom in document.axioms
+    assert document.unsupported == []
+
+
+def test_individuals_without_a_name_of_two_documents_are_two(tmp_path: Path) -> None:
+    def written(name: str, body: str) -> Path:
+        path = tmp_path / name
+        path.write_text(f'Prefix(:=<http://x/#>)\nOntology(<http://x/{name}>\n{body})')
+        return path
+
+    written('upper.ofn', 'ClassAssertion(:Wheel _:b)')
+    main = written('main.ofn', 'Import(<http://x/upper>) ClassAssertion(:Door _:b)')
+    kinds = [a for a in read_ontology(main, IRI).axioms if isinstance(a, ax.ClassAssertion)]
+    assert len({axiom.individual for axiom in kinds}) == len(kinds) == 2
+
+
+@pytest.mark.parametrize(
+    ('base', 'reference', 'iri'),
+    [
+        ('http://x/onto', '#A', 'http://x/onto#A'),
+        ('http://x/onto#', 'A', 'http://x/onto#A'),
+        ('http://x/onto#', '#A', 'http://x/onto#A'),
+        ('http://x/onto', '/A', 'http://x/onto/A'),
+        ('http://x/onto/', 'A', 'http://x/onto/A'),
+        ('http://x/onto/', '../A', 'http://x/A'),
+        ('http://x/onto#', 'urn:a:A', 'urn:a:A'),
+    ],
+)
+def test_names_in_owl_xml_are_those_that_the_owl_api_shortened(
+    base: str, reference: str, iri: str
+) -> None:
+    text = (
+        f'<Ontology xmlns="http://www.w3.org/2002/07/owl#" xml:base="{base}" ontologyIRI="{base}">'
+        f'<SubClassOf><Class IRI="{reference}"/><Class IRI="http://x/B"/></SubClassOf></Ontology>'
+    )
+    assert read_ontology(text.encode(), IRI).axioms == [ax.SubClassOf(iri, 'http://x/B')]

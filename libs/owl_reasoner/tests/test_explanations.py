@@ -1,0 +1,198 @@
+"""Why a fact holds and why an ontology is inconsistent, in words."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from owl_reasoner import KnowledgeBase
+from owl_reasoner.owl.axioms import (
+    Axiom,
+    ClassAssertion,
+    DifferentIndividuals,
+    SameIndividual,
+    SubClassOf,
+)
+from owl_reasoner.owl.expressions import ObjectSomeValuesFrom
+
+from .patrol_map import (
+    IRI,
+    NOW,
+    PLACES_DIFFER,
+    VISITS,
+    link,
+    n,
+    seven_rooms,
+    value,
+)
+
+
+def test_urgency_is_explained_by_its_calculation() -> None:
+    kb = seven_rooms()
+    kb.change([value('now', 'Robot1', NOW + 20)], [value('now', 'Robot1', NOW)])
+    kb.change([value('visitedAt', 'R3', NOW)], [axiom for axiom in VISITS if 'R3' in repr(axiom)])
+    kb.reason()
+    explanation = kb.explain(ClassAssertion(n('URGENT'), n('R3')))
+    assert explanation is not None
+    assert explanation.sentence() == (
+        f'R3 is URGENT because now {NOW + 20} - visitedAt {NOW} = 20 > urgencyThreshold 7'
+    )
+    assert explanation.kind == 'rule'
+    assert explanation.because == 'the rule Urgency'
+    assert {premise.fact_text for premise in explanation.premises} == {
+        f'Robot1 now {NOW + 20}',
+        f'R3 visitedAt {NOW}',
+        'Robot1 urgencyThreshold 7',
+    }
+    assert all(premise.kind == 'asserted' for premise in explanation.premises)
+
+
+def test_reachability_is_explained_down_to_the_assertions() -> None:
+    explanation = seven_rooms().explain(link('canReach', 'Robot1', 'C1'))
+    assert explanation is not None
+    lines = explanation.tree().splitlines()
+    assert lines[:7] == [
+        'Robot1 canReach C1  [by the rule Reachability]',
+        '  E is different from C1  [by C1, C2, E, R1, R2, 2 more are all different]',
+        '  Robot1 isIn E  [asserted]',
+        '  E connectedTo C1  [by the rule Connectability]',
+        '    C1 hasDoor D6  [asserted]',
+        '    E hasDoor D6  [asserted]',
+        '    E is different from C1  [by C1, C2, E, R1, R2, 2 more are all different]',
+    ]
+    # The rules ask for classes that other axioms imply: those stand at the end.
+    assert '  range of hasDoor is DOOR  [asserted]' in lines[7:]
+    assert holds_in(explanation.sources(), link('canReach', 'Robot1', 'C1'))
+
+
+def test_membership_is_explained_by_its_definition() -> None:
+    explanation = seven_rooms().explain(ClassAssertion(n('CORRIDOR'), n('E')))
+    assert explanation is not None
+    assert explanation.sentence() == (
+        'E is CORRIDOR because E hasDoor D6, E hasDoor D7 and D6 is different from D7'
+        ' (CORRIDOR EquivalentTo (LOCATION and hasDoor min 2 DOOR))'
+    )
+
+
+def test_difference_is_explained() -> None:
+    kb = seven_rooms(without=[PLACES_DIFFER])
+    explanation = kb.explain(DifferentIndividuals(frozenset((n('E'), n('C1')))))
+    assert explanation is not None
+    assert f'E visitedAt {NOW}' in explanation.tree()
+    assert f'C1 visitedAt {NOW - 1}' in explanation.tree()
+
+
+def test_sameness_is_explained() -> None:
+    kb = seven_rooms(link('isIn', 'Robot1', 'C1'), without=[PLACES_DIFFER, *VISITS])
+    explanation = kb.explain(SameIndividual(frozenset((n('E'), n('C1')))))
+    assert explanation is not None
+    assert explanation.because == 'isIn is functional'
+    shared = kb.explain(link('hasDoor', 'E', 'D1'))
+    assert shared is not None
+    assert 'C1 hasDoor D1  [asserted]' in shared.tree()
+    assert 'is the same as' in shared.tree()
+
+
+def test_what_is_asserted_and_what_does_not_hold() -> None:
+    kb = seven_rooms()
+    asserted = kb.explain(link('isIn', 'Robot1', 'E'))
+    assert asserted is not None
+    assert asserted.sentence() == 'Robot1 isIn E because it is asserted'
+    assert kb.explain(link('isIn', 'Robot1', 'C1')) is None
+    assert kb.explain(ClassAssertion(n('URGENT'), n('R1'))) is None
+    assert kb.explain(ClassAssertion(n('NOSUCH'), n('R1'))) is None
+    assert kb.explain(SubClassOf(n('CORRIDOR'), n('ROOM'))) is not None
+    assert kb.explain(SubClassOf(n('ROOM'), n('CORRIDOR'))) is None
+    assert kb.explain_inconsistency() is None
+
+
+def test_two_places_at_once_are_explained() -> None:
+    explanation = seven_rooms(link('isIn', 'Robot1', 'C1')).explain_inconsistency()
+    assert explanation is not None
+    assert explanation.sentence() == (
+        'the ontology is inconsistent because Robot1 isIn C1, Robot1 isIn E'
+        ' and C1 is different from E (isIn is functional)'
+    )
+
+
+def test_two_visits_are_explained() -> None:
+    kb = seven_rooms(value('visitedAt', 'R4', 5))
+    explanation = kb.explain_inconsistency()
+    assert explanation is not None
+    assert 'R4 visitedAt 5' in explanation.sentence()
+    assert f'R4 visitedAt {NOW - 6}' in explanation.sentence()
+    assert 'visitedAt exactly 1 long' in explanation.sentence()
+
+
+def test_disjoint_classes_are_explained() -> None:
+    explanation = seven_rooms(link('hasDoor', 'R1', 'C2')).explain_inconsistency()
+    assert explanation is not None
+    assert 'these classes are disjoint' in explanation.sentence()
+    assert 'C2 is DOOR' in explanation.tree()
+
+
+def test_a_subclass_fact_is_explained_by_its_axioms() -> None:
+    kb = KnowledgeBase(
+        IRI,
+        [
+            SubClassOf(n('A'), ObjectSomeValuesFrom(n('p'), n('B'))),
+            SubClassOf(n('B'), n('C')),
+            SubClassOf(n('B'), n('E')),
+            SubClassOf(ObjectSomeValuesFrom(n('p'), n('C')), n('D')),
+            SubClassOf(n('D'), n('E')),
+            ClassAssertion(n('A'), n('i')),
+        ],
+    )
+    kb.reason()
+    fact = SubClassOf(n('A'), n('D'))
+    explanation = kb.explain(fact)
+    assert explanation is not None
+    texts = {premise.fact_text for premise in explanation.premises}
+    assert texts == {'A SubClassOf p some B', 'B SubClassOf C', 'p some C SubClassOf D'}
+    assert set(kb.justification(fact)) == set(explanation.sources())
+    why = kb.explain(ClassAssertion(n('D'), n('i')))
+    assert why is not None
+    assert all(text in why.tree() for text in texts)
+
+
+def test_a_justification_is_enough_and_no_axiom_of_it_is_spare() -> None:
+    kb = seven_rooms(link('isIn', 'Robot1', 'C1'), without=[PLACES_DIFFER, *VISITS])
+    facts = [
+        *(ClassAssertion(n(cls), n('E')) for cls in ('ROOM', 'CORRIDOR', 'LOCATION')),
+        SameIndividual(frozenset((n('E'), n('C1')))),
+        link('hasDoor', 'E', 'D1'),
+        SubClassOf(n('CORRIDOR'), n('LOCATION')),
+    ]
+    for fact in facts:
+        axioms = kb.justification(fact)
+        assert axioms
+        assert holds_in(axioms, fact)
+        for spare in axioms:
+            assert not holds_in([axiom for axiom in axioms if axiom != spare], fact)
+
+
+def test_an_explanation_that_took_too_long_to_shorten_says_so() -> None:
+    kb = seven_rooms()
+    fact = SubClassOf(n('CORRIDOR'), n('LOCATION'))
+    short = kb.explain(fact)
+    kb.patience = -1.0
+    long = kb.explain(fact)
+    assert short is not None
+    assert long is not None
+    assert short.because == 'these axioms together'
+    assert long.because == 'these axioms together, perhaps not all of them'
+    assert set(long.sources()) > set(short.sources())
+    assert holds_in(long.sources(), fact)
+
+
+def test_a_contradiction_has_a_justification() -> None:
+    kb = seven_rooms(link('isIn', 'Robot1', 'C1'))
+    axioms = kb.justification(None)
+    assert set(axioms) >= {link('isIn', 'Robot1', 'C1'), link('isIn', 'Robot1', 'E')}
+    assert len(axioms) == 4
+    assert not KnowledgeBase(IRI, axioms).reason()
+    assert seven_rooms().justification(None) == ()
+
+
+def holds_in(axioms: Iterable[Axiom], fact: Axiom) -> bool:
+    kb = KnowledgeBase(IRI, axioms)
+    return kb.reason() and kb.holds(fact)

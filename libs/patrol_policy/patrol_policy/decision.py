@@ -1,0 +1,349 @@
+"""Where to go next: charging first, then an operator's request, then the rules, then the policy.
+
+`decide` is the one function that decides, for both behaviours. It is pure: all that it knows
+comes in as a `World`, a `Battery` and `DecisionSettings`. `why_not` answers from the same steps
+why a place is not chosen.
+
+The rules are a list of classes of places in order of priority. The first class that has a
+reachable member decides: its members are the candidates, and the policy chooses among them.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from patrol_policy.battery_reserve import Battery, BatteryLimits, reserve
+from patrol_policy.policies import DEFAULT_POLICY, POLICIES, Scores, make_policy
+from patrol_policy.settings import converted, names_expected, parameter, parameters
+from patrol_policy.suggestions import nearest
+from patrol_policy.world import Decision, World
+
+RECHARGE = 'recharge'
+"""The rule of a decision to go charging."""
+REQUEST = 'request'
+"""The rule of a decision to go where an operator has sent the robot."""
+ANY = 'any'
+"""The rule of a decision for which no class had a reachable member."""
+URGENT = 'URGENT'
+DEFAULT_RULES = (URGENT, 'CORRIDOR', 'ROOM')
+
+
+LONGEST_THRESHOLD = 10**9
+"""Seconds: 31 years."""
+
+
+class NowhereToGoError(RuntimeError):
+    """No place can be reached from where the robot is."""
+
+
+class RequestError(NowhereToGoError):
+    """The place that an operator asked for cannot be reached."""
+
+
+@dataclass(frozen=True)
+class Rules:
+    """Classes of places by falling priority.
+
+    Attributes:
+        classes: Names of classes of the ontology; with none, every reachable place may be chosen.
+
+    Raises:
+        ValueError: A name is no class name, or stands twice.
+    """
+
+    classes: tuple[str, ...] = DEFAULT_RULES
+
+    def __post_init__(self) -> None:
+        for position, name in enumerate(self.classes):
+            if not re.fullmatch(r'[A-Za-z_][\w.-]*', name):
+                raise ValueError(f'{name!r} is not the name of a class of places')
+            if name in self.classes[:position]:
+                raise ValueError(f'{name} stands twice in the list of rules')
+
+    def candidates(self, world: World) -> tuple[str, tuple[str, ...]]:
+        """Return the rule whose turn it is and the places it allows, sorted.
+
+        Places that could not be reached lately only count when nothing else can be reached.
+
+        Raises:
+            NowhereToGoError: Nothing is reachable.
+        """
+        reachable = [place for place in world.reachable if place != world.place]
+        if not reachable:
+            raise NowhereToGoError(f'nothing can be reached from {world.place}')
+        open_places = [place for place in reachable if place not in world.avoided] or reachable
+        for name in self.classes:
+            members = [p for p in open_places if name in world.classes.get(p, frozenset())]
+            if members:
+                return name, tuple(sorted(members))
+        return ANY, tuple(sorted(open_places))
+
+
+def rules_expected(names: Sequence[str]) -> str | None:
+    """Ask for classes of places that the rules know, each once."""
+    try:
+        Rules(tuple(names))
+    except ValueError as error:
+        return f'names of classes of places, each once ({error})'
+    return None
+
+
+@dataclass
+class DecisionSettings:
+    """What a decision depends on beside the world and the battery; may be changed in between.
+
+    Attributes:
+        battery: When to charge.
+    """
+
+    rules: Rules = converted(
+        lambda names: Rules(tuple(names)),
+        DEFAULT_RULES,
+        'Classes of places by falling priority; empty: any place within reach.',
+        name='rooms_priority',
+        of=str,
+        check=rules_expected,
+    )
+    policy: str = parameter(
+        DEFAULT_POLICY,
+        'How a place is chosen among those that the rules allow.',
+        choices=tuple(POLICIES),
+    )
+    urgency_threshold: float = parameter(
+        7, 'Seconds without a visit after which a place is URGENT.', 0, LONGEST_THRESHOLD
+    )
+    recharge_rooms: tuple[str, ...] = parameter(
+        ('E',), 'Places with a charging station.', of=str, check=names_expected
+    )
+    battery: BatteryLimits = parameters(BatteryLimits)
+    exploration_seconds: float = parameter(
+        2.0, 'Seconds the robot takes to explore a place.', 0.0, 86_400.0
+    )
+    speed: float = parameter(
+        0.6,
+        "Metres per second, to tell a move's time before any was driven.",
+        0.001,
+        100.0,
+        name='robot_speed',
+    )
+
+
+def decide(world: World, battery: Battery, settings: DecisionSettings) -> Decision:
+    """Choose where to go next.
+
+    Raises:
+        NowhereToGoError: Nothing can be reached, or no charging place when one is needed.
+    """
+    if why := why_charge(world, battery, settings):
+        return _to_charge(world, settings.recharge_rooms, why)
+    if world.requested and world.requested != world.place:
+        return _as_requested(world)
+    rule, allowed = settings.rules.candidates(world)
+    scores = make_policy(settings.policy)(world, allowed)
+    return _best(world, rule, allowed, scores, settings.policy)
+
+
+def why_charge(world: World, battery: Battery, settings: DecisionSettings) -> str:
+    """Return why the robot must charge now, as a sentence; empty: it need not.
+
+    Once it was sent to charge it must until it has: what is too little for the far end of the
+    map may be enough beside the station.
+    """
+    if battery.sent_to_charge and not battery.charged_enough(settings.battery):
+        return battery.sent_to_charge
+    if battery.low:
+        return f'the battery is low ({battery.level_text()})'
+    if battery.level is None:
+        return ''
+    required, words = settings.battery.require_recharge, f'{world.place} is not on the map'
+    if world.place in world.graph.index:
+        required, words = reserve(
+            world.graph,
+            world.place,
+            world.reachable,
+            settings.recharge_rooms,
+            battery.draw,
+            world.time_spread,
+            settings.battery,
+        )
+    if battery.level >= required:
+        return ''
+    return f'the battery is at {battery.level:g} %, below {required:.1f} % ({words})'
+
+
+def _to_charge(world: World, stations: Sequence[str], why: str) -> Decision:
+    """Send the robot to the nearest place where it can charge, wherever that is."""
+    within = stations_within_reach(world, stations)
+    if not within:
+        raise NowhereToGoError(
+            f'no charging place ({", ".join(stations)}) can be reached from {world.place}'
+        )
+    best = min(within, key=lambda station: (station in world.avoided, within[station]))
+    reason = f'{why}; {best} is the nearest charging place, {within[best]:.1f} s away'
+    return _straight_to(world, best, RECHARGE, 'nearest', reason, within)
+
+
+def stations_within_reach(world: World, stations: Sequence[str]) -> dict[str, float]:
+    """Return the seconds to each charging place that can be reached, sorted by name."""
+    away = {
+        station: world.graph.seconds(world.place, station)
+        for station in sorted(stations)
+        if station in world.graph.index
+    }
+    return {station: seconds for station, seconds in away.items() if math.isfinite(seconds)}
+
+
+def _as_requested(world: World) -> Decision:
+    """Send the robot where an operator wants it."""
+    place = world.requested
+    if place not in world.graph.index:
+        raise RequestError(f'{place}, as requested, cannot be reached from {world.place}')
+    seconds = world.graph.seconds(world.place, place)
+    reason = f'an operator has sent the robot to {place}, {seconds:.1f} s away'
+    return _straight_to(world, place, REQUEST, 'request', reason, {place: seconds})
+
+
+def _straight_to(
+    world: World, place: str, rule: str, policy: str, reason: str, away: Mapping[str, float]
+) -> Decision:
+    """Go to a place whatever the rules say; ``away`` has the seconds to each candidate."""
+    scores = {candidate: -seconds for candidate, seconds in away.items()}
+    return Decision(world.now, world.place, place, place, rule, policy, reason, scores)
+
+
+def _best(world: World, rule: str, allowed: Sequence[str], scores: Scores, policy: str) -> Decision:
+    """Take the highest score; among equals the longest unvisited, then the first by name."""
+    order = sorted(allowed)
+    best = max(
+        order,
+        key=lambda place: (
+            round(scores[place].value, 6),
+            world.unvisited(place),
+            -order.index(place),
+        ),
+    )
+    threshold = f', threshold {world.threshold:g} s' if rule == URGENT else ''
+    name = f'{best} ({world.wait_in_words(best)}{threshold})'
+    kind = 'place' if rule == ANY else f'{rule} place'
+    if len(allowed) == 1:
+        choice = f'{name} is the only reachable {kind}'
+    else:
+        choice = f'{policy} chose {name} from {len(allowed)} reachable {kind}s'
+    return Decision(
+        time=world.now,
+        from_place=world.place,
+        place=best,
+        target=scores[best].target,
+        rule=rule,
+        policy=policy,
+        reason=f'{choice}; {scores[best].words}',
+        scores={place: scores[place].value for place in order},
+    )
+
+
+def tour_warning(tour: float, threshold: float) -> str:
+    """Return what to say when no robot can keep to the threshold; empty when one can.
+
+    Args:
+        tour: Length of the shortest closed tour, seconds.
+        threshold: The urgency threshold, seconds.
+    """
+    if threshold >= tour:
+        return ''
+    return (
+        f'urgency_threshold is {threshold:g} s, but the shortest tour of all places takes '
+        f'{tour:.1f} s: no robot can keep them from becoming URGENT'
+    )
+
+
+@dataclass(frozen=True)
+class WhyNot:
+    """Why a place is not chosen.
+
+    Attributes:
+        sentence: The rule and the figures.
+        premises: What the ontology would have to hold for the place to be chosen, those that it
+            lacks first; each says whether it holds.
+    """
+
+    sentence: str
+    premises: tuple[str, ...] = ()
+
+
+def check_place(place: str, world: World) -> None:
+    """Check that a place is on the map, and that an open door leads to it.
+
+    Raises:
+        ValueError: It is not, or none does.
+    """
+    places = world.graph.places
+    if place in places:
+        return
+    if place in world.classes:
+        raise ValueError(f'{place} cannot be reached: no open door leads to it')
+    raise ValueError(f'there is no place {place!r} on the map, expected {nearest(place, places)}')
+
+
+def why_not(place: str, world: World, battery: Battery, settings: DecisionSettings) -> WhyNot:
+    """Tell why `decide` would not send the robot to ``place`` now; changes nothing of that.
+
+    Raises:
+        ValueError: There is no such place, or no open door leads to it.
+    """
+    check_place(place, world)
+    if place == world.place:
+        return WhyNot(f'the robot is in {place} already')
+    try:
+        asked = replace(world, memory=world.memory.for_a_question())
+        decision = decide(asked, battery, settings)
+    except NowhereToGoError as error:
+        return WhyNot(str(error), _premises(place, world, ''))
+    if decision.place == place:
+        return WhyNot(f'the robot would go to {place} now [{decision.rule}]: {decision.reason}')
+    instead = f'the robot goes to {decision.place} [{decision.rule}]'
+    if decision.rule in (RECHARGE, REQUEST):
+        return WhyNot(f'{instead}: {decision.reason}')
+    premises = _premises(place, world, '' if decision.rule == ANY else decision.rule)
+    if place not in world.reachable:
+        way = ' - '.join((world.place, *world.graph.route(world.place, place)))
+        return WhyNot(
+            f'{place} cannot be reached from {world.place} in one move (the way is {way}); '
+            f'{instead}',
+            premises,
+        )
+    if place not in decision.scores:
+        if place in world.avoided:
+            return WhyNot(f'{place} could not be reached lately and is avoided for now; {instead}')
+        return WhyNot(
+            f'{place} is not {decision.rule} ({world.wait_in_words(place)}, threshold '
+            f'{world.threshold:g} s), but {_listed(decision.scores)} '
+            f'{"is" if len(decision.scores) == 1 else "are"}; {instead}',
+            premises,
+        )
+    return WhyNot(
+        f'{settings.policy} scores {place} {decision.scores[place]:.1f} and {decision.place} '
+        f'{decision.scores[decision.place]:.1f}; {instead}: {decision.reason}',
+        premises,
+    )
+
+
+def _listed(names: Mapping[str, float]) -> str:
+    *rest, last = sorted(names)
+    return f'{", ".join(rest)} and {last}' if rest else last
+
+
+def _premises(place: str, world: World, rule: str) -> tuple[str, ...]:
+    """Return the facts that a choice of ``place`` rests on, with whether they hold, missing ones
+    first.
+    """
+    facts = [
+        (f'the robot canReach {place}', place in world.reachable),
+        (f'{world.place} connectedTo {place}', place in world.graph.legs.get(world.place, {})),
+    ]
+    if rule:
+        facts.append((f'{place} is {rule}', rule in world.classes.get(place, frozenset())))
+    facts.sort(key=lambda fact: fact[1])
+    return tuple(f'{fact}: {"holds" if holds else "missing"}' for fact, holds in facts)

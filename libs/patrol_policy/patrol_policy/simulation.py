@@ -1,0 +1,186 @@
+"""A patrol in simulated time: the map, the clock and the battery, without any robot.
+
+The same rules and policies as on the robot choose every move. It is what the benchmark measures
+and what the tests search for mistakes; thousands of moves take a second.
+"""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+from patrol_policy.battery_reserve import Battery, BatteryLimits, Draw
+from patrol_policy.decision import (
+    RECHARGE,
+    URGENT,
+    DecisionSettings,
+    Rules,
+    decide,
+    why_charge,
+)
+from patrol_policy.graph import PatrolGraph
+from patrol_policy.rollout import HALF_OPEN
+from patrol_policy.world import Decision, PolicyMemory, World
+
+CORRIDOR, ROOM = 'CORRIDOR', 'ROOM'
+
+
+@dataclass(frozen=True)
+class SimulatedBattery:
+    """A battery that falls evenly.
+
+    Attributes:
+        draw: Percent per second away from the station.
+        charge: Percent per second at the station.
+        limits: When to charge.
+        keeps_reserve: Whether the way home counts, or only the fixed level.
+    """
+
+    draw: float
+    charge: float = 1.0
+    limits: BatteryLimits = field(default_factory=BatteryLimits)
+    keeps_reserve: bool = True
+
+
+@dataclass
+class PatrolRun:
+    """What a simulated patrol came to.
+
+    Attributes:
+        longest: The longest time any place went unvisited, seconds, the start included.
+        settled: The longest time from one visit of a place to its next, seconds.
+        mean: The time a place went unvisited, averaged over places and time, seconds.
+        moves: Places entered.
+        recharges: Times charged.
+        strandings: Times the battery was empty away from the station.
+        rules: Decisions by rule.
+    """
+
+    longest: float = 0.0
+    settled: float = 0.0
+    mean: float = 0.0
+    moves: int = 0
+    recharges: int = 0
+    strandings: int = 0
+    rules: dict[str, int] = field(default_factory=dict)
+
+
+@dataclass
+class Patrol:
+    """A robot on a map.
+
+    Args:
+        graph: The map; a place with two ways or more is a CORRIDOR.
+        rules: Which places may be chosen.
+        policy: Name of the policy.
+        threshold: Seconds after which a place is URGENT.
+        station: Where the robot starts and charges.
+        battery: None: it never gets empty.
+    """
+
+    graph: PatrolGraph
+    rules: Rules
+    policy: str
+    threshold: float
+    station: str
+    battery: SimulatedBattery | None = None
+    generator: random.Random = field(default_factory=lambda: random.Random(1))
+
+    def __post_init__(self) -> None:
+        self.place = self.station
+        self.now = 0.0
+        self.level = 100.0
+        self.target: str | None = None
+        self.visited_at = dict.fromkeys(self.graph.places, 0.0)
+        self._memory = PolicyMemory(self.generator)
+        self._settings = DecisionSettings(
+            self.rules,
+            self.policy,
+            self.threshold,
+            (self.station,),
+            self.battery.limits if self.battery else BatteryLimits(),
+        )
+        self._seen: set[str] = set()
+        self.run = PatrolRun()
+        self._classes = {
+            place: frozenset((ROOM, CORRIDOR) if len(ways) > 1 else (ROOM,))
+            for place, ways in self.graph.legs.items()
+        }
+        self._area = 0.0
+
+    def world(self) -> World:
+        """Return what the robot knows now."""
+        reachable = tuple(sorted(self.graph.legs[self.place]))
+        urgent = {
+            place: self._classes[place] | {URGENT}
+            for place in reachable
+            if self.now - self.visited_at[place] > self.threshold + HALF_OPEN / 2.0
+        }
+        return World(
+            place=self.place,
+            now=self.now,
+            reachable=reachable,
+            classes={**self._classes, **urgent},
+            visited_at=self.visited_at,
+            graph=self.graph,
+            threshold=self.threshold,
+            target=self.target,
+            rules=self.rules.classes,
+            memory=self._memory,
+        )
+
+    def step(self) -> Decision:
+        """Charge if need be, or move to the next place; return the decision behind it."""
+        world = self.world()
+        decision = decide(world, self._battery(world), self._settings)
+        self._go(decision.place)
+        if decision.rule == RECHARGE:
+            self._charge()
+        self.target = decision.target
+        self.run.rules[decision.rule] = self.run.rules.get(decision.rule, 0) + 1
+        return decision
+
+    def until(self, end: float) -> Iterator[Decision]:
+        """Go on until ``end``, seconds, and then counts what still waits."""
+        while self.now < end:
+            yield self.step()
+        for place in self.graph.places:
+            self._count_gap(place)
+        self.run.mean = self._area / (self.now * len(self.graph.places))
+
+    def _battery(self, world: World) -> Battery:
+        if self.battery is None:
+            return Battery()
+        draw = Draw(self.battery.draw) if self.battery.keeps_reserve else Draw()
+        battery = Battery(self.level, draw=draw)
+        charged = self.place == self.station and self.level >= 99.0
+        return Battery() if charged and why_charge(world, battery, self._settings) else battery
+
+    def _go(self, place: str) -> None:
+        seconds = self.graph.move(self.place, place)
+        self.now += seconds
+        if self.battery is not None:
+            self.level -= self.battery.draw * seconds
+            if self.level < 0.0:
+                self.run.strandings += 1
+                self.level = 0.0
+        self._count_gap(place)
+        self.visited_at[place] = self.now
+        self.place = place
+        self.run.moves += 1
+
+    def _charge(self) -> None:
+        assert self.battery is not None
+        wanted = self.battery.limits.stop_recharge
+        self.now += max(0.0, wanted - self.level) / self.battery.charge
+        self.level = max(self.level, wanted)
+        self.run.recharges += 1
+
+    def _count_gap(self, place: str) -> None:
+        gap = self.now - self.visited_at[place]
+        self.run.longest = max(self.run.longest, gap)
+        if place in self._seen:
+            self.run.settled = max(self.run.settled, gap)
+        self._seen.add(place)
+        self._area += gap * gap / 2.0

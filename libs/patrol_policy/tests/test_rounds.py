@@ -1,0 +1,102 @@
+"""Rounds within the rules, and following them ahead: what is promised is what comes."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from benchmarks.rule_bound import default_ranks, rule_bound
+from patrol_policy.decision import Rules
+from patrol_policy.graph import PatrolGraph
+from patrol_policy.plan import Plan
+from patrol_policy.rollout import RuleMap, State, lookahead, oldest, roll_out
+from patrol_policy.rounds import RoundSearch
+from patrol_policy.simulation import Patrol
+
+from .test_plan import chain, grid
+from .worlds import graphs, seven_rooms
+
+
+def rules_of(graph: PatrolGraph, threshold: float) -> RuleMap:
+    return RuleMap(graph, threshold, default_ranks(graph), 0)
+
+
+def at_start(graph: PatrolGraph) -> State:
+    count = len(graph.places)
+    return State(0, 0.0, [0.0] * count, [False] * count)
+
+
+def test_the_shortest_lawful_round_of_a_grid_is_found() -> None:
+    graph = grid(3, 3)
+    search = RoundSearch(rules_of(graph, 0.1 * graph.tour.length), [[graph.tour.order]])
+    search.improve(200_000.0)
+    assert not search.best.breaches
+    assert search.best.length == pytest.approx(1.2 * graph.tour.length)
+
+
+def test_a_round_is_filled_where_the_robot_would_wait_for_a_room() -> None:
+    legs = {'A': {'B': 8.0, 'C': 17.0, 'D': 22.0, 'E': 17.0}, 'B': {'A': 8.0, 'D': 19.0}}
+    legs |= {'C': {'A': 17.0}, 'D': {'A': 22.0, 'B': 19.0}, 'E': {'A': 17.0}}
+    graph = PatrolGraph(legs)
+    rules = rules_of(graph, graph.tour.length)
+    search = RoundSearch(rules, [[graph.tour.order]], fills=True)
+    search.improve(100_000.0)
+    assert not search.best.breaches
+    # Nobody waits: the round is as long as its ways, and hardly longer than it must be.
+    assert search.best.length == pytest.approx(rules.length(search.best.targets))
+    assert rules.least_period <= search.best.length <= 1.05 * rules.least_period
+    patrol = Patrol(graph, Rules(), 'tour', graph.tour.length, 'A')
+    for _ in patrol.until(20.0 * graph.tour.length):
+        pass
+    assert patrol.run.settled <= search.best.length + 1e-6
+
+
+@settings(max_examples=30)
+@given(graphs(), st.floats(0.1, 2.0))
+def test_a_round_visits_every_place_in_its_length(graph: PatrolGraph, factor: float) -> None:
+    rules = rules_of(graph, factor * graph.tour.length)
+    search = RoundSearch(rules, [[graph.tour.order]])
+    search.improve(5_000.0)
+    assert set(search.best.targets) == set(range(len(graph.places)))
+    walked = rules.length(search.best.targets)
+    assert search.best.length == pytest.approx(max(walked, rules.least_period))
+    assert walked >= graph.tour.length - 1e-9
+
+
+@pytest.mark.parametrize('kind', ['oldest', 'lookahead'])
+@pytest.mark.parametrize('factor', [0.1, 0.75, 1.25])
+def test_a_policy_followed_ahead_does_what_it_does_in_a_patrol(kind: str, factor: float) -> None:
+    graph = seven_rooms()
+    threshold = factor * graph.tour.length
+    patrol = Patrol(graph, Rules(), kind, threshold, graph.places[0])
+    for _ in patrol.until(60.0 * graph.tour.length):
+        pass
+    rules = rules_of(graph, threshold)
+    choose = oldest if kind == 'oldest' else lookahead
+    found = roll_out(rules, choose, at_start(graph), 60.0 * graph.tour.length)
+    assert found.settled == pytest.approx(patrol.run.settled)
+    assert found.first == pytest.approx(patrol.run.longest)
+
+
+@pytest.mark.parametrize('factor', [0.1, 1.25])
+def test_a_plan_keeps_what_it_promises(factor: float) -> None:
+    graph = chain(6)
+    threshold = factor * graph.tour.length
+    patrol = Patrol(graph, Rules(), 'tour', threshold, graph.places[0])
+    promised = Plan(patrol.world()).longest
+    for _ in patrol.until(12.0 * max(graph.tour.length, threshold)):
+        pass
+    assert patrol.run.settled <= promised + 1e-6
+
+
+@settings(max_examples=15)
+@given(graphs(), st.floats(0.05, 3.0), st.sampled_from(['tour', 'oldest', 'lookahead']))
+def test_nobody_goes_below_the_bound_that_knows_the_rules(
+    graph: PatrolGraph, factor: float, policy: str
+) -> None:
+    threshold = factor * graph.tour.length
+    patrol = Patrol(graph, Rules(), policy, threshold, graph.places[0])
+    for _ in patrol.until(12.0 * max(graph.tour.length, threshold)):
+        pass
+    assert patrol.run.settled >= rule_bound(graph, threshold, states=3_000).low - 0.01

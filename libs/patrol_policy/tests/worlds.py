@@ -1,0 +1,54 @@
+"""Maps and worlds to decide in."""
+
+from __future__ import annotations
+
+from hypothesis import strategies as st
+
+from patrol_policy.graph import PatrolGraph, graph_of_places
+from patrol_policy.world import World
+
+from .scripted_world import POSITIONS, SEVEN_ROOMS
+
+
+def seven_rooms(dwell: float = 2.0) -> PatrolGraph:
+    neighbours = {
+        room: [
+            other
+            for other, theirs in SEVEN_ROOMS.items()
+            if other != room and set(theirs) & set(doors)
+        ]
+        for room, doors in SEVEN_ROOMS.items()
+    }
+    return graph_of_places(neighbours, POSITIONS, 1.0, dwell)
+
+
+def world(**changes: object) -> World:
+    values: dict[str, object] = {
+        'place': 'C1',
+        'now': 100.0,
+        'reachable': ('C2', 'E', 'R1', 'R2'),
+        'classes': {
+            'C2': frozenset({'CORRIDOR', 'ROOM'}),
+            'E': frozenset({'CORRIDOR', 'ROOM'}),
+            'R1': frozenset({'ROOM', 'URGENT'}),
+            'R2': frozenset({'ROOM', 'URGENT'}),
+        },
+        'visited_at': {'C1': 100.0, 'C2': 80.0, 'E': 90.0, 'R1': 20.0, 'R2': 10.0, 'R3': 50.0},
+        'graph': seven_rooms(),
+        'threshold': 60.0,
+    }
+    return World(**{**values, **changes})  # type: ignore[arg-type]
+
+
+@st.composite
+def graphs(draw: st.DrawFn, most: int = 8) -> PatrolGraph:
+    """Draw connected graphs: a random tree with some edges more."""
+    count = draw(st.integers(2, most))
+    legs: dict[str, dict[str, float]] = {f'P{number}': {} for number in range(count)}
+    extra = draw(st.lists(st.tuples(st.integers(0, count - 1), st.integers(0, count - 1))))
+    parents = [(child, draw(st.integers(0, child - 1))) for child in range(1, count)]
+    for first, second in [*parents, *extra]:
+        if first != second:
+            seconds = float(draw(st.integers(1, 30)))
+            legs[f'P{first}'][f'P{second}'] = legs[f'P{second}'][f'P{first}'] = seconds
+    return PatrolGraph(legs, float(draw(st.integers(0, 5))))

@@ -1,0 +1,74 @@
+"""A state machine engine with SMACH's interface and without ROS.
+
+``import state_machines as smach`` runs machines written for SMACH. The rest is in modules of
+their own: `verify`, `export`, `history`, `testing`, and `state_machines.ros` for ROS 2.
+"""
+
+from __future__ import annotations
+
+from state_machines.clock import Clock, Interrupt, WallClock
+from state_machines.concurrence import Concurrence
+from state_machines.container import Container
+from state_machines.exceptions import (
+    InvalidConstructionError,
+    InvalidStateError,
+    InvalidTransitionError,
+    InvalidUserCodeError,
+    MachineFileError,
+    MissingKeyError,
+    SmachError,
+)
+from state_machines.execution import is_shutdown, set_shutdown_check
+from state_machines.log import (
+    logdebug,
+    logerr,
+    loginfo,
+    logwarn,
+    reset_loggers,
+    set_loggers,
+)
+from state_machines.nodes import RESUME, LimitOptions
+from state_machines.state import (
+    CBInterface,
+    CBState,
+    State,
+    cb_interface,
+    has_smach_interface,
+)
+from state_machines.state_machine import Iterator, Sequence, StateMachine
+from state_machines.userdata import Remapper, UserData
+
+__all__ = [
+    'RESUME',
+    'CBInterface',
+    'CBState',
+    'Clock',
+    'Concurrence',
+    'Container',
+    'Interrupt',
+    'InvalidConstructionError',
+    'InvalidStateError',
+    'InvalidTransitionError',
+    'InvalidUserCodeError',
+    'Iterator',
+    'LimitOptions',
+    'MachineFileError',
+    'MissingKeyError',
+    'Remapper',
+    'Sequence',
+    'SmachError',
+    'State',
+    'StateMachine',
+    'UserData',
+    'WallClock',
+    'cb_interface',
+    'has_smach_interface',
+    'is_shutdown',
+    'logdebug',
+    'logerr',
+    'loginfo',
+    'logwarn',
+    'reset_loggers',
+    'set_loggers',
+    'set_shutdown_check',
+]

@@ -1,0 +1,488 @@
+"""An execution of a machine: its threads, and how it is watched and steered from outside.
+
+Each root has a `Control`, which all its executions share. An execution consists of logical threads,
+`ExecutionThread`: one for the root, and one for each child of a concurrence. A logical thread keeps
+a stack of frames, one for each container that it is in. It runs on one thread of the interpreter
+after another: when a state hangs, that thread is left behind and another one goes on (`timeouts`).
+
+Threads of the interpreter are kept for the next execution, because starting one costs more than
+most machines need for all their states.
+
+The shutdown check belongs to all machines: each asks it between two states, and ends with None when
+it is true.
+"""
+
+from __future__ import annotations
+
+import contextvars
+import os
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from queue import Empty, SimpleQueue
+from typing import TYPE_CHECKING, Any
+
+from state_machines import log
+from state_machines.clock import WALL_CLOCK, Clock, Interrupt, elapsed_of
+from state_machines.exceptions import InvalidStateError, InvalidTransitionError, describe
+from state_machines.nodes import Node, Noted, RawTransition, Trace
+from state_machines.state import this_thread
+
+if TYPE_CHECKING:
+    from state_machines.frame import Frame
+
+DEFAULT_PREEMPT_TIMEOUT = 60.0
+"""Seconds (steady time) that a state may ignore a preempt before the machine goes on."""
+
+IDLE_SECONDS = 10.0
+"""How long a thread waits for the next execution before it ends."""
+
+
+shutdown_check: Callable[[], bool] | None = None
+"""What was set with `set_shutdown_check`."""
+
+
+def is_shutdown() -> bool:
+    """Tell whether the check set with `set_shutdown_check` says that the program is shutting
+    down.
+    """
+    return shutdown_check is not None and bool(shutdown_check())
+
+
+def set_shutdown_check(cb: Callable[[], bool] | None) -> None:
+    """Set the function that tells of a shutdown, for example ``lambda: not rclpy.ok()``.
+
+    Args:
+        cb: Called between any two states; None takes the check away.
+    """
+    global shutdown_check
+    shutdown_check = cb
+
+
+class LeftBehindError(BaseException):
+    """Unwinds a thread that the machine went on without."""
+
+
+# The machine from outside.
+
+
+class Control:
+    """What may be done to a root container from other threads, between runs too.
+
+    Args:
+        name: Tells the root's name.
+
+    Attributes:
+        condition: The one condition of the machine.
+        paused: No further state is entered; see `pause`.
+        steps: States that may be entered although paused.
+        trace: Where transitions are reported, if anywhere.
+        running: An execution has not ended.
+    """
+
+    def __init__(self, name: Callable[[], str]) -> None:
+        self.condition = threading.Condition()
+        self.paused = False
+        self.steps = 0
+        self.trace: Trace | None = None
+        self.running = False
+        self._name = name
+        self._traces: list[Trace] = []
+        self._set_up(WALL_CLOCK, None)
+
+    def _set_up(self, clock: Clock, preempt_timeout: float | None) -> None:
+        """Set what each execution begins with, for the engine's own modules.
+
+        Attributes:
+            clock: The machine's clock.
+            preempt_timeout: See `DEFAULT_PREEMPT_TIMEOUT`; None waits for ever.
+            now: The time of reports and limits.
+            chatty: Transitions are worth a line in the log.
+            sleeps_on_clock: A thread watches time limits and waits on the machine's clock.
+            hanging: Paths of the states the machine went on without, and the work that hangs.
+            threads: The logical threads that are at work.
+        """
+        self.clock = clock
+        self.preempt_timeout = preempt_timeout
+        self.now: Callable[[], float] = time.monotonic if clock is WALL_CLOCK else elapsed_of(clock)
+        self.chatty = log.chatty()
+        self.sleeps_on_clock = False
+        self.hanging: list[tuple[str, Work]] = []
+        self.threads: list[ExecutionThread] = []
+
+    def add_trace(self, trace: Trace) -> Callable[[], None]:
+        """Report every transition to `trace`, in the thread that makes it.
+
+        Args:
+            trace: Takes each transition as the loop notes it; `nodes.unfold` says it in full.
+                What it raises is logged.
+
+        Returns:
+            A function that ends the reports.
+        """
+        with self.condition:
+            self._traces.append(trace)
+            self._set_trace()
+
+        def remove() -> None:
+            with self.condition:
+                if trace in self._traces:
+                    self._traces.remove(trace)
+                    self._set_trace()
+
+        return remove
+
+    def _set_trace(self) -> None:
+        traces = tuple(self._traces)
+
+        def tell_all(raw: RawTransition) -> None:
+            for trace in traces:
+                try:
+                    trace(raw)
+                except Exception as error:
+                    log.logerr(f'Trace {trace!r} raised {describe(error)}')
+
+        self.trace = tell_all if traces else None
+        self._call_attention()
+
+    def pause(self) -> None:
+        """Enter no further state; the one that runs is not disturbed. A preempt goes through."""
+        self._set_paused(True)
+
+    def resume(self) -> None:
+        """Go on after a pause."""
+        self._set_paused(False)
+
+    def _set_paused(self, paused: bool) -> None:
+        with self.condition:
+            self.paused, self.steps = paused, 0
+            self._call_attention()
+
+    def step(self) -> None:
+        """Enter one more state of a paused machine.
+
+        Raises:
+            InvalidStateError: The machine is not paused, or does not run.
+        """
+        with self.condition:
+            if not self.running or not self.paused:
+                lacking = 'paused' if self.running else 'running'
+                raise InvalidStateError(f"'{self._name()}' cannot step: it is not {lacking}")
+            self.steps += 1
+            self._call_attention()
+
+    def _call_attention(self) -> None:
+        """Make every thread look up at its next transition, and wake those that pause."""
+        for thread in self.threads:
+            for frame in tuple(thread.stack):
+                frame.attention = True
+        self.condition.notify_all()
+
+    def force_outcome(self, path: str, outcome: str) -> None:
+        """End the state at `path` with `outcome`, whatever it returns itself.
+
+        Args:
+            path: Of a state that runs, or before which the machine is paused.
+            outcome: One of its outcomes.
+
+        Raises:
+            InvalidStateError: No such state is active.
+            InvalidTransitionError: It has no such outcome.
+        """
+        with self.condition:
+            # Attention first, then a look: what is current now is held until this is done.
+            self._call_attention()
+            active = self._active()
+            if path not in active:
+                raise InvalidStateError(
+                    f"State '{path}' is not active; the active ones are {sorted(active)}"
+                )
+            frame, node = active[path]
+            if outcome not in node.state.get_registered_outcomes():
+                raise InvalidTransitionError(
+                    f"State '{path}' cannot be forced to '{outcome}': its outcomes are "
+                    f'{sorted(node.state.get_registered_outcomes())}'
+                )
+            if frame.forced is not None and frame.forced[0] is not node:
+                raise InvalidStateError(
+                    f"State '{path}' cannot be forced yet: '{frame.forced[0].label}' has not ended "
+                    f"with '{frame.forced[1]}', as it was forced to"
+                )
+            frame.forced = (node, outcome)
+            frame.thread.asked()
+            node.state.request_preempt()
+
+    def active_paths(self) -> list[str]:
+        """Paths of all states that are active, containers included, outermost first."""
+        with self.condition:
+            return list(self._active())
+
+    def _active(self) -> dict[str, tuple[Frame, Node]]:
+        """Return the active states by path: the frames they run in, and their nodes."""
+        active: dict[str, tuple[Frame, Node]] = {}
+        for thread in self.threads:
+            for frame in tuple(thread.stack):
+                node = frame.current
+                # All states of a concurrence together have no label.
+                if isinstance(node, Node) and node.label:
+                    active[f'{frame.path}/{node.label}'] = frame, node
+        return active
+
+    def left_behind(self) -> list[str]:
+        """Paths of states that the last run went on without and that are still running."""
+        with self.condition:
+            return [path for path, work in self.hanging if work.is_going_on()]
+
+    def fsm_begin(self, clock: Clock, preempt_timeout: float | None) -> None:
+        """Begin an execution.
+
+        Raises:
+            InvalidStateError: Another one has not ended.
+        """
+        with self.condition:
+            if self.running:
+                raise InvalidStateError(f"'{self._name()}' is running already")
+            # First what may fail, as with a clock that is none.
+            self._set_up(clock, preempt_timeout)
+            self.running, self.steps = True, 0
+
+    def fsm_end(self) -> None:
+        """Note that the execution has ended."""
+        with self.condition:
+            # The next one may go by another clock.
+            now, self.running = self.now, False
+            self.condition.notify_all()
+        # Others may end their reports in this moment.
+        trace = self.trace
+        if trace is not None:
+            trace(Noted(self._name(), '', '', '', now(), {}, 'end'))
+
+
+# Threads.
+
+
+@dataclass
+class Watch:
+    """Limits at work on a state that executes.
+
+    Attributes:
+        node: The state's node.
+        depth: Index in the thread's stack of the frame it runs in.
+        soft: When the state is asked to stop, on the machine's clock; None when it was, or never.
+        hard: When the machine goes on without it; None for never.
+        asked: The state was asked to stop.
+    """
+
+    node: Node
+    depth: int
+    soft: float | None
+    hard: float | None
+    asked: bool = False
+
+
+class ExecutionThread:
+    """One logical thread of execution through nested containers.
+
+    Attributes:
+        control: The control of the machine it belongs to.
+        path: Path of the state it was started for.
+        stack: Frames of the containers it is in, outermost first. A thread of the interpreter is
+            the present one as long as this is the list that it began with.
+        done: It has ended.
+        outcome: What it ended with.
+        error: What it was ended by.
+        wakeup: Raised when it has ended, or its limits have changed.
+        watches: Limits at work, outermost first.
+        asked_at: When the state that executes was asked to stop, steady time; None: it was not.
+        work: What its present thread does.
+    """
+
+    def __init__(self, control: Control, path: str, wakeup: Interrupt) -> None:
+        self.control = control
+        self.path = path
+        self.wakeup = wakeup
+        self.stack: list[Frame] = []
+        self.watches: list[Watch] = []
+        self.done = False
+        self.outcome: Any = None
+        self.error: BaseException | None = None
+        self.asked_at: float | None = None
+        self.work: Work | None = None
+        control.threads.append(self)
+
+    # The side of the thread that executes.
+
+    def path_inside(self) -> str:
+        """Return the path of the state that is being executed."""
+        for frame in reversed(self.stack):
+            if isinstance(frame.current, Node):
+                return frame.current.path
+            return f'{frame.path}/{frame.current.label}'
+        return self.path
+
+    def start(self, body: Callable[[], Any]) -> None:
+        """Run `body` on another thread; its value is the logical thread's outcome."""
+        self.work = Work(self, self.stack, body)
+        self.work.begin()
+
+    def run_here(self, body: Callable[[], Any]) -> Any:
+        """Run `body` on the calling thread, unwatched."""
+        here = this_thread
+        outer = here.thread, here.stack
+        here.thread, here.stack = self, self.stack
+        try:
+            return body()
+        finally:
+            here.thread, here.stack = outer
+            self.retire()
+
+    def end(self, outcome: Any, error: BaseException | None) -> None:
+        """Note what it ended with; under the condition. `wakeup` is to be raised after."""
+        self.outcome, self.error, self.done = outcome, error, True
+        # The two refer to each other, which is left to no garbage collector.
+        self.work = None
+        self.retire()
+
+    def retire(self) -> None:
+        """Take it from those that are at work."""
+        with self.control.condition:
+            if self in self.control.threads:
+                self.control.threads.remove(self)
+
+    def check(self) -> None:
+        """Raise `LeftBehindError` in a thread that is not the present one any more."""
+        if this_thread.thread is self and this_thread.stack is not self.stack:
+            raise LeftBehindError
+
+    # The side of whoever asks it to stop.
+
+    def asked(self) -> None:
+        """Note that the state that executes was asked to stop; its bound begins to count.
+
+        As a rule nobody is woken for that: whoever watches looks once in every bound
+        (`timeouts.supervise`).
+        """
+        if self.asked_at is None:
+            self.asked_at = time.monotonic()
+            if self.control.sleeps_on_clock:
+                self.wakeup.set()
+
+    def asked_anew(self) -> None:
+        """Begin to count again, if it was asked: something else is to stop now."""
+        if self.asked_at is not None:
+            self.asked_at = time.monotonic()
+
+    def renew_request(self, node: Node) -> None:
+        """Take the request of an earlier execution back from a state, but not a present one."""
+        with self.control.condition:
+            node.state.recall_preempt()
+            if self.asked_at is not None:
+                node.state.request_preempt()
+
+    def still_gone(self, node: Node) -> None:
+        """Note that a state could not be entered: an earlier execution of it has not ended."""
+        with self.control.condition:
+            self.check()
+            frame = self.stack[-1]
+            frame.gone, frame.attention = node, True
+
+
+class Work:
+    """What a thread of the interpreter does for a logical thread.
+
+    Attributes:
+        stack: The logical thread's list of frames when it began.
+    """
+
+    def __init__(
+        self, thread: ExecutionThread, stack: list[Frame], body: Callable[[], Any]
+    ) -> None:
+        self.stack = stack
+        self._thread = thread
+        self._body = body
+        self._context = contextvars.copy_context()
+        self._going_on = threading.Lock()
+        self._going_on.acquire()
+
+    @property
+    def name(self) -> str:
+        """The path of what the logical thread was started for."""
+        return self._thread.path
+
+    def begin(self) -> None:
+        """Have an idle thread do it, or a new one."""
+        try:
+            worker = _idle.pop()
+        except IndexError:
+            worker = _Worker()
+        worker.given.put(self)
+
+    def is_going_on(self) -> bool:
+        """Tell whether it has not ended."""
+        return self._going_on.locked()
+
+    def await_end(self, seconds: float | None) -> bool:
+        """Wait for the end, in seconds of steady time; whether it came."""
+        limit = -1.0 if seconds is None else min(seconds, threading.TIMEOUT_MAX)
+        if not self._going_on.acquire(timeout=limit):
+            return False
+        self._going_on.release()
+        return True
+
+    def do(self) -> None:
+        """Do it, on the present thread; never raises."""
+        here, thread = this_thread, self._thread
+        here.thread, here.stack = thread, self.stack
+        outcome, error = None, None
+        try:
+            outcome = self._context.run(self._body)
+        except LeftBehindError:
+            return
+        except BaseException as raised:
+            error = raised
+        finally:
+            here.thread = here.stack = None
+            self._going_on.release()
+        with thread.control.condition:
+            if self.stack is not thread.stack:
+                if error is not None:
+                    log.logwarn(f"'{thread.path}', left behind, ended with {type(error).__name__}")
+                return
+            thread.end(outcome, error)
+        # Who wakes takes the condition at once.
+        thread.wakeup.set()
+
+
+_idle: list[_Worker] = []
+os.register_at_fork(after_in_child=_idle.clear)
+
+
+class _Worker:
+    """A thread of the interpreter that does one piece of work after another.
+
+    Attributes:
+        given: What it is to do; one that is idle is given one piece.
+    """
+
+    def __init__(self) -> None:
+        self.given: SimpleQueue[Work] = SimpleQueue()
+        self._thread = threading.Thread(target=self._serve, name='state machine', daemon=True)
+        self._thread.start()
+
+    def _serve(self) -> None:
+        while True:
+            try:
+                work = self.given.get(timeout=IDLE_SECONDS)
+            except Empty:
+                try:
+                    _idle.remove(self)
+                except ValueError:
+                    # Somebody is about to give it something.
+                    work = self.given.get()
+                else:
+                    return
+            self._thread.name = work.name
+            work.do()
+            del work
+            _idle.append(self)
