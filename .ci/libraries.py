@@ -23,7 +23,7 @@ sys.path.insert(0, str(CHECKOUT))
 
 from launcher.environment import LIBRARIES  # noqa: E402
 
-RUNNERS = ['pytest>=8,<10', 'pytest-xdist>=3.5,<4', 'hypothesis>=6.100,<7']
+RUNNERS = ['pytest-xdist>=3.5,<4']
 BY_PATH = ('CMAKE_PREFIX_PATH', 'AMENT_PREFIX_PATH', 'PYTHONPATH', 'PYTHONHOME')
 
 

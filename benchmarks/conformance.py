@@ -30,7 +30,7 @@ from typing import Any
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
-from benchmarks.java_reasoner import KINDS, JavaReasoner, JavaReasonerError, absent
+from libs.owl_reasoner.tests.java_reasoner import KINDS, JavaReasoner, JavaReasonerError, absent
 from owl_reasoner import (
     KnowledgeBase,
     OntologyFileError,

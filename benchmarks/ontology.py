@@ -31,7 +31,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
-from benchmarks.java_reasoner import KINDS, JavaReasoner, JavaReasonerError, absent
+from libs.owl_reasoner.tests.java_reasoner import KINDS, JavaReasoner, JavaReasonerError, absent
 from benchmarks.tables import table
 from owl_reasoner.documents.reading import read_ontology
 from owl_reasoner.documents.writing import write_ontology

@@ -27,7 +27,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
-from benchmarks.java_reasoner import KINDS, JavaReasoner, JavaReasonerError, absent
+from libs.owl_reasoner.tests.java_reasoner import KINDS, JavaReasoner, JavaReasonerError, absent
 from libs.owl_reasoner.tests.wide_ontologies import DenseOntology, WideOntology
 from owl_reasoner import KnowledgeBase, write_ontology
 from owl_reasoner.owl.axioms import (

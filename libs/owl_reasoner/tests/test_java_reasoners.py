@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.java_reasoner import JavaReasoner, JavaReasonerError, absent
+from .java_reasoner import JavaReasoner, JavaReasonerError, absent
 from owl_reasoner.documents.writing import write_ontology
 from owl_reasoner.knowledge_base import KnowledgeBase
 from owl_reasoner.owl.axioms import (
