@@ -21,8 +21,8 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
-from libs.owl_reasoner.tests.java_reasoner import JavaReasoner, JavaReasonerError, absent
 from benchmarks.random_agreement import IRI, drawn_axioms, spelt_out, words_for
+from libs.owl_reasoner.tests.java_reasoner import JavaReasoner, JavaReasonerError, absent
 from owl_reasoner import KnowledgeBase, read_ontology, write_ontology
 from owl_reasoner.owl.axiom_text import axiom_text
 from owl_reasoner.owl.axioms import (

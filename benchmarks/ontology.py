@@ -31,8 +31,8 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
-from libs.owl_reasoner.tests.java_reasoner import KINDS, JavaReasoner, JavaReasonerError, absent
 from benchmarks.tables import table
+from libs.owl_reasoner.tests.java_reasoner import KINDS, JavaReasoner, JavaReasonerError, absent
 from owl_reasoner.documents.reading import read_ontology
 from owl_reasoner.documents.writing import write_ontology
 from owl_reasoner.knowledge_base import KnowledgeBase

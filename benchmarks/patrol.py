@@ -36,16 +36,16 @@ ROOT = Path(__file__).resolve().parents[1]
 for package in ('behaviour', 'fsm', 'ontology', 'runtime'):
     sys.path.insert(0, str(ROOT / f'surveillance_{package}'))
 
-from patrolling_sim import read_patrolling_sim
-from rule_bound import rule_bound
 from tables import table
 
+from patrol_policy.bounds import rule_bound
 from patrol_policy.decision import Rules
 from patrol_policy.graph import (
     GraphError,
     PatrolGraph,
     graph_of_places,
 )
+from patrol_policy.patrolling_sim import read_patrolling_sim
 from patrol_policy.policies import DEFAULT_POLICY
 from patrol_policy.simulation import (
     Patrol,

@@ -39,9 +39,9 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from benchmarks.backdrops import BACKDROPS, backdrop_of
 from benchmarks.photographs import AS_TAKEN, VARIATIONS, Photograph, photographs_in
 from benchmarks.tables import table
+from libs.marker_detection.tests.backdrops import BACKDROPS, backdrop_of
 from marker_detection.camera_model import CameraModel
 from marker_detection.detector import DetectorSettings, MarkerDetector
 from marker_detection.dictionaries import dictionary_named

@@ -25,7 +25,7 @@ import yaml
 from rclpy.parameter import Parameter
 from sensor_msgs.msg import Image
 
-from benchmarks.backdrops import backdrop_of
+from libs.marker_detection.tests.backdrops import backdrop_of
 from marker_detection.annotation import annotated
 from marker_detection.camera_model import CameraModel
 from marker_detection.detector import DetectorSettings, MarkerDetector

@@ -105,8 +105,9 @@ def requirements(checkout: Path, extras: Iterable[str]) -> list[str]:
     wanted = dict.fromkeys(project['dependencies'])
     for extra in extras:
         wanted |= dict.fromkeys(project['optional-dependencies'][extra])
-    for name in LIBRARIES:  # imported from the checkout: what they need themselves is installed
-        wanted |= dict.fromkeys(_project(checkout / 'libs' / name)['dependencies'])
+    for project_file in sorted(checkout.glob('libs/*/pyproject.toml')):
+        # Libraries are imported from the checkout: what they need themselves is installed.
+        wanted |= dict.fromkeys(_project(project_file.parent)['dependencies'])
     return [line for line in wanted if line.partition('=')[0] not in LIBRARIES]
 
 

@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 import pytest
 
-from benchmarks.backdrops import backdrop_of
+from libs.marker_detection.tests.backdrops import backdrop_of
 from marker_detection.camera_model import CameraModel
 from marker_detection.dictionaries import dictionary_named
 from marker_detection.testing.marker_scene import (

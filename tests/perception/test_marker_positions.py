@@ -14,7 +14,7 @@ from nav_msgs.msg import Odometry
 from sensor_msgs.msg import Image, JointState
 from std_msgs.msg import Header
 
-from benchmarks.backdrops import backdrop_of
+from libs.marker_detection.tests.backdrops import backdrop_of
 from marker_detection.camera_model import CameraModel
 from marker_detection.dictionaries import dictionary_named
 from marker_detection.testing.marker_scene import (

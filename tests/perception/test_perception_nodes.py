@@ -19,7 +19,7 @@ from sensor_msgs.msg import CameraInfo, CompressedImage, Image, JointState
 from std_msgs.msg import Bool, Header, Int32
 from trajectory_msgs.msg import JointTrajectory
 
-from benchmarks.backdrops import backdrop_of
+from libs.marker_detection.tests.backdrops import backdrop_of
 from marker_detection.camera_model import CameraModel
 from marker_detection.dictionaries import dictionary_named
 from marker_detection.testing.marker_scene import (

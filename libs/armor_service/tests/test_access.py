@@ -11,7 +11,7 @@ import pytest
 from armor_service.access import CODE, Settings, state_folder
 from armor_service.service import ArmorService
 
-from .seven_rooms import IRI, ONTOLOGY, Ask, asker
+from .seven_rooms import FIXTURES, IRI, ONTOLOGY, Ask, asker
 
 PAYLOAD = 'x\nimport os; os.system("id")\n'
 
@@ -26,7 +26,11 @@ def folder(tmp_path: Path) -> Path:
 def ask(folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Ask:
     """Provide a client of a service with the default settings, started in a checkout."""
     monkeypatch.chdir(tmp_path)
-    service = ArmorService(Settings(folder), screen=lambda _: None, warn=lambda _: None)
+    service = ArmorService(
+        Settings(folder, read_only_directories=(FIXTURES,)),
+        screen=lambda _: None,
+        warn=lambda _: None,
+    )
     send = asker(service)
     assert send('LOAD FILE', ONTOLOGY, IRI, 'false', 'PELLET', 'false').success
     return send

@@ -231,12 +231,12 @@ def test_names_and_values_are_taken_out_of_answers() -> None:
 
 def test_a_client_imports_no_reasoner_and_no_documents() -> None:
     script = (
-        'import sys, armor_api, surveillance_ontology.patrol_ontology; '
-        "print(*(name for name in sys.modules if name.startswith('surveillance_ontology.')))"
+        'import sys, armor_service.client; '
+        "print(*(name for name in sys.modules if name.startswith(('owl_reasoner.', 'armor_s'))))"
     )
     run = subprocess.run([sys.executable, '-c', script], capture_output=True, text=True, check=True)
     loaded = run.stdout.split()
-    assert 'surveillance_ontology.armor_client' in loaded
-    for needless in ('reasoner', 'documents', 'owl.axioms', 'knowledge_base', 'armor.service'):
-        prefix = f'surveillance_ontology.{needless}'
+    assert 'armor_service.client' in loaded
+    needless = ('reasoner', 'documents', 'owl.axioms', 'knowledge_base')
+    for prefix in (*(f'owl_reasoner.{name}' for name in needless), 'armor_service.service'):
         assert not [name for name in loaded if name.startswith(prefix)]

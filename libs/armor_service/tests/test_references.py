@@ -425,7 +425,7 @@ def test_the_web_when_it_is_allowed(tmp_path: Path) -> None:
         base = f'http://127.0.0.1:{server.server_address[1]}'
         service = ArmorService(Settings(ontologies_folder=tmp_path, allow_web=True))
         ask = asker(service)
-        good = ask('LOAD WEB MOUNTED', f'{base}/surveillance.owl', IRI, 'false', '', 'false')
+        good = ask('LOAD WEB MOUNTED', f'{base}/patrol.owl', IRI, 'false', '', 'false')
         assert good.success
         assert ask('GET REF CLIENT', 'map').queried_objects == ['tester']
         assert 'expected a path' in ask('SAVE', '').error_description

@@ -6,9 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from benchmarks.perception import without_markers
 from marker_detection.cell_differences import CellDifferences
-from marker_detection.detector import DetectorSettings, MarkerDetector
 from marker_detection.dictionaries import MarkerCodes, dictionary_named
 
 CODES = MarkerCodes.of(dictionary_named('DICT_5X5_100'))
@@ -108,11 +106,3 @@ def test_cells_of_the_other_colour_are_counted():
     cells[0, 0, 2] = 225.0
     inner, border = DIFFERENCES.wrong(cells, entries)
     assert (inner.item(), border.item()) == (1, 1)
-
-
-def test_markers_of_another_dictionary_are_not_read_as_ids():
-    detector = MarkerDetector(DetectorSettings('DICT_5X5_100', frozenset(range(11, 18))))
-    # each was read as an id once
-    for kind, image in without_markers((458, 539, 557, 728, 2771, 8900)):
-        assert kind == 'other dictionaries'
-        assert detector.detect(image) == []

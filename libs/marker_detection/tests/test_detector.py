@@ -9,7 +9,6 @@ import cv2
 import numpy as np
 import pytest
 
-from benchmarks.backdrops import BACKDROPS, backdrop_of
 from marker_detection.camera_model import CameraModel
 from marker_detection.candidates import distinct, quads_around
 from marker_detection.detector import DetectorSettings, MarkerDetector
@@ -22,6 +21,8 @@ from marker_detection.testing.marker_scene import (
     corners_in_image,
     image_of,
 )
+
+from .backdrops import BACKDROPS, backdrop_of
 
 CAMERA = CameraModel.from_field_of_view(640, 480, math.radians(60))
 DICTIONARY = dictionary_named('DICT_5X5_100')

@@ -9,7 +9,6 @@ from pathlib import Path
 
 import pytest
 
-from .java_reasoner import JavaReasoner, JavaReasonerError, absent
 from owl_reasoner.documents.writing import write_ontology
 from owl_reasoner.knowledge_base import KnowledgeBase
 from owl_reasoner.owl.axioms import (
@@ -25,6 +24,7 @@ from owl_reasoner.owl.axioms import (
     SubPropertyChainOf,
 )
 
+from .java_reasoner import JavaReasoner, JavaReasonerError, absent
 from .patrol_map import DOORS, IRI, SEVEN_ROOMS, n, seven_rooms
 from .random_ontologies import CLASSES, INDIVIDUALS, OBJECTS, RandomOntology
 

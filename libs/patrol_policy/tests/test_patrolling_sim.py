@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.patrolling_sim import read_patrolling_sim
 from patrol_policy.graph import GraphError
+from patrol_policy.patrolling_sim import read_patrolling_sim
 
 VERTICES = '0 10 10 1 1 E 40\n1 50 10 2 0 W 40 2 S 20\n2 50 30 1 1 N 20\n'
 

@@ -9,8 +9,8 @@ from functools import cache
 
 import pytest
 
-from benchmarks.rule_bound import RuleBound, rule_bound, simple_bound
 from patrol_policy.battery_reserve import Battery
+from patrol_policy.bounds import RuleBound, rule_bound, simple_bound
 from patrol_policy.decision import DecisionSettings, Rules, decide
 from patrol_policy.graph import PatrolGraph, graph_of_places
 from patrol_policy.simulation import Patrol

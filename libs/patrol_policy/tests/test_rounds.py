@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from benchmarks.rule_bound import default_ranks, rule_bound
+from patrol_policy.bounds import default_ranks, rule_bound
 from patrol_policy.decision import Rules
 from patrol_policy.graph import PatrolGraph
 from patrol_policy.plan import Plan

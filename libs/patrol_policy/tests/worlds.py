@@ -7,7 +7,24 @@ from hypothesis import strategies as st
 from patrol_policy.graph import PatrolGraph, graph_of_places
 from patrol_policy.world import World
 
-from .scripted_world import POSITIONS, SEVEN_ROOMS
+SEVEN_ROOMS = {
+    'R1': ['D1'],
+    'R2': ['D2'],
+    'R3': ['D3'],
+    'R4': ['D4'],
+    'E': ['D6', 'D7'],
+    'C1': ['D1', 'D2', 'D5', 'D6'],
+    'C2': ['D3', 'D4', 'D5', 'D7'],
+}
+POSITIONS = {
+    'R1': (10.0, 5.0, 0.0),
+    'R2': (15.0, 5.0, 0.0),
+    'R3': (10.0, 15.0, 0.0),
+    'R4': (15.0, 15.0, 0.0),
+    'E': (5.0, 10.0, 0.0),
+    'C1': (10.0, 8.0, 0.0),
+    'C2': (10.0, 14.0, 0.0),
+}
 
 
 def seven_rooms(dwell: float = 2.0) -> PatrolGraph:
