@@ -190,14 +190,14 @@ class Covers:
 
     def __init__(self, graph: PatrolGraph) -> None:
         ticks = np.maximum(np.floor(TICKS * graph.distances).astype(np.int32) - 1, 0)
-        ways = {place: set(graph.legs[place]) for place in graph.places}
+        ways = {name: set(graph.legs[name]) for name in graph.places}
         removed = []
-        while ends := [place for place, others in ways.items() if len(others) == 1]:
-            place = ends[0]
-            (parent,) = ways.pop(place)
-            ways[parent].discard(place)
-            removed.append((graph.index[place], graph.index[parent]))
-        self.core = [graph.index[place] for place in ways]
+        while ends := [name for name, others in ways.items() if len(others) == 1]:
+            end = ends[0]
+            (trunk,) = ways.pop(end)
+            ways[trunk].discard(end)
+            removed.append((graph.index[end], graph.index[trunk]))
+        self.core = [graph.index[name] for name in ways]
         count = len(graph.places)
         self._bits = [0] * count
         self._rows = [0] * count
