@@ -55,7 +55,7 @@ from patrol_policy.simulation import (
 from surveillance_runtime.place import read_place_file
 
 DAY = 86400.0
-SPEED, DWELL = 0.6, 2.0
+SPEED, EXPLORATION_SECONDS = 0.6, 2.0
 SEED = 1
 URGENCY = 7.0
 """Threshold of the seeds' ontology, seconds."""
@@ -85,7 +85,9 @@ def place_map(name: str, path: Path) -> Map:
         room: list(dict.fromkeys(o for door in doors for o in place.doors[door] if o != room))
         for room, doors in place.rooms.items()
     }
-    return Map(name, graph_of_places(neighbours, place.positions, SPEED, DWELL), place.start)
+    return Map(
+        name, graph_of_places(neighbours, place.positions, SPEED, EXPLORATION_SECONDS), place.start
+    )
 
 
 def grid(width: int, height: int) -> Map:
@@ -100,7 +102,7 @@ def grid(width: int, height: int) -> Map:
         for x in range(width)
         for y in range(height)
     }
-    graph = graph_of_places(neighbours, positions, SPEED, DWELL)
+    graph = graph_of_places(neighbours, positions, SPEED, EXPLORATION_SECONDS)
     return Map(f'grid {width}x{height}', graph, 'P0_0')
 
 
@@ -110,7 +112,7 @@ def _joined(pairs: Sequence[tuple[int, int]], draw: random.Random) -> PatrolGrap
         metres = draw.uniform(2.0, 10.0)
         legs.setdefault(f'P{first}', {})[f'P{second}'] = metres / SPEED
         legs.setdefault(f'P{second}', {})[f'P{first}'] = metres / SPEED
-    return PatrolGraph(legs, DWELL)
+    return PatrolGraph(legs, EXPLORATION_SECONDS)
 
 
 def tree(count: int) -> Map:
@@ -226,7 +228,7 @@ def random_graph(count: int, seed: int, uneven: bool = False) -> Map:
             slower = draw.uniform(1.0, 1.5) if uneven else 1.0
             legs[f'P{start:03}'][f'P{goal:03}'] = slower * lengths[first, second] / SPEED
     name = f'random {count}, seed {seed}' + (', uneven' if uneven else '')
-    return Map(name, PatrolGraph(legs, DWELL), 'P000')
+    return Map(name, PatrolGraph(legs, EXPLORATION_SECONDS), 'P000')
 
 
 def within_rules(
@@ -421,7 +423,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             for name in options.graph:
                 path = Path(name)
                 for file in sorted(path.rglob('*.graph')) if path.is_dir() else [path]:
-                    graph = read_patrolling_sim(file, SPEED, DWELL)
+                    graph = read_patrolling_sim(file, SPEED, EXPLORATION_SECONDS)
                     chosen.append(Map(file.stem, graph, graph.places[0]))
         else:
             words = options.only or ['']

@@ -2,6 +2,7 @@
 
 - `robot_behavior_node`: the mission's state machine as a node; begin there;
 - `machines`: the states; `mission`: what they work on, its record, its recovery from failures;
-- `reasoner_node`, `decider`: the decision, made by the library `patrol_policy`;
-- `peers`: what the states ask of other nodes, and how; `map_from_markers`: the first look around.
+- `reasoner_node`, `world_model`: the decision, made by the library `patrol_policy`;
+- `ports`: what the states ask of other nodes; `ros_adapters`: how;
+- `map_from_markers`: the first look around.
 """

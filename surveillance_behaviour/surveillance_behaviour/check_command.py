@@ -17,7 +17,7 @@ from state_machines.verify import Finding, verify
 from surveillance_behaviour.charging import BatteryMonitor
 from surveillance_behaviour.machines import MACHINES
 from surveillance_behaviour.mission.mission import Mission, MissionSettings
-from surveillance_behaviour.peers.ports import Ports
+from surveillance_behaviour.ports import Ports
 from surveillance_runtime.command_line import CommandParser
 from surveillance_runtime.suggestions import nearest
 

@@ -21,12 +21,17 @@ from patrol_policy.decision import DecisionSettings, NowhereToGoError
 from state_machines.exceptions import CallError, CallInterruptedError
 from state_machines.ros import ClockWait
 from surveillance_behaviour.charging import BatteryMonitor
-from surveillance_behaviour.peers.deciding import (
+from surveillance_behaviour.ros_adapters.decision_services import (
     MemorySettings,
-    decider_of,
     offer_decision_services,
+    world_model_of,
 )
-from surveillance_behaviour.peers.ros_ports import Deadlines, RosPlaces, hear_battery, ros_ontology
+from surveillance_behaviour.ros_adapters.peers import (
+    Deadlines,
+    RosPlaces,
+    hear_battery,
+    ros_ontology,
+)
 from surveillance_interfaces.msg import MissionStatus
 from surveillance_interfaces.srv import Reason
 from surveillance_runtime.conversions import seconds_of
@@ -49,7 +54,7 @@ class Reasoner(PatrolNode):
         )
         battery = BatteryMonitor()
         self._wait = ClockWait(self)
-        self._decider = decider_of(
+        self._world_model = world_model_of(
             self,
             settings,
             self.declare_fields(MemorySettings()),
@@ -70,16 +75,16 @@ class Reasoner(PatrolNode):
             Reason, 'reason', self._on_reason, callback_group=ReentrantCallbackGroup()
         )
         self._work = offer_decision_services(
-            self, self._decider, self._wait.now, lambda: self._avoided
+            self, self._world_model, self._wait.now, lambda: self._avoided
         )
 
     def _on_status(self, status: MissionStatus) -> None:
         self._avoided = frozenset(status.avoided)
         if status.waiting_for_help or 'Recover' in status.state:
-            self._decider.disturbed()
+            self._world_model.disturbed()
         if status.place and status.place != self._place:
             self._place = status.place
-            self._decider.arrived(status.place, seconds_of(status.stamp))
+            self._world_model.arrived(status.place, seconds_of(status.stamp))
 
     def _on_parameters(self, event: ParameterEvent) -> None:
         """Take over what is set in the node that owns the settings of decisions."""
@@ -106,7 +111,7 @@ class Reasoner(PatrolNode):
             # The lock is held until the request that began this choice has noted it as the next.
             self._next = None
         try:
-            return self._decider.decide(self._wait.now(), self.stopping, self._avoided).place
+            return self._world_model.decide(self._wait.now(), self.stopping, self._avoided).place
         except CallInterruptedError:  # the node ends
             return ''
         except (CallError, NowhereToGoError) as error:

@@ -21,23 +21,23 @@ from surveillance_behaviour.charging import BatteryMonitor
 from surveillance_behaviour.machines import MACHINES
 from surveillance_behaviour.mission.mission import Mission, MissionSettings
 from surveillance_behaviour.mission.mission_log import MissionRecord
-from surveillance_behaviour.peers.deciding import (
+from surveillance_behaviour.ports import Ports
+from surveillance_behaviour.ros_adapters.decision_services import (
     MemorySettings,
-    decider_of,
     offer_decision_services,
+    world_model_of,
 )
-from surveillance_behaviour.peers.ports import Ports
-from surveillance_behaviour.peers.ros_ports import (
+from surveillance_behaviour.ros_adapters.peers import (
     Deadlines,
     MissionClock,
     RosAnnouncer,
     RosMotion,
     RosPlaces,
-    RosReasoner,
     RosRoutine,
     hear_battery,
     ros_ontology,
 )
+from surveillance_behaviour.ros_adapters.reason_client import ReasonClient
 from surveillance_runtime.files import FileError
 from surveillance_runtime.introspection import IntrospectionServer
 from surveillance_runtime.launch_protocol import NotNowError
@@ -94,15 +94,15 @@ class RobotBehavior(PatrolNode):
         clock = self._mission_clock
         ontology, places = ros_ontology(self, deadlines), RosPlaces(self, deadlines)
         if self._behaviour == 'patrol':
-            reasoner = RosReasoner(self, deadlines, ontology, battery)
+            reasoner = ReasonClient(self, deadlines, ontology, battery)
             routine = RosRoutine(self, deadlines, battery, clock)
             return Ports(ontology, places, self._announcer, reasoner, routine=routine)
-        decider = decider_of(self, settings, memory, ontology, places, battery, clock.now)
+        world_model = world_model_of(self, settings, memory, ontology, places, battery, clock.now)
         offer_decision_services(
-            self, decider, clock.now, lambda: self.mission.recovery.avoided(self.mission.now())
+            self, world_model, clock.now, lambda: self.mission.recovery.avoided(self.mission.now())
         )
         motion = RosMotion(self, deadlines)
-        return Ports(ontology, places, self._announcer, decider, motion=motion)
+        return Ports(ontology, places, self._announcer, world_model, motion=motion)
 
     def on_stop(self) -> None:
         """Preempts the machine, so that what it started is cancelled while messages flow."""

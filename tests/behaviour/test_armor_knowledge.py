@@ -14,7 +14,7 @@ from armor_service.client import (
 from armor_service.service import ArmorService
 from state_machines import Interrupt
 from state_machines.exceptions import CallError, CallInterruptedError
-from surveillance_behaviour.peers.armor_knowledge import ArmorKnowledge, Whereabouts
+from surveillance_behaviour.ros_adapters.armor_knowledge import ArmorKnowledge, Whereabouts
 from surveillance_ontology.patrol_ontology import DATA, PatrolOntology, Snapshot
 from surveillance_runtime.place import read_place_file
 

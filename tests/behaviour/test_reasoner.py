@@ -23,7 +23,7 @@ def test_requests_that_come_while_a_choice_is_made_share_the_next_one(
         assert done.wait(60.0)
         raise CallError('armor: away')
 
-    monkeypatch.setattr(reasoner._decider, 'decide', look)
+    monkeypatch.setattr(reasoner._world_model, 'decide', look)
     client = graph.node.create_client(Reason, 'reason')
     graph.until(client.service_is_ready)
     answers = [client.call_async(Reason.Request())]
@@ -62,7 +62,7 @@ def test_a_choice_that_begins_at_once_is_given_once(graph: Any, monkeypatch: Any
         return future
 
     graph_pause = threading.Event()
-    monkeypatch.setattr(reasoner._decider, 'decide', choose_now)
+    monkeypatch.setattr(reasoner._world_model, 'decide', choose_now)
     monkeypatch.setattr(reasoner._work, 'run', run_and_wait)
     client = graph.node.create_client(Reason, 'reason')
     graph.until(client.service_is_ready)
@@ -80,6 +80,6 @@ def test_a_choice_that_ends_with_its_node_is_no_failure(graph: Any, monkeypatch:
         raise CallInterruptedError
 
     monkeypatch.setattr(reasoner.get_logger(), 'warn', warned.append)
-    monkeypatch.setattr(reasoner._decider, 'decide', interrupted)
+    monkeypatch.setattr(reasoner._world_model, 'decide', interrupted)
     assert reasoner._choose() == ''
     assert not warned

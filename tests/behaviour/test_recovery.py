@@ -9,7 +9,7 @@ import pytest
 
 import state_machines as fsm
 from state_machines.exceptions import CallError, UnavailableError
-from surveillance_behaviour.peers.ports import Point
+from surveillance_behaviour.ports import Point
 
 from .machine_runs import CALLS, Run, visited
 from .scripted_world import POSITIONS, SEVEN_ROOMS, World, fails, started_again

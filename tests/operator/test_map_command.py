@@ -66,8 +66,8 @@ def test_it_draws_a_place_and_says_what_it_is(
 def test_the_tour_of_a_place_is_measured_over_the_doors() -> None:
     plan = read_world(CONFIG / 'seven_rooms.yaml').plan
     graph = map_command.graph_over_doors(plan)
-    assert graph.legs['C1']['R1'] == pytest.approx(1.5 + 1.5)
-    assert graph.legs['E']['C1'] == pytest.approx(np.hypot(2.0, 1.5) + np.hypot(3.0, 0.5))
+    assert graph.leg_seconds['C1']['R1'] == pytest.approx(1.5 + 1.5)
+    assert graph.leg_seconds['E']['C1'] == pytest.approx(np.hypot(2.0, 1.5) + np.hypot(3.0, 0.5))
 
 
 def test_a_run_is_drawn_with_its_waits(

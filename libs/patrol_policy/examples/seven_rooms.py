@@ -29,7 +29,7 @@ HOURS = 1.0
 
 def main() -> None:
     """Print the longest time from visit to visit under each policy, for two thresholds."""
-    graph = graph_of_places(WAYS, POSITIONS, speed=0.6, dwell=2.0)
+    graph = graph_of_places(WAYS, POSITIONS, speed=0.6, exploration_seconds=2.0)
     tour = graph.tour.length
     print(f'{len(graph.places)} places, shortest tour {tour:.1f} s: {" - ".join(graph.walk)}')
     for factor in (0.5, 1.0):

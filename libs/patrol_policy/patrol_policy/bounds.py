@@ -57,7 +57,7 @@ class RuleBound:
 
 def default_ranks(graph: PatrolGraph) -> list[int]:
     """Return the ranks of the default rules: places with several ways before those with one."""
-    return [1 if len(graph.legs[place]) > 1 else 2 for place in graph.places]
+    return [1 if len(graph.leg_seconds[place]) > 1 else 2 for place in graph.places]
 
 
 def simple_bound(graph: PatrolGraph, threshold: float, ranks: Sequence[int] | None = None) -> float:
@@ -114,7 +114,7 @@ class _Search:
         self._rules, self._left = rules, states
         self._legs = [
             [(other, round(TICKS * seconds)) for other, seconds in ways.items()]
-            for ways in rules.legs
+            for ways in rules.leg_seconds
         ]
         self._threshold = round(TICKS * rules.threshold)
         self._covers = covers
@@ -190,7 +190,7 @@ class Covers:
 
     def __init__(self, graph: PatrolGraph) -> None:
         ticks = np.maximum(np.floor(TICKS * graph.distances).astype(np.int32) - 1, 0)
-        ways = {name: set(graph.legs[name]) for name in graph.places}
+        ways = {name: set(graph.leg_seconds[name]) for name in graph.places}
         removed = []
         while ends := [name for name, others in ways.items() if len(others) == 1]:
             end = ends[0]

@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 from patrol_policy.battery_reserve import Battery, BatteryLimits, reserve
 from patrol_policy.policies import DEFAULT_POLICY, POLICIES, Scores, make_policy
 from patrol_policy.settings import converted, names_expected, parameter, parameters
-from patrol_policy.suggestions import nearest
+from patrol_policy.suggestions import closest_name
 from patrol_policy.world import Decision, World
 
 RECHARGE = 'recharge'
@@ -284,7 +284,9 @@ def check_place(place: str, world: World) -> None:
         return
     if place in world.classes:
         raise ValueError(f'{place} cannot be reached: no open door leads to it')
-    raise ValueError(f'there is no place {place!r} on the map, expected {nearest(place, places)}')
+    raise ValueError(
+        f'there is no place {place!r} on the map, expected {closest_name(place, places)}'
+    )
 
 
 def why_not(place: str, world: World, battery: Battery, settings: DecisionSettings) -> WhyNot:
@@ -341,7 +343,10 @@ def _premises(place: str, world: World, rule: str) -> tuple[str, ...]:
     """
     facts = [
         (f'the robot canReach {place}', place in world.reachable),
-        (f'{world.place} connectedTo {place}', place in world.graph.legs.get(world.place, {})),
+        (
+            f'{world.place} connectedTo {place}',
+            place in world.graph.leg_seconds.get(world.place, {}),
+        ),
     ]
     if rule:
         facts.append((f'{place} is {rule}', rule in world.classes.get(place, frozenset())))

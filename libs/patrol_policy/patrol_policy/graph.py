@@ -1,7 +1,7 @@
 """The map as a patrol sees it: places, the ways between neighbours, and what they cost in time.
 
-A leg costs the time to drive it; whoever enters a place also spends ``dwell`` seconds there. All
-costs that leave this module are the sum of both, in seconds.
+A leg costs the time to drive it; whoever enters a place also spends ``exploration_seconds`` there.
+All costs that leave this module are the sum of both, in seconds.
 """
 
 from __future__ import annotations
@@ -38,31 +38,31 @@ class PatrolGraph:
     """Places and the ways between them. Derived quantities are computed once, when first asked for.
 
     Attributes:
-        legs: For each place, its neighbours and the seconds it takes to drive there. Each leg has a
-            way back, which may take another time.
-        dwell: Seconds that the robot stays in each place it enters.
+        leg_seconds: For each place, its neighbours and the seconds it takes to drive there. Each
+            leg has a way back, which may take another time.
+        exploration_seconds: Seconds that the robot stays in each place it enters.
 
     Raises:
         GraphError: A leg leads to an unknown place, is not positive, or has no way back.
     """
 
-    legs: Mapping[str, Mapping[str, float]]
-    dwell: float = 0.0
+    leg_seconds: Mapping[str, Mapping[str, float]]
+    exploration_seconds: float = 0.0
 
     def __post_init__(self) -> None:
-        for place, ways in self.legs.items():
+        for place, ways in self.leg_seconds.items():
             for other, seconds in ways.items():
-                if other not in self.legs:
+                if other not in self.leg_seconds:
                     raise GraphError(f'{place} leads to {other}, which is not a place of the map')
-                if not seconds + self.dwell > 0.0 or not math.isfinite(seconds):
+                if not seconds + self.exploration_seconds > 0.0 or not math.isfinite(seconds):
                     raise GraphError(f'{place} to {other} takes {seconds} s, expected more than 0')
-                if place not in self.legs[other]:
+                if place not in self.leg_seconds[other]:
                     raise GraphError(f'{place} leads to {other}, but {other} not back')
 
     @cached_property
     def places(self) -> tuple[str, ...]:
         """All places, in the order of every array below."""
-        return tuple(sorted(self.legs))
+        return tuple(sorted(self.leg_seconds))
 
     @cached_property
     def index(self) -> Mapping[str, int]:
@@ -71,11 +71,11 @@ class PatrolGraph:
 
     @cached_property
     def direct(self) -> NDArray[np.float64]:
-        """Seconds of each leg, dwell included, shape (n, n); inf: not neighbours."""
+        """Seconds of each leg, exploring included, shape (n, n); inf: not neighbours."""
         costs = np.full((len(self.places), len(self.places)), np.inf)
-        for place, ways in self.legs.items():
+        for place, ways in self.leg_seconds.items():
             for other, seconds in ways.items():
-                costs[self.index[place], self.index[other]] = seconds + self.dwell
+                costs[self.index[place], self.index[other]] = seconds + self.exploration_seconds
         return costs
 
     @cached_property
@@ -111,8 +111,8 @@ class PatrolGraph:
         """Return the seconds of a move: over the leg to a neighbour, even where a way round is
         shorter; by the shortest way to any other place.
         """
-        leg = self.legs[start].get(goal)
-        return self.seconds(start, goal) if leg is None else leg + self.dwell
+        leg = self.leg_seconds[start].get(goal)
+        return self.seconds(start, goal) if leg is None else leg + self.exploration_seconds
 
     def route(self, start: str, goal: str) -> tuple[str, ...]:
         """Return the places on the shortest way, without ``start``, with ``goal``.
@@ -124,7 +124,7 @@ class PatrolGraph:
             raise GraphError(f'there is no way from {start} to {goal}')
         way, place = [], start
         while place != goal:
-            ways = self.legs[place]
+            ways = self.leg_seconds[place]
             place = min(sorted(ways), key=lambda other: ways[other] + self.seconds(other, goal))
             way.append(place)
         return tuple(way)
@@ -135,29 +135,29 @@ class PatrolGraph:
         """
         within, pending = {place}, [place]
         while pending:
-            found = [other for other in self.legs[pending.pop()] if other not in within]
+            found = [other for other in self.leg_seconds[pending.pop()] if other not in within]
             within.update(found)
             pending += found
-        return self if len(within) == len(self.legs) else self.restricted(within)
+        return self if len(within) == len(self.leg_seconds) else self.restricted(within)
 
     def restricted(self, kept: Iterable[str]) -> PatrolGraph:
         """Return the map without all places but ``kept``."""
         names = set(kept)
         legs = {
             place: {other: cost for other, cost in ways.items() if other in names}
-            for place, ways in self.legs.items()
+            for place, ways in self.leg_seconds.items()
             if place in names
         }
-        return PatrolGraph(legs, self.dwell)
+        return PatrolGraph(legs, self.exploration_seconds)
 
     def without_leg(self, start: str, goal: str) -> PatrolGraph:
         """Return the map without the direct way between two places."""
         gone = {(start, goal), (goal, start)}
         legs = {
             place: {other: cost for other, cost in ways.items() if (place, other) not in gone}
-            for place, ways in self.legs.items()
+            for place, ways in self.leg_seconds.items()
         }
-        return PatrolGraph(legs, self.dwell)
+        return PatrolGraph(legs, self.exploration_seconds)
 
     @cached_property
     def tour(self) -> Tour:
@@ -174,7 +174,9 @@ class PatrolGraph:
 
         network = networkx.Graph()
         network.add_nodes_from(self.places)
-        network.add_edges_from((place, other) for place in self.legs for other in self.legs[place])
+        network.add_edges_from(
+            (place, other) for place in self.leg_seconds for other in self.leg_seconds[place]
+        )
         blocks = [
             sorted(self.index[place] for place in block)
             for block in networkx.biconnected_components(network)
@@ -197,7 +199,7 @@ def graph_of_places(
     connections: Mapping[str, Iterable[str]],
     positions: Mapping[str, Sequence[float]],
     speed: float = 1.0,
-    dwell: float = 0.0,
+    exploration_seconds: float = 0.0,
 ) -> PatrolGraph:
     """Return a graph whose legs are as long as the straight line between the places.
 
@@ -205,7 +207,7 @@ def graph_of_places(
         connections: For each place, its neighbours.
         positions: A point in each place, metres.
         speed: Metres per second.
-        dwell: Seconds spent in each place.
+        exploration_seconds: Seconds spent in each place.
 
     Raises:
         GraphError: A position is missing, or the connections do not fit together.
@@ -222,5 +224,5 @@ def graph_of_places(
             }
             for place, others in connections.items()
         },
-        dwell,
+        exploration_seconds,
     )

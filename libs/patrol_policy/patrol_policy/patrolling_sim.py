@@ -14,13 +14,15 @@ from pathlib import Path
 from patrol_policy.graph import GraphError, PatrolGraph
 
 
-def read_patrolling_sim(path: str | Path, speed: float = 1.0, dwell: float = 0.0) -> PatrolGraph:
+def read_patrolling_sim(
+    path: str | Path, speed: float = 1.0, exploration_seconds: float = 0.0
+) -> PatrolGraph:
     """Read a graph file.
 
     Args:
         path: The file.
         speed: Metres per second.
-        dwell: Seconds spent in each place.
+        exploration_seconds: Seconds spent in each place.
 
     Raises:
         GraphError: The file cannot be read or is not of the format; one line that names it and what
@@ -38,7 +40,7 @@ def read_patrolling_sim(path: str | Path, speed: float = 1.0, dwell: float = 0.0
         except GraphError:
             raise error from None
     try:
-        return PatrolGraph(legs, dwell)
+        return PatrolGraph(legs, exploration_seconds)
     except GraphError as error:
         raise GraphError(f'{path}: {error}') from None
 

@@ -103,7 +103,7 @@ class Course:
         hop = rules.hop(state.place, target)
         if hop in allowed:
             return hop
-        legs, away = rules.legs[state.place], rules.away
+        legs, away = rules.leg_seconds[state.place], rules.away
         return min(allowed, key=lambda o: (legs[o] + away[o][target], state.seen[o], o))
 
     def _target(self, rules: RuleMap, state: State) -> int:
@@ -171,12 +171,12 @@ class Plan:
         return graph is planned or (
             graph.places == planned.places
             and all(
-                ways.keys() == graph.legs[place].keys()
+                ways.keys() == graph.leg_seconds[place].keys()
                 and all(
-                    abs(graph.legs[place][other] - seconds) <= LEG_CHANGE * seconds
+                    abs(graph.leg_seconds[place][other] - seconds) <= LEG_CHANGE * seconds
                     for other, seconds in ways.items()
                 )
-                for place, ways in planned.legs.items()
+                for place, ways in planned.leg_seconds.items()
             )
         )
 

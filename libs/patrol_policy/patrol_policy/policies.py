@@ -31,7 +31,7 @@ from numpy.typing import NDArray
 
 from patrol_policy.graph import PatrolGraph
 from patrol_policy.plan import plan_of
-from patrol_policy.suggestions import nearest
+from patrol_policy.suggestions import closest_name
 from patrol_policy.world import Score, World
 
 Scores = Mapping[str, Score]
@@ -52,7 +52,7 @@ def make_policy(name: str) -> Policy:
         ValueError: There is no such policy.
     """
     if name not in POLICIES:
-        raise ValueError(f'unknown policy {name!r}, expected {nearest(name, POLICIES)}')
+        raise ValueError(f'unknown policy {name!r}, expected {closest_name(name, POLICIES)}')
     return POLICIES[name]
 
 

@@ -39,7 +39,7 @@ class RuleMap:
         urgent: The position of URGENT in the rules; `NEVER` when it is not among them.
 
     Attributes:
-        legs: For each place, the seconds to each neighbour, dwell included.
+        legs: For each place, the seconds to each neighbour, exploring included.
         away: Seconds from each place to each other, shape (n, n). A neighbour is entered by the leg
             to it: where a way round by another place is shorter, the rules may not allow that.
         overdue: A place that went unvisited for longer is URGENT, seconds.
@@ -53,9 +53,12 @@ class RuleMap:
         self.ranks, self.urgent = list(ranks), urgent
         self.count = len(graph.places)
         index = graph.index
-        self.legs = [
-            {index[other]: seconds + graph.dwell for other, seconds in sorted(ways.items())}
-            for ways in (graph.legs[place] for place in graph.places)
+        self.leg_seconds = [
+            {
+                index[other]: seconds + graph.exploration_seconds
+                for other, seconds in sorted(ways.items())
+            }
+            for ways in (graph.leg_seconds[place] for place in graph.places)
         ]
         self._shortest: list[list[float]] = graph.distances.tolist()
         self._hops: dict[int, int] = {}
@@ -66,7 +69,7 @@ class RuleMap:
         shortest = self._shortest
         longer = {
             other
-            for place, ways in enumerate(self.legs)
+            for place, ways in enumerate(self.leg_seconds)
             for other, seconds in ways.items()
             if seconds > shortest[place][other] + HALF_OPEN
         }
@@ -78,22 +81,24 @@ class RuleMap:
             for place in np.argsort(to_target, kind='stable').tolist():
                 if place != target and math.isfinite(to_target[place]):
                     hop = self.hop(place, target)
-                    away[place][target] = self.legs[place][hop] + away[hop][target]
+                    away[place][target] = self.leg_seconds[place][hop] + away[hop][target]
         return away
 
     @cached_property
     def gates(self) -> list[int]:
         """For each place that is entered only when URGENT, where from; -1 for all others."""
         gates = []
-        for place, ways in enumerate(self.legs):
+        for place, ways in enumerate(self.leg_seconds):
             held = bool(ways) and all(self._held(place, other) for other in ways)
-            gates.append(min(ways, key=lambda o: self.legs[o][place]) if held else -1)
+            gates.append(min(ways, key=lambda o: self.leg_seconds[o][place]) if held else -1)
         return gates
 
     def _held(self, place: int, gate: int) -> bool:
         """Whether a neighbour of the gate comes before the place as long as that is not URGENT."""
         rank = self.ranks[place]
-        return self.urgent < rank and any(self.ranks[other] < rank for other in self.legs[gate])
+        return self.urgent < rank and any(
+            self.ranks[other] < rank for other in self.leg_seconds[gate]
+        )
 
     @cached_property
     def least_period(self) -> float:
@@ -103,7 +108,7 @@ class RuleMap:
         it. 0: there is none.
         """
         held = [(gate, place) for place, gate in enumerate(self.gates) if gate >= 0]
-        legs = [self.legs[gate][place] for gate, place in held]
+        legs = [self.leg_seconds[gate][place] for gate, place in held]
         return self.threshold + max(legs) + HALF_OPEN if legs else 0.0
 
     @cached_property
@@ -126,7 +131,7 @@ class RuleMap:
     @cached_property
     def mean_leg(self) -> float:
         """Seconds of the mean leg."""
-        legs = [seconds for ways in self.legs for seconds in ways.values()]
+        legs = [seconds for ways in self.leg_seconds for seconds in ways.values()]
         return sum(legs) / max(1, len(legs))
 
     def length(self, targets: Sequence[int]) -> float:
@@ -139,7 +144,7 @@ class RuleMap:
         key = place * self.count + target
         found = self._hops.get(key)
         if found is None:
-            ways, away = self.legs[place], self._shortest
+            ways, away = self.leg_seconds[place], self._shortest
             found = target
             if target not in ways:
                 found = min(ways, key=lambda other: ways[other] + away[other][target])
@@ -172,7 +177,7 @@ class RuleMap:
         seen, ranks, urgent = state.seen, self.ranks, self.urgent
         limit = state.now - self.overdue
         best, found = NEVER + 1, []
-        ways: Iterable[int] = self.legs[state.place]
+        ways: Iterable[int] = self.leg_seconds[state.place]
         if state.avoided:
             ways = [other for other in ways if other not in state.avoided] or ways
         for other in ways:
@@ -269,7 +274,7 @@ def roll_out(
         stop: A wait from visit to visit that is too long, seconds.
     """
     at = state.fresh()
-    seen, met, legs = at.seen, at.met, rules.legs
+    seen, met, legs = at.seen, at.met, rules.leg_seconds
     end = at.now + horizon
     settled = first = 0.0
     walk: list[int] = []
@@ -313,6 +318,6 @@ def lookahead(rules: RuleMap, state: State) -> int:
         return allowed[0] if allowed else state.place
     idle = state.now - np.array(state.seen)
     idle[state.place] = -np.inf
-    legs, away = rules.legs[state.place], rules.graph.distances
+    legs, away = rules.leg_seconds[state.place], rules.graph.distances
     worth = {p: round(float((idle - away[p]).max()) - legs[p], 6) for p in allowed}
     return max(allowed, key=lambda place: (worth[place], -state.seen[place], -place))

@@ -125,7 +125,7 @@ class RoundSearch:
         self.work += STEP_WORK * len(walk)
         times, now = [], 0.0
         for other in walk:
-            now += rules.legs[place][other]
+            now += rules.leg_seconds[place][other]
             times.append(now)
             place = other
         return walk, ends, times
@@ -137,7 +137,7 @@ class RoundSearch:
         if not walk:
             return []
         rules = self._rules
-        legs, ranks, urgent = rules.legs, rules.ranks, rules.urgent
+        legs, ranks, urgent = rules.leg_seconds, rules.ranks, rules.urgent
         # When each place was visited last, for the first step: in the round before.
         seen = {other: then - length for other, then in zip(walk, times, strict=True)}
         breaches, now, place = list[Breach](), 0.0, walk[-1]

@@ -105,13 +105,13 @@ class Patrol:
         self.run = PatrolRun()
         self._classes = {
             place: frozenset((ROOM, CORRIDOR) if len(ways) > 1 else (ROOM,))
-            for place, ways in self.graph.legs.items()
+            for place, ways in self.graph.leg_seconds.items()
         }
         self._area = 0.0
 
     def world(self) -> World:
         """Return what the robot knows now."""
-        reachable = tuple(sorted(self.graph.legs[self.place]))
+        reachable = tuple(sorted(self.graph.leg_seconds[self.place]))
         urgent = {
             place: self._classes[place] | {URGENT}
             for place in reachable

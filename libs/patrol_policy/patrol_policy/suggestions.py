@@ -8,7 +8,7 @@ from collections.abc import Iterable
 _MOST = 16
 
 
-def nearest(name: str, known: Iterable[str]) -> str:
+def closest_name(name: str, known: Iterable[str]) -> str:
     """Return the known name that is most like ``name``, in quotes; else the names, at most 16."""
     names = list(dict.fromkeys(known))
     folded = {each.casefold(): each for each in names}

@@ -166,7 +166,7 @@ def test_a_question_changes_no_decision(policy: str) -> None:
             here = world(
                 place=place,
                 now=now,
-                reachable=tuple(graph.legs[place]),
+                reachable=tuple(graph.leg_seconds[place]),
                 visited_at=visited_at,
                 graph=graph,
                 memory=memory,
@@ -174,7 +174,7 @@ def test_a_question_changes_no_decision(policy: str) -> None:
             for other in ('R1', 'R4') if asked else ():
                 why_not(other, here, Battery(), settings)
             decision = decide(here, Battery(), settings)
-            now += graph.legs[place][decision.place]
+            now += graph.leg_seconds[place][decision.place]
             place = decision.place
             visited_at = {**visited_at, place: now}
             taken.append(place)
@@ -185,7 +185,9 @@ def test_a_question_changes_no_decision(policy: str) -> None:
 
 def test_questions_before_the_first_choice_share_one_plan() -> None:
     graph, memory = seven_rooms(), PolicyMemory()
-    here = world(place='C1', now=1.0, reachable=tuple(graph.legs['C1']), graph=graph, memory=memory)
+    here = world(
+        place='C1', now=1.0, reachable=tuple(graph.leg_seconds['C1']), graph=graph, memory=memory
+    )
     why_not('R1', here, Battery(), DecisionSettings())
     planned = memory.for_a_question().plan
     assert planned is not None

@@ -20,8 +20,10 @@ def written(tmp_path: Path, text: str) -> Path:
 
 @pytest.mark.parametrize('header', ['3 100 80 0.1 -5.0 -4.0\n', '3\n100\n80\n0.1\n\n'])
 def test_a_file_is_read_with_and_without_an_origin(tmp_path: Path, header: str) -> None:
-    graph = read_patrolling_sim(written(tmp_path, header + VERTICES), speed=0.5, dwell=2.0)
-    assert graph.legs == {'0': {'1': 8.0}, '1': {'0': 8.0, '2': 4.0}, '2': {'1': 4.0}}
+    graph = read_patrolling_sim(
+        written(tmp_path, header + VERTICES), speed=0.5, exploration_seconds=2.0
+    )
+    assert graph.leg_seconds == {'0': {'1': 8.0}, '1': {'0': 8.0, '2': 4.0}, '2': {'1': 4.0}}
     assert graph.seconds('0', '2') == pytest.approx(16.0)
 
 

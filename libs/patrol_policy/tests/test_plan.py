@@ -175,9 +175,9 @@ def test_places_that_the_ontology_calls_urgent_at_the_start_are_visited_first() 
     memory, visited_at = PolicyMemory(), {'E': 0.0}
     place, now = 'E', 0.0
     while now < graph.tour.length + 5.0:
-        reachable = tuple(sorted(graph.legs[place]))
+        reachable = tuple(sorted(graph.leg_seconds[place]))
         kinds = {
-            name: {'ROOM', *(['CORRIDOR'] if len(graph.legs[name]) > 1 else [])}
+            name: {'ROOM', *(['CORRIDOR'] if len(graph.leg_seconds[name]) > 1 else [])}
             | ({'URGENT'} if name not in visited_at else set())
             for name in graph.places
         }

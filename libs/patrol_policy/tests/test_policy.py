@@ -75,7 +75,7 @@ def test_the_tour_of_a_small_map_is_the_shortest(graph: PatrolGraph) -> None:
     assert graph.tour.length == pytest.approx(shortest)
     assert graph.tour.bound == pytest.approx(shortest)
     walked = sum(
-        graph.legs[start][goal] + graph.dwell
+        graph.leg_seconds[start][goal] + graph.exploration_seconds
         for start, goal in itertools.pairwise([*graph.walk, graph.walk[0]])
     )
     assert walked == pytest.approx(shortest)
@@ -87,11 +87,13 @@ def test_the_tour_of_a_small_map_is_the_shortest(graph: PatrolGraph) -> None:
 def test_the_shortest_ways_are_the_same_with_and_without_scipy(graph: PatrolGraph) -> None:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr('patrol_policy.graph.DENSE_UP_TO', 0)
-        other = PatrolGraph(graph.legs, graph.dwell)
+        other = PatrolGraph(graph.leg_seconds, graph.exploration_seconds)
         assert np.allclose(graph.distances, other.distances)
     for start, goal in itertools.product(graph.places, repeat=2):
         way = (start, *graph.route(start, goal))
-        seconds = sum(graph.legs[a][b] + graph.dwell for a, b in itertools.pairwise(way))
+        seconds = sum(
+            graph.leg_seconds[a][b] + graph.exploration_seconds for a, b in itertools.pairwise(way)
+        )
         assert seconds == pytest.approx(graph.seconds(start, goal))
 
 
@@ -135,7 +137,9 @@ def test_the_reserve_never_strands(graph: PatrolGraph, draw: float, policy: str)
     station = graph.places[0]
     far = max(graph.seconds(station, place) for place in graph.places)
     longest_leg = max(
-        seconds + graph.dwell for ways in graph.legs.values() for seconds in ways.values()
+        seconds + graph.exploration_seconds
+        for ways in graph.leg_seconds.values()
+        for seconds in ways.values()
     )
     limits = BatteryLimits()
     # Nobody can patrol a place that a full battery does not reach.

@@ -27,7 +27,7 @@ POSITIONS = {
 }
 
 
-def seven_rooms(dwell: float = 2.0) -> PatrolGraph:
+def seven_rooms(exploration_seconds: float = 2.0) -> PatrolGraph:
     neighbours = {
         room: [
             other
@@ -36,7 +36,7 @@ def seven_rooms(dwell: float = 2.0) -> PatrolGraph:
         ]
         for room, doors in SEVEN_ROOMS.items()
     }
-    return graph_of_places(neighbours, POSITIONS, 1.0, dwell)
+    return graph_of_places(neighbours, POSITIONS, 1.0, exploration_seconds)
 
 
 def world(**changes: object) -> World:

@@ -26,7 +26,7 @@ from surveillance_behaviour.machines.shared_states import (
 )
 from surveillance_behaviour.mission.mission import Mission
 from surveillance_behaviour.mission.recovery import Step
-from surveillance_behaviour.peers.ports import Point, Routine
+from surveillance_behaviour.ports import Point, Routine
 
 BATTERY_LOW = 'battery_low'
 

@@ -12,7 +12,7 @@ from patrol_policy.decision import NowhereToGoError
 from state_machines.exceptions import CallError, CallInterruptedError, UnavailableError
 from surveillance_behaviour.mission.mission import Mission
 from surveillance_behaviour.mission.recovery import Failure, Step
-from surveillance_behaviour.peers.ports import Point
+from surveillance_behaviour.ports import Point
 
 PREEMPTED = 'preempted'
 FAILED = 'failed'

@@ -23,7 +23,7 @@ from surveillance_behaviour.machines.shared_states import (
 )
 from surveillance_behaviour.mission.mission import Mission
 from surveillance_behaviour.mission.recovery import Step
-from surveillance_behaviour.peers.ports import Point
+from surveillance_behaviour.ports import Point
 
 NOTE_SECONDS = 1.0
 """The shortest time between two notes of how far a place is explored, seconds."""
@@ -47,7 +47,7 @@ class ChooseRoomTask(MissionState):
     ends = ('recharge', 'explore')
 
     def work(self, ud: Any, interrupt: fsm.Interrupt) -> str:
-        must_charge = self.mission.at_station() and self.mission.ports.decisions.why_charge()
+        must_charge = self.mission.at_station() and self.mission.ports.reasoner.why_charge()
         return 'recharge' if must_charge else 'explore'
 
 
@@ -58,7 +58,7 @@ class ExploreTask(MissionState):
 
     def work(self, ud: Any, interrupt: fsm.Interrupt) -> str:
         mission = self.mission
-        why = mission.ports.decisions.why_charge
+        why = mission.ports.reasoner.why_charge
         with mission.battery.interrupting(interrupt, lambda: bool(why())) as wake:
             whole = self._explore(wake)
         if self.preempt_requested():
@@ -92,7 +92,7 @@ class RechargeTask(MissionState):
 
     def work(self, ud: Any, interrupt: fsm.Interrupt) -> str:
         mission = self.mission
-        why = mission.ports.decisions.why_charge()
+        why = mission.ports.reasoner.why_charge()
         mission.say(f'charging in {mission.place} ({mission.battery.level_text()}, {why})')
         mission.charge(interrupt)
         return 'recharged'
@@ -164,7 +164,7 @@ def _stops(mission: Mission, place: str, goal: Point, interrupt: fsm.Interrupt) 
     before = mission.place
     if mission.recovery.tries(place) < max(1, mission.settings.recovery.path_tries - 1):
         return [goal]
-    way = mission.ports.decisions.route_round(before, place)
+    way = mission.ports.reasoner.route_round(before, place)
     if not way:
         return [goal]
     mission.say(f'trying the way round: {" - ".join((before, *way))}')

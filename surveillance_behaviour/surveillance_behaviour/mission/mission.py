@@ -13,7 +13,7 @@ from state_machines.exceptions import CallError
 from surveillance_behaviour.charging import BatteryMonitor, charge
 from surveillance_behaviour.mission.mission_log import MissionRecord, is_other_simulation
 from surveillance_behaviour.mission.recovery import Failure, Recovery, RecoveryLimits
-from surveillance_behaviour.peers.ports import Point, Ports
+from surveillance_behaviour.ports import Point, Ports
 from surveillance_runtime.files import FileError
 from surveillance_runtime.parameters import parameter, parameters
 
@@ -107,19 +107,19 @@ class Mission:
         Raises:
             CallError: The ontology cannot be asked.
         """
-        decisions = self.ports.decisions
-        self.place = decisions.begin(self.now(), interrupt)
-        self.say(f'{len(decisions.places)} places to patrol, starting in {self.place}')
+        reasoner = self.ports.reasoner
+        self.place = reasoner.begin(self.now(), interrupt)
+        self.say(f'{len(reasoner.places)} places to patrol, starting in {self.place}')
         if self._started is not None:
             return
         self._started = self.now()
-        self._noted_places = decisions.places
+        self._noted_places = reasoner.places
         self._noted_threshold = self.settings.choice.urgency_threshold
         self.note(
             'start',
             machine=self.machine,
             place=self.place,
-            places=sorted(decisions.places),
+            places=sorted(reasoner.places),
             urgency_threshold=self._noted_threshold,
         )
         before, self._cut_off = self._cut_off, None
@@ -127,7 +127,7 @@ class Mission:
             return
         self.astray = before.left
         if before.charging and not self.charged_enough():
-            decisions.send_to_charge(before.charging)
+            reasoner.send_to_charge(before.charging)
         if before.place == self.place:
             self.explored = before.explored
         self.say(f'going on: {before}')
@@ -144,15 +144,15 @@ class Mission:
             NowhereToGoError: Nothing can be reached.
         """
         self._notice_place(interrupt)
-        decisions, now = self.ports.decisions, self.now()
+        reasoner, now = self.ports.reasoner, self.now()
         avoided = self.recovery.avoided(now)
-        decision = decisions.decide(now, interrupt, avoided, to_charge=to_charge)
+        decision = reasoner.decide(now, interrupt, avoided, to_charge=to_charge)
         if decision.from_place:
             self.place = decision.from_place
         self.heading_to = decision.place
         self.pending = decision
-        if decisions.places != self._noted_places:
-            self._noted_places = decisions.places
+        if reasoner.places != self._noted_places:
+            self._noted_places = reasoner.places
             self.note('map', places=sorted(self._noted_places))
         threshold, changed = self.settings.choice.urgency_threshold, {}
         if threshold != self._noted_threshold:
@@ -198,7 +198,7 @@ class Mission:
     def arrived(self, place: str, distance: float, path: Sequence[Point] = ()) -> None:
         """Note that the robot is in ``place``, after ``distance`` metres along ``path``."""
         self._visit(place, distance, path)
-        self.ports.decisions.arrived(place, self.now(), distance)
+        self.ports.reasoner.arrived(place, self.now(), distance)
         self.recovery.arrived(place)
         self.failure = None
         self.say(f'arrived in {place}')
@@ -217,7 +217,7 @@ class Mission:
     def came_back(self, distance: float) -> None:
         """Note that the robot is again where it was last known to be."""
         self._visit(self.place, distance)
-        self.ports.decisions.saw(self.place, self.now())
+        self.ports.reasoner.saw(self.place, self.now())
         self.say(f'back in {self.place}')
 
     def _visit(self, place: str, distance: float, path: Sequence[Point] = ()) -> None:
@@ -248,7 +248,7 @@ class Mission:
             recharge=recharge,
         )
         seconds = self.now() - began
-        self.ports.decisions.charged()
+        self.ports.reasoner.charged()
         self.recovery.charged(self.place)
         self.failure = None
         self.note('recharge', place=self.place, seconds=seconds)
@@ -266,7 +266,7 @@ class Mission:
         """Remember, record and say what did not work; see :class:`Failure`."""
         self.failure = Failure(what, reason, goal, charging, is_over)
         self.pending = None
-        self.ports.decisions.disturbed()
+        self.ports.reasoner.disturbed()
         self.note('failure', what=what, reason=reason, **self._driven())
         self.say(f'{what} failed: {reason}', warning=True)
 

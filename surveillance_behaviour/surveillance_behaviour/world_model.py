@@ -1,11 +1,11 @@
-"""Decides for one robot: looks at the world, asks `decide`, and remembers what came of it.
+"""What one robot knows when it decides: looks at the world, asks `decide`, remembers what came.
 
 The ontology says where the robot is, what it can reach, which classes each place has and when it
-was visited: one snapshot for each choice. The decider adds what the robot itself knows better:
+was visited: one snapshot for each choice. The world model adds what the robot itself knows better:
 where the places are, when it was where, and how long each leg takes.
 
 One process of a robot decides: `robot_behavior` in the behaviour `surveillance`, `reasoner` in
-`patrol`. Each has one `Decider`, which holds all that is remembered between two decisions.
+`patrol`. Each has one `WorldModel`, which holds all that is remembered between two decisions.
 """
 
 from __future__ import annotations
@@ -37,12 +37,12 @@ from state_machines import Interrupt
 from state_machines.exceptions import CallError
 from surveillance_behaviour.charging import BatteryMonitor
 from surveillance_behaviour.experience import Experience
-from surveillance_behaviour.peers.ports import Ontology, Places, Point, UnknownPlaceError
+from surveillance_behaviour.ports import Ontology, Places, Point, UnknownPlaceError
 from surveillance_ontology.patrol_ontology import Snapshot
 from surveillance_runtime.suggestions import nearest
 
 
-class Decider:
+class WorldModel:
     """Decides where one robot goes.
 
     Args:
@@ -196,7 +196,7 @@ class Decider:
         self.places = frozenset(positions)
         if found.place not in positions:
             raise CallError(f'ontology: the robot is in {found.place}, which is not on the map')
-        times, dwell = self.experience.leg_times, self.settings.exploration_seconds
+        times, exploring = self.experience.leg_times, self.settings.exploration_seconds
         times.forget_fit(self.settings.speed)
         legs = {
             place: {
@@ -207,13 +207,13 @@ class Decider:
             for place, others in found.connections.items()
             if place in positions
         }
-        if (found.place in self.graph.index, legs, dwell) == self._graph_key:
+        if (found.place in self.graph.index, legs, exploring) == self._graph_key:
             return self.graph
         try:
-            graph = PatrolGraph(legs, dwell).connected(found.place)
+            graph = PatrolGraph(legs, exploring).connected(found.place)
         except GraphError as error:
             raise CallError(f'ontology: {error}') from None
-        self._graph_key = (True, legs, dwell)
+        self._graph_key = (True, legs, exploring)
         return graph
 
     def _metres(self, start: str, goal: str) -> float:
@@ -230,7 +230,7 @@ class Decider:
         threshold have changed, or what all legs take together, by more than `LEG_CHANGE`.
         """
         of_what = world.threshold, world.graph.places
-        seconds = sum(sum(ways.values()) for ways in world.graph.legs.values())
+        seconds = sum(sum(ways.values()) for ways in world.graph.leg_seconds.values())
         alike = abs(seconds - self._checked_seconds) <= LEG_CHANGE * self._checked_seconds
         if of_what == self._checked_threshold and (self._warned or alike):
             return
@@ -322,7 +322,7 @@ class Decider:
         if world is None:
             return ''
         if place != world.place and place in world.graph.index:
-            world = replace(world, place=place, reachable=tuple(world.graph.legs[place]))
+            world = replace(world, place=place, reachable=tuple(world.graph.leg_seconds[place]))
         return why_charge(world, self.battery(), self.settings)
 
     def saw(self, place: str, now: float) -> None:
@@ -342,7 +342,7 @@ class Decider:
         leg, self._leg = self._leg, None
         if leg is not None and leg.place == place:
             start = leg.from_place
-            if place in self.graph.legs.get(start, ()):
+            if place in self.graph.leg_seconds.get(start, ()):
                 straight = self._metres(start, place)
                 self.experience.leg_times.observe(start, place, now - leg.time, straight, metres)
         self.saw(place, now)

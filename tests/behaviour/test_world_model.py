@@ -14,27 +14,27 @@ import pytest
 
 from patrol_policy.decision import REQUEST, DecisionSettings, NowhereToGoError
 from state_machines import Interrupt
-from surveillance_behaviour.decider import Decider
 from surveillance_behaviour.experience import Experience
 from surveillance_behaviour.mission.mission_log import MissionRecord
+from surveillance_behaviour.world_model import WorldModel
 
 from .scripted_world import World
 
 NOBODY = Interrupt()
 
 
-def decider(world: World, record: Path) -> Decider:
+def world_model(world: World, record: Path) -> WorldModel:
     experience = Experience.of_record(str(record))
     assert not experience.problem
-    return Decider(DecisionSettings(), world, world, world.battery, experience)
+    return WorldModel(DecisionSettings(), world, world, world.battery, experience)
 
 
 def test_a_request_outlives_the_node_that_took_it(tmp_path: Path) -> None:
     world, record = World(), tmp_path / 'mission.jsonl'
-    first = decider(world, record)
+    first = world_model(world, record)
     first.begin(1.0, NOBODY)
     assert 'goes to R4' in first.request('R4')
-    decision = decider(world, record).decide(2.0, NOBODY)
+    decision = world_model(world, record).decide(2.0, NOBODY)
     assert (decision.rule, decision.place) == (REQUEST, 'R4')
 
 
@@ -43,18 +43,18 @@ def test_a_request_ends_when_the_robot_has_been_there_or_cannot_go(
     tmp_path: Path, avoided: frozenset[str]
 ) -> None:
     world, record = World(), tmp_path / 'mission.jsonl'
-    first = decider(world, record)
+    first = world_model(world, record)
     first.begin(1.0, NOBODY)
     first.request('R4')
     if not avoided:
         world.is_in = 'R4'
     assert first.decide(2.0, NOBODY, avoided).rule != REQUEST
-    assert decider(world, record).decide(3.0, NOBODY).rule != REQUEST
+    assert world_model(world, record).decide(3.0, NOBODY).rule != REQUEST
 
 
 def test_a_request_behind_a_door_that_closed_is_said_and_the_patrol_goes_on() -> None:
     world, said = World(), list[str]()
-    told = Decider(DecisionSettings(), world, world, world.battery, warn=said.append)
+    told = WorldModel(DecisionSettings(), world, world, world.battery, warn=said.append)
     told.begin(1.0, NOBODY)
     told.request('R4')
     world.closed.update(world.rooms['R4'])
@@ -66,7 +66,7 @@ def test_a_request_behind_a_door_that_closed_is_said_and_the_patrol_goes_on() ->
 
 def test_a_request_waits_while_no_charging_place_can_be_reached() -> None:
     world, said = World(start_place='C1'), list[str]()
-    told = Decider(DecisionSettings(), world, world, world.battery, warn=said.append)
+    told = WorldModel(DecisionSettings(), world, world, world.battery, warn=said.append)
     told.begin(1.0, NOBODY)
     told.request('R1')
     world.battery.set_level(1.0)
@@ -80,7 +80,7 @@ def test_a_request_waits_while_no_charging_place_can_be_reached() -> None:
 
 def test_the_ontology_knows_until_when_the_robot_was_in_a_place() -> None:
     world = World()
-    told = Decider(DecisionSettings(), world, world, world.battery)
+    told = WorldModel(DecisionSettings(), world, world, world.battery)
     told.begin(1.0, NOBODY)
     told.decide(20.0, NOBODY)
     assert world.visited_at['E'] == 20.0
@@ -96,7 +96,7 @@ def test_a_clock_that_is_set_back_while_nobody_decides_empties_no_visit(
         record.write('visit', date + 10.0, place='C1', distance=0.0)
         record.write('visit', date + 30.0, place='E', distance=0.0)
     world.visited_at |= {'C1': date + 10.0, 'E': date + 30.0}
-    told = decider(world, path)
+    told = world_model(world, path)
     now = date + 30.0 + after
     told.begin(now, NOBODY)
     assert told.experience.visits == {'C1': now - 20.0, 'E': now}
@@ -106,7 +106,7 @@ def test_a_decision_says_which_facts_clash_while_they_do(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     world = World()
-    told = decider(world, tmp_path / 'mission.jsonl')
+    told = world_model(world, tmp_path / 'mission.jsonl')
     told.begin(1.0, NOBODY)
     clash, right = 'ontology map is inconsistent because R4 is ROOM and R4 is DOOR', world.snapshot
     monkeypatch.setattr(world, 'snapshot', lambda *args: replace(right(*args), contradiction=clash))
@@ -117,7 +117,7 @@ def test_a_decision_says_which_facts_clash_while_they_do(
 
 def test_a_request_is_taken_while_somebody_looks(tmp_path: Path) -> None:
     world = World()
-    told = decider(world, tmp_path / 'mission.jsonl')
+    told = world_model(world, tmp_path / 'mission.jsonl')
     told.begin(1.0, NOBODY)
     answered, asked, right = threading.Event(), threading.Event(), world.snapshot
 
@@ -148,9 +148,9 @@ def test_the_shortest_tour_is_looked_for_when_the_map_changes_not_with_each_leg(
         lengths.append(tour)
         return 'too short' if threshold < tour else ''
 
-    monkeypatch.setattr('surveillance_behaviour.decider.tour_warning', warning)
+    monkeypatch.setattr('surveillance_behaviour.world_model.tour_warning', warning)
     settings = DecisionSettings(urgency_threshold=1e6)
-    told = Decider(settings, world, world, world.battery, warn=warnings.append)
+    told = WorldModel(settings, world, world, world.battery, warn=warnings.append)
     told.begin(1.0, NOBODY)
     for drive in range(5):
         told.experience.leg_times.observe('E', 'C1', 8.0 + 0.1 * drive, 5.0, 5.0)

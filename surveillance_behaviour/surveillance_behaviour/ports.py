@@ -1,9 +1,9 @@
 """What the machines need from the rest of the robot, as small interfaces without ROS.
 
 A machine talks to its peers only through these ports. On the robot they are services and actions
-(:mod:`surveillance_behaviour.peers.ros_ports`); in a test they are plain Python. Every method may
-take its time and ends early when the interrupt is raised. It raises `CallError` when the peer did
-not do what was asked within a deadline that the port knows, `UnavailableError` when it is away.
+(:mod:`surveillance_behaviour.ros_adapters`); in a test they are plain Python. Every method may take
+its time and ends early when the interrupt is raised. It raises `CallError` when the peer did not do
+what was asked within a deadline that the port knows, `UnavailableError` when it is away.
 """
 
 from __future__ import annotations
@@ -68,8 +68,8 @@ class Places(Protocol):
         """Return a point in the place; raises UnknownPlaceError when there is no such place."""
 
 
-class Decisions(Protocol):
-    """Who decides where the robot goes: a `Decider`, here or in another process.
+class Reasoner(Protocol):
+    """Who decides where the robot goes: a `WorldModel`, here or in another process.
 
     A class need not define the methods that return nothing: it is then told in vain.
     """
@@ -181,6 +181,6 @@ class Ports:
     ontology: Ontology
     places: Places
     announcer: Announcer
-    decisions: Decisions
+    reasoner: Reasoner
     motion: Motion | None = None
     routine: Routine | None = None

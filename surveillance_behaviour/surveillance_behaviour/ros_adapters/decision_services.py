@@ -1,4 +1,4 @@
-"""What a node that decides has and offers: its decider, `decision`, `why_not` and `go_to`."""
+"""What a node that decides has and offers: its world model, `decision`, `why_not` and `go_to`."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from patrol_policy.world import Decision
 from state_machines.exceptions import CallError
 from surveillance_behaviour import conversions
 from surveillance_behaviour.charging import BatteryMonitor
-from surveillance_behaviour.decider import Decider
 from surveillance_behaviour.experience import Experience
-from surveillance_behaviour.peers.ports import Ontology, Places
+from surveillance_behaviour.ports import Ontology, Places
+from surveillance_behaviour.world_model import WorldModel
 from surveillance_interfaces.msg import Decision as DecisionMessage
 from surveillance_interfaces.srv import GoTo, WhyNot
 from surveillance_runtime.node import PatrolNode
@@ -39,7 +39,7 @@ class MemorySettings:
     )
 
 
-def decider_of(
+def world_model_of(
     node: PatrolNode,
     settings: DecisionSettings,
     memory: MemorySettings,
@@ -47,10 +47,11 @@ def decider_of(
     places: Places,
     battery: BatteryMonitor,
     now: Callable[[], float],
-) -> Decider:
-    """Return a decider that knows what was learned before, and learns how fast the battery falls.
+) -> WorldModel:
+    """Return what a robot knows when it decides, with what it learned before.
 
-    Its decisions are published and logged, numbered from 1.
+
+    It learns how fast the battery falls. Its decisions are published and logged, numbered from 1.
 
     Args:
         node: The node that decides.
@@ -79,16 +80,16 @@ def decider_of(
             f'[{decision.rule}] {decision.reason}'
         )
 
-    decider = Decider(
+    world_model = WorldModel(
         settings, ontology, places, battery, experience, generator, lambda w: log.warn(w), announce
     )
-    decider.learn_draw(now)
-    return decider
+    world_model.learn_draw(now)
+    return world_model
 
 
 def offer_decision_services(
     node: PatrolNode,
-    decider: Decider,
+    world_model: WorldModel,
     now: Callable[[], float],
     avoided: Callable[[], frozenset[str]],
 ) -> AwaitedWork:
@@ -96,7 +97,7 @@ def offer_decision_services(
 
     Args:
         node: The node that decides.
-        decider: Decides.
+        world_model: What decides.
         now: Seconds on the mission's clock.
         avoided: The places that could not be reached lately.
 
@@ -109,7 +110,7 @@ def offer_decision_services(
     async def on_why_not(request: Any, response: Any) -> Any:
         def answer() -> None:
             try:
-                told = decider.why_not(request.place, now(), node.stopping, avoided())
+                told = world_model.why_not(request.place, now(), node.stopping, avoided())
             except (ValueError, CallError) as error:
                 response.success, response.message = False, str(error)
                 return
@@ -121,7 +122,7 @@ def offer_decision_services(
 
     def on_go_to(request: Any, response: Any) -> Any:
         try:
-            response.message = decider.request(request.place)
+            response.message = world_model.request(request.place)
             response.success = True
             node.get_logger().info(response.message)
         except ValueError as error:

@@ -18,8 +18,6 @@ from std_msgs.msg import Bool, UInt8
 from std_srvs.srv import Empty
 
 import state_machines as fsm
-from patrol_policy.decision import ANY, RECHARGE
-from patrol_policy.world import Decision
 from state_machines import Interrupt
 from state_machines.ros import (
     CallError,
@@ -30,16 +28,14 @@ from state_machines.ros import (
     ServiceCaller,
 )
 from state_machines.structure import Structure
-from surveillance_behaviour import conversions
 from surveillance_behaviour.charging import BatteryMonitor
 from surveillance_behaviour.mission.mission import Mission
 from surveillance_behaviour.mission.recovery import WAITING_FOR_HELP
-from surveillance_behaviour.peers.armor_knowledge import ArmorKnowledge, Whereabouts
-from surveillance_behaviour.peers.ports import Decisions, Ontology, Point, UnknownPlaceError
+from surveillance_behaviour.ports import Point, UnknownPlaceError
+from surveillance_behaviour.ros_adapters.armor_knowledge import ArmorKnowledge, Whereabouts
 from surveillance_interfaces.action import ComputePath, Control, FollowPath, Plan
-from surveillance_interfaces.msg import Decision as DecisionMessage
 from surveillance_interfaces.msg import MissionStatus, RobotPlace
-from surveillance_interfaces.srv import Reason, ReferenceName, RoomPosition
+from surveillance_interfaces.srv import ReferenceName, RoomPosition
 from surveillance_ontology.armor_client import RosTransport
 from surveillance_runtime.conversions import (
     nanoseconds_of,
@@ -53,8 +49,6 @@ from surveillance_runtime.qos import STATE_QOS
 
 ASK_AGAIN = 10.0
 """How long one question to a service that takes long waits for its answer, seconds."""
-DECISION_SECONDS = 1.0
-"""How long the message about a decision may come after the answer of `reason`, seconds."""
 MARGIN = 1e-6
 """By how much a wait is announced longer than it is, seconds: more than stamps are rounded by."""
 LONGEST_CHARGE = 24 * 3600.0
@@ -237,91 +231,6 @@ class RosMotion:
         """Return where the robot was on its way, since this was asked last."""
         driven, self._driven = self._driven, []
         return driven
-
-
-class RosReasoner(Decisions):
-    """Decides over the service `reason`; the topic `decision` tells by which rule.
-
-    It need not be told what happens: the reasoner hears that on `mission_status`.
-
-    Args:
-        node: The node.
-        deadlines: Seconds of steady time.
-        ontology: Asked once, at the start, what places there are.
-        battery: The battery.
-    """
-
-    def __init__(
-        self, node: PatrolNode, deadlines: Deadlines, ontology: Ontology, battery: BatteryMonitor
-    ) -> None:
-        self._deadlines = deadlines
-        self._ontology = ontology
-        self._battery = battery
-        self._places: frozenset[str] = frozenset()
-        self._told = threading.Condition()
-        self._decision: Decision | None = None
-        self._reason = ServiceCaller(node, Reason, 'reason')
-        node.create_subscription(DecisionMessage, 'decision', self._on_decision, STATE_QOS)
-
-    def _on_decision(self, message: DecisionMessage) -> None:
-        with self._told:
-            self._decision = conversions.decision_from(message)
-            self._told.notify_all()
-
-    @property
-    def places(self) -> frozenset[str]:
-        """The places that were there at the start, and those that decisions have named since."""
-        return self._places
-
-    def begin(self, now: float, interrupt: Interrupt) -> str:
-        """Look at the map for the first time; where the robot is."""
-        found = self._ontology.snapshot(now, (), {}, interrupt)
-        self._places = frozenset(found.connections)
-        return str(found.place)
-
-    def decide(
-        self,
-        now: float,
-        interrupt: Interrupt,
-        avoided: frozenset[str],
-        *,
-        to_charge: bool = False,
-    ) -> Decision:
-        """Ask the reasoner, which knows from `mission_status` what is avoided."""
-        late = time.monotonic() + self._deadlines.answer
-        while True:
-            decision = self._ask(now, interrupt)
-            self._places |= {decision.place, decision.target, *decision.scores} - {''}
-            # The reasoner may hear of a low battery a moment after this node.
-            if not to_charge or decision.rule in (RECHARGE, ANY) or time.monotonic() > late:
-                return decision
-            interrupt.wait(0.1)
-            if interrupt.is_set():
-                raise CallInterruptedError
-
-    def _ask(self, now: float, interrupt: Interrupt) -> Decision:
-        self._decision = None
-        answer = self._reason.call(Reason.Request(), self._deadlines.answer, interrupt)
-        if not answer.point:
-            raise CallError(f'{self._reason.name}: it names no place; its log says why')
-        place = str(answer.point)
-
-        def told() -> bool:
-            return self._decision is not None and self._decision.place == place
-
-        with self._told:
-            if self._told.wait_for(told, DECISION_SECONDS) and self._decision is not None:
-                return self._decision
-        return Decision(now, '', place, place, ANY, 'reason', 'the service `reason` names it')
-
-    def why_charge(self) -> str:
-        """Return that the battery is low; all else is the reasoner's to say."""
-        battery = self._battery
-        return f'the battery is low ({battery.level_text()})' if battery.low else ''
-
-    def route_round(self, start: str, goal: str) -> tuple[str, ...]:
-        """Return nothing: the planner of `motion/planner` goes round by itself."""
-        return ()
 
 
 class RosRoutine:
