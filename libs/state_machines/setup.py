@@ -6,5 +6,7 @@ setup(
     data_files=[
         ('share/ament_index/resource_index/packages', ['resource/state_machines']),
         ('share/state_machines', ['package.xml']),
-    ]
+    ],
+    # Here, as a text: colcon reads what setup() was given, and understands no other form.
+    python_requires='>=3.11',
 )
