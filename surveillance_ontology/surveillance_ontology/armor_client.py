@@ -35,6 +35,7 @@ from armor_service.protocol import (
 )
 from state_machines import Interrupt
 from state_machines.ros import CallError, CallTimeoutError, ServiceCaller
+from state_machines.ros.waiting import executor_of
 from surveillance_interfaces.msg import FactChanges
 from surveillance_interfaces.srv import ArmorDirective, ArmorDirectiveList
 from surveillance_ontology.conversions import (
@@ -132,7 +133,7 @@ class RosTransport:
         if self._node.executor is None:
             return False
         spun = threading.Event()
-        self._node.executor.create_task(spun.set)
+        executor_of(self._node).create_task(spun.set)
         return spun.wait(SPUN_WITHIN)
 
 
@@ -247,7 +248,7 @@ class FactSubscription:
             self._ask_again = True
             return
         self._asking = True
-        self._node.executor.create_task(self._ask)
+        executor_of(self._node).create_task(self._ask)
 
     async def _ask(self) -> None:
         try:

@@ -23,7 +23,7 @@ from armor_service.protocol import DirectiveRequest, DirectiveResponse, StoreErr
 from armor_service.service import ArmorService
 from armor_service.store import Store
 from armor_service.turns import Backlog, Turns
-from state_machines.ros.waiting import reported
+from state_machines.ros.waiting import executor_of, reported
 from surveillance_interfaces.msg import ArmorDirectiveRes, FactChanges
 from surveillance_interfaces.srv import ArmorDirective, ArmorDirectiveList
 from surveillance_ontology.armor_client import CHANGES_TOPIC
@@ -124,7 +124,7 @@ class ArmorServer(PatrolNode):
                 break
             self._backlog.put(request.armor_request.client_name, (request, header))
         if idle and self._backlog:
-            self.executor.create_task(self._answer_backlog)
+            executor_of(self).create_task(self._answer_backlog)
 
     async def _answer_backlog(self) -> None:
         end = time.monotonic() + SLICE
@@ -133,13 +133,13 @@ class ArmorServer(PatrolNode):
             directive = request_from_ros(request.armor_request)
             answer = self._service.execute_at_once(directive)
             if answer is None:
-                self.executor.create_task(self._answer_slow, directive, header)
+                executor_of(self).create_task(self._answer_slow, directive, header)
             else:
                 self._send(answer, header)
         if self._backlog:
             # Others first: those who subscribe, lists, and requests that came meanwhile.
             self._take_more()
-            self.executor.create_task(self._answer_backlog)
+            executor_of(self).create_task(self._answer_backlog)
 
     async def _answer_slow(self, directive: DirectiveRequest, header: Any) -> None:
         self._send(await self._slow_answer(directive), header)
@@ -189,7 +189,7 @@ class ArmorServer(PatrolNode):
 
     def _soon(self) -> None:
         if self.executor is not None:
-            self.executor.create_task(self._begin_pause)
+            executor_of(self).create_task(self._begin_pause)
 
     def _begin_pause(self) -> None:
         # Not anew with each change: an unbroken series of changes would never be told.

@@ -19,7 +19,7 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile
 
 
-class _Unattended(CallbackGroup):  # type: ignore[misc]
+class _Unattended(CallbackGroup):
     """Keeps executors from waiting for what is in it."""
 
     def can_execute(self, entity: Any) -> bool:
@@ -84,6 +84,8 @@ def await_message(
     """Wait until one of the subscriptions has a message, at most that many seconds."""
     handles = [each._subscription.handle for each in subscriptions]
     with contextlib.ExitStack() as held:
+        if context.handle is None:
+            return
         held.enter_context(context.handle)
         for handle in handles:
             held.enter_context(handle)

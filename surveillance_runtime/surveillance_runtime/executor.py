@@ -140,7 +140,7 @@ class _WaitList:
         self._in_use.close()
 
 
-class PatrolExecutor(SingleThreadedExecutor):  # type: ignore[misc]  # rclpy has no types
+class PatrolExecutor(SingleThreadedExecutor):
     """Spins nodes in the thread that spins it, as rclpy's executor of the same kind does."""
 
     def __init__(self, *, context: Any = None) -> None:

@@ -89,7 +89,7 @@ class Allowance:
         return True
 
 
-class CleanLogger(rcutils.RcutilsLogger):  # type: ignore[misc]
+class CleanLogger(rcutils.RcutilsLogger):
     """A logger whose lines cannot be forged, grow without bound, or come without end.
 
     Attributes:

@@ -90,7 +90,7 @@ class Destroyable(Protocol):
         """Leave the ROS graph."""
 
 
-class PatrolNode(Node):  # type: ignore[misc]
+class PatrolNode(Node):
     """A node with checked parameters and threads that end with it.
 
     Attributes:
@@ -307,7 +307,7 @@ class PatrolNode(Node):  # type: ignore[misc]
             options['clock'] = Clock(clock_type=ClockType.STEADY_TIME)
         return super().create_timer(*args, **options)
 
-    def create_service(
+    def create_service(  # type: ignore[override]  # rclpy's has no room for further options
         self, srv_type: Any, name: str, callback: Callable[..., Any], **options: Any
     ) -> Service:
         """Create a service as rclpy does, with a queue that does not lose requests."""
@@ -348,7 +348,9 @@ class PatrolNode(Node):  # type: ignore[misc]
 
         return answer
 
-    def create_client(self, srv_type: Any, name: str, **options: Any) -> Client:
+    def create_client(  # type: ignore[override]  # likewise
+        self, srv_type: Any, name: str, **options: Any
+    ) -> Client:
         """Create a client as rclpy does, with a queue that does not lose answers."""
         options.setdefault('qos_profile', CLIENT_QOS)
         return super().create_client(srv_type, name, **options)

@@ -19,6 +19,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import rclpy
+from rclpy.clock import ROSClock
 from rclpy.executors import ExternalShutdownException, ShutdownException
 from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
@@ -194,7 +195,9 @@ def share_clock(nodes: Sequence[PatrolNode]) -> None:
         now = Time.from_msg(message.clock)
         for node in following:
             try:
-                node.get_clock().set_ros_time_override(now)
+                clock = node.get_clock()
+                assert isinstance(clock, ROSClock)
+                clock.set_ros_time_override(now)
             except Exception as error:
                 report_exception(error, node, CLOCK_TOPIC)
 

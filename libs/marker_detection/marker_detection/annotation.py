@@ -47,4 +47,4 @@ def annotated(
         top_left = (origin[0] - 2, origin[1] - height - 2)
         cv2.rectangle(drawn, top_left, (origin[0] + width + 2, origin[1] + 3), _GROUND, -1)
         cv2.putText(drawn, text, origin, 0, scale, color, thickness, cv2.LINE_AA)
-    return drawn
+    return np.asarray(drawn, np.uint8)

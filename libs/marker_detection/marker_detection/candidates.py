@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import cv2
 import numpy as np
@@ -83,13 +83,10 @@ def dark_masks(
         the image's grey levels part best: a shadow's edge, which is dark beside the light, is
         still brighter than ink in the light. Then the masks with gaps closed.
     """
-    halved = cv2.resize(
-        image,
-        (max(1, image.shape[1] // 2), max(1, image.shape[0] // 2)),
-        interpolation=cv2.INTER_AREA,
-    )
+    half = (max(1, image.shape[1] // 2), max(1, image.shape[0] // 2))
+    halved = _bytes(cv2.resize(image, half, interpolation=cv2.INTER_AREA))
     white = float(np.percentile(halved[::4, ::4], 98.0))
-    yield cv2.threshold(image, white / 4.0, 255, cv2.THRESH_BINARY_INV)[1], 1
+    yield _bytes(cv2.threshold(image, white / 4.0, 255, cv2.THRESH_BINARY_INV)[1]), 1
     full_size: list[Grey] = []
     for window in windows:
         wide = window >= _WIDE_WINDOW and window > min(windows)
@@ -99,11 +96,17 @@ def dark_masks(
             full_size.append(_darker_than_around(image, window, contrast))
             yield full_size[-1], 1
     split, _ = cv2.threshold(halved, 0, 255, cv2.THRESH_BINARY_INV + cv2.THRESH_OTSU)
-    yield cv2.threshold(halved, split, 255, cv2.THRESH_BINARY_INV)[1], 2
+    yield _bytes(cv2.threshold(halved, split, 255, cv2.THRESH_BINARY_INV)[1]), 2
     for length in bridges:
         for dark in full_size:
             for shape in ((length, 1), (1, length)):
-                yield cv2.morphologyEx(dark, cv2.MORPH_CLOSE, np.ones(shape, np.uint8)), 1
+                closed = cv2.morphologyEx(dark, cv2.MORPH_CLOSE, np.ones(shape, np.uint8))
+                yield _bytes(closed), 1
+
+
+def _bytes(image: npt.NDArray[Any]) -> Grey:
+    """Return what OpenCV gives, whose pixels are bytes like those of what it was given."""
+    return np.asarray(image, np.uint8)
 
 
 def _darker_than_around(image: Grey, window: int, contrast: float) -> Grey:
@@ -210,7 +213,7 @@ def _blobs_in(mask: Grey, length: float, width: float) -> _Blobs | None:
     within = large.repeat(counts)
     boxes = np.stack([left, top, right + 1, bottom + 1], axis=1)[large].astype(np.int64)
     return _Blobs(
-        [outlines[index] for index in np.flatnonzero(large).tolist()],
+        [np.asarray(outlines[index], np.int32) for index in np.flatnonzero(large).tolist()],
         boxes,
         _scatter(
             x[within] - left.repeat(counts)[within],

@@ -57,7 +57,8 @@ class ImagePyramid:
         while len(self._levels) <= level:
             last = self._levels[-1]
             size = (max(1, last.shape[1] // 2), max(1, last.shape[0] // 2))
-            self._levels.append(cv2.resize(last, size, interpolation=cv2.INTER_AREA))
+            halved = cv2.resize(last, size, interpolation=cv2.INTER_AREA)
+            self._levels.append(np.asarray(halved, np.uint8))
         sampled = cv2.remap(
             self._levels[level], x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
         )

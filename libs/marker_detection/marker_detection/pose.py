@@ -130,7 +130,8 @@ def _refined(
         )
     except cv2.error:
         return None
-    place, turned = moved.ravel(), cv2.Rodrigues(vector)[0]
+    place = np.asarray(moved, np.float64).ravel()
+    turned = np.asarray(cv2.Rodrigues(vector)[0], np.float64)
     # the paper's front faces the camera
     if not np.isfinite(place).all() or place[2] <= 0 or turned[:, 2] @ place > 0:
         return None

@@ -53,7 +53,7 @@ def prepare(image: npt.NDArray[np.uint8]) -> PreparedImage:
         if left <= _QUIET:
             break
         kernel = cv2.getGaussianKernel(9, deviation)
-        smooth = cv2.sepFilter2D(grey, -1, kernel, kernel)
+        smooth = np.asarray(cv2.sepFilter2D(grey, -1, kernel, kernel), np.uint8)
         left = noise * float(np.square(kernel).sum())
     return PreparedImage(grey, smooth, left)
 

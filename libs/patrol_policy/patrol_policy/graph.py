@@ -172,13 +172,13 @@ class PatrolGraph:
             return shortest_tour(self.distances)
         import networkx
 
-        network = networkx.Graph()
+        network: networkx.Graph[str] = networkx.Graph()
         network.add_nodes_from(self.places)
         network.add_edges_from(
             (place, other) for place in self.leg_seconds for other in self.leg_seconds[place]
         )
         blocks = [
-            sorted(self.index[place] for place in block)
+            sorted(self.index[place] for place in block)  # type: ignore[index]
             for block in networkx.biconnected_components(network)
         ]
         return tour_over_blocks(self.distances, sorted(blocks))

@@ -98,8 +98,8 @@ class GridSearch:
             return None
         near = np.zeros(self._coarse.shape, np.uint8)
         near[blocks[:, 0], blocks[:, 1]] = 1
-        near = cv2.dilate(near, np.ones((2 * BESIDE + 1,) * 2, np.uint8))
-        return self._among(near.astype(np.bool_), start, goal)
+        wide = cv2.dilate(near, np.ones((2 * BESIDE + 1,) * 2, np.uint8))
+        return self._among(wide.astype(np.bool_), start, goal)
 
     def _among(self, near: NDArray[np.bool_], start: Cell, goal: Cell) -> Cells | None:
         """Search the cells of some blocks; None where they have no way."""
@@ -118,7 +118,7 @@ class GridSearch:
         source, target = np.searchsorted(
             cells, [start[0] * columns + start[1], goal[0] * columns + goal[1]]
         )
-        lengths, before = dijkstra(
+        lengths, before = dijkstra(  # type: ignore[call-overload]  # its stubs want more
             graph, directed=False, indices=int(source), return_predecessors=True
         )
         if not np.isfinite(lengths[target]):

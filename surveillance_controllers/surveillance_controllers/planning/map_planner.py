@@ -156,7 +156,7 @@ def route(
     import networkx as nx  # takes its time: a planner comes up without it
 
     def doors_through(doors: Iterable[str]) -> list[str] | None:
-        graph = nx.Graph()
+        graph: nx.Graph[str] = nx.Graph()
         graph.add_nodes_from([start, goal])
         for door in sorted(doors):
             for first, second in combinations(sorted(rooms_of[door]), 2):

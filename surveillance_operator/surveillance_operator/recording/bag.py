@@ -170,7 +170,7 @@ class BagWriter:
         return file
 
     def _finish(self, file: BufferedWriter) -> None:
-        self._writer.finish()  # type: ignore[no-untyped-call]
+        self._writer.finish()
         file.close()
         self._file = None
         # `prune` may have taken old segments away.
@@ -389,5 +389,5 @@ def _rewrite(path: Path) -> None:
             raise
         except Exception:  # where it is torn, any of the readers' errors may come
             pass
-        writer.finish()  # type: ignore[no-untyped-call]
+        writer.finish()
     temporary.replace(path)

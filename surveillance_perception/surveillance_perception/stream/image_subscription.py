@@ -14,6 +14,7 @@ from typing import Any, Generic, TypeVar
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 
+from state_machines.ros.waiting import executor_of
 from surveillance_runtime.node import PatrolNode
 
 IMAGES_QOS = QoSProfile(depth=2, reliability=ReliabilityPolicy.RELIABLE)
@@ -58,7 +59,7 @@ class ImageSubscription:
 
     def _on_incompatible(self, _event: Any) -> None:
         # not here: the event belongs to the subscription that goes
-        self._node.executor.create_task(self._settle_for_best_effort)
+        executor_of(self._node).create_task(self._settle_for_best_effort)
 
     def _settle_for_best_effort(self) -> None:
         former, self._subscription = self._subscription, self._subscribe(reliable=False)

@@ -137,12 +137,13 @@ def expose(scene: Scene, conditions: Conditions, rng: np.random.Generator) -> Pi
     """Return the picture (rows, columns, channels) that the camera takes of ideal brightnesses."""
     taken = lit(scene, conditions.lighting, rng)
     if conditions.blur > 0:
-        taken = cv2.GaussianBlur(taken, (0, 0), conditions.blur)
+        taken = np.asarray(cv2.GaussianBlur(taken, (0, 0), conditions.blur), np.float32)
     if conditions.motion > 1:
-        taken = cv2.filter2D(taken, -1, streak(conditions.motion, conditions.motion_angle))
+        path = streak(conditions.motion, conditions.motion_angle)
+        taken = np.asarray(cv2.filter2D(taken, -1, path), np.float32)
     if conditions.light != 1.0:
         taken = taken * np.float32(conditions.light)
     if conditions.noise > 0:
         grain = rng.standard_normal(taken.shape, dtype=np.float32)
-        taken = cv2.scaleAdd(grain, conditions.noise, taken)
+        taken = np.asarray(cv2.scaleAdd(grain, conditions.noise, taken), np.float32)
     return np.asarray(cv2.convertScaleAbs(np.maximum(taken, 0.0)), dtype=np.uint8)

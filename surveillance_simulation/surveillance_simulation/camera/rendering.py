@@ -161,7 +161,8 @@ class Renderer:
         key = (id(texture), halvings_x, halvings_y)
         if key not in self._shrunk:
             size = (max(1, columns >> halvings_x), max(1, rows >> halvings_y))
-            self._shrunk[key] = cv2.resize(texture, size, interpolation=cv2.INTER_AREA)
+            shrunk = cv2.resize(texture, size, interpolation=cv2.INTER_AREA)
+            self._shrunk[key] = np.asarray(shrunk, np.uint8)
         return self._shrunk[key]
 
 

@@ -53,7 +53,9 @@ def leaf() -> Texture:
     """Return a door leaf with two panels and a handle."""
     rng = np.random.default_rng(13)
     grain = rng.normal(0, 9, (1, _TEXELS)) + rng.normal(0, 2, (_TEXELS, _TEXELS))
-    picture = _tinted(150 + cv2.GaussianBlur(grain, (0, 0), 2.0), (1.0, 0.74, 0.5))
+    picture = _tinted(
+        np.asarray(150 + cv2.GaussianBlur(grain, (0, 0), 2.0), np.float64), (1.0, 0.74, 0.5)
+    )
     for top, bottom in ((0.08, 0.45), (0.55, 0.93)):
         corners = [(int(0.14 * _TEXELS), int(share * _TEXELS)) for share in (top, bottom)]
         opposite = (int(0.86 * _TEXELS), corners[1][1])

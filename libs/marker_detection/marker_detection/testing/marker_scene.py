@@ -150,11 +150,13 @@ def degrade(
         rows = scene.shape[0]
         lean = np.array([[1.0, degradation.shutter / rows, -degradation.shutter / 2], [0, 1, 0]])
         size = (scene.shape[1], rows)
-        result = cv2.warpAffine(result, lean, size, borderMode=cv2.BORDER_REPLICATE)
+        leant = cv2.warpAffine(result, lean, size, borderMode=cv2.BORDER_REPLICATE)
+        result = np.asarray(leant, np.float32)
     if degradation.blur > 0:
-        result = cv2.GaussianBlur(result, (0, 0), degradation.blur)
+        result = np.asarray(cv2.GaussianBlur(result, (0, 0), degradation.blur), np.float32)
     if degradation.motion > 1:
-        result = cv2.filter2D(result, -1, streak(degradation.motion, degradation.direction))
+        path = streak(degradation.motion, degradation.direction)
+        result = np.asarray(cv2.filter2D(result, -1, path), np.float32)
     if degradation.slope:
         ramp = np.linspace(1 + degradation.slope, 1 - degradation.slope, scene.shape[1])
         result = result * ramp.astype(np.float32)

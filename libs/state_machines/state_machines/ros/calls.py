@@ -361,7 +361,7 @@ _STATUS = {
 }
 
 
-class _ActionClient(ActionClient):  # type: ignore[misc]
+class _ActionClient(ActionClient):
     """An action client that takes no answer before it has noted what it asked.
 
     rclpy 7.1 sends a request and notes it afterwards. An answer that the executor takes in between
@@ -375,15 +375,18 @@ class _ActionClient(ActionClient):  # type: ignore[misc]
     def send_goal_async(self, *args: Any, **kwargs: Any) -> Future:
         """Send a goal, see rclpy."""
         with self._asking:
-            return super().send_goal_async(*args, **kwargs)
+            answer: Future = super().send_goal_async(*args, **kwargs)
+            return answer
 
     def _get_result_async(self, goal_handle: Any) -> Future:
         with self._asking:
-            return super()._get_result_async(goal_handle)
+            answer: Future = super()._get_result_async(goal_handle)
+            return answer
 
     def _cancel_goal_async(self, goal_handle: Any) -> Future:
         with self._asking:
-            return super()._cancel_goal_async(goal_handle)
+            answer: Future = super()._cancel_goal_async(goal_handle)
+            return answer
 
     async def execute(self, taken_data: Any) -> None:
         """Take answers in, see rclpy."""

@@ -12,8 +12,9 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-from rclpy.clock import ClockType, JumpThreshold
+from rclpy.clock import JumpThreshold, ROSClock
 from rclpy.duration import Duration
+from rclpy.executors import Executor
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.task import Future
@@ -170,7 +171,7 @@ class ClockWait:
         return not interrupt.is_set()
 
     def _follows_topic(self) -> bool:
-        return bool(self._clock.clock_type == ClockType.ROS_TIME and self._clock.ros_time_is_active)
+        return isinstance(self._clock, ROSClock) and self._clock.ros_time_is_active
 
     def _passed(self) -> int:
         if not self._follows_topic():
@@ -220,6 +221,17 @@ def reported(node: Node, work: Callable[[], Any]) -> tuple[Future, Callable[[], 
         wake_executor(node)
 
     return future, report
+
+
+def executor_of(node: Node) -> Executor:
+    """Return the executor that spins a node.
+
+    Raises:
+        RuntimeError: None does.
+    """
+    if node.executor is None:
+        raise RuntimeError(f'node {node.get_name()} is not spun by an executor')
+    return node.executor
 
 
 def wake_executor(node: Node) -> None:
