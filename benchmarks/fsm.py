@@ -1,11 +1,13 @@
 #!/usr/bin/env python3
 """Measures the state machine engine beside its peers, in one run.
 
-    python3 benchmarks/fsm.py [--quick]
+    python3 benchmarks/fsm.py [--quick] [--peers FOLDER ...]
 
-Peers are SMACH's pure-Python core (a checkout's folder that holds the package ``smach``, in the
-environment variable SMACH_PATH), YASMIN, transitions and py_trees; each is left out where it is not
-found. Absolute times depend on the computer: what counts is the ratio within one run.
+Peers are SMACH's pure-Python core, YASMIN's C++ core with its Python bindings, transitions,
+py_trees and python-statemachine. Each is imported from the environment or from the folders that
+``--peers`` names: for SMACH and YASMIN the folder that holds the package ``smach`` or the built
+package ``yasmin``. One that is not found has no rows. The peers' logs are silenced. Absolute times
+depend on the computer: what counts is the ratio within one run.
 """
 
 from __future__ import annotations
@@ -22,14 +24,13 @@ import sys
 import tempfile
 import threading
 import time
-import tracemalloc
 from collections import deque
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 CHECKOUT = Path(__file__).resolve().parent.parent
-sys.path.insert(0, str(CHECKOUT / 'state_machines'))
+sys.path.insert(0, str(CHECKOUT / 'libs' / 'state_machines'))
 
 import state_machines as fsm
 from state_machines import history
@@ -244,23 +245,66 @@ def run_py_trees(count: int) -> Callable[[], object]:
     return work
 
 
-def run_yasmin(count: int) -> Callable[[], object]:
-    """YASMIN: a ring of three states with a counter on the blackboard."""
+def run_python_statemachine(count: int) -> Callable[[], object]:
+    """`python-statemachine`: a ring of three states with a counter on the machine."""
+    from statemachine import State, StateMachine
+
+    class Ring(StateMachine):  # type: ignore[misc]
+        a = State(initial=True)
+        b = State()
+        c = State()
+        next = a.to(b) | b.to(c) | c.to(a)
+
+    machine = Ring()
+    left = count
+
+    def work() -> None:
+        nonlocal left
+        while left:
+            left -= 1
+            machine.send('next')
+
+    return work
+
+
+def yasmin_state(outcomes: Sequence[str] = ('next', 'done')) -> Any:
+    """Return a state for YASMIN that counts on the blackboard."""
     import yasmin
 
     class Count(yasmin.State):  # type: ignore[misc]
         def __init__(self) -> None:
-            super().__init__(['next', 'done'])
+            super().__init__(list(outcomes))
 
         def execute(self, blackboard: Any) -> str:
             left = blackboard['left'] - 1
             blackboard['left'] = left
             return 'next' if left else 'done'
 
-    machine = yasmin.StateMachine(outcomes=['end'])
-    for number in range(RING):
-        target = f'S{(number + 1) % RING}'
-        machine.add_state(f'S{number}', Count(), transitions={'next': target, 'done': 'end'})
+    return Count
+
+
+def yasmin_ring(make: Callable[[], Any], outer: Sequence[str], last: str, width: int = RING) -> Any:
+    """Return a machine for YASMIN whose states follow one another; `last` comes after the last."""
+    import yasmin
+
+    machine = yasmin.StateMachine(outcomes=list(outer))
+    for number in range(width):
+        target = f'S{number + 1}' if number < width - 1 else last
+        machine.add_state(f'S{number}', make(), transitions={'next': target, 'done': 'done'})
+    return machine
+
+
+def run_yasmin(count: int, levels: int = 1) -> Callable[[], object]:
+    """YASMIN: a ring of three states, or the nested machine of `nested`."""
+    import yasmin
+
+    def level(depth: int) -> Any:
+        if depth == 0:
+            return state()
+        return yasmin_ring(lambda: level(depth - 1), ['next', 'done'], 'next')
+
+    state = yasmin_state()
+    machine = yasmin_ring(lambda: level(levels - 1), ['done'], 'S0')
     blackboard = yasmin.Blackboard()
     blackboard['left'] = count
     return lambda: machine(blackboard)
@@ -329,8 +373,29 @@ def handing_over() -> float:
     return spent
 
 
-def sleeper_of(library: Any) -> type:
-    """Return a state that waits for the preempt and notes when it left."""
+class Sleeping(NamedTuple):
+    """A machine whose deepest state waits for the preempt.
+
+    Attributes:
+        state: That state; ``ready`` is a semaphore that it releases before it waits, ``left`` when
+            it returned.
+        run: Executes the machine.
+        preempt: Asks it to stop.
+    """
+
+    state: Any
+    run: Callable[[], object]
+    preempt: Callable[[], object]
+
+
+def sleeping_in(library: Any, *, bounded: bool = False, depth: int = 5) -> Sleeping:
+    """Return such a machine for a library with SMACH's interface.
+
+    Args:
+        library: The library.
+        bounded: A state that ignores a preempt is left behind; this engine only.
+        depth: How many machines there are in one another.
+    """
 
     class Sleeper(library.State):  # type: ignore[misc,name-defined]
         def __init__(self) -> None:
@@ -353,39 +418,71 @@ def sleeper_of(library: Any) -> type:
             self.service_preempt()
             return 'preempted'
 
-    return Sleeper
-
-
-def preempt_latencies(
-    repeats: int, library: Any = fsm, depth: int = 5
-) -> tuple[list[float], list[float]]:
-    """Return the seconds from the request to the deepest state's exit, and to the root's end."""
-    sleeper = sleeper_of(library)()
-    machine = sleeper
+    sleeper = Sleeper()
+    machine: Any = sleeper
     for _ in range(depth):
         outer = library.StateMachine(['done', 'preempted'])
         with outer:
             bound = {'done': 'done', 'preempted': 'preempted'}
             library.StateMachine.add('INNER', machine, bound)
         machine = outer
-    root = machine
+    if bounded:
+        machine.preempt_timeout = 60.0
+    return Sleeping(sleeper, lambda: machine.execute(library.UserData()), machine.request_preempt)
+
+
+def sleeping_in_yasmin(depth: int = 5) -> Sleeping:
+    """Return such a machine for YASMIN."""
+    import yasmin
+
+    class Sleeper(yasmin.State):  # type: ignore[misc]
+        def __init__(self) -> None:
+            super().__init__(['done', 'preempted'])
+            self.ready = threading.Semaphore(0)
+            self.asked = threading.Event()
+            self.left = 0.0
+
+        def cancel_state(self) -> None:
+            super().cancel_state()
+            self.asked.set()
+
+        def execute(self, blackboard: object) -> str:
+            self.ready.release()
+            preempted = self.asked.wait(60.0)
+            self.asked.clear()
+            self.left = time.perf_counter()
+            return 'preempted' if preempted else 'done'
+
+    sleeper = Sleeper()
+    machine: Any = sleeper
+    for _ in range(depth):
+        outer = yasmin.StateMachine(outcomes=['done', 'preempted'])
+        bound = {'done': 'done', 'preempted': 'preempted'}
+        outer.add_state('INNER', machine, transitions=bound)
+        machine = outer
+    blackboard = yasmin.Blackboard()
+    return Sleeping(sleeper, lambda: machine(blackboard), machine.cancel_state)
+
+
+def preempt_latencies(repeats: int, sleeping: Sleeping) -> tuple[list[float], list[float]]:
+    """Return the seconds from the request to the deepest state's exit, and to the root's end."""
     exits, ends = [], []
     for _ in range(repeats):
         ended: list[float] = []
 
         def body(ended: list[float] = ended) -> None:
-            root.execute(library.UserData())
+            sleeping.run()
             ended.append(time.perf_counter())
 
         thread = threading.Thread(target=body)
         thread.start()
-        sleeper.ready.acquire()
+        sleeping.state.ready.acquire()
         # Let it get from the announcement into the wait itself.
         time.sleep(0.001)
         asked = time.perf_counter()
-        root.request_preempt()
+        sleeping.preempt()
         thread.join()
-        exits.append(sleeper.left - asked)
+        exits.append(sleeping.state.left - asked)
         ends.append(ended[0] - asked)
     return exits, ends
 
@@ -414,19 +511,99 @@ def event_latencies(repeats: int) -> list[float]:
     return woke
 
 
-def bytes_of_a_state(library: Any, count: int = 5_000) -> float:
-    """Bytes that a state of a large machine takes, once it has been executed."""
+DEEPEST = 5_000
+"""More levels than this are not tried."""
+
+
+def resident() -> int:
+    """Return the bytes of memory that this process has."""
+    pages = int(Path('/proc/self/statm').read_text().split()[1])
+    return pages * os.sysconf('SC_PAGE_SIZE')
+
+
+def bytes_of_a_state(name: str, count: int = 20_000) -> float:
+    """Return the resident bytes that a state of a large machine takes, once it has run."""
+    if name == 'YASMIN':
+        make = yasmin_state()
+        gc.collect()
+        before = resident()
+        import yasmin
+
+        machine = yasmin_ring(make, ['done'], 'done', count)
+        blackboard = yasmin.Blackboard()
+        blackboard['left'] = 3
+        machine(blackboard)
+        return (resident() - before) / count
+    library = fsm if name == 'this engine' else find_smach()
     state = states_of(library)[1]
     gc.collect()
-    tracemalloc.start()
-    before = tracemalloc.get_traced_memory()[0]
+    before = resident()
     machine = ring([state() for _ in range(count)], library)
     machine.userdata.left = 3
     machine.execute()
     gc.collect()
-    size = (tracemalloc.get_traced_memory()[0] - before) / count
-    tracemalloc.stop()
-    return size
+    return (resident() - before) / count
+
+
+def runs_nested(name: str, depth: int) -> bool:
+    """Tell whether a machine of so many levels runs to its end."""
+    machine: Any
+    if name == 'YASMIN':
+        import yasmin
+
+        machine = yasmin_state(['next', 'done'])()
+        for _ in range(depth):
+            outer = yasmin.StateMachine(outcomes=['next', 'done'])
+            outer.add_state('INNER', machine, transitions={'next': 'next', 'done': 'done'})
+            machine = outer
+        blackboard = yasmin.Blackboard()
+        blackboard['left'] = 1
+        return bool(machine(blackboard) == 'done')
+    library = fsm if name == 'this engine' else find_smach()
+    machine = library.CBState(lambda ud: 'done', outcomes=['done'])
+    for _ in range(depth):
+        outer = library.StateMachine(['done'])
+        with outer:
+            library.StateMachine.add('INNER', machine, {'done': 'done'})
+        machine = outer
+    return bool(machine.execute() == 'done')
+
+
+def in_process(work: Callable[[], float]) -> float:
+    """Return what some work returns in a process of its own; 0 where it fails or the process
+    dies.
+    """
+    reading, writing = os.pipe()
+    child = os.fork()
+    if child == 0:
+        answer = 0.0
+        with contextlib.suppress(BaseException):
+            answer = float(work())
+        os.write(writing, repr(answer).encode())
+        os._exit(0)
+    os.close(writing)
+    with open(reading, 'rb') as file:
+        text = file.read()
+    os.waitpid(child, 0)
+    return float(text or b'0')
+
+
+def in_processes_of_their_own() -> tuple[dict[str, float], dict[str, int]]:
+    """Return bytes a state and the deepest nesting that runs, of all that are there."""
+    names = ['this engine']
+    names += ['SMACH'] if find_smach() is not None else []
+    names += ['YASMIN'] if find_yasmin() is not None else []
+    measured, deepest = {}, {}
+    for name in names:
+        measured[name] = in_process(lambda name=name: bytes_of_a_state(name))  # type: ignore[misc]
+        low, high = 1, DEEPEST + 1
+        while high - low > max(1, low // 100):
+            # The largest first: what is bounded by memory only needs one try.
+            depth = DEEPEST if high > DEEPEST else (low + high) // 2
+            runs = in_process(lambda name=name, depth=depth: runs_nested(name, depth))  # type: ignore[misc]
+            low, high = (depth, high) if runs else (low, depth)
+        deepest[name] = low
+    return measured, deepest
 
 
 def large_machine(width: int) -> fsm.StateMachine:
@@ -600,16 +777,28 @@ def _run_mission(checkpoint: Path, log: Path, items: int) -> None:
 # The run.
 
 
-def find_smach() -> Any:
-    """SMACH's core, if SMACH_PATH names a folder that has it."""
-    folder = os.environ.get('SMACH_PATH')
-    if not folder:
+def found(name: str) -> Any:
+    """Return a peer's module; None where it is not there."""
+    try:
+        return importlib.import_module(name)
+    except ImportError:
         return None
-    sys.path.append(folder)
-    smach = importlib.import_module('smach')
-    quiet = [lambda message: None] * 4
-    smach.set_loggers(*quiet)
+
+
+def find_smach() -> Any:
+    """Return SMACH with its log switched off, if it is there."""
+    smach = found('smach')
+    if smach is not None:
+        smach.set_loggers(*[lambda message: None] * 4)
     return smach
+
+
+def find_yasmin() -> Any:
+    """Return YASMIN with its log switched off, but for errors, if it is there."""
+    yasmin = found('yasmin')
+    if yasmin is not None:
+        yasmin.set_log_level(yasmin.LogLevel.ERROR)
+    return yasmin
 
 
 def percentile(values: Sequence[float], share: float) -> float:
@@ -618,8 +807,10 @@ def percentile(values: Sequence[float], share: float) -> float:
     return ordered[min(len(ordered) - 1, int(share * len(ordered)))]
 
 
-def throughput(count: int, slow: int, rounds: int, smach: Any) -> None:
+def throughput(count: int, slow: int, rounds: int) -> None:
     """Print transitions a second, best of several rounds."""
+    smach, few = find_smach(), max(slow // 10, 1_000)
+    yasmin = find_yasmin() is not None
     subjects: list[tuple[str, int, Callable[[], Callable[[], object]]]] = [
         ('this engine, flat', count, lambda: flat(count).execute),
         ('this engine, flat, traced', count, lambda: traced(flat(count)).execute),
@@ -638,94 +829,155 @@ def throughput(count: int, slow: int, rounds: int, smach: Any) -> None:
             lambda: with_shutdown_check(counting(count)),
         ),
         ('this engine, userdata, feed to its end', slow, lambda: with_feed(counting(slow), slow)),
-        ('transitions, flat, counter', slow, lambda: run_transitions_library(slow)),
-        ('py_trees, flat, blackboard', slow, lambda: run_py_trees(slow)),
-        ('YASMIN, flat, blackboard', slow, lambda: run_yasmin(slow)),
     ]
     if smach is not None:
-        few = max(slow // 10, 1_000)
         subjects += [
             ('SMACH, flat', few, lambda: flat(few, smach).execute),
             ('SMACH, flat, userdata', few, lambda: counting(few, smach).execute),
             ('SMACH, 3 levels, userdata', few, lambda: nested(few, smach).execute),
         ]
+    if yasmin:
+        subjects += [
+            ('YASMIN, flat, blackboard', slow, lambda: run_yasmin(slow)),
+            ('YASMIN, 3 levels, blackboard', slow, lambda: run_yasmin(slow, LEVELS)),
+        ]
+    if found('transitions') is not None:
+        subjects.append(('transitions, flat, counter', slow, lambda: run_transitions_library(slow)))
+    if found('py_trees') is not None:
+        subjects.append(('py_trees, flat, blackboard', slow, lambda: run_py_trees(slow)))
+    if found('statemachine') is not None:
+        name = 'python-statemachine, flat, counter'
+        subjects.append((name, few, lambda: run_python_statemachine(few)))
     # Round by round, so that a busy moment of the computer meets all alike.
     best: dict[str, float] = {}
-    absent: set[str] = set()
     for _ in range(rounds):
         for name, number, make in subjects:
-            if name in absent:
-                continue
-            try:
-                work = make()
-            except ImportError:
-                absent.add(name)
-                continue
-            best[name] = max(best.get(name, 0.0), number / timed(work))
+            best[name] = max(best.get(name, 0.0), number / timed(make()))
     unit = best['this engine, flat, userdata']
     print(f'Transitions a second of processor time, best of {rounds} rounds')
     print(f'{"":42}{"a second":>12}{"each":>10}{"share":>10}')
     for name, rate in best.items():
         print(f'{name:42}{rate:12,.0f}{1e6 / rate:7.2f} us{rate / unit:10.2f}')
-    for name in sorted(absent):
-        print(f'{name:42}{"not installed":>12}')
+    if yasmin:
+        ratio = best['this engine, 3 levels, userdata'] / best['YASMIN, 3 levels, blackboard']
+        print(f'{"3 levels, this engine / YASMIN":42}{"":12}{"":10}{ratio:10.2f}')
     reading = min(clock_reading(count) for _ in range(rounds))
     print(f'a trace reads the clock and keeps its value: {1e6 * reading:.2f} us at the least')
 
 
-def figures(quick: bool, smach: Any) -> None:
-    """Print what is no rate: one execution, preempts, sizes, checks."""
-    libraries = [('this engine', fsm), *([('SMACH', smach)] if smach is not None else [])]
-    repeats = 300 if quick else 3000
-    print(f'\n{"From the request of a preempt on":42}{"median":>12}{"p99":>12}{"worst":>12}')
-    rows = [('one thread sets an Event for another', event_latencies(repeats))]
-    for name, library in libraries:
-        exits, ends = preempt_latencies(repeats, library)
-        rows += [
-            (f'{name}, 5 levels, deepest state exits', exits),
-            (f'{name}, 5 levels, root has ended', ends),
-        ]
+def preempts(repeats: int) -> None:
+    """Print how long preempts take, of all that are there in turn."""
+    smach = find_smach()
+    subjects: list[tuple[str, Callable[[], Sleeping]]] = [
+        ('this engine', lambda: sleeping_in(fsm)),
+        ('this engine, bounded', lambda: sleeping_in(fsm, bounded=True)),
+    ]
+    if smach is not None:
+        subjects.append(('SMACH', lambda: sleeping_in(smach)))
+    if find_yasmin() is not None:
+        subjects.append(('YASMIN', sleeping_in_yasmin))
+    exits: dict[str, list[float]] = {name: [] for name, _ in subjects}
+    ends: dict[str, list[float]] = {name: [] for name, _ in subjects}
+    events: list[float] = []
+    turns = 10
+    for _ in range(turns):
+        events += event_latencies(repeats // turns)
+        for name, make in subjects:
+            exited, ended = preempt_latencies(repeats // turns, make())
+            exits[name] += exited
+            ends[name] += ended
+    print(f'\n{"From the request of a preempt on":54}{"median":>12}{"p99":>12}{"worst":>12}')
+    rows = [('one thread sets an Event for another', events)]
+    for name, _ in subjects:
+        rows.append((f'{name}, 5 levels, deepest state exits', exits[name]))
+        rows.append((f'{name}, 5 levels, root has ended', ends[name]))
     for what, values in rows:
         row = [statistics.median(values), percentile(values, 0.99), max(values)]
-        print(f'{what:42}{"".join(f"{1e3 * value:9.3f} ms" for value in row)}')
+        print(f'{what:54}{"".join(f"{1e3 * value:9.3f} ms" for value in row)}')
+
+
+def single_executions() -> None:
+    """Print what one execution takes."""
+    smach, yasmin = find_smach(), find_yasmin()
+    bounded = one_state()
+    bounded.preempt_timeout = 60.0
+    alone: list[tuple[str, Callable[[], object]]] = [
+        ('this engine, execute() of one state', one_state().execute),
+        ('this engine, bounded: preempt_timeout is set', bounded.execute),
+        ('this engine, a concurrence of 3 states', three_together().execute),
+    ]
+    if smach is not None:
+        alone += [
+            ('SMACH, execute() of one state', one_state(smach).execute),
+            ('SMACH, a concurrence of 3 states', three_together(smach).execute),
+        ]
+    if yasmin is not None:
+        blackboard = yasmin.Blackboard()
+        blackboard['left'] = 1 << 60
+        machine = yasmin_ring(yasmin_state(['done', 'next']), ['next', 'done'], 'next', 1)
+        states = {label: yasmin_state(['next', 'done'])() for label in 'ABC'}
+        together = yasmin.Concurrence(states, 'done', {})
+        alone += [
+            ('YASMIN, one state', lambda: machine(blackboard)),
+            ('YASMIN, a concurrence of 3 states', lambda: together(blackboard)),
+        ]
+    best: dict[str, float] = {}
+    for _ in range(5):
+        for name, work in alone:
+            best[name] = min(best.get(name, 1.0), time_of(work, rounds=4))
     print()
-    for name, library in libraries:
-        spent = time_of(one_state(library).execute)
-        print(f'{f"{name}, execute() of one state":42}{1e6 * spent:9.1f} us')
-        spent = time_of(three_together(library).execute, rounds=5)
-        print(f'{f"{name}, a concurrence of 3 states":42}{1e6 * spent:9.1f} us')
-    unwatched = one_state()
-    unwatched.preempt_timeout = None
-    print(f'{"this engine, on the calling thread":42}{1e6 * time_of(unwatched.execute):9.1f} us')
+    for name, spent in best.items():
+        print(f'{name:42}{1e6 * spent:9.1f} us{1 / spent:12,.0f} a second')
     print(f'{"two threads: there and back":42}{1e6 * handing_over():9.1f} us')
-    for name, library in libraries:
-        print(f'{f"{name}, bytes a state":42}{bytes_of_a_state(library):9,.0f}')
+
+
+def sizes(measured: dict[str, float], deepest: dict[str, int]) -> None:
+    """Print bytes, depths, and what checks of large machines take."""
+    print()
+    for name, size in measured.items():
+        print(f'{f"{name}, resident bytes a state":42}{size:9,.0f}')
+    for name, depth in deepest.items():
+        more = '' if depth < DEEPEST else ' (no more were tried)'
+        print(f'{f"{name}, levels that run":42}{depth:9,}{more}')
     for what, machine in (
         ('10,000 states', large_machine(10_000)),
         ('50 levels', deep_machine(50, states_of(fsm)[1])),
     ):
         begin = time.perf_counter()
-        found = len(verify(machine, ['left']))
+        findings = len(verify(machine, ['left']))
         spent = time.perf_counter() - begin
-        print(f'{f"verify, {what}":42}{spent:9.3f} s, {found} findings')
+        print(f'{f"verify, {what}":42}{spent:9.3f} s, {findings} findings')
 
 
 def main() -> int:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=(__doc__ or '').splitlines()[0])
-    parser.add_argument('--quick', action='store_true', help='a run below 50 s')
+    parser.add_argument('--quick', action='store_true', help='a run below 60 s')
+    parser.add_argument(
+        '--peers', nargs='+', default=[], metavar='FOLDER', help='where peers are imported from'
+    )
+    parser.add_argument(
+        '--only', choices=('kills', 'rates', 'preempts', 'single', 'sizes'), help='one part of it'
+    )
     options = parser.parse_args()
-    quick = options.quick
-    smach = find_smach()
-    if smach is None:
-        print('SMACH is left out: SMACH_PATH names no folder with it')
-    # Before anything else: the processes that are forked have one thread then.
-    kills, repeated, lost = faults_of_killed_missions(100 if quick else 1_000)
-    throughput(60_000 if quick else 600_000, 20_000 if quick else 120_000, 3 if quick else 7, smach)
-    figures(quick, smach)
-    preempts = 1_000 if quick else 10_000
-    print(f'\npreempts at random moments, {preempts:,}: {lost_preempts(preempts)} lost')
-    print(f'SIGKILLs of a checkpointed mission, {kills:,}: {repeated} items repeated, {lost} lost')
+    sys.path += options.peers
+    quick, only = options.quick, options.only
+    if only in (None, 'kills'):
+        # Before anything else: the processes that are forked have one thread then.
+        kills, repeated, lost = faults_of_killed_missions(100 if quick else 1_000)
+        print(
+            f'SIGKILLs of a checkpointed mission, {kills:,}: {repeated} items repeated, {lost} lost'
+        )
+    if only in (None, 'sizes'):
+        sizes(*in_processes_of_their_own())
+    if only in (None, 'rates'):
+        throughput(60_000 if quick else 600_000, 20_000 if quick else 120_000, 3 if quick else 7)
+    if only in (None, 'single'):
+        single_executions()
+    if only in (None, 'preempts'):
+        preempts(300 if quick else 3_000)
+        count = 1_000 if quick else 10_000
+        print(f'\npreempts at random moments, {count:,}: {lost_preempts(count)} lost')
     return 0
 
 

@@ -1,6 +1,6 @@
 """What it costs to see, to record and to replay a mission.
 
-    .venv/bin/python benchmarks/operator.py [--quick] [--minutes N]
+    .venv/bin/python benchmarks/page.py [--quick] [--minutes N]
 
 Starts a whole mission in processes of its own, looks at its page in a real Chromium (where Debian's
 chromium and chromium-driver are installed) and with further readers of the same events, and prints
