@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 from nav_msgs.msg import Odometry
 from rclpy.callback_groups import ReentrantCallbackGroup
-from rclpy.time import Time
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, Header
 from trajectory_msgs.msg import JointTrajectory
@@ -32,12 +31,14 @@ from surveillance_perception.conversions import (
     scan_result_to_ros,
     trajectory_to_ros,
 )
+from surveillance_runtime.conversions import seconds_of
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.parameters import converted, parameter
 from surveillance_runtime.process import run_node
 from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
 from surveillance_runtime.robot_arm import ARM, REST_PATIENCE, Arm, Array
 from surveillance_runtime.settled_frames import SettledFrames
+from surveillance_runtime.stamp_offset import StampOffset
 
 _POSES = {
     MarkerRoutine.Request.LEFT: 'left',
@@ -123,13 +124,14 @@ class ArmController(PatrolNode):
         self._settings = arm_settings(self, ARM)
         group = ReentrantCallbackGroup()
         self._base: tuple[str, np.ndarray] | None = None
-        self._rest_since: Time | None = None
+        self._rest_since: float | None = None
+        self._stamps = StampOffset('aruco_detector/detections')
         self._trajectories = self.create_publisher(JointTrajectory, 'arm/joint_trajectory', 10)
         self._at_rest = self.create_publisher(Bool, 'arm/at_rest', STATE_QOS)
         self._driver = ArmDriver(
             ARM,
             lambda motion: self._trajectories.publish(trajectory_to_ros(motion, ARM.names)),
-            lambda: self.get_clock().now().nanoseconds / 1e9,
+            self._now,
             self._tell_rest,
         )
         self.stopping.subscribe(self._driver.wake)
@@ -157,15 +159,19 @@ class ArmController(PatrolNode):
             self.get_logger().warn(str(error), throttle_duration_sec=60.0)
 
     def _tell_rest(self, resting: bool) -> None:
-        self._rest_since = self.get_clock().now() if resting else None
+        self._rest_since = self._now() if resting else None
         self._at_rest.publish(Bool(data=resting))
+
+    def _now(self) -> float:
+        return float(self.get_clock().now().nanoseconds / 1e9)
 
     def _on_detections(self, message: MarkerDetectionArray) -> None:
         """Fuse what is seen at rest with what was seen from elsewhere, in the odometry's frame."""
+        taken = self._stamps.time_of(seconds_of(message.header.stamp), self._now())
         since = self._rest_since
         if self._base is None or since is None or not message.detections:
             return
-        if Time.from_msg(message.header.stamp, since.clock_type) < since:
+        if taken < since:
             return
         frame, base = self._base
         camera = base @ ARM.camera_frame(self._driver.posture)

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from geometry_msgs.msg import PoseArray
 from rclpy.qos import DurabilityPolicy, QoSProfile
-from rclpy.time import Time
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 from std_msgs.msg import Bool, Int32
 
@@ -26,10 +25,12 @@ from surveillance_perception.conversions import (
     transforms_to_ros,
 )
 from surveillance_perception.stream.image_subscription import IMAGES_QOS, ImageSubscription, Latest
+from surveillance_runtime.conversions import seconds_of
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.parameters import parameter
 from surveillance_runtime.process import run_node
 from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
+from surveillance_runtime.stamp_offset import StampOffset
 
 try:
     # the wheels on PyPI hold no tf2_msgs; an installed ROS 2 does
@@ -69,12 +70,14 @@ class ArucoDetector(PatrolNode):
         self._options = self.declare_live(ImageSettings())
         self._described: CameraModel | None = None
         self._undescribed = True
-        self._rest_since: Time | None = Time(clock_type=self.get_clock().clock_type)
+        self._rest_since: float | None = -math.inf
         self._stale = False
         self._said_left_out = False
         self.skipped = self._skipped_before = 0
         self._watch = MarkerStream(self._settings)
-        self._images: Latest[Image | CompressedImage] = Latest()
+        # with each image, when it was taken: seconds of this node's clock
+        self._images: Latest[tuple[Image | CompressedImage, float]] = Latest()
+        self._stamps: list[StampOffset] = []
         self._ids = self.create_publisher(Int32, 'aruco_detector/id', IDS_QOS)
         self._detections = self.create_publisher(
             MarkerDetectionArray, 'aruco_detector/detections', 10
@@ -83,8 +86,9 @@ class ArucoDetector(PatrolNode):
         self._annotated = self.create_publisher(Image, 'aruco_detector/annotated', IMAGES_QOS)
         self._transforms = None if TFMessage is None else self.create_publisher(TFMessage, 'tf', 10)
         topic = 'camera/rgb/image_raw'
-        ImageSubscription(self, Image, topic, self._images.put)
-        ImageSubscription(self, CompressedImage, topic + '/compressed', self._images.put)
+        ImageSubscription(self, Image, topic, self._image_taker(topic))
+        compressed = topic + '/compressed'
+        ImageSubscription(self, CompressedImage, compressed, self._image_taker(compressed))
         self.create_subscription(
             CameraInfo, 'camera/rgb/camera_info', self._on_camera_info, SENSOR_QOS
         )
@@ -111,15 +115,34 @@ class ArucoDetector(PatrolNode):
             )
 
     def _on_rest(self, message: Bool) -> None:
-        self._rest_since = self.get_clock().now() if message.data else None
+        self._rest_since = self._now() if message.data else None
+
+    def _now(self) -> float:
+        return float(self.get_clock().now().nanoseconds / 1e9)
+
+    def _image_taker(self, topic: str) -> Callable[[Image | CompressedImage], None]:
+        """Return what takes the images of a topic, whatever clock its camera stamps them by."""
+        stamps = StampOffset(topic)
+        self._stamps.append(stamps)
+
+        def take(message: Image | CompressedImage) -> None:
+            # here, not in the worker, which may be late
+            taken = stamps.time_of(seconds_of(message.header.stamp), self._now())
+            warning = stamps.warning()
+            if warning is not None:
+                self.get_logger().warn(warning)
+            self._images.put((message, taken))
+
+        return take
 
     def _work(self) -> None:
-        while (message := self._images.take()) is not None:
+        while (item := self._images.take()) is not None:
+            message, taken = item
             try:
                 if self._stale:
                     self._stale = False
                     self._watch.adopt(self._settings)
-                if self._options.only_at_rest and not self._taken_at_rest(message):
+                if self._options.only_at_rest and not self._taken_at_rest(taken):
                     self.skipped += 1
                     continue
                 self._look(message)
@@ -137,9 +160,9 @@ class ArucoDetector(PatrolNode):
         self.health.error('images', reason)
         self.get_logger().error(reason, throttle_duration_sec=5.0)
 
-    def _taken_at_rest(self, message: Any) -> bool:
+    def _taken_at_rest(self, taken: float) -> bool:
         since = self._rest_since
-        return since is not None and Time.from_msg(message.header.stamp) >= since
+        return since is not None and taken >= since
 
     def _look(self, message: Any) -> None:
         image = image_from_any(message, self._options.max_pixels)
@@ -186,6 +209,11 @@ class ArucoDetector(PatrolNode):
             health.warn('images', 'no images')
         elif not statistics.refused:
             health.clear('images')
+        odd = [finding for each in self._stamps if (finding := each.finding()) is not None]
+        if odd:
+            health.warn('stamps', '; '.join(odd))
+        else:
+            health.clear('stamps')
         health.figure('images', statistics.images)
         health.figure('refused', statistics.refused)
         health.figure('candidates_left_out', statistics.left_out)

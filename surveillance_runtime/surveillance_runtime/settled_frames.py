@@ -5,12 +5,12 @@ A dwell in seconds alone would guarantee nothing: on a busy machine no picture m
 
 from __future__ import annotations
 
-from rclpy.time import Time
-
 from state_machines import Interrupt
 from state_machines.ros import ClockWait
 from surveillance_interfaces.msg import MarkerDetectionArray
+from surveillance_runtime.conversions import seconds_of
 from surveillance_runtime.node import PatrolNode
+from surveillance_runtime.stamp_offset import StampOffset
 
 
 class SettledFrames:
@@ -23,7 +23,9 @@ class SettledFrames:
     def __init__(self, node: PatrolNode) -> None:
         self._node = node
         self._clock = ClockWait(node)
-        self._since: Time | None = None
+        self._since: float | None = None
+        # the detector keeps the camera's stamps, whatever clock they are of
+        self._stamps = StampOffset('aruco_detector/detections')
         self._wanted = 0
         self._changed = Interrupt()
         self._subscription = node.create_subscription(
@@ -48,7 +50,7 @@ class SettledFrames:
         """
         self._changed.clear()
         self._wanted = pictures
-        self._since = self._node.get_clock().now()
+        self._since = self._now()
         remove = interrupt.subscribe(self._changed.set)
         try:
             if not self._clock.sleep(dwell, interrupt):
@@ -60,8 +62,12 @@ class SettledFrames:
         return not interrupt.is_set()
 
     def _on_picture(self, message: MarkerDetectionArray) -> None:
+        taken = self._stamps.time_of(seconds_of(message.header.stamp), self._now())
         since = self._since
-        if since is not None and Time.from_msg(message.header.stamp) >= since:
+        if since is not None and taken >= since:
             self._wanted -= 1
             if self._wanted <= 0:
                 self._changed.set()
+
+    def _now(self) -> float:
+        return float(self._node.get_clock().now().nanoseconds / 1e9)

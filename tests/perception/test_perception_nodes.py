@@ -11,6 +11,7 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
+from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticStatus
 from geometry_msgs.msg import Point, PoseArray
 from rcl_interfaces.srv import SetParameters
@@ -241,6 +242,47 @@ def test_images_taken_while_the_arm_moves_are_not_read(graph: Any) -> None:
     graph.until(lambda: node.skipped == 2)
     camera.show(ROOM)
     assert len(camera.detections) == 2
+
+
+@pytest.mark.parametrize(
+    ('stamp_of', 'words'),
+    [
+        (lambda _now: Time(), 'do not advance'),
+        (lambda now: Time(sec=now.sec - 60, nanosec=now.nanosec), '60.0 s behind'),
+        (lambda now: Time(sec=now.sec + 60, nanosec=now.nanosec), '60.0 s ahead of'),
+        (lambda now: Time(sec=now.sec % 1000, nanosec=now.nanosec), 'use_sim_time'),
+    ],
+)
+def test_camera_with_another_clock_is_read_while_the_arm_rests_and_named_once(
+    graph: Any, monkeypatch: pytest.MonkeyPatch, stamp_of: Any, words: str
+) -> None:
+    rest = graph.node.create_publisher(Bool, 'arm/at_rest', STATE_QOS)
+    camera, node = detector(graph)
+    warnings: list[str] = []
+    logger = node.get_logger()
+    monkeypatch.setattr(logger, 'warn', lambda text, **_: warnings.append(text))
+    monkeypatch.setattr(node, 'get_logger', lambda: logger)
+    graph.until(lambda: rest.get_subscription_count())
+
+    def publish() -> None:
+        stamp = stamp_of(graph.node.get_clock().now().to_msg())
+        camera.images.publish(image_to_ros(ROOM, Header(stamp=stamp)))
+
+    for _ in range(2):
+        rest.publish(Bool(data=False))
+        graph.until(lambda: node._rest_since is None)
+        skipped = node.skipped
+        publish()
+        graph.until(lambda skipped=skipped: node.skipped > skipped)
+        rest.publish(Bool(data=True))
+        graph.until(lambda: node._rest_since is not None)
+        for _ in range(3):
+            read = len(camera.detections)
+            publish()
+            graph.until(lambda read=read: len(camera.detections) > read)
+    assert len(warnings) == 1
+    assert words in warnings[0]
+    graph.until(lambda: any(words in text for _, text in node.health.findings()))
 
 
 @pytest.mark.parametrize(
