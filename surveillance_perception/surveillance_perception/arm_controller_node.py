@@ -167,11 +167,11 @@ class ArmController(PatrolNode):
 
     def _on_detections(self, message: MarkerDetectionArray) -> None:
         """Fuse what is seen at rest with what was seen from elsewhere, in the odometry's frame."""
-        taken = self._stamps.time_of(seconds_of(message.header.stamp), self._now())
+        seen_at = self._stamps.time_of(seconds_of(message.header.stamp), self._now())
         since = self._rest_since
         if self._base is None or since is None or not message.detections:
             return
-        if taken < since:
+        if seen_at < since:
             return
         frame, base = self._base
         camera = base @ ARM.camera_frame(self._driver.posture)
