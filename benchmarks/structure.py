@@ -1,10 +1,11 @@
 #!/usr/bin/env python3
-"""Print figures of the code's structure: size, ownership, inheritance, splinters.
+"""Print figures of the code's structure: the two floors, circles, ownership, inheritance.
 
     python3 benchmarks/structure.py [CHECKOUT]
 
-Everything is read from the sources of the product (packages and launcher; no tests, benchmarks,
-examples, documents). Lines of code are lines with a token that is no comment and no docstring.
+Everything is read from the sources of the product (libraries, packages and launcher; no tests,
+benchmarks, examples, documents). Lines of code are lines with a token that is no comment and no
+docstring.
 """
 
 from __future__ import annotations
@@ -47,9 +48,20 @@ def main(words: Sequence[str] | None = None) -> int:
     )
     chain = longest_chain(trees)
     errors = [name for tree in trees.values() for name in error_classes(tree)]
+    libraries = {name for name, path in modules.items() if 'libs' in path.parts}
+    robot = set(modules) - libraries
+    arrows = arrows_between(trees)
+    circles = circles_of(trees)
     rows = [
-        ('product modules', str(len(modules))),
-        ('lines of code', f'{sum(lines.values()):,}'),
+        ('modules of the robot; of libraries', f'{len(robot)}; {len(libraries)}'),
+        (
+            'lines of code of the robot; of libraries',
+            f'{sum(lines[n] for n in robot):,}; {sum(lines[n] for n in libraries):,}',
+        ),
+        ('imports from a library to the robot', listed(upward(trees, libraries, robot))),
+        ('arrows between packages', str(len(arrows))),
+        ('circles of files', listed(' - '.join(circle) for circle in circles)),
+        ('classes above 40 methods', listed(large_classes(trees, 40))),
         ('median module', str(sorted(lines.values())[len(lines) // 2])),
         (f'modules that spell {", ".join(VOCABULARY)}', listed(spelling(trees))),
         ('modules that write isIn', listed(writers(modules))),
@@ -59,9 +71,17 @@ def main(words: Sequence[str] | None = None) -> int:
         ('of them not named ...Error', listed(e for e in errors if not e.endswith('Error'))),
     ]
     packages: Counter[str] = Counter()
+    comments: Counter[str] = Counter()
     for name, count in lines.items():
         packages[name.split('.')[0]] += count
-    rows += [(f'lines of {package}', f'{count:,}') for package, count in packages.most_common()]
+        comments[name.split('.')[0]] += comment_lines(modules[name])
+    rows += [
+        (
+            f'lines of {package}; comments in 100 of them',
+            f'{count:,}; {100 * comments[package] / count:.1f}',
+        )
+        for package, count in packages.most_common()
+    ]
     width = max(len(title) for title, _ in rows)
     for title, figure in rows:
         print(f'{title:{width}}  {figure}')
@@ -70,7 +90,7 @@ def main(words: Sequence[str] | None = None) -> int:
 
 def product(checkout: Path) -> dict[str, Path]:
     """Return the product's modules by dotted name, setup scripts left out."""
-    patterns = ('surveillance_*/*.py', 'armor_api/*.py', 'launcher/*.py', 'launch.py')
+    patterns = ('libs/*.py', 'surveillance_*/*.py', 'launcher/*.py', 'launch.py')
     listing = subprocess.run(
         ['git', '-C', str(checkout), 'ls-files', *patterns],
         capture_output=True,
@@ -80,8 +100,12 @@ def product(checkout: Path) -> dict[str, Path]:
     found = {}
     for line in listing.stdout.split():
         parts = Path(line).with_suffix('').parts
+        if parts[0] == 'libs':
+            if parts[2] != parts[1]:  # its tests and examples
+                continue
+            parts = parts[1:]
         if parts[-1] != 'setup' and not parts[-1].endswith('.launch'):
-            inner = parts[1:] if parts[0] == parts[1:2] or parts[0].startswith('surv') else parts
+            inner = parts[1:] if parts[:1] == parts[1:2] or parts[0].startswith('surv') else parts
             found['.'.join(inner)] = checkout / line
     return found
 
@@ -125,6 +149,104 @@ def importers_of(trees: dict[str, ast.Module]) -> dict[str, set[str]]:
                 for alias in node.names:
                     found[alias.name].add(name)
     return found
+
+
+def comment_lines(path: Path) -> int:
+    """Return how many lines hold a comment that a person wrote for a person."""
+    source = path.read_text(encoding='utf-8')
+    tokens = tokenize.generate_tokens(io.StringIO(source).readline)
+    directives = ('# type:', '# noqa', '#!')
+    return sum(
+        token.type == tokenize.COMMENT and not token.string.startswith(directives)
+        for token in tokens
+    )
+
+
+def imports_of(trees: dict[str, ast.Module]) -> dict[str, set[str]]:
+    """Return the product's modules that each module imports at its top, for its types too."""
+    packages = {name.removesuffix('.__init__'): name for name in trees}
+    found: dict[str, set[str]] = {name: set() for name in trees}
+
+    def visit(name: str, body: Sequence[ast.stmt]) -> None:
+        for node in body:
+            if isinstance(node, ast.If | ast.Try | ast.With):
+                visit(name, node.body)
+            named: list[str] = []
+            if isinstance(node, ast.ImportFrom) and node.module:
+                inner = [f'{node.module}.{alias.name}' for alias in node.names]
+                named = [each for each in inner if each in packages] or [node.module]
+            elif isinstance(node, ast.Import):
+                named = [alias.name for alias in node.names]
+            found[name] |= {packages[each] for each in named if each in packages} - {name}
+
+    for name, tree in trees.items():
+        visit(name, tree.body)
+    return found
+
+
+def arrows_between(trees: dict[str, ast.Module]) -> set[tuple[str, str]]:
+    """Return which package imports which other one, anywhere in its modules."""
+    own = {name.split('.')[0] for name in trees}
+    found = set()
+    for imported, importers in importers_of(trees).items():
+        for importer in importers:
+            pair = importer.split('.')[0], imported.split('.')[0]
+            if pair[1] in own and pair[0] != pair[1]:
+                found.add(pair)
+    return found
+
+
+def upward(trees: dict[str, ast.Module], libraries: set[str], robot: set[str]) -> list[str]:
+    """Return the imports with which a library names the robot."""
+    above = {name.split('.')[0] for name in robot}
+    return sorted(
+        f'{importer} -> {imported}'
+        for imported, importers in importers_of(trees).items()
+        if imported.split('.')[0] in above
+        for importer in importers & libraries
+    )
+
+
+def circles_of(trees: dict[str, ast.Module]) -> list[list[str]]:
+    """Return the groups of modules that import each other in a circle (Tarjan's components)."""
+    imports = imports_of(trees)
+    order: dict[str, int] = {}
+    low: dict[str, int] = {}
+    stack: list[str] = []
+    circles: list[list[str]] = []
+
+    def visit(name: str) -> None:
+        order[name] = low[name] = len(order)
+        stack.append(name)
+        for other in imports[name]:
+            if other not in order:
+                visit(other)
+                low[name] = min(low[name], low[other])
+            elif other in stack:
+                low[name] = min(low[name], order[other])
+        if low[name] == order[name]:
+            circle = []
+            while not circle or circle[-1] != name:
+                circle.append(stack.pop())
+            if len(circle) > 1:
+                circles.append(sorted(circle))
+
+    sys.setrecursionlimit(10_000)
+    for name in imports:
+        if name not in order:
+            visit(name)
+    return circles
+
+
+def large_classes(trees: dict[str, ast.Module], most: int) -> list[str]:
+    """Return the classes with more methods than `most`."""
+    return [
+        f'{name}.{node.name} ({count})'
+        for name, tree in trees.items()
+        for node in ast.walk(tree)
+        if isinstance(node, ast.ClassDef)
+        and (count := sum(isinstance(each, ast.FunctionDef) for each in node.body)) > most
+    ]
 
 
 def longest_chain(trees: dict[str, ast.Module]) -> list[str]:
