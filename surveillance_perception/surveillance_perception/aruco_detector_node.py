@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -38,6 +39,8 @@ try:
 except ImportError:
     TFMessage = None
 
+# seconds after which a warning is repeated, and how many different ones there are in that time
+_SAY_AGAIN, _MOST_REASONS = 60.0, 10
 REPORT_PERIOD = 1.0
 """Seconds over which images are counted for the node's health."""
 IDS_QOS = QoSProfile(depth=200, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -73,6 +76,7 @@ class ArucoDetector(PatrolNode):
         self._rest_since: float | None = -math.inf
         self._stale = False
         self._said_left_out = False
+        self._warned: dict[str, float] = {}
         self.skipped = self._skipped_before = 0
         self._watch = MarkerStream(self._settings)
         # with each image, when it was taken: seconds of this node's clock
@@ -109,10 +113,15 @@ class ArucoDetector(PatrolNode):
             self._described = camera_from_ros(message)
         except ValueError as error:
             self._described = None
-            self.get_logger().warn(
-                f'camera_info refused, ids are read without poses: {error}',
-                throttle_duration_sec=60.0,
-            )
+            self._warn_once_a_minute(f'camera_info refused, ids are read without poses: {error}')
+
+    def _warn_once_a_minute(self, text: str) -> None:
+        """Say each of the last few reasons once a minute: another one is not swallowed."""
+        now = time.monotonic()
+        self._warned = {told: at for told, at in self._warned.items() if now - at < _SAY_AGAIN}
+        if text not in self._warned and len(self._warned) < _MOST_REASONS:
+            self._warned[text] = now
+            self.get_logger().warn(text)
 
     def _on_rest(self, message: Bool) -> None:
         self._rest_since = self._now() if message.data else None
@@ -195,9 +204,8 @@ class ArucoDetector(PatrolNode):
         camera = self._described.scaled_to(width, height)
         if camera is None:
             size = f'{self._described.width}x{self._described.height}'
-            self.get_logger().warn(
-                f'images have {width}x{height} pixels, camera_info {size}: ids without poses',
-                throttle_duration_sec=60.0,
+            self._warn_once_a_minute(
+                f'images have {width}x{height} pixels, camera_info {size}: ids without poses'
             )
         return camera
 

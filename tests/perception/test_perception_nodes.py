@@ -199,6 +199,25 @@ def test_camera_info_that_fits_no_camera_leaves_ids_without_poses(graph: Any) ->
         graph.until(has_poses)
 
 
+def test_each_reason_against_camera_info_is_said_within_the_minute(
+    graph: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    camera, node = detector(graph)
+    said: list[str] = []
+    logger = node.get_logger()
+    monkeypatch.setattr(logger, 'warn', lambda text, **_: said.append(text))
+    monkeypatch.setattr(node, 'get_logger', lambda: logger)
+    graph.until(lambda: camera.info.get_subscription_count())
+    for changes in ({'d': [0.1] * 3}, {'distortion_model': 'mei'}, {'d': [0.1] * 3}):
+        message = camera_to_ros(CAMERA, Header())
+        for name, value in changes.items():
+            setattr(message, name, value)
+        before = node._described = CAMERA
+        camera.info.publish(message)
+        graph.until(lambda before=before: node._described is not before)
+    assert ['3 distortion' in said[0], "model 'mei'" in said[1], len(said)] == [True, True, 2]
+
+
 def test_settings_change_while_it_runs(graph: Any) -> None:
     camera, node = detector(graph)
     other = image(Panel(7, 1.5), dictionary='DICT_4X4_50')

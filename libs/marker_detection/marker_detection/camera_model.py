@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import cv2
 import numpy as np
@@ -21,8 +22,10 @@ _COEFFICIENTS = {
     'equidistant': (4,),
 }
 
-DISTORTION_MODELS: tuple[str, ...] = tuple(_COEFFICIENTS)
-"""The models of sensor_msgs/distortion_models.hpp that are understood."""
+_OTHER_NAMES = {'fisheye': 'equidistant'}
+
+DISTORTION_MODELS: tuple[str, ...] = (*_COEFFICIENTS, *_OTHER_NAMES)
+"""The models of sensor_msgs/distortion_models.hpp that are understood, and OpenCV's own name."""
 
 _SAME_SHAPE = 0.02
 # of the larger side of the image: a lens that sees a hundredth of a degree
@@ -30,6 +33,8 @@ _LARGEST = 1e4
 _CORRECTIONS = 40
 _EXACT = 0.02
 _WIDEST = 1e3
+# angles from the axis up to which a lens is looked at, and how many of them
+_ANGLES = np.linspace(0.0, math.atan(_WIDEST), 2000)
 
 
 @dataclass(frozen=True)
@@ -39,10 +44,10 @@ class CameraModel:
     Attributes:
         width: Image width in pixels.
         height: Image height in pixels.
-        matrix: (3, 3) camera matrix K.
+        matrix: (3, 3) camera matrix K: [fx skew cx, 0 fy cy, 0 0 1].
         distortion: (n,) coefficients in the model's order; empty or zeros mean a rectified image.
             Zeros beyond the model's own are left out: bridges and drivers send as many for each.
-        distortion_model: One of `DISTORTION_MODELS`.
+        distortion_model: One of `DISTORTION_MODELS`; `fisheye` is kept as `equidistant`.
 
     Raises:
         ValueError: A number is not as a calibrated camera has it.
@@ -68,12 +73,14 @@ class CameraModel:
         largest = _LARGEST * max(self.width, self.height)
         if np.abs(matrix).max() > largest:
             raise ValueError(f'the camera matrix must have no number above {largest:g}')
-        if matrix[2].tolist() != [0.0, 0.0, 1.0] or matrix[1, 0] or matrix[0, 1]:
+        if matrix[2].tolist() != [0.0, 0.0, 1.0] or matrix[1, 0]:
             raise ValueError(
-                'the camera matrix must have the form [fx 0 cx, 0 fy cy, 0 0 1], '
+                'the camera matrix must have the form [fx skew cx, 0 fy cy, 0 0 1], '
                 f'got {" ".join(f"{value:g}" for value in matrix.ravel())}'
             )
-        allowed = _COEFFICIENTS.get(self.distortion_model)
+        model = _OTHER_NAMES.get(self.distortion_model, self.distortion_model)
+        object.__setattr__(self, 'distortion_model', model)
+        allowed = _COEFFICIENTS.get(model)
         if allowed is None:
             raise ValueError(f'distortion model {self.distortion_model!r} is not known')
         if len(self.distortion) > max(allowed) and not self.distortion[max(allowed) :].any():
@@ -141,22 +148,51 @@ class CameraModel:
         fisheye = self.distortion_model == 'equidistant'
         if not fisheye and not self.distortion.any():
             return np.asarray(pixels @ straight[:2, :2].T + straight[:2, 2])
-        points = np.ascontiguousarray(pixels, dtype=float).reshape(-1, 1, 2)
+        # OpenCV ignores a skew: its share is taken away before
+        matrix, pixels = self.matrix.copy(), np.array(pixels, dtype=float)
+        pixels[:, 0] -= matrix[0, 1] / matrix[1, 1] * (pixels[:, 1] - matrix[1, 2])
+        matrix[0, 1] = 0.0
+        scale = np.diag(matrix)[:2]
+        points = pixels.reshape(-1, 1, 2)
         undistort = cv2.fisheye.undistortPoints if fisheye else cv2.undistortPoints
         project = cv2.fisheye.projectPoints if fisheye else cv2.projectPoints
         zero = np.zeros(3)
         try:
-            rays = undistort(points, self.matrix, self.distortion).reshape(-1, 2).astype(float)
+            rays = undistort(points, matrix, self.distortion).reshape(-1, 2).astype(float)
             for _ in range(_CORRECTIONS):
                 if not np.isfinite(rays).all() or np.abs(rays).max(initial=0.0) > _WIDEST:
                     return None
                 space = np.column_stack([rays, np.ones(len(rays))]).reshape(-1, 1, 3)
-                again = project(space, zero, zero, self.matrix, self.distortion)[0]
+                again = project(space, zero, zero, matrix, self.distortion)[0]
                 miss = pixels - again.reshape(-1, 2)
                 if np.abs(miss).max(initial=0.0) < _EXACT:
-                    return np.asarray(rays)
+                    angles = np.arctan(np.linalg.norm(rays, axis=1))
+                    return np.asarray(rays) if (angles <= self._widest_angle).all() else None
                 # OpenCV stops after a few steps, which is too early for strong distortion
-                rays = rays + miss @ straight[:2, :2].T
+                rays = rays + miss / scale
         except cv2.error:
             pass
         return None
+
+    @cached_property
+    def _widest_angle(self) -> float:
+        """Angle from the axis, rad, up to which what lies further out is also seen further out.
+
+        Beyond it the polynomial of the calibration turns back: a pixel there belongs to two rays,
+        of which the fit knew one at most.
+        """
+        numbers = np.zeros(14)
+        numbers[: len(self.distortion)] = self.distortion
+        if self.distortion_model == 'equidistant':
+            square = _ANGLES**2
+            powers = np.stack([square, square**2, square**3, square**4])
+            seen = _ANGLES * (1.0 + numbers[:4] @ powers)
+        else:
+            radius = np.tan(_ANGLES)
+            powers = np.stack([radius**2, radius**4, radius**6])
+            above = 1.0 + numbers[[0, 1, 4]] @ powers
+            # a denominator that changes its sign is no lens beyond
+            below = 1.0 + numbers[5:8] @ powers
+            seen = np.where(np.minimum.accumulate(below) > 0.0, radius * above / below, -np.inf)
+        falls = np.flatnonzero(~(np.diff(seen) > 0.0))
+        return float(_ANGLES[falls[0] if len(falls) else -1])

@@ -88,3 +88,47 @@ def test_camera_scales_with_its_images():
         CameraModel(640, 480, K).rays(np.array([[160.0, 120.0]]))
     )
     assert CameraModel(640, 480, K).scaled_to(640, 360) is None
+
+
+@pytest.mark.parametrize('model', ['', *MODELS])
+def test_skew_of_the_matrix_is_part_of_the_ray(model):
+    numbers = np.array(MODELS.get(model, []))
+    kind = model or 'plumb_bob'
+    upright = CameraModel(640, 480, K, numbers, kind)
+    skewed = K.copy()
+    skewed[0, 1] = 8.0
+    rays = upright.rays(PIXELS)
+    shifted = PIXELS + np.column_stack([8.0 / 510.0 * (PIXELS[:, 1] - 240.0), np.zeros(4)])
+    assert CameraModel(640, 480, skewed, numbers, kind).rays(shifted) == pytest.approx(rays)
+
+
+def test_fisheye_is_opencvs_name_of_the_equidistant_model():
+    numbers = np.array(MODELS['equidistant'])
+    named = CameraModel(640, 480, K, numbers, 'fisheye')
+    assert named.rays(PIXELS) == pytest.approx(
+        CameraModel(640, 480, K, numbers, 'equidistant').rays(PIXELS)
+    )
+
+
+@pytest.mark.parametrize(
+    ('model', 'numbers', 'turns_back'),
+    [
+        # theta (1 + k1 theta^2) is highest where theta^2 = -1 / (3 k1): 76 and 72 degrees
+        ('equidistant', [-0.19, 0.0, 0.0, 0.0], 75.9),
+        ('equidistant', [-0.211, 0.0, 0.0, 0.0], 72.0),
+        # likewise r (1 + k1 r^2): r = 1
+        ('plumb_bob', [-1.0 / 3.0, 0.0, 0.0, 0.0, 0.0], 45.0),
+    ],
+)
+def test_pixels_beyond_where_the_polynomial_turns_back_have_no_ray(model, numbers, turns_back):
+    camera = CameraModel(640, 480, K, np.array(numbers), model)
+    project = cv2.fisheye.projectPoints if model == 'equidistant' else cv2.projectPoints
+    for degrees in range(5, 87, 2):
+        ray = np.array([[[np.tan(np.radians(degrees)), 0.0, 1.0]]])
+        pixel = project(ray, np.zeros(3), np.zeros(3), K, np.array(numbers))[0].reshape(1, 2)
+        found = camera.rays(pixel)
+        if degrees < turns_back - 3.0:
+            assert np.degrees(np.arctan(found[0, 0])) == pytest.approx(degrees, abs=0.2)
+        elif found is not None:
+            # such a pixel is also what a ray on the near side shows
+            assert np.degrees(np.arctan(found[0, 0])) < turns_back

@@ -52,3 +52,45 @@ def test_camera_matrix_beyond_all_numbers_gives_no_pose_and_no_warning(recwarn):
     corners = corners_in_image(Panel(0, 1.0), CAMERA)
     assert pose_of(corners, 0.2, CameraModel(640, 480, matrix)) is None
     assert not recwarn.list
+
+
+def test_pose_is_in_the_better_of_both_minima_and_the_other_one_is_given():
+    camera = CameraModel(640, 480, np.array([[600.0, 0, 320], [0, 600, 240], [0, 0, 1]]))
+    corners = np.array(
+        [(194.607, 186.845), (196.207, 197.882), (174.986, 195.84), (173.378, 185.082)]
+    )
+    pose = pose_of(corners, 0.2, camera)
+    assert pose.position == pytest.approx([-1.29, -0.465, 5.73], abs=0.01)
+    assert pose.reprojection_error == pytest.approx(0.167, abs=0.01)
+    assert pose.other.reprojection_error > pose.reprojection_error
+    assert pose.ambiguity == pytest.approx(pose.reprojection_error / pose.other.reprojection_error)
+
+
+def test_no_pose_of_hundreds_is_far_off():
+    generator = np.random.default_rng(41)
+    for _ in range(300):
+        panel = Panel(
+            0,
+            generator.uniform(2.0, 8.0),
+            turn=generator.uniform(0.0, 1.4),
+            axis=generator.uniform(0.0, 2.0 * math.pi),
+            roll=generator.uniform(0.0, 2.0 * math.pi),
+            offset=(generator.uniform(-250, 250), generator.uniform(-180, 180)),
+        )
+        truth = corners_in_camera(panel, CAMERA).mean(axis=0)
+        corners = corners_in_image(panel, CAMERA) + generator.normal(0.0, 0.15, (4, 2))
+        apart = np.linalg.norm(pose_of(corners, 0.2, CAMERA).position - truth)
+        assert apart < 0.1 * np.linalg.norm(truth)
+
+
+@pytest.mark.parametrize('distance', [0.5, 1.0, 4.0])
+def test_marker_seen_straight_from_the_front_has_a_pose(distance):
+    corners = corners_in_image(Panel(0, distance), CAMERA)
+    pose = pose_of(corners, 0.2, CAMERA)
+    assert pose.position == pytest.approx([0.0, 0.0, distance], abs=1e-3)
+
+
+def test_corners_that_are_no_square_within_a_pixel_have_no_pose():
+    corners = corners_in_image(Panel(0, 2.0, turn=0.5), CAMERA)
+    corners[0] += (6.0, 5.0)
+    assert pose_of(corners, 0.2, CAMERA) is None
