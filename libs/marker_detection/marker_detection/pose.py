@@ -125,7 +125,10 @@ def _ippe(outline: Array, rays: Array, _size: float) -> list[tuple[Array, Array]
     except cv2.error:
         return []
     return [
-        (np.asarray(cv2.Rodrigues(vector)[0]), np.asarray(position).ravel())
+        (
+            np.asarray(cv2.Rodrigues(vector)[0], dtype=float),
+            np.asarray(position, dtype=float).ravel(),
+        )
         for vector, position in zip(vectors, positions, strict=True)
         if np.isfinite(vector).all() and np.isfinite(position).all() and position[2] > 0
     ]
@@ -180,7 +183,10 @@ def _refined(
         )
     except cv2.error:
         return None
-    place, turned = np.asarray(moved, dtype=float).ravel(), np.asarray(cv2.Rodrigues(vector)[0])
+    place, turned = (
+        np.asarray(moved, dtype=float).ravel(),
+        np.asarray(cv2.Rodrigues(vector)[0], dtype=float),
+    )
     # the paper's front faces the camera
     if not np.isfinite(place).all() or place[2] <= 0 or turned[:, 2] @ place > 0:
         return None
