@@ -47,7 +47,7 @@ WORKERS = 4
 """Threads for directives that may take long, as many for `LONG_QUERIES`, for LOAD and for SAVE."""
 QUERIES = 2
 """Long queries of one ontology at a time."""
-LONG_QUERIES = ('SPARQL', 'AT', 'EXPLAIN')
+LONG_QUERIES = ('SPARQL', 'EXPLAIN')
 _Answer = TypeVar('_Answer')
 
 
@@ -246,10 +246,7 @@ def _service(node: PatrolNode, keep: bool) -> ArmorService:
     folder = _own_folder(node) if stored == 'auto' else Path(stored).expanduser()
     try:
         store = None if stored in ('', 'none') else Store(folder)
-        clock = node.get_clock()
-        service = ArmorService(
-            settings, log.info, log.warn, store, lambda: clock.now().nanoseconds * 1e-9
-        )
+        service = ArmorService(settings, log.info, log.warn, store)
         if store:
             kept = ', '.join(service.references.names()) or 'empty'
             log.info(f'store {folder} ({kept}); "-p store:=none" turns it off')

@@ -75,11 +75,8 @@ class Settings:
         30.0, 'Longest time a SPARQL query may take, seconds.', 0.01, 3600.0
     )
     sparql_rows: int = 100_000
-    history: int = parameter(
-        20_000,
-        'Axioms of past changes that are kept for QUERY AT, for each reference.',
-        0,
-        10_000_000,
+    worlds: bool = parameter(
+        True, 'Keep each reference in the store as a World of owlready2 as well, in worlds/.'
     )
     max_file_bytes: int = 64 * 1024 * 1024
     max_arguments: int = 100_000

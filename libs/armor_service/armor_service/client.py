@@ -497,15 +497,6 @@ class Query(ClientPart):
         return [parse_fact(text) for text in objects]
 
     @operation
-    def facts_at(self, time: float, pattern: str) -> Steps[list[ShortFact]]:
-        """Yield asserted and derived facts that matched a pattern at a time, seconds since the
-        epoch.
-        """
-        parse_fact(pattern)
-        objects = yield from self._objects('QUERY AT', repr(float(time)), pattern)
-        return [parse_fact(text) for text in objects]
-
-    @operation
     def facts_by_origin(self, pattern: str) -> Steps[tuple[list[ShortFact], list[ShortFact]]]:
         """Yield facts that match a pattern: all of them, and those of them that are asserted."""
         parse_fact(pattern)

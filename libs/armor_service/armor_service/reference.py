@@ -11,7 +11,6 @@ from pathlib import Path
 
 from armor_service.changes import (
     Change,
-    History,
     RemoveAxiom,
     RemoveEntity,
     RenameEntity,
@@ -93,7 +92,6 @@ class Reference:
         took: Seconds of processor time of the last reasoning that had something to do.
         revision: Counts what may have changed an answer, so that copies know when they are old.
         dropped: The name does not stand for it any more.
-        history: What was asserted when.
     """
 
     name: str
@@ -108,7 +106,6 @@ class Reference:
     took: float = 0.0
     revision: int = 0
     dropped: bool = False
-    history: History = field(default_factory=History)
     lock: threading.RLock = field(default_factory=threading.RLock)
 
     @contextlib.contextmanager

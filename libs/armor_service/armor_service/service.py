@@ -13,7 +13,6 @@ from __future__ import annotations
 import contextlib
 import itertools
 import threading
-import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -34,6 +33,7 @@ from armor_service.reference import Reference, Registry
 from armor_service.rendering import one_line, shown
 from armor_service.sparql import SparqlEngine
 from armor_service.store import Store
+from armor_service.worlds import Worlds
 from owl_reasoner import memory
 from owl_reasoner.knowledge_base import Changes
 from owl_reasoner.reasoner.java_reasoning import JavaReasonerError
@@ -55,20 +55,19 @@ class ArmorService:
         screen: Writes a line of LOG SCREEN.
         warn: Told in one line of what went wrong inside and of what a client should know.
         store: Makes references durable; those it holds are there at once.
-        clock: Seconds since the epoch, for QUERY AT.
 
     Raises:
         StoreError: What is in the store cannot be read.
 
     Attributes:
         settings: What is allowed.
-        clock: Seconds since the epoch.
         paths: Which files may be read and written.
         log: The log of directives.
         sparql: Runs SPARQL queries.
         references: What is loaded.
         entering: Held while what was loaded gets its name.
         store: Makes references durable; None: they end with the process.
+        worlds: Writes them for programs that use owlready2; None: nobody does.
         states: Numbers the states that are taken to be saved.
         saved: The newest state that each file holds.
     """
@@ -79,7 +78,6 @@ class ArmorService:
         screen: Callable[[str], None] = print,
         warn: Callable[[str], None] = print,
         store: Store | None = None,
-        clock: Callable[[], float] = time.time,
     ) -> None:
         self.settings = settings or Settings()
         readable = (*self.settings.directories, *self.settings.read_only_directories)
@@ -88,8 +86,8 @@ class ArmorService:
         self.sparql = SparqlEngine(self.settings)
         self.references = Registry()
         self.entering = threading.Lock()
-        self.clock = clock
         self.store = store
+        self.worlds: Worlds | None = None
         self.states = itertools.count(1)
         self.saved: dict[Path, int] = {}
         self._saving: dict[Path, threading.Lock] = {}
@@ -97,10 +95,14 @@ class ArmorService:
         self._watchers: list[Watcher] = [self.sparql.note]
         if store:
             store.warn = self.warn
+            if self.settings.worlds:
+                self.worlds = Worlds(store.directory / 'worlds', self.warn)
             with memory.uncollected():
-                for ref in store.recover(self.settings.history):
+                for ref in store.recover():
                     self.register(ref)
                     memory.settle(len(ref.kb))
+            if self.worlds:
+                self.worlds.keep_only(self.references.names())
             for note in store.notes:
                 warn(note)
 
@@ -124,10 +126,11 @@ class ArmorService:
         """Make a reference known under its name, and its changes to the watchers."""
 
         def on_changes(changes: Changes) -> None:
-            ref.history.note(self.clock(), changes)
             self.tell(ref.name, changes)
 
         ref.kb.subscribe(on_changes)
+        if self.worlds:
+            self.worlds.follow(ref)
         self.references.add(ref)
         self.tell(ref.name, None)
 
@@ -222,6 +225,8 @@ class ArmorService:
     def close(self) -> None:
         """End helper processes and close files."""
         self.sparql.close()
+        if self.worlds:
+            self.worlds.close()
         if self.store:
             self.store.close()
         self.log.close()
@@ -260,12 +265,12 @@ class ArmorService:
         self.check_free(ref, request.client_name)
         if directive.kind is Kind.CONTROL:
             if self.store and ref.queue:
-                self.store.flushed(ref.name, self.clock())
+                self.store.flushed(ref.name)
             directive.run(ref)
             return ''
         changes: list[Change] = directive.run(ref, *self._values(directive, request, ref))
         if self.store and changes:
-            self.store.changed(ref.name, changes, self.clock())
+            self.store.changed(ref.name, changes)
         ref.heavy |= directive.schema
         remark = ref.missing(changes)
         if not changes:

@@ -29,7 +29,7 @@ from dataclasses import fields, is_dataclass
 from pathlib import Path
 from typing import Any, get_args
 
-from armor_service.changes import Change, History, PastChange, apply_all
+from armor_service.changes import Change, apply_all
 from armor_service.protocol import StoreError
 from armor_service.reference import Origin, Reference, knowledge_base
 from owl_reasoner.owl import axioms, expressions
@@ -433,16 +433,13 @@ class Store:
         self._waiting: list[Record] = []
         self._closed = threading.Event()
 
-    def recover(self, history: int = 0) -> list[Reference]:
+    def recover(self) -> list[Reference]:
         """Make the references as they were answered for; their derived facts are up to date.
-
-        Args:
-            history: Axioms of past changes that are kept for each.
 
         Raises:
             StoreError: A record that this version does not know.
         """
-        recovery = _Recovery(history)
+        recovery = _Recovery()
         for record in self._journal.records():
             try:
                 recovery.take(record)
@@ -471,17 +468,17 @@ class Store:
         """Remember who is mounted."""
         self._write(['mount', name, client])
 
-    def buffered(self, name: str, on: bool, time: float = 0.0) -> None:
-        """Remember that buffered manipulation was switched at a time."""
-        self._write(['buffer', name, on, time])
+    def buffered(self, name: str, on: bool) -> None:
+        """Remember that buffered manipulation was switched."""
+        self._write(['buffer', name, on])
 
-    def changed(self, name: str, changes: Iterable[Change], time: float = 0.0) -> None:
-        """Remember changes at a time, applied or queued as the reference is set up."""
-        self._write(['change', name, [encode(change) for change in changes], time])
+    def changed(self, name: str, changes: Iterable[Change]) -> None:
+        """Remember changes, applied or queued as the reference is set up."""
+        self._write(['change', name, [encode(change) for change in changes]])
 
-    def flushed(self, name: str, time: float = 0.0) -> None:
-        """Remember that the queue was applied at a time."""
-        self._write(['flush', name, time])
+    def flushed(self, name: str) -> None:
+        """Remember that the queue was applied."""
+        self._write(['flush', name])
 
     @contextmanager
     def batch(self) -> Iterator[None]:
@@ -607,7 +604,7 @@ class Store:
         return True
 
 
-_State = tuple[str, dict[str, Any], list[Axiom], list[Change], list[PastChange]]
+_State = tuple[str, dict[str, Any], list[Axiom], list[Change]]
 
 
 def _state(ref: Reference) -> _State:
@@ -620,10 +617,8 @@ def _state(ref: Reference) -> _State:
         'buffered_manipulation': ref.buffered_manipulation,
         'buffered_reasoner': ref.buffered_reasoner,
         'mounted': ref.mounted,
-        'since': ref.history.since,
     }
-    changes = list(ref.history.changes)
-    return ref.name, settings, list(ref.kb.axioms()), list(ref.queue), changes
+    return ref.name, settings, list(ref.kb.axioms()), list(ref.queue)
 
 
 def _records(
@@ -631,20 +626,17 @@ def _records(
     settings: dict[str, Any],
     axioms: list[Axiom],
     queue: list[Change],
-    history: list[PastChange],
 ) -> Iterator[Record]:
     """Return the records of a reference: short ones, since damage costs a whole record."""
     yield ['load', name, settings, [], [encode(change) for change in queue]]
     for start in range(0, len(axioms), CHUNK):
         yield ['axioms', name, [encode(axiom) for axiom in axioms[start : start + CHUNK]]]
-    for past in history:
-        added, removed = ([encode(axiom) for axiom in part] for part in (past.added, past.removed))
-        yield ['past', name, past.time, added, removed]
     # Once more, should damage have hit the first.
     yield ['loaded', name, settings]
 
 
-_KINDS = frozenset({'axioms', 'past', 'mount', 'change', 'flush', 'buffer'})
+_KINDS = frozenset({'axioms', 'mount', 'change', 'flush', 'buffer', 'past'})
+"""Kinds of records; 'past' is of stores of before, and says nothing of what is asserted now."""
 
 
 class _Recovery:
@@ -655,10 +647,9 @@ class _Recovery:
         orphans: Records of references that are not there.
     """
 
-    def __init__(self, history: int) -> None:
+    def __init__(self) -> None:
         self.references: dict[str, Reference] = {}
         self.orphans = 0
-        self._history = history
         self._early: dict[str, list[Axiom]] = {}
 
     def take(self, record: Record) -> None:
@@ -686,10 +677,6 @@ class _Recovery:
                 ref.kb.change(added)
         elif ref is None:
             self.orphans += 1
-        elif what == 'past':
-            when, added, removed = rest
-            came, went = (tuple(map(decode, part)) for part in (added, removed))
-            ref.history.append(PastChange(when, came, went))
         elif what == 'mount':
             ref.mounted = rest[0]
         elif what == 'change':
@@ -697,13 +684,13 @@ class _Recovery:
             if ref.buffered_manipulation:
                 ref.queue += changes
             else:
-                self._apply(ref, changes, *rest[1:])
+                apply_all(ref.kb, changes)
         elif what == 'flush':
-            self._flush(ref, *rest)
+            self._flush(ref)
         elif what == 'buffer':
             ref.buffered_manipulation = rest[0]
             if not rest[0]:
-                self._flush(ref, *rest[1:])
+                self._flush(ref)
 
     def _load(self, name: str, settings: dict[str, Any], axioms: list[Axiom]) -> None:
         try:
@@ -719,16 +706,10 @@ class _Recovery:
                 settings['buffered_manipulation'],
                 settings['buffered_reasoner'],
                 settings['mounted'],
-                history=History(settings.get('since', 0.0), self._history),
             )
         except KeyError as error:
             raise ValueError(f'no setting {error}') from None
 
-    def _flush(self, ref: Reference, time: float = 0.0) -> None:
+    def _flush(self, ref: Reference) -> None:
         queue, ref.queue = ref.queue, []
-        self._apply(ref, queue, time)
-
-    def _apply(self, ref: Reference, changes: list[Change], time: float = 0.0) -> None:
-        unsubscribe = ref.kb.subscribe(lambda told: ref.history.note(time, told))
-        apply_all(ref.kb, changes)
-        unsubscribe()
+        apply_all(ref.kb, queue)

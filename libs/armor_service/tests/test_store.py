@@ -41,7 +41,7 @@ class Server:
 
     def start(self) -> None:
         store = Store(self._directory, self._compact_from)
-        settings = Settings(ontologies_folder=self._files, history=20)
+        settings = Settings(ontologies_folder=self._files)
         self.service = ArmorService(settings, print, self._note, store)
         self.ask: Ask = asker(self.service)
 

@@ -41,7 +41,7 @@ from armor_service.rendering import (
     shown,
 )
 from armor_service.rendering import render_literal as _literal
-from owl_reasoner.knowledge_base import Fact, KnowledgeBase
+from owl_reasoner.knowledge_base import Fact
 from owl_reasoner.owl.axioms import (
     Axiom,
     ClassAssertion,
@@ -266,35 +266,6 @@ def _matching(words: str, ref: Reference, pattern: str, asserted: bool) -> Direc
         raise DirectiveError(f'{words}: argument pattern {error}') from None
     found = {str(fact) for fact in candidates if wanted.matches(fact)}
     return DirectiveResponse(queried_objects=sorted(found))
-
-
-@query(
-    'QUERY AT',
-    text('time'),
-    text('pattern'),
-    flag('asserted', 'false'),
-    native=False,
-    slow=True,
-    summary='QUERY FACT at a time in the past, seconds since the epoch by the clock of the server: '
-    'what was asserted then, and what followed from it. As far back as the parameter history goes.',
-)
-def _at(
-    service: ArmorService, ref: Reference, time: str, pattern: str, asserted: bool
-) -> DirectiveResponse:
-    try:
-        seconds = float(time)
-    except ValueError:
-        problem = f'{shown(time)}: expected seconds since the epoch'
-        raise DirectiveError(f'QUERY AT: argument time {problem}') from None
-    try:
-        with ref.held() as kb:
-            axioms = ref.history.at(seconds, kb.axioms(), service.clock())
-    except ValueError as error:
-        raise DirectiveError(f'QUERY AT: argument time {error}') from None
-    past = Reference(ref.name, KnowledgeBase(ref.kb.iri, axioms), ref.origin)
-    if not asserted:
-        past.kb.reason()
-    return _matching('QUERY AT', past, pattern, asserted)
 
 
 def _asserted(ref: Reference, wanted: ShortFact) -> Iterable[ShortFact]:

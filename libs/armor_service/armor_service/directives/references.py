@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from armor_service.access import LOG_ENDINGS, ONTOLOGY_ENDINGS, Settings
-from armor_service.changes import History
 from armor_service.directives.table import control, flag, text, utility
 from armor_service.protocol import (
     DirectiveError,
@@ -105,7 +104,6 @@ def _load(
             ref, found = _read_document(service, request, source, iri, reasoner)
             memory.settle(len(ref.kb))
         ref.buffered_manipulation, ref.buffered_reasoner = buffered, lazy
-        ref.history = History(service.clock(), service.settings.history)
         with service.entering:
             entered = name not in service.references
             if entered:
@@ -131,7 +129,7 @@ def _rebuffer(service: ArmorService, request: DirectiveRequest, buffered: bool) 
         if ref.buffered_manipulation != buffered:
             service.check_free(ref, request.client_name)
             if service.store:
-                service.store.buffered(ref.name, buffered, service.clock())
+                service.store.buffered(ref.name, buffered)
             ref.buffer(buffered)
     return True
 
@@ -149,6 +147,8 @@ def _drop(service: ArmorService, request: DirectiveRequest) -> DirectiveResponse
             if service.store:
                 service.store.dropped(ref.name)
             service.references.remove(ref)
+            if service.worlds:
+                service.worlds.drop(ref)
             service.tell(ref.name, None)
             # Not yet: this directive and those that wait for the lock still refer to it.
             release = threading.Timer(RELEASE_AFTER, _release, args=(service, ref))
@@ -163,7 +163,7 @@ def _release(service: ArmorService, ref: Reference) -> None:
         service.sparql.forget()
     with ref.lock:  # The last of those who found it before it was dropped.
         parts = ref.kb.give_up()
-        ref.kb, ref.history = KnowledgeBase(ref.kb.iri), History()
+        ref.kb = KnowledgeBase(ref.kb.iri)
     memory.release(parts, service.references.hold_more_than(memory.LARGE))
 
 

@@ -17,7 +17,7 @@ from owl_reasoner.owl.expressions import Literal
 from owl_reasoner.owl.vocabulary import OWL, RDF, RDFS, SWRL, THING, XSD
 
 _TYPE = RDF + 'type'
-_KIND_TYPES = {
+KIND_TYPES = {
     'class': OWL + 'Class',
     'object_property': OWL + 'ObjectProperty',
     'data_property': OWL + 'DatatypeProperty',
@@ -92,9 +92,10 @@ _COUNTED = {record: row[:2] for row in CARDINALITIES for record in row[2:]}
 
 
 class _Mapping:
-    def __init__(self, iri: str) -> None:
+    def __init__(self, iri: str, prefix: str = '_:w') -> None:
         self.iri = iri
         self.triples: list[Triple] = []
+        self._prefix = prefix
         self._numbers = count(1)
         self._variables: dict[str, None] = {}
 
@@ -103,7 +104,7 @@ class _Mapping:
         self.triples.append((subject, predicate, value))
 
     def blank(self, kind: str = '') -> str:
-        node = f'_:w{next(self._numbers)}'
+        node = f'{self._prefix}{next(self._numbers)}'
         if kind:
             self.add(node, _TYPE, kind)
         return node
@@ -166,7 +167,7 @@ class _Mapping:
     def axiom(self, axiom: Axiom) -> None:
         kind: Any = type(axiom)
         if isinstance(axiom, ax.Declaration):
-            self.add(axiom.iri, _TYPE, _KIND_TYPES[axiom.kind])
+            self.add(axiom.iri, _TYPE, KIND_TYPES[axiom.kind])
         elif isinstance(axiom, ax.Import):
             self.add(self.iri, OWL + 'imports', axiom.iri)
         elif isinstance(axiom, ax.AnnotationAssertion):
@@ -285,6 +286,25 @@ def _mentioned(axioms: Iterable[Axiom]) -> tuple[dict[tuple[str, str], None], se
     return used, labels
 
 
+NODE = '_:#'
+"""How the nodes of expressions begin in `axiom_triples`; no individual has such a label."""
+
+
+def axiom_triples(axiom: Axiom, iri: str) -> list[Triple]:
+    """Return the triples of one axiom, without those that declare what it uses.
+
+    Args:
+        axiom: Of any kind; the annotation of an axiom comes with the axiom that it annotates.
+        iri: The ontology's IRI, the subject of imports.
+    """
+    mapping = _Mapping(iri, NODE)
+    if isinstance(axiom, ax.AxiomAnnotation):
+        mapping.annotated(axiom.axiom, [axiom])
+    else:
+        mapping.axiom(axiom)
+    return mapping.triples
+
+
 _VALUED = ('object_property', 'data_property')
 
 
@@ -315,5 +335,5 @@ def triples_of(axioms: Iterable[Axiom], iri: str) -> Iterator[Triple]:
         if kind == 'annotation_property' and name in valued:
             continue
         if (kind, name) not in declared and not name.startswith((OWL, RDF, RDFS, XSD)):
-            mapping.add(name, _TYPE, _KIND_TYPES[kind])
+            mapping.add(name, _TYPE, KIND_TYPES[kind])
     return iter(mapping.triples)
