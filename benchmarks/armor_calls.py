@@ -145,18 +145,21 @@ def inside(rounds: int) -> list[Row]:
     from armor_service.store import Store
 
     rows = _service_rows('in process', None, rounds)
-    with tempfile.TemporaryDirectory() as directory:
-        rows += _service_rows('with store', Store(Path(directory)), max(rounds // 10, 20))
+    few = max(rounds // 10, 20)
+    for label, worlds in (('with store', True), ('with store, no World', False)):
+        with tempfile.TemporaryDirectory() as directory:
+            rows += _service_rows(label, Store(Path(directory)), few, worlds=worlds)
     return rows
 
 
-def _service_rows(label: str, store: Any, rounds: int) -> list[Row]:
+def _service_rows(label: str, store: Any, rounds: int, *, worlds: bool = False) -> list[Row]:
+    from armor_service.access import Settings
     from armor_service.client import ArmorClient, InProcessTransport
     from armor_service.service import ArmorService
     from surveillance_ontology.patrol_ontology import DATA, PatrolOntology
     from surveillance_runtime.place import read_place_file
 
-    service = ArmorService(store=store)
+    service = ArmorService(Settings(worlds=worlds), store=store)
     client = ArmorClient('benchmark', 'map', InProcessTransport(service))
     ontology = PatrolOntology(client)
     ontology.build(read_place_file(PLACE).place, str(DATA / 'surveillance.owl'), IRI, 2_000_000_000)

@@ -4,8 +4,8 @@
     world['http://bnc/exp-rob-lab/2022-23#URGENT'].instances()
 
 The file holds what is asserted, in the ontology with the reference's IRI, and what is derived, in
-`INFERRED`, where owlready2's own reasoners put it. It follows each change as one transaction, in
-write-ahead mode, so that readers see whole changes only and keep nobody waiting.
+`INFERRED`, where owlready2's own reasoners put it. It follows the changes of each `PAUSE` as one
+transaction, in write-ahead mode, so that readers see whole changes only and keep nobody waiting.
 
 It is written on a thread of its own, after the journal, and made anew where it is behind: what the
 service answers for must not hang on a file that others open. owlready2 begins a transaction when it
@@ -39,6 +39,8 @@ INFERRED = 'http://inferrences/'
 ENDING = '.sqlite3'
 OPEN_FOR = 0.5
 """Seconds without a change after which a file is closed, so that others may lock it."""
+PAUSE = 0.05
+"""Seconds between a change and its writing."""
 RETRY_SECONDS = 1.0
 """Seconds between two attempts to write a file that somebody has locked, or on a full disk."""
 MOST_WAITING = 10_000
@@ -177,6 +179,8 @@ class Worlds:
                 continue
             if name is None:
                 break
+            # What changes often is written together, and the client that changes it goes first.
+            time.sleep(PAUSE)
             self._see_to(name)
         self._close_files()
 
