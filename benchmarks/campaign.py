@@ -379,7 +379,7 @@ class Campaign:
         described = read_place_file(ROOT / 'config' / PLACES[chosen.behaviour])
         positions = described.place.positions
         self._positions = {name: (at[0], at[1]) for name, at in positions.items()}
-        self._regions = Regions(described.plan) if described.plan is not None else None
+        self._regions = Regions(described.plan) if described.plan.is_enclosed else None
         self.launcher = self._launch(())
         self._folder = self._wait_for_folder()
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import shlex
-import shutil
 import subprocess
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -21,6 +20,7 @@ from surveillance_behaviour.mission import mission_log
 from surveillance_behaviour.mission.recovery import WAITING_FOR_HELP
 from surveillance_runtime import node_table
 from surveillance_runtime.files import PLACE, RECORD, TIMELINE, FileError
+from surveillance_runtime.place.writing import copy_place
 from surveillance_runtime.run_parameters import BEHAVIOUR_NODE, place_file, write_parameters
 
 NOTHING_RECORDED = 'Mission: nothing was recorded.'
@@ -47,7 +47,7 @@ def run_mission(run: Run, config: Path, runs: Path, resume: Path | None = None) 
     files = write_parameters(folder / 'parameters', run.namespace, merged, everyone)
     programs = programs_of(run, nodes, observers, files, node_environ(run, folder / 'ros'))
     place = place_file(config, run.behaviour, run.place)
-    shutil.copyfile(place, folder / PLACE)
+    copy_place(place, folder / PLACE)
     names = [*(node.name for node in everyone), *([COMPOSED] if run.composed else [])]
     log = MergedLog(None, names, path=folder / 'launch.log')
     log.say(

@@ -27,15 +27,18 @@ _SUFFIXES = ('.png', '.jpg', '.jpeg', '.webp')
 def graph_over_doors(plan: FloorPlan) -> PatrolGraph:
     """Return the graph of a place, each leg as long as the way over the middle of the door, metres.
 
-    Where two doors join the same places, the shorter way counts.
+    Where two doors join the same places, the shorter way counts. A door of which no position is
+    known counts as on the straight line.
     """
     place = plan.place
     legs: dict[str, dict[str, float]] = {name: {} for name in place.rooms}
     for name, (first, second) in place.doors.items():
-        door = plan.doors[name]
-        length = sum(
-            math.dist(place.positions[room][:2], (door.x, door.y)) for room in (first, second)
-        )
+        ends = [place.positions[room][:2] for room in (first, second)]
+        door = plan.doors.get(name)
+        if door is None:
+            length = math.dist(*ends)
+        else:
+            length = sum(math.dist(end, (door.x, door.y)) for end in ends)
         length = min(length, legs[first].get(second, math.inf))
         legs[first][second] = legs[second][first] = length
     return PatrolGraph(legs)
@@ -43,7 +46,7 @@ def graph_over_doors(plan: FloorPlan) -> PatrolGraph:
 
 def facts(plan: FloorPlan) -> str:
     """Return what there is to say about a place in one line."""
-    parts = [_count(len(plan.place.rooms), 'place'), _count(len(plan.doors), 'door')]
+    parts = [_count(len(plan.place.rooms), 'place'), _count(len(plan.place.doors), 'door')]
     if plan.markers:
         parts.append(_count(len(plan.markers), 'marker'))
     tour = graph_over_doors(plan).tour
@@ -156,8 +159,7 @@ def _parse(argv: Sequence[str] | None) -> argparse.Namespace:
 
 
 def _draw(options: argparse.Namespace) -> list[str]:
-    plan = read_place_file(options.place, walls=True).plan
-    assert plan is not None  # as walls were asked for
+    plan = read_place_file(options.place).plan
     try:
         checked_names(plan.place)
     except PlaceError as error:

@@ -21,6 +21,7 @@ from surveillance_runtime.files import PLACE, RECORD, RECORDING, FileError, repl
 from surveillance_runtime.place import read_place_file
 from surveillance_runtime.place.drawing import Run, draw_place
 from surveillance_runtime.place.floor_plan import FloorPlan
+from surveillance_runtime.place.occupancy_grid import outlines
 
 NAME, PICTURE = 'report.html', 'report.png'
 MOST_LINES = 2000
@@ -92,14 +93,17 @@ def _material(folder: Path) -> tuple[Sequence[Event], FloorPlan | None, Run | No
     file = folder / PLACE
     if not file.exists() or not events:
         return events, None, None
-    plan = read_place_file(file, walls=True).plan
-    assert plan is not None  # as walls were asked for
+    plan = read_place_file(file).plan
     return events, plan, run_of(events, plan.place, str(folder / RECORD))
 
 
 def _map(plan: FloorPlan, run: Run) -> str:
     """Return the place with the ways driven, as SVG; y points up in it."""
-    lines = [(wall.start, wall.end) for wall in plan.walls.values()]
+    lines: list[Iterable[Sequence[float]]] = [
+        (wall.start, wall.end) for wall in plan.walls.values()
+    ]
+    if plan.map is not None:
+        lines += [line.tolist() for line in outlines(plan.map.grid, plan.map.resolution)]
     walls, ways = _drawn(lines), _drawn(run.driven)
     doors = _drawn(door.ends for door in plan.doors.values())
     names = ''.join(
@@ -115,7 +119,7 @@ def _map(plan: FloorPlan, run: Run) -> str:
     )
 
 
-def _drawn(lines: Iterable[Sequence[Sequence[float]]]) -> str:
+def _drawn(lines: Iterable[Iterable[Sequence[float]]]) -> str:
     """Return lines through points as the data of an SVG path."""
     return ''.join('M' + 'L'.join(f'{x:.2f} {-y:.2f}' for x, y, *_ in line) for line in lines)
 

@@ -27,7 +27,8 @@ import yaml
 from surveillance_runtime.files import FileError
 from surveillance_runtime.node_table import LOG_LEVELS
 from surveillance_runtime.parameters import Check, ParameterError, ParameterSpec
-from surveillance_runtime.place import Place, PlaceError, checked_place
+from surveillance_runtime.place import Place, PlaceError, checked_plan
+from surveillance_runtime.place.description import map_file_beside
 from surveillance_runtime.place.rooms import GEOMETRY_KEYS, PLACE_KEYS, tables_of
 from surveillance_runtime.robot_base import ROBOT_RADIUS
 from surveillance_runtime.suggestions import nearest
@@ -204,6 +205,8 @@ def file_layer(path: str | Path) -> Layer:
     for section in file.values:
         for where, name, value in parameters_of(file, section):
             line = file.lines[where]
+            if name == 'map_file' and isinstance(value, str) and value:
+                value = map_file_beside(file.path, value)
             entries.append(Entry(section, name, value, origins.get(line, f'{path}:{line}')))
     return Layer(str(path), tuple(entries))
 
@@ -341,8 +344,7 @@ class Configuration:
             parameters = tables_of(described.items())
             if not parameters.keys() & {'map', 'room_positions'}:
                 return None
-            walls = bool(parameters.keys() & {'walls', 'doors'})
-            return checked_place(parameters, walls=walls, radius=float(radius))[0]
+            return checked_plan(parameters, float(radius)).place
         except PlaceError as error:
             raise ParameterError(f'{self._origin(settings, error)}: {error}') from None
 

@@ -268,6 +268,18 @@ def _place_parameters(node: PatrolNode) -> dict[str, Any]:
     described['station'] = node.parameter(
         'station', [], 'Pose of the charging station: x, y in metres, yaw in rad.', of=float
     )
+    described['map_file'] = node.parameter(
+        'map_file', '', "Map of the place in map_server's format, or a picture; empty: none."
+    )
+    described['map_file_resolution'] = node.parameter(
+        'map_file_resolution', 0.0, "Side of a pixel, metres, where the map's file is a picture."
+    )
+    described['map_file_origin'] = node.parameter(
+        'map_file_origin',
+        [],
+        "Pose of a picture's lower left corner: x, y in metres, yaw in rad; empty: 0, 0, 0.",
+        of=float,
+    )
     described['marker_size'] = node.parameter(
         'marker_size', 0.2, "Side of a marker's black square, metres."
     )

@@ -22,6 +22,7 @@ DISTRIBUTIONS = {
     'yaml': 'pyyaml',
     'PIL': 'pillow',
     're2': 'google-re2',
+    'ruamel': 'ruamel.yaml',
 }
 # Looked for at run time and done without when absent: an installed ROS has them.
 OPTIONAL = {'tf2_msgs', 'nav2_msgs', 'mujoco', 'launch', 'launch_ros'}

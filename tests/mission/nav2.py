@@ -30,7 +30,7 @@ class MapServer(PatrolNode):
 
     def __init__(self, place: Path, **options: Any) -> None:
         super().__init__('map_server', **options)
-        plan = read_place_file(place, walls=True).plan
+        plan = read_place_file(place).plan
         assert plan is not None
         grid = occupancy_grid.draw(plan)
         topic = self.create_publisher(OccupancyGrid, 'map', STATE_QOS)

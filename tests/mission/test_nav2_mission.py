@@ -49,8 +49,7 @@ def robot(graph: Any, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterat
 
 
 def place_regions() -> PlaceRegions:
-    file = read_place_file(PLACE, walls=True)
-    assert file.plan is not None
+    file = read_place_file(PLACE)
     grid = occupancy_grid.draw(file.plan)
     doors = [door.segment for door in file.plan.doors.values()]
     return PlaceRegions(grid, doors, file.place.positions)

@@ -10,7 +10,7 @@ import pytest
 
 from surveillance_runtime.files import FileError
 from surveillance_runtime.place import generation as place_generation
-from surveillance_runtime.place import occupancy_grid
+from surveillance_runtime.place import occupancy_grid, writing
 from surveillance_runtime.place.floor_plan import Marker, PlaceError
 from surveillance_simulation.world.world import World, read_world
 
@@ -26,7 +26,7 @@ def test_every_place_of_the_project_is_sound(name: str) -> None:
 
 
 def test_office_file_is_what_its_generator_writes() -> None:
-    written = place_generation.format_place(place_generation.office(), '')
+    written = writing.format_place(place_generation.office(), '')
     text = (CONFIG / 'office.yaml').read_text()
     assert text[text.index('/**:') :] == written[written.index('/**:') :]
 
@@ -118,7 +118,7 @@ def test_a_wrong_change_is_refused_in_one_line(change, message: str) -> None:
 @pytest.mark.parametrize(
     ('parameters', 'message'),
     [
-        (changed(walls={}), 'walls: missing or empty: expected NAME: [x1, y1, x2, y2] for each'),
+        (changed(walls={}), 'walls: empty: expected NAME: [x1, y1, x2, y2] for each'),
         (changed(walls__south=[0, 0, 6]), 'walls.south: [0, 0, 6]: expected [x1, y1, x2, y2]'),
         (changed(walls__south=[0, 0, 6, 'a']), "walls.south: 'a': expected a number"),
         (changed(walls__south=[0, 0, 6, math.inf]), 'walls.south: inf: expected a number'),
@@ -135,7 +135,7 @@ def test_a_wrong_change_is_refused_in_one_line(change, message: str) -> None:
         ),
         (changed(room_positions__B=[9.0, 1.0]), 'room_positions.B: (9, 1) lies outside'),
         (changed(station=[5.0, 1.0, 0.0]), 'station: (5, 1) lies in B: expected a point in A'),
-        (changed(station=None), 'station: missing: expected [x, y, yaw]'),
+        (changed(station=[1.0]), 'station: [1.0]: expected [x, y, yaw]'),
         (changed(markers__m2=[1.0, 1.0, 1.0, 1.0, 0.0]), 'markers.m2: id 1 is that of m1 already'),
         (changed(markers__m1=[1.5, 1.0, 1.0, 1.0, 0.0]), 'markers.m1: id 1.5: expected a whole'),
         (changed(markers__m1=[1.0, 1.0, 1.0, 9.0, 0.0]), 'markers.m1: height 9 m: expected 0 to'),

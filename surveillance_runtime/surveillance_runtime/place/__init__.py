@@ -8,7 +8,7 @@ what the place's file says of walls, doors and markers, and `Regions` which room
 """
 
 from surveillance_runtime.place.description import PlaceFile as PlaceFile
-from surveillance_runtime.place.description import checked_place as checked_place
+from surveillance_runtime.place.description import checked_plan as checked_plan
 from surveillance_runtime.place.description import described_place as described_place
 from surveillance_runtime.place.description import read_place_file as read_place_file
 from surveillance_runtime.place.floor_plan import FloorPlan as FloorPlan

@@ -1,6 +1,6 @@
 """A place as a file or the parameters of a node describe it, read and checked.
 
-Rooms always, walls and doors where they are given.
+Rooms always; walls, doors and the map that the place refers to where they are given.
 """
 
 from __future__ import annotations
@@ -10,8 +10,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from surveillance_runtime.files import FileError
 from surveillance_runtime.parameters import ParameterError, parameter
 from surveillance_runtime.place.floor_plan import FloorPlan
+from surveillance_runtime.place.occupancy_map import is_map_description, is_picture
 from surveillance_runtime.place.regions import Regions, check_passable
 from surveillance_runtime.place.rooms import (
     GEOMETRY_KEYS,
@@ -19,7 +21,6 @@ from surveillance_runtime.place.rooms import (
     Place,
     PlaceError,
     make_place,
-    place_from,
     tables_of,
 )
 from surveillance_runtime.robot_base import ROBOT_RADIUS
@@ -36,25 +37,29 @@ class PlaceFile:
 
     Attributes:
         place: The rooms, which doors join them, a point in each.
-        plan: Walls, doors and markers; None where the file has rooms only.
+        plan: Walls, map, doors and markers, as far as the file has them.
     """
 
     place: Place
-    plan: FloorPlan | None
+    plan: FloorPlan
 
 
-def read_place_file(path: str | Path, *, walls: bool = False) -> PlaceFile:
+def read_place_file(path: str | Path, *, radius: float = ROBOT_RADIUS) -> PlaceFile:
     """Read a place's file and check all that it says, also that the robot fits through the doors.
 
     Args:
         path: A parameter file whose section `/**` describes a place.
-        walls: Whether walls and doors must be given, as a simulated place needs them.
+        radius: Of the robot, metres.
 
     Raises:
         FileError: The file cannot be read, or what it describes is no sound place; one line
             with file and line number.
     """
+    if is_picture(path) and Path(path).exists():
+        raise FileError(f'{path}: the picture of a map, and no place: {_importing(path)}')
     file = read_yaml_file(path)
+    if is_map_description(file.values):
+        raise FileError(f"{path}: a map in map_server's format, and no place: {_importing(path)}")
     if '/**' not in file.values:
         found = ', '.join(file.values) or 'nothing'
         raise file.error((), f"expected the top-level key '/**', got {found}")
@@ -67,6 +72,8 @@ def read_place_file(path: str | Path, *, walls: bool = False) -> PlaceFile:
     file = YamlFile(file.path, given, lines)
     try:
         described = tables_of(given.items())
+        if isinstance(name := described.get('map_file'), str) and name:
+            described['map_file'] = map_file_beside(file.path, name)
         known = (*PLACE_KEYS, *GEOMETRY_KEYS)
         for key in described:
             if key not in known:
@@ -74,32 +81,36 @@ def read_place_file(path: str | Path, *, walls: bool = False) -> PlaceFile:
         for key in PLACE_KEYS[:3]:
             if key not in described:
                 raise PlaceError((), f"parameter '{key}' is missing")
-        geometry = any(key in described for key in GEOMETRY_KEYS)
-        place, plan = checked_place(described, walls=walls or geometry)
+        plan = checked_plan(described, radius)
     except PlaceError as error:
         raise file.error(error.where, error.problem) from None
-    return PlaceFile(place, plan)
+    return PlaceFile(plan.place, plan)
 
 
-def checked_place(
-    parameters: Mapping[str, Any], *, walls: bool, radius: float = ROBOT_RADIUS
-) -> tuple[Place, FloorPlan | None]:
-    """Make the place that parameters describe, with all checks.
+def map_file_beside(place: Path, name: str) -> str:
+    """Return the path of the map's file that a place's file names relative to itself."""
+    return str((place.parent / name).absolute())
+
+
+def _importing(path: str | Path) -> str:
+    return f'expected a place; `python3 launch.py import {path}` makes one of it'
+
+
+def checked_plan(parameters: Mapping[str, Any], radius: float = ROBOT_RADIUS) -> FloorPlan:
+    """Make the floor plan that parameters describe, with all checks.
 
     Args:
-        parameters: As a place's file has them.
-        walls: Whether walls and doors are described, too.
+        parameters: As a place's file has them, the name of the map's file as for
+            `FloorPlan.from_parameters`.
         radius: Of the robot that has to get through the doors, metres.
 
     Raises:
         PlaceError: What is described is no sound place.
     """
-    if not walls:
-        return place_from(parameters), None
     plan = FloorPlan.from_parameters(parameters)
     Regions(plan)
     check_passable(plan, radius)
-    return plan.place, plan
+    return plan
 
 
 @dataclass(frozen=True)

@@ -105,7 +105,11 @@ class _Picture:
         self._size = min(15.0, max(9.0, canvas.scale / 3.4))
 
     def floors(self, run: Run | None) -> None:
+        if not self._plan.is_enclosed:
+            return  # where a room ends is not known
         grid, masks = self._regions.grid, self._regions.masks()
+        if self._plan.map is not None:
+            masks = {name: mask & grid.free for name, mask in masks.items()}
         longest = max(run.waits.values(), default=0.0) if run else 0.0
         for name, mask in masks.items():
             colour = self._floor_colour(name)
@@ -130,6 +134,9 @@ class _Picture:
         return _CORRIDOR if len(self._place.rooms[name]) > 1 else _ROOM
 
     def walls(self) -> None:
+        if self._plan.map is not None:
+            grid = self._plan.map.grid
+            self._canvas.raster(grid.occupied, grid.origin, grid.resolution, _WALL)
         solid = boxes.boxes_around(self._plan.wall_pieces(), WALL_THICKNESS)
         solid[:, 5] = max(WALL_THICKNESS / 2, 1.6 / self._canvas.scale)
         jambs = {end for door in self._plan.doors.values() for end in door.ends}
@@ -183,12 +190,10 @@ class _Picture:
 
     def graph(self) -> None:
         for name, (first, second) in self._place.doors.items():
-            door = self._plan.doors[name]
-            way = [
-                self._place.positions[first][:2],
-                (door.x, door.y),
-                self._place.positions[second][:2],
-            ]
+            door = self._plan.doors.get(name)
+            way = [self._place.positions[first][:2], self._place.positions[second][:2]]
+            if door is not None:
+                way.insert(1, (door.x, door.y))
             self._canvas.line(way, _GRAPH, max(1.2, self._canvas.scale / 30), dash=(6, 4))
 
     def markers(self) -> None:
@@ -408,6 +413,28 @@ class Canvas:
                 width=max(1, round(width * _FINE)),
                 joint='curve',
             )
+
+    def raster(
+        self, mask: npt.NDArray[np.bool_], origin: Point, resolution: float, colour: str
+    ) -> None:
+        """Fill the cells of a map, row 0 in the south; its origin and resolution in metres."""
+        rows, columns = mask.shape
+        left, bottom = self._fine(self.at(origin))
+        side = resolution * self.scale * _FINE
+        size = self._image.size
+        # Each fine pixel is what the cell is that its middle lies in.
+        column = np.floor((np.arange(size[0]) + 0.5 - left) / side).astype(np.intp)
+        row = np.floor((bottom - np.arange(size[1]) - 0.5) / side).astype(np.intp)
+        across = np.clip(column, 0, columns - 1)
+        upwards = np.clip(row, 0, rows - 1)
+        if side < 1.0:
+            # Thin walls of a large map stay: a pixel is filled where one of its cells is.
+            reach = 2 * math.ceil(0.5 / side) + 1
+            mask = cv2.dilate(mask.astype(np.uint8), np.ones((reach, reach), np.uint8)) > 0
+        paint = mask[upwards[:, None], across[None, :]]
+        paint &= ((row >= 0) & (row < rows))[:, None] & ((column >= 0) & (column < columns))
+        ink = Image.new('RGB', size, ImageColor.getrgb(colour))
+        self._image.paste(ink, mask=Image.fromarray(paint * np.uint8(255)))
 
     def arc(
         self,

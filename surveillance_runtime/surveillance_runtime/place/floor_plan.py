@@ -1,7 +1,8 @@
 """The unchanging geometry of a place: walls, doors, markers, station, as its parameter file says.
 
 Walls and doors are boxes around a centre line. A wall runs through; each door cuts its opening out
-of the wall it lies on. Everything is checked when it is read: a `PlaceError` is one line that names
+of the wall it lies on. A place may refer to a map instead of walls, or besides, and may have
+neither. Everything is checked when it is read: a `PlaceError` is one line that names
 the entry, its value and what was expected.
 """
 
@@ -10,11 +11,15 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from surveillance_runtime.files import FileError
 from surveillance_runtime.place.rooms import Place, PlaceError, place_from
+
+if TYPE_CHECKING:
+    from surveillance_runtime.place.occupancy_map import OccupancyMap
 
 Point = tuple[float, float]
 Pose = tuple[float, float, float]
@@ -28,6 +33,8 @@ FURTHEST = 1000.0
 LARGEST = 100_000.0
 """Area of the largest place, square metres: its map is held in memory cell by cell."""
 _ON_WALL = 0.03
+_AROUND = 2.0
+"""Of a place without walls and map, so much is taken around its points, metres."""
 
 
 @dataclass(frozen=True)
@@ -87,12 +94,14 @@ class FloorPlan:
 
     Attributes:
         place: The rooms, which doors join them, a point in each.
-        walls: Walls by name, uncut.
-        doors: Doors by name.
+        walls: Walls by name, uncut; may be empty.
+        doors: Doors by name; all of them where there are walls.
         markers: Markers by name.
         marker_size: Side of a marker's black square, metres.
         marker_dictionary: OpenCV's name of the markers' dictionary.
-        station: Pose of the charging station, metres and rad.
+        station: Pose of the charging station, metres and rad; where the file names none, the point
+            of the first room with one.
+        map: The map that the file refers to.
     """
 
     place: Place
@@ -102,17 +111,21 @@ class FloorPlan:
     marker_size: float
     marker_dictionary: str
     station: Pose
+    map: OccupancyMap | None = None
 
     @classmethod
     def from_parameters(cls, parameters: Mapping[str, Any]) -> FloorPlan:
         """Return the plan that a place's parameters describe.
 
         Args:
-            parameters: The mapping below `ros__parameters` in the place's file.
+            parameters: The mapping below `ros__parameters` in the place's file; the name of its
+                map's file is absolute or relative to the working directory.
 
         Raises:
-            PlaceError: An entry is missing, of the wrong shape or contradicts another.
+            PlaceError: An entry is of the wrong shape, contradicts another, or its map cannot be
+                read.
         """
+        place = place_from(parameters)
         walls = {}
         for name, (x1, y1, x2, y2) in _rows(parameters, 'walls', ('x1', 'y1', 'x2', 'y2')).items():
             walls[name] = Wall(name, (x1, y1), (x2, y2))
@@ -123,15 +136,14 @@ class FloorPlan:
         size = _number(parameters.get('marker_size', 0.2), 'marker_size')
         markers = {}
         columns = ('id', 'x', 'y', 'z', 'yaw')
-        for name, row in _rows(parameters, 'markers', columns, required=False).items():
+        for name, row in _rows(parameters, 'markers', columns).items():
             if row[0] != int(row[0]) or row[0] < 0:
                 raise PlaceError(
                     ('markers', name), f'id {row[0]:g}: expected a whole number from 0'
                 )
             markers[name] = Marker(name, int(row[0]), row[1], row[2], row[3], row[4], size)
-        station = _row(parameters.get('station'), ('x', 'y', 'yaw'), 'station')
         plan = cls(
-            place=place_from(parameters),
+            place=place,
             walls=walls,
             doors=doors,
             markers=markers,
@@ -139,7 +151,8 @@ class FloorPlan:
             marker_dictionary=_name(
                 parameters.get('marker_dictionary', 'DICT_5X5_100'), 'marker_dictionary'
             ),
-            station=(station[0], station[1], station[2]),
+            station=_station(parameters.get('station'), place),
+            map=_map_of(parameters),
         )
         plan._check()
         return plan
@@ -151,6 +164,11 @@ class FloorPlan:
             return self.station
         x, y, _ = self.place.positions[self.place.start]
         return x, y, 0.0
+
+    @property
+    def is_enclosed(self) -> bool:
+        """Whether anything is known of what stands in the place: walls, or a map."""
+        return bool(self.walls) or self.map is not None
 
     def _check(self) -> None:
         for wall in self.walls.values():
@@ -166,9 +184,9 @@ class FloorPlan:
                     f'{WALL_THICKNESS:g} m',
                 )
         west, south, east, north = self.bounds
-        if (east - west) * (north - south) > LARGEST:
+        if self.map is None and (east - west) * (north - south) > LARGEST:
             raise PlaceError(
-                ('walls',),
+                ('walls' if self.walls else 'room_positions',),
                 f'the place is {east - west:g} m by {north - south:g} m: expected at most '
                 f'{LARGEST:g} square metres',
             )
@@ -177,14 +195,14 @@ class FloorPlan:
                 raise PlaceError(
                     ('doors', door.name), f'width {door.width:g} m: expected 0.3 to 20 m'
                 )
-            if not self.walls_of(door):
+            if self.walls and self.map is None and not self.walls_of(door):
                 raise PlaceError(
                     ('doors', door.name),
                     f'({door.x:g}, {door.y:g}) with width {door.width:g} m lies on no wall: '
                     f'expected both its jambs on the centre line of one wall',
                 )
         for name, (first, _) in self.place.doors.items():
-            if name not in self.doors:
+            if name not in self.doors and self.walls and self.map is None:
                 raise PlaceError(
                     ('map', first), f"door '{name}' has no position: expected an entry doors.{name}"
                 )
@@ -235,9 +253,20 @@ class FloorPlan:
 
     @property
     def bounds(self) -> tuple[float, float, float, float]:
-        """West, south, east and north edge of the walls' centre lines, metres."""
-        ends = np.array([end for wall in self.walls.values() for end in (wall.start, wall.end)])
-        (west, south), (east, north) = ends.min(axis=0), ends.max(axis=0)
+        """West, south, east and north edge of what is known of the place, metres.
+
+        The walls' centre lines and what its map knows; with neither, some metres around its points.
+        """
+        ends = [end for wall in self.walls.values() for end in (wall.start, wall.end)]
+        if self.map is not None:
+            west, south, east, north = self.map.grid.known
+            ends += [(west, south), (east, north)]
+        if not ends:
+            ends = [(x, y) for x, y, _ in self.place.positions.values()]
+            ends += [end for door in self.doors.values() for end in door.ends]
+            ends = [(x + d, y + d) for x, y in ends for d in (-_AROUND, _AROUND)]
+        corners = np.array(ends)
+        (west, south), (east, north) = corners.min(axis=0), corners.max(axis=0)
         return float(west), float(south), float(east), float(north)
 
 
@@ -274,15 +303,47 @@ def _row(value: object, columns: Sequence[str], *where: str) -> list[float]:
     return [_number(entry, *where) for entry in value]
 
 
+def _station(value: object, place: Place) -> Pose:
+    if not value and not isinstance(value, int | float | str):  # a node's parameter is [] then
+        x, y, _ = place.positions[next(iter(place.recharge_rooms), place.start)]
+        return x, y, 0.0
+    x, y, yaw = _row(value, ('x', 'y', 'yaw'), 'station')
+    return x, y, yaw
+
+
+def _map_of(parameters: Mapping[str, Any]) -> OccupancyMap | None:
+    """Read the map that a place refers to; a node has '', 0 and [] for what is not given."""
+    name = parameters.get('map_file') or ''
+    resolution = parameters.get('map_file_resolution') or None
+    origin = parameters.get('map_file_origin') or []
+    if not isinstance(name, str):
+        raise PlaceError(('map_file',), f"{name!r}: expected the name of a map's file")
+    if not name:
+        if resolution or origin:
+            which = 'map_file_resolution' if resolution else 'map_file_origin'
+            raise PlaceError((which,), 'is of no map: expected map_file, too')
+        return None
+    if resolution is not None:
+        resolution = _number(resolution, 'map_file_resolution')
+    if origin:
+        origin = _row(origin, ('x', 'y', 'yaw'), 'map_file_origin')
+    from surveillance_runtime.place.occupancy_map import read_map
+
+    try:
+        return read_map(name, resolution=resolution, origin=origin)
+    except FileError as error:
+        raise PlaceError(('map_file',), str(error)) from None
+
+
 def _rows(
-    parameters: Mapping[str, Any], section: str, columns: Sequence[str], required: bool = True
+    parameters: Mapping[str, Any], section: str, columns: Sequence[str]
 ) -> dict[str, list[float]]:
     entries = parameters.get(section)
-    if entries is None and not required:
+    if entries is None:
         return {}
     if not isinstance(entries, Mapping) or not entries:
         expected = f'expected NAME: [{", ".join(columns)}] for each'
-        raise PlaceError((section,), f'missing or empty: {expected}')
+        raise PlaceError((section,), f'empty: {expected}')
     return {str(name): _row(row, columns, section, str(name)) for name, row in entries.items()}
 
 

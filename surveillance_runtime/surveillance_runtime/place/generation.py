@@ -17,6 +17,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from surveillance_runtime.command_line import CommandParser
+from surveillance_runtime.place.writing import format_place
 
 Rectangle = tuple[float, float, float, float]
 """West, south, east and north edge, metres."""
@@ -138,27 +139,6 @@ def tree(columns: int, rows: int, rng: random.Random) -> dict[str, Any]:
             group[root(first)] = root(second)
             kept.append((first, second))
     return place_from_rectangles(_cells(columns, rows), kept, start='R1')
-
-
-def format_place(parameters: Mapping[str, Any], title: str) -> str:
-    """Return a place's parameters as the text of a ROS 2 parameter file."""
-    lines = [f'# {line}' for line in title.splitlines()]
-    lines += ['/**:', '  ros__parameters:']
-    for name, value in parameters.items():
-        if isinstance(value, Mapping):
-            lines.append(f'    {name}:')
-            lines += [f'      {key}: {_scalar(entry)}' for key, entry in value.items()]
-        else:
-            lines.append(f'    {name}: {_scalar(value)}')
-    return '\n'.join(lines) + '\n'
-
-
-def _scalar(value: object) -> str:
-    if isinstance(value, Sequence) and not isinstance(value, str):
-        return '[' + ', '.join(_scalar(entry) for entry in value) + ']'
-    if isinstance(value, float):
-        return repr(round(value, 7))
-    return str(value)
 
 
 def _cells(columns: int, rows: int) -> dict[str, Rectangle]:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -226,16 +227,19 @@ def draw(plan: FloorPlan, resolution: float = 0.05, margin: float = 0.5) -> Grid
     """Return the occupancy grid of a place.
 
     A cell is occupied when its centre lies within half a cell of a wall, unknown when no place
-    reaches it, else free.
+    reaches it, else free. A place with a map has the map's cells, with its own walls added; one
+    with neither is free all over.
 
     Args:
         plan: The place.
-        resolution: Side of a cell, metres.
+        resolution: Side of a cell, metres; that of a map is the map's own.
         margin: Width of the unknown border around the walls, metres.
     """
     import cv2
 
     solid = walled(plan, plan.wall_pieces(), resolution, margin)
+    if plan.map is not None or not plan.walls:
+        return solid
     reached = cv2.connectedComponents(solid.free.astype(np.uint8), connectivity=4)[1]
     inside = {reached[solid.cell_of(x, y)] for x, y, _ in plan.place.positions.values()} - {0}
     solid.cells[solid.free & ~np.isin(reached, list(inside))] = UNKNOWN
@@ -248,8 +252,16 @@ def walled(
     resolution: float = 0.05,
     margin: float = 0.5,
 ) -> Grid:
-    """Return a grid around a place on which walls stand along lines; all else is free."""
+    """Return a grid around a place on which walls stand along lines.
+
+    All else is free, or as the place's map has it.
+    """
     solid = boxes.boxes_around(lines, WALL_THICKNESS)
+    if plan.map is not None:
+        grid = plan.map.grid
+        cells = grid.cells.copy()
+        _paint(cells, grid.resolution, grid.origin, solid)
+        return Grid(cells, grid.resolution, grid.origin)
     west, south, east, north = plan.bounds
     # The corner of the grid falls on a multiple of the resolution: maps of one place line up.
     origin_x = math.floor((west - margin) / resolution) * resolution
@@ -257,14 +269,60 @@ def walled(
     columns = math.ceil((east + margin - origin_x) / resolution)
     rows = math.ceil((north + margin - origin_y) / resolution)
     cells = np.zeros((rows, columns), np.int8)
+    _paint(cells, resolution, (origin_x, origin_y), solid)
+    return Grid(cells, resolution, (origin_x, origin_y))
+
+
+def _paint(
+    cells: NDArray[np.int8], resolution: float, origin: tuple[float, float], solid: boxes.Array
+) -> None:
+    """Make the cells occupied that lie within half a cell of boxes."""
+    rows, columns = cells.shape
+    origin_x, origin_y = origin
     reach = resolution / 2
     for box, corners in zip(solid, boxes.corners(solid), strict=True):
         low = np.floor((corners.min(axis=0) - reach - (origin_x, origin_y)) / resolution)
         high = np.ceil((corners.max(axis=0) + reach - (origin_x, origin_y)) / resolution)
         first_column, first_row = np.maximum(low.astype(int), 0)
         last_column, last_row = np.minimum(high.astype(int), (columns, rows))
+        if first_column >= last_column or first_row >= last_row:
+            continue
         x = origin_x + (np.arange(first_column, last_column) + 0.5) * resolution
         y = origin_y + (np.arange(first_row, last_row) + 0.5) * resolution
         inside = boxes.distances(box[None], x[None, :], y[:, None])[..., 0] < reach - 1e-9
         cells[first_row:last_row, first_column:last_column][inside] = OCCUPIED
-    return Grid(cells, resolution, (origin_x, origin_y))
+
+
+def outlines(grid: Grid, tolerance: float) -> list[Points]:
+    """Return the outlines of what is occupied, each a closed line (n, 2), metres.
+
+    Args:
+        grid: The map.
+        tolerance: How far a line may run beside the edges of the cells, metres.
+    """
+    import cv2
+
+    rows, columns = grid.cells.shape
+    fine = np.zeros((rows + 2, columns + 2), np.uint8)
+    fine[1:-1, 1:-1] = grid.occupied
+    found = cv2.findContours(fine, cv2.RETR_LIST, cv2.CHAIN_APPROX_NONE)[0]
+    lines = []
+    for contour in found:
+        short = cv2.approxPolyDP(contour, tolerance / grid.resolution, True).reshape(-1, 2)
+        points = (short.astype(float) - 0.5) * grid.resolution + grid.origin
+        lines.append(np.vstack([points, points[:1]]))
+    return lines
+
+
+def solid_lines(plan: FloorPlan) -> list[tuple[Point, Point]]:
+    """Return the centre lines of all that stands in a place with its doors open, metres.
+
+    The walls' pieces, and the outlines of what its map shows.
+    """
+    lines = list(plan.wall_pieces())
+    if plan.map is not None:
+        for outline in outlines(plan.map.grid, plan.map.resolution):
+            for (x1, y1), (x2, y2) in pairwise(outline.tolist()):
+                if (x1, y1) != (x2, y2):
+                    lines.append(((x1, y1), (x2, y2)))
+    return lines

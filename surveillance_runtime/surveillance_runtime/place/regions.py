@@ -12,8 +12,11 @@ import numpy as np
 import numpy.typing as npt
 
 from surveillance_runtime.place.floor_plan import WALL_THICKNESS, FloorPlan
-from surveillance_runtime.place.occupancy_grid import distance_to, draw, regions, walled
+from surveillance_runtime.place.occupancy_grid import UNKNOWN, distance_to, draw, regions, walled
 from surveillance_runtime.place.rooms import PlaceError
+
+_LARGE = 1.0
+"""A part of the floor from this size on that no point lies in is no part of a room, m^2."""
 
 
 class Regions:
@@ -31,10 +34,15 @@ class Regions:
         self._plan = plan
         lines = plan.wall_pieces() + [door.ends for door in plan.doors.values()]
         self.grid = walled(plan, lines)
-        self._labels = regions(self.grid.free)
-        self._names = self._named()
-        self._check_doors()
-        self._check_station()
+        if plan.walls and plan.map is None:
+            self._labels = regions(self.grid.free)
+            self._names = self._named()
+        else:
+            self._names = dict(enumerate(plan.place.positions, start=1))
+            self._labels = self._divided()
+        if plan.is_enclosed:
+            self._check_doors()
+            self._check_station()
 
     def room_at(self, x: float, y: float) -> str | None:
         """Return the room that a point (metres) lies in, None outside of every room."""
@@ -65,14 +73,70 @@ class Regions:
             names[label] = room
         return names
 
+    def _divided(self) -> npt.NDArray[np.int32]:
+        """Return each cell's room by its number in `_names`, 0 in none, on a map or an open floor.
+
+        The lines of doors cut what is free into parts; a part is the room whose point lies in it,
+        and where several do (no door is drawn between them) the nearest one's. What is not free,
+        and a small part with no point, as the floor below a table, belongs to the nearest room.
+        """
+        import cv2
+
+        grid, positions = self.grid, self._plan.place.positions
+        free = grid.free
+        parts, stats = cv2.connectedComponentsWithStats(
+            free.astype(np.uint8), connectivity=4, ltype=cv2.CV_32S
+        )[1:3]
+        inside: dict[int, list[int]] = {}
+        for number, room in self._names.items():
+            x, y, _ = positions[room]
+            if not grid.at(free, x, y):
+                unknown = grid.at(grid.cells, x, y) in (None, UNKNOWN)
+                found = 'outside of what the map knows' if unknown else 'in a wall or a door'
+                raise PlaceError(
+                    ('room_positions', room),
+                    f'({x:g}, {y:g}) lies {found}: expected free space',
+                )
+            inside.setdefault(grid.at(parts, x, y), []).append(number)
+        number_of_part = np.full(len(stats), -1, np.int32)
+        for part, numbers in inside.items():
+            number_of_part[part] = numbers[0]
+        large = stats[:, cv2.CC_STAT_AREA] * grid.resolution**2 >= _LARGE
+        number_of_part[large & (number_of_part < 0)] = 0
+        number_of_part[0] = -1
+        labels: npt.NDArray[np.int32] = number_of_part[parts]
+        for part, numbers in inside.items():
+            if len(numbers) > 1:
+                cells = np.argwhere(parts == part)
+                centres = grid.centres_of(cells)
+                points = np.array([positions[self._names[number]][:2] for number in numbers])
+                away = np.stack([np.hypot(*(centres - point).T) for point in points])
+                labels[cells[:, 0], cells[:, 1]] = np.array(numbers)[np.argmin(away, axis=0)]
+        nearest = cv2.distanceTransformWithLabels(
+            (labels < 0).astype(np.uint8),
+            cv2.DIST_L2,
+            cv2.DIST_MASK_5,
+            labelType=cv2.DIST_LABEL_PIXEL,
+        )[1]
+        seeds = np.zeros(int(nearest.max()) + 1, np.int32)
+        known = labels >= 0
+        seeds[nearest[known]] = labels[known]
+        return np.asarray(seeds[nearest], dtype=np.int32)
+
     def _check_doors(self) -> None:
+        # Beside the door of a map there may stand something, and its cells may be large.
+        far = () if self._plan.map is None else (0.3, 0.5)
+        reach = max(WALL_THICKNESS, 2 * self.grid.resolution)
         for room, doors in self._plan.place.rooms.items():
             for name in doors:
-                door = self._plan.doors[name]
+                door = self._plan.doors.get(name)
+                if door is None:
+                    continue  # has no position, as it may where there are no walls
                 across = (-math.sin(door.yaw), math.cos(door.yaw))
                 sides = {
                     self.room_at(door.x + step * across[0], door.y + step * across[1])
-                    for step in (-WALL_THICKNESS, WALL_THICKNESS)
+                    for away in (reach, *far)
+                    for step in (-away, away)
                 }
                 if room not in sides:
                     found = ' and '.join(sorted(side or 'outside' for side in sides))
@@ -112,8 +176,10 @@ def check_passable(plan: FloorPlan, radius: float) -> None:
                 f'width {door.width:g} m: expected more than {2 * radius:g} m, '
                 f'as the robot is {2 * radius:g} m wide',
             )
+    if not plan.is_enclosed:
+        return
     grid = draw(plan)
-    clearance = distance_to(grid.occupied, grid.resolution)
+    clearance = distance_to(~grid.free if plan.map is not None else grid.occupied, grid.resolution)
     # A cell's centre may be half a cell farther from the wall than the wall's own surface.
     fits = (clearance > radius - grid.resolution / 2).astype(np.uint8)
     pieces = cv2.connectedComponents(fits, connectivity=8)[1]

@@ -17,7 +17,10 @@ from surveillance_runtime.suggestions import nearest
 from surveillance_runtime.yaml_file import KeyPath
 
 PLACE_KEYS = ('map', 'room_positions', 'robot_room', 'recharge_rooms')
-GEOMETRY_KEYS = ('walls', 'doors', 'markers', 'marker_size', 'marker_dictionary', 'station')
+GEOMETRY_KEYS = (
+    *('walls', 'doors', 'markers', 'marker_size', 'marker_dictionary', 'station'),
+    *('map_file', 'map_file_resolution', 'map_file_origin'),
+)
 PLACE_TABLES = ('map', 'room_positions', 'walls', 'doors', 'markers')
 """Those that hold an entry for each room, wall, door or marker: `map.R1`, `map.R2`, ..."""
 _NAME = re.compile(r'[A-Za-z_][A-Za-z0-9_-]*\Z')
@@ -225,7 +228,8 @@ def tables_of(parameters: Iterable[tuple[str, Any]]) -> dict[str, Any]:
         elif entry:
             described.setdefault(table, {})[entry] = value
         else:
-            raise PlaceError((table,), f'got {_shown(value)}, expected NAME: [...] for each')
+            hint = "; a map's file is map_file: NAME" if table == 'map' else ''
+            raise PlaceError((table,), f'got {_shown(value)}, expected NAME: [...] for each{hint}')
     return described
 
 
@@ -281,6 +285,8 @@ def _position(where: KeyPath, value: Any) -> Position:
 def _check_graph(place: Place) -> None:
     for door, sides in place.doors.items():
         where = ('map', sides[0])
+        if len(sides) == 1 and len(place.rooms) == 1:
+            continue  # the door of the only room leads out of the place
         if len(sides) == 1:
             raise PlaceError(where, f"door '{door}' is in only one place, {sides[0]}; expected two")
         if len(sides) > 2:

@@ -15,6 +15,7 @@ import numpy.typing as npt
 
 from surveillance_runtime.place import boxes
 from surveillance_runtime.place.floor_plan import WALL_HEIGHT, WALL_THICKNESS, Door
+from surveillance_runtime.place.occupancy_grid import solid_lines
 from surveillance_simulation.camera.model import Array, Camera
 from surveillance_simulation.camera.scene import DOOR_HEIGHT, OBSTACLE_HEIGHT, STATION_SIDE
 from surveillance_simulation.world import textures
@@ -111,7 +112,7 @@ def _model(world: World, camera: Camera) -> Any:
     plaster = (textures.plaster() * world.wall_brightness).astype(np.uint8)
     _material(spec, 'plaster', plaster, mujoco.mjtTexture.mjTEXTURE_CUBE)
     _material(spec, 'leaf', textures.leaf(), mujoco.mjtTexture.mjTEXTURE_CUBE)
-    for start, end in world.plan.wall_pieces():
+    for start, end in solid_lines(world.plan):
         _box(spec, start, end, 0.0, WALL_HEIGHT, 'plaster')
     for door in world.plan.doors.values():
         _door(spec, door, is_open=world.is_open(door.name))

@@ -11,6 +11,7 @@ import numpy as np
 
 from surveillance_runtime.place import boxes
 from surveillance_runtime.place.floor_plan import WALL_HEIGHT, WALL_THICKNESS, Door
+from surveillance_runtime.place.occupancy_grid import solid_lines
 from surveillance_simulation.camera.model import Array
 from surveillance_simulation.world import textures
 from surveillance_simulation.world.textures import TILE, Texture
@@ -55,7 +56,7 @@ def faces_of(world: World) -> list[Face]:
     """
     plan = world.plan
     faces = list(_floor(plan.bounds))
-    for start, end in plan.wall_pieces():
+    for start, end in solid_lines(plan):
         faces += _box(start, end, WALL_THICKNESS, 0.0, WALL_HEIGHT, None)
     for door in plan.doors.values():
         faces += _door(door, is_open=world.is_open(door.name))

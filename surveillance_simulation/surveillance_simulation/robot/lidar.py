@@ -2,7 +2,7 @@
 
 Every ray is cut with every box at once (slab method: the ray enters a box where it has passed the
 nearer face of both pairs of faces) and with every disc (quadratic equation). Only what is within
-range is looked at.
+range is looked at. What a map shows is met on the way along the rays.
 """
 
 from __future__ import annotations
@@ -60,6 +60,8 @@ def scan(
     direction = np.stack([np.cos(angles), np.sin(angles)])
     near = boxes.distances(world.solid, x, y) <= model.range_max
     distance = _to_boxes(world.solid[near], x, y, direction)
+    if world.surface is not None:
+        distance = np.minimum(distance, world.surface.ranges(x, y, direction, model.range_max))
     discs = world.discs
     if len(discs):
         distance = np.minimum(distance, _to_discs(discs, x, y, direction))

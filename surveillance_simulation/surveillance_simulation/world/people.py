@@ -157,9 +157,14 @@ class _Ways:
     def __init__(self, plan: FloorPlan, reach: float) -> None:
         self._points = {name: (x, y) for name, (x, y, _) in plan.place.positions.items()}
         grid = self._grid = occupancy_grid.draw(plan, _CELL)
+        self._cell = grid.resolution  # that of a map is the map's own
         rows, columns = np.indices(grid.cells.shape)
-        x, y = (columns + 0.5) * _CELL + grid.origin[0], (rows + 0.5) * _CELL + grid.origin[1]
+        x = (columns + 0.5) * self._cell + grid.origin[0]
+        y = (rows + 0.5) * self._cell + grid.origin[1]
         clearance = np.full(grid.cells.shape, np.inf)
+        if plan.map is not None:
+            away = occupancy_grid.distance_to(grid.occupied, self._cell)
+            clearance = away.astype(np.float64) - self._cell / 2
         for box in boxes.boxes_around(plan.wall_pieces(), WALL_THICKNESS):
             np.minimum(clearance, boxes.distances(box[None], x, y)[..., 0], out=clearance)
         self._free = (clearance >= reach) & (grid.cells == occupancy_grid.FREE)
@@ -179,7 +184,7 @@ class _Ways:
     def left(self, goal: str, at: Point) -> float:
         """Return how much of the way to a room is left, metres; a way near walls counts more."""
         row, column = self._grid.cell_of(*at)
-        return _CELL * float(self._to(goal).left[row, column])
+        return self._cell * float(self._to(goal).left[row, column])
 
     def direction(self, goal: str, at: Point) -> float:
         """Return the direction of the way from a point to a room, rad."""

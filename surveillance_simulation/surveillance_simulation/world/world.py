@@ -22,6 +22,7 @@ from surveillance_runtime.place.floor_plan import (
 )
 from surveillance_runtime.place.regions import Regions
 from surveillance_runtime.suggestions import nearest
+from surveillance_simulation.world.map_surface import MapSurface
 
 MARKER_STATES = ('whole', 'broken', 'covered')
 
@@ -75,6 +76,7 @@ class World:
         self._people: boxes.Array = np.zeros((0, 3))
         self._panels = {name: Panel(marker) for name, marker in plan.markers.items()}
         self._walls = boxes.boxes_around(plan.wall_pieces(), WALL_THICKNESS)
+        self._surface = None if plan.map is None else MapSurface(plan.map.grid)
         self.regions = Regions(plan)
         self._refresh()
 
@@ -94,6 +96,11 @@ class World:
     def solid(self) -> boxes.Array:
         """Walls and closed doors as boxes (n, 6)."""
         return self._solid
+
+    @property
+    def surface(self) -> MapSurface | None:
+        """What stands in the place by its map; None where it has none."""
+        return self._surface
 
     @property
     def discs(self) -> boxes.Array:
@@ -201,7 +208,9 @@ class World:
 
     def clearance(self, x: float, y: float) -> float:
         """Return the distance from a point to the nearest solid surface, 0 inside one, metres."""
-        nearest = float(boxes.distances(self._solid, x, y).min())
+        nearest = float(boxes.distances(self._solid, x, y).min(initial=math.inf))
+        if self._surface is not None:
+            nearest = min(nearest, self._surface.clearance(x, y))
         if len(self._discs):
             centre = np.hypot(self._discs[:, 0] - x, self._discs[:, 1] - y)
             nearest = min(nearest, float((centre - self._discs[:, 2]).min()))
@@ -238,6 +247,4 @@ def read_world(path: str | Path) -> World:
     Raises:
         FileError: The file cannot be read, or describes no sound place; one line.
     """
-    plan = read_place_file(path, walls=True).plan
-    assert plan is not None, 'walls were asked for'
-    return World(plan)
+    return World(read_place_file(path).plan)
