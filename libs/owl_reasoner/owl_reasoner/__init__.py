@@ -24,6 +24,8 @@ if TYPE_CHECKING:
     from owl_reasoner.documents.xml_reading import OntologyFileError as OntologyFileError
     from owl_reasoner.knowledge_base import Changes as Changes
     from owl_reasoner.knowledge_base import KnowledgeBase as KnowledgeBase
+    from owl_reasoner.reasoner.budget import Progress as Progress
+    from owl_reasoner.reasoner.budget import ReasoningBudgetError as ReasoningBudgetError
     from owl_reasoner.reasoner.explanation import Explanation as Explanation
 
 _HOME = {
@@ -32,6 +34,8 @@ _HOME = {
     'KnowledgeBase': 'knowledge_base',
     'OntologyDocument': 'documents.reading',
     'OntologyFileError': 'documents.xml_reading',
+    'Progress': 'reasoner.budget',
+    'ReasoningBudgetError': 'reasoner.budget',
     'ontology_bytes': 'documents.writing',
     'read_ontology': 'documents.reading',
     'write_ontology': 'documents.writing',

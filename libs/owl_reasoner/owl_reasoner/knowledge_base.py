@@ -20,7 +20,7 @@ from functools import partial
 from typing import Any, TypeAlias
 
 from owl_reasoner.memory import uncollected
-from owl_reasoner.owl.assertions import Assertions, is_assertion
+from owl_reasoner.owl.assertions import Assertions, Unsettled, is_assertion
 from owl_reasoner.owl.axiom_text import axiom_text
 from owl_reasoner.owl.axioms import (
     Annotation,
@@ -38,6 +38,7 @@ from owl_reasoner.owl.entities import entities_of, renamed
 from owl_reasoner.owl.expressions import ClassExpression, Literal
 from owl_reasoner.owl.vocabulary import NOTHING, THING
 from owl_reasoner.reasoner.absence import Absence, Absences
+from owl_reasoner.reasoner.budget import Budget, Cancel, Progress, ReasoningBudgetError
 from owl_reasoner.reasoner.cases import entails
 from owl_reasoner.reasoner.classification import Classification
 from owl_reasoner.reasoner.clauses import Fact as StoredFact
@@ -101,19 +102,32 @@ class Feed:
         """Return what subscribers know of derived facts, before `engine` is given up."""
         return visible(engine) if self._shown is None else self._shown
 
+    def given_up(self, engine: Engine | None) -> None:
+        """Remember what subscribers know, where `engine` and what it shows is given up."""
+        self._shown = self.shown_by(engine)
+
     def replaced(self, before: set[Axiom], engine: Engine) -> None:
         """Tell what a new engine shows that the old one did not, and the reverse."""
         after = self._show(engine)
         self._derived(engine, after - before, before - after)
 
     def updating(self, engine: Engine, update: Callable[[], None]) -> None:
-        """Run an engine's update and tell what it changed."""
+        """Run an engine's update and tell what it changed.
+
+        Where the update ends with an error nobody is told anything: what was shown before it is
+        remembered until another engine shows something.
+        """
         before = self._shown
         log: dict[StoredFact, bool] = {}
         engine.changed, engine.renamed = log, False
-        update()
-        engine.changed = None
         view = FactView(engine)
+        try:
+            update()
+        except BaseException:
+            self._shown = _before(engine, view, log) if before is None else before
+            raise
+        finally:
+            engine.changed = None
         if before is not None or engine.renamed or not engine.consistent:
             if before is None:
                 before = _before(engine, view, log)
@@ -159,6 +173,7 @@ def justify(
     schema: Iterable[Axiom],
     assumed: tuple[Axiom, ...] = (),
     until: float = math.inf,
+    clock: Callable[[], float] = time.monotonic,
 ) -> tuple[Axiom, ...]:
     """Return a smallest set of axioms from which a goal follows (Junker, "QuickXplain", AAAI 2004).
 
@@ -168,7 +183,8 @@ def justify(
         likely: Axioms that a proof uses; with the schema they are tried first.
         schema: The axioms that are not about individuals.
         assumed: Axioms that are there in any case.
-        until: Steady time after which axioms that are not needed may be left in.
+        until: Time by the clock after which axioms that are not needed may be left in.
+        clock: A steady clock, in seconds.
     """
     fixed = list(assumed)
 
@@ -185,7 +201,7 @@ def justify(
             fixed = list(assumed)
             if not enough(candidates):
                 candidates = [*declared, *candidates]
-            return tuple(_fewest(candidates, enough, until))
+            return tuple(_fewest(candidates, enough, lambda: clock() > until))
     return ()
 
 
@@ -203,14 +219,16 @@ def follows(axioms: Iterable[Axiom], goal: Axiom | None) -> bool:
 
 
 def _fewest(
-    candidates: list[Axiom], follows: Callable[[Iterable[Axiom]], bool], until: float
+    candidates: list[Axiom],
+    follows: Callable[[Iterable[Axiom]], bool],
+    is_late: Callable[[], bool],
 ) -> list[Axiom]:
     """Return the candidates without those that are not needed, as far as the time allows."""
 
     def narrow(known: list[Axiom], changed: bool, rest: list[Axiom]) -> list[Axiom]:
         if changed and follows(known):
             return []
-        if len(rest) == 1 or time.monotonic() > until:
+        if len(rest) == 1 or is_late():
             return rest
         middle = len(rest) // 2
         first, second = rest[:middle], rest[middle:]
@@ -254,6 +272,7 @@ class KnowledgeBase:
     Args:
         iri: The ontology's IRI.
         axioms: The first assertions.
+        clock: A steady clock, in seconds.
 
     Attributes:
         iri: The ontology's IRI.
@@ -262,8 +281,14 @@ class KnowledgeBase:
         patience: Seconds after which `explain` looks no further for axioms that it can do without.
     """
 
-    def __init__(self, iri: str, axioms: Iterable[Axiom] = ()) -> None:
+    def __init__(
+        self,
+        iri: str,
+        axioms: Iterable[Axiom] = (),
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
         self.iri = iri
+        self._clock, self._budget = clock, Budget(clock)
         self.classified = 0
         self.patience = math.inf
         self._told = Assertions()
@@ -274,6 +299,7 @@ class KnowledgeBase:
         self._snapshots: dict[str, frozenset[str]] = {}
         self._watched: set[Predicate] = set()
         self._feed = Feed()
+        self._interrupted = False
         for axiom in axioms:
             self._told.insert(axiom)
 
@@ -337,7 +363,9 @@ class KnowledgeBase:
 
     @property
     def stale(self) -> bool:
-        """Whether assertions changed since the last `reason`."""
+        """Whether assertions changed since the last `reason` that completed."""
+        if self._interrupted:
+            return True
         return bool(self._told.added or self._told.removed or self._told.schema_changed)
 
     @property
@@ -608,7 +636,9 @@ class KnowledgeBase:
             return known is not None and known.is_impossible(sub)
         return sup in (sub, THING, *self.superclasses(sub))
 
-    def entails(self, axiom: Axiom) -> bool:
+    def entails(
+        self, axiom: Axiom, timeout: float = math.inf, cancel: Cancel | None = None
+    ) -> bool:
         """Whether an axiom of any kind follows from what is asserted now.
 
         Unlike `holds` it searches a model without the axiom, which takes longer.
@@ -617,7 +647,11 @@ class KnowledgeBase:
             UnsupportedError: The axiom is a key, a rule, a datatype definition or about anonymous
                 individuals, or compares data properties.
         """
-        return self.holds(axiom) or bool(entails(self._told.axioms, axiom))
+        self._budget.begin(timeout, cancel)
+        try:
+            return self.holds(axiom) or bool(entails(self._told.axioms, axiom, self._budget))
+        finally:
+            self._budget.finish()
 
     def explain(self, fact: Axiom) -> Explanation | None:
         """Return why a fact holds; None when it is neither asserted nor derived.
@@ -694,10 +728,12 @@ class KnowledgeBase:
         self, goal: Axiom | None, proof: Explanation | None
     ) -> tuple[tuple[Axiom, ...], bool]:
         """Return the axioms to which a fact is owed, and whether they are the fewest."""
-        until = time.monotonic() + self.patience
+        until = self._clock() + self.patience
         likely = proof.sources() if proof else ()
-        needed = justify(self._told.axioms, goal, likely, self._told.schema, until=until)
-        return needed, time.monotonic() <= until
+        needed = justify(
+            self._told.axioms, goal, likely, self._told.schema, until=until, clock=self._clock
+        )
+        return needed, self._clock() <= until
 
     def _schema_axioms(self, assumed: tuple[Axiom, ...], goal: Axiom | None) -> tuple[Axiom, ...]:
         """Return the axioms about classes and properties by which assumptions imply something."""
@@ -766,8 +802,80 @@ class KnowledgeBase:
 
     # --- reasoning ---
 
-    def reason(self) -> bool:
-        """Bring what is derived up to date; return whether the ontology is consistent."""
+    def reason(
+        self,
+        timeout: float = math.inf,
+        cancel: Cancel | None = None,
+        progress: Callable[[Progress], None] | None = None,
+        *,
+        memory: float = math.inf,
+        steps: float = math.inf,
+    ) -> bool:
+        """Bring what is derived up to date; return whether the ontology is consistent.
+
+        A reasoning that ends early leaves the assertions as they are, what changed among them
+        included, and gives up what had been derived: queries answer from the assertions alone
+        until `reason` completes, and subscribers are told nothing. `revert` takes back what
+        changed since the last `reason` that completed; the next one then takes as long as the
+        ontology took when it was new.
+
+        Args:
+            timeout: Seconds after which to end, by the knowledge base's clock.
+            cancel: An event, or a function, that tells whether to end; asked from this thread.
+            progress: Called about ten times a second.
+            memory: Bytes by which the process may grow; looked at on Linux alone.
+            steps: Units of work after which to end, each of about a microsecond. The same work
+                takes the same number on every machine.
+
+        Raises:
+            ReasoningBudgetError: A limit was passed, or `cancel` said so; it names the axiom or
+                rule at work. With `memory` as limit, also where the system gave none.
+        """
+        changes, before = self._told.unsettled(), self._engine
+        budget = self._budget
+        budget.begin(timeout, cancel, progress, memory, steps)
+        try:
+            self._bring_up_to_date()
+            self._told.settle()
+            self._interrupted = False
+            return self._consistent
+        except BaseException as error:
+            where = budget.at_work() or budget.stage
+            self._give_up_derived(before, changes)
+            if isinstance(error, MemoryError):
+                message = 'reasoning took all memory that there is'
+                raise ReasoningBudgetError('memory', message, where) from None
+            raise
+        finally:
+            budget.finish()
+
+    def _give_up_derived(self, before: Engine | None, changes: Unsettled) -> None:
+        """Forget an engine that an error left in the middle of its work."""
+        if self._feed:
+            self._feed.given_up(before)
+        self._engine = self._completion = self._classification = None
+        self._interrupted = True
+        self._snapshots.clear()
+        self._watched.clear()
+        self._told.unsettle(changes)
+
+    def revert(self) -> int:
+        """Take back every change since the last `reason` that completed.
+
+        Returns:
+            The number of axioms that changed.
+        """
+        changes = self._told.unsettled()
+        come, gone = (
+            (*changes.schema_added, *changes.added),
+            (
+                *changes.schema_removed,
+                *changes.removed,
+            ),
+        )
+        return self.change(gone, come)
+
+    def _bring_up_to_date(self) -> None:
         engine, told = self._engine, self._told
         if engine is None or told.schema_changed or not self._fits(engine):
             self._classify()
@@ -779,7 +887,6 @@ class KnowledgeBase:
                 self._rebuild(engine)
         elif told.added or told.removed:
             self._update(engine, partial(engine.update, *told.settle()))
-        return self._consistent
 
     def _fits(self, engine: Engine) -> bool:
         """Tell whether the program was made for every complex class and negated property that was
@@ -797,7 +904,7 @@ class KnowledgeBase:
     def _classify(self) -> None:
         self.classified += 1
         needs = Engine.needs_of(self._told.complex)
-        self._classification = Classification(self._told.schema, *needs)
+        self._classification = Classification(self._told.schema, *needs, self._budget)
 
     def _change_of(self, engine: Engine | None) -> ProgramChange | None:
         """Return what an engine needs for the new classification; None: it must be made anew."""
@@ -834,7 +941,7 @@ class KnowledgeBase:
     def _rebuild(self, old: Engine | None) -> None:
         before = self._feed.shown_by(old) if self._feed else set()
         assert self._classification is not None
-        engine = self._engine = Engine(self._classification.program, self._told)
+        engine = self._engine = Engine(self._classification.program, self._told, self._budget)
         if old is not None:
             engine.take_spelling(old)
         self._told.settle()
@@ -878,4 +985,4 @@ class KnowledgeBase:
 
     def copy(self) -> KnowledgeBase:
         """Another knowledge base with the same assertions, nothing derived and no subscribers."""
-        return KnowledgeBase(self.iri, self._told.axioms)
+        return KnowledgeBase(self.iri, self._told.axioms, self._clock)

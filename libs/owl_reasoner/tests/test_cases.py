@@ -14,6 +14,7 @@ from owl_reasoner.owl.axiom_text import axiom_text
 from owl_reasoner.owl.axioms import Axiom, ClassAssertion, SubClassOf
 from owl_reasoner.owl.expressions import Literal
 from owl_reasoner.owl.vocabulary import NOTHING, SWRLB, THING, TOP_LITERAL, XSD
+from owl_reasoner.reasoner.budget import Budget
 from owl_reasoner.reasoner.cases import CaseReasoner, UnsupportedError, entails
 
 from .wide_ontologies import INDIVIDUALS, PlainOntology, WideOntology
@@ -334,9 +335,9 @@ def test_a_value_that_nobody_asks_for_needs_no_cases(monkeypatch: pytest.MonkeyP
     asked: list[object] = []
 
     class Counted(CaseReasoner):
-        def __init__(self, axioms: list[Axiom]) -> None:
+        def __init__(self, axioms: list[Axiom], budget: Budget) -> None:
             asked.append(axioms)
-            super().__init__(axioms)
+            super().__init__(axioms, budget=budget)
 
     monkeypatch.setattr('owl_reasoner.reasoner.completion.CaseReasoner', Counted)
     value = [SubClassOf(A, ex.ObjectHasValue(P, k)), ax.SubObjectPropertyOf(P, Q)]

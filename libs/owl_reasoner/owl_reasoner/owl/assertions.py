@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from itertools import count
+from typing import NamedTuple
 
 from owl_reasoner.owl.axioms import (
     Annotation,
@@ -24,6 +25,16 @@ from owl_reasoner.owl.entities import entities_of
 from owl_reasoner.owl.vocabulary import THING
 
 
+class Unsettled(NamedTuple):
+    """What changed since `Assertions.settle`, as it names it."""
+
+    added: dict[Axiom, None]
+    removed: dict[Axiom, None]
+    schema_added: dict[Axiom, None]
+    schema_removed: dict[Axiom, None]
+    schema_changed: bool
+
+
 class Assertions:
     """A set of axioms.
 
@@ -35,6 +46,7 @@ class Assertions:
             classes, and negative ones.
         added, removed: What changed about individuals since `settle`.
         schema_changed: Whether anything else that matters to a reasoner changed since `settle`.
+        schema_added, schema_removed: What changed since `settle` and is not about individuals.
     """
 
     def __init__(self) -> None:
@@ -45,16 +57,36 @@ class Assertions:
         self.added: dict[Axiom, None] = {}
         self.removed: dict[Axiom, None] = {}
         self.schema_changed = True
+        self.schema_added: dict[Axiom, None] = {}
+        self.schema_removed: dict[Axiom, None] = {}
         self._numbers = count(1)
         self._notes: dict[Axiom, dict[AxiomAnnotation, None]] = {}
 
     def settle(self) -> tuple[tuple[Axiom, ...], tuple[Axiom, ...]]:
         """Take what was added and removed; from here on, nothing changed."""
         changes = tuple(self.added), tuple(self.removed)
-        self.added.clear()
-        self.removed.clear()
+        # New ones: `unsettled` gave the old ones away.
+        self.added, self.removed = {}, {}
+        self.schema_added, self.schema_removed = {}, {}
         self.schema_changed = False
         return changes
+
+    def unsettled(self) -> Unsettled:
+        """Return what changed since `settle`."""
+        return Unsettled(
+            self.added,
+            self.removed,
+            self.schema_added,
+            self.schema_removed,
+            self.schema_changed,
+        )
+
+    def unsettle(self, changes: Unsettled) -> None:
+        """Take `settle` back: what changed before it counts as changed since."""
+        self.added, self.removed = dict(changes.added), dict(changes.removed)
+        self.schema_added = dict(changes.schema_added)
+        self.schema_removed = dict(changes.schema_removed)
+        self.schema_changed = changes.schema_changed
 
     def mentioning(self, entity: str) -> Iterable[Axiom]:
         """Return the axioms that mention an entity, oldest first."""
@@ -82,6 +114,10 @@ class Assertions:
                 self.complex[axiom] = None
             return True
         self.schema[axiom] = None
+        if axiom in self.schema_removed:
+            del self.schema_removed[axiom]
+        else:
+            self.schema_added[axiom] = None
         if isinstance(axiom, AxiomAnnotation):
             self._notes.setdefault(axiom.axiom, {})[axiom] = None
         elif _is_schema(axiom):
@@ -110,6 +146,10 @@ class Assertions:
             self.complex.pop(axiom, None)
             return True
         del self.schema[axiom]
+        if axiom in self.schema_added:
+            del self.schema_added[axiom]
+        else:
+            self.schema_removed[axiom] = None
         if isinstance(axiom, AxiomAnnotation):
             notes = self._notes[axiom.axiom]
             del notes[axiom]

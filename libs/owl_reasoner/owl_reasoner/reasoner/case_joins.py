@@ -169,14 +169,26 @@ class CaseJoins:
         if any(map(self._model.is_gone, nodes)):
             return
         self._origin = plan.rule.origin
+        self._model.budget.at_work = self._name_rule
         found = [_Match({}, choices, ())]
         for term, node in zip(plan.atom.terms, nodes, strict=True):
             found = [more for match in found for more in self._bind(match, term, node)]
-        for atom in plan.order:
-            found = [more for match in found for more in self._ways(atom, match)]
-        for match in found:
+        # All at once: what a match states may change what the atoms are compared with.
+        for match in [match for first in found for match in self._joined(plan.order, 0, first)]:
             self._model.step()
             self._fire(plan.rule, match)
+
+    def _joined(self, order: tuple[NamedAtom, ...], place: int, match: _Match) -> Iterator[_Match]:
+        """Return the ways in which all atoms from a place on hold."""
+        self._model.budget.tick()
+        if place == len(order):
+            yield match
+            return
+        for more in self._ways(order[place], match):
+            yield from self._joined(order, place + 1, more)
+
+    def _name_rule(self) -> str:
+        return axiom_text(self._origin)
 
     def _bind(self, match: _Match, term: Term, node: Any) -> Iterator[_Match]:
         """Let a term stand for an individual, where it may; values are compared by `_equal`."""

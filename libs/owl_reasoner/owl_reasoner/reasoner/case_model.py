@@ -49,6 +49,7 @@ class CaseModel:
 
     def __init__(self, rules: CaseRules, most_steps: int) -> None:
         self.rules, self._most_steps, self.steps = rules, most_steps, 0
+        self.budget = rules.budget
         self.labels: dict[int, dict[int, Choices]] = {}
         self.out: dict[int, dict[int, dict[int, Choices]]] = {}
         self.names: dict[int, tuple[str, ...]] = {}
@@ -99,8 +100,14 @@ class CaseModel:
         self.revalue.clear()
 
     def step(self) -> None:
-        """Count one step of the search."""
+        """Count one step of the search.
+
+        Raises:
+            StoppedError: So many steps were taken.
+            ReasoningBudgetError: A limit of the whole reasoning is passed.
+        """
         self.steps += 1
+        self.budget.tick()
         if self.steps > self._most_steps:
             raise StoppedError
 

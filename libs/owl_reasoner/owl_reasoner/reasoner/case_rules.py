@@ -30,6 +30,7 @@ from owl_reasoner.owl.vocabulary import (
     TOP_DATA,
     TOP_LITERAL,
 )
+from owl_reasoner.reasoner.budget import Budget
 from owl_reasoner.reasoner.clauses import (
     ComputedAtom,
     Constant,
@@ -182,9 +183,12 @@ class CaseRules:
         gaps: One sentence for each axiom that is not fully covered.
         tested: One for each with a range that single values alone can be tested for.
         has_inverse: Whether any role is used backwards.
+        budget: What the search may use.
     """
 
-    def __init__(self, axioms: Iterable[Axiom]) -> None:
+    def __init__(self, axioms: Iterable[Axiom], budget: Budget | None = None) -> None:
+        self.budget = budget or Budget()
+        self.budget.at_work = self._subject
         axioms = list(axioms)
         tbox = [axiom for axiom in axioms if not isinstance(axiom, (ax.Assertion, ax.Annotation))]
         self.names: list[str] = ['']
@@ -243,10 +247,14 @@ class CaseRules:
 
     def _attempt(self, axiom: Axiom, take: Callable[[Axiom], None]) -> None:
         self._origin = axiom
+        self.budget.tick()
         try:
             take(axiom)
         except UnsupportedError as reason:
             self.gaps[f'{axiom_text(axiom)}: {reason}'] = None
+
+    def _subject(self) -> str:
+        return '' if self._origin is None else axiom_text(self._origin)
 
     # --- numbers ---
 

@@ -151,10 +151,12 @@ class CaseSearch:
     def _saturate(self) -> None:
         model = self.model
         queue, recount, revalue, is_gone = model.queue, model.recount, model.revalue, model.is_gone
+        budget = model.budget
         while queue or recount or revalue:
             while queue:
                 # The newest first: a contradiction is met before all else that follows is.
                 event = queue.pop()
+                budget.tick()
                 if is_gone(event[0]):
                     continue
                 if len(event) == 2:
@@ -163,6 +165,7 @@ class CaseSearch:
                     self._on_relation(*event)
             if recount:
                 x, _ = recount.popitem()
+                budget.tick()
                 if not is_gone(x):
                     self._count_all(x)
             elif revalue:
@@ -456,6 +459,7 @@ class CaseSearch:
         found, different = self._related(x, needed), self.model.different
 
         def extend(chosen: list[int], place: int) -> bool:
+            self.model.budget.tick()
             if len(chosen) == needed.n:
                 return True
             for next_place in range(place, len(found) - (needed.n - len(chosen)) + 1):
@@ -507,6 +511,7 @@ class CaseSearch:
         seen: dict[Any, int] = {}
         cores = {y: None for y in self._chosen if y not in self._put_off}
         for x in model.alive():
+            model.budget.tick()
             parent = model.parent[x]
             if parent is None:
                 continue

@@ -14,10 +14,11 @@ from typing import TypeAlias
 
 from owl_reasoner.owl import axioms as ax
 from owl_reasoner.owl import expressions as ex
-from owl_reasoner.owl.axiom_text import expression_text
+from owl_reasoner.owl.axiom_text import axiom_text, expression_text
 from owl_reasoner.owl.axioms import Axiom
 from owl_reasoner.owl.expressions import ClassExpression, Literal
-from owl_reasoner.owl.vocabulary import NOTHING, THING, TOP, TOP_LITERAL
+from owl_reasoner.owl.vocabulary import NOTHING, THING, TOP, TOP_LITERAL, local_name
+from owl_reasoner.reasoner.budget import Budget
 from owl_reasoner.reasoner.case_model import Choices
 from owl_reasoner.reasoner.case_rules import ANYBODY, FRESH, CaseRules
 from owl_reasoner.reasoner.case_search import CaseSearch
@@ -51,6 +52,7 @@ class CaseReasoner:
     Args:
         axioms: Everything that is asserted.
         most_steps: When to give up, in facts added.
+        budget: What the whole reasoning may use.
 
     Attributes:
         gaps: One sentence for each axiom that is not fully used, or for what was not decided.
@@ -59,9 +61,16 @@ class CaseReasoner:
         names_individuals: Whether the axioms about classes name individuals.
     """
 
-    def __init__(self, axioms: Iterable[Axiom], most_steps: int = MOST_STEPS) -> None:
+    def __init__(
+        self,
+        axioms: Iterable[Axiom],
+        most_steps: int = MOST_STEPS,
+        budget: Budget | None = None,
+    ) -> None:
         axioms = list(axioms)
-        self._rules = CaseRules(axioms)
+        self._budget = budget or Budget()
+        self._budget.stage = 'reasoning by cases'
+        self._rules = CaseRules(axioms, self._budget)
         self.gaps = dict(self._rules.gaps)
         self.class_gaps: dict[str, None] = {}
         self.stopped = False
@@ -107,6 +116,7 @@ class CaseReasoner:
     def _state(self, axiom: Axiom, concept: int) -> None:
         """State an assertion, whose concept is made."""
         model = self._search.model
+        self._budget.tick()
         if isinstance(axiom, ax.ClassAssertion):
             model.concept(model.individual(axiom.individual)[0], concept, 0)
         elif isinstance(axiom, ax.ObjectPropertyAssertion):
@@ -171,6 +181,7 @@ class CaseReasoner:
         while candidates and not self.stopped:
             fact = next(iter(candidates))
             del candidates[fact]
+            self._budget.at_work = partial(axiom_text, fact)
             ((denial,),) = _denials(fact)
             if self._is_possible(partial(self._state, *self._prepared(denial))):
                 held = {other for other, _ in self._held()}
@@ -327,6 +338,7 @@ class CaseReasoner:
             for question in questions if model else again:
                 if self.stopped:
                     return
+                self._budget.at_work = partial(_question_text, question)
                 if not models.may_be(*question):
                     continue
                 if self._is_possible(partial(models.state, *question), search):
@@ -387,6 +399,10 @@ class _ClassModels:
     def possible(self) -> list[tuple[str, str]]:
         """Return the pairs of classes, one above the other in the class's model by choice."""
         return [(cls, sup) for cls, above in self._above.items() for sup in sorted(above)]
+
+
+def _question_text(question: tuple[str, ...]) -> str:
+    return 'the question ' + ' below '.join(map(local_name, question))
 
 
 # --- what must hold where an axiom does not ---
@@ -492,7 +508,9 @@ def _fails(role: AnyRole, one: str = _A, other: str = _B) -> Axiom:
     return ax.NegativeObjectPropertyAssertion(iri, *pair)
 
 
-def entails(axioms: Iterable[Axiom], goal: Axiom | None) -> bool | None:
+def entails(
+    axioms: Iterable[Axiom], goal: Axiom | None, budget: Budget | None = None
+) -> bool | None:
     """Tell whether an axiom (None: a contradiction) follows: its denial contradicts the others.
 
     Returns:
@@ -509,7 +527,7 @@ def entails(axioms: Iterable[Axiom], goal: Axiom | None) -> bool | None:
     against: list[_Denial] = [()] if goal is None else list(_denials(goal))
     certain = True
     for denial in against:
-        reasoner = CaseReasoner([*axioms, *denial], _QUESTION_STEPS)
+        reasoner = CaseReasoner([*axioms, *denial], _QUESTION_STEPS, budget)
         if reasoner.consistent():
             if not reasoner.gaps and not reasoner.stopped:
                 return False

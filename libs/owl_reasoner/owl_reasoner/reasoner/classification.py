@@ -21,6 +21,7 @@ from owl_reasoner.owl.expressions import (
     ObjectSomeValuesFrom,
 )
 from owl_reasoner.owl.vocabulary import NOTHING, THING
+from owl_reasoner.reasoner.budget import Budget
 from owl_reasoner.reasoner.clauses import (
     AtMost,
     BodyAtom,
@@ -57,6 +58,7 @@ class Classification:
         axioms: The ontology's axioms; of its assertions only the complex classes matter.
         asserted: Complex class expressions that individuals are asserted to belong to.
         negated: Properties with negative assertions, as pairs (kind, IRI).
+        budget: What it may use.
 
     Attributes:
         program: To be run by one `Engine`.
@@ -68,21 +70,24 @@ class Classification:
         axioms: Iterable[Axiom],
         asserted: Iterable[ClassExpression] = (),
         negated: Iterable[tuple[str, str]] = (),
+        budget: Budget | None = None,
     ) -> None:
+        self._budget = budget or Budget()
         tbox = [axiom for axiom in axioms if not isinstance(axiom, ax.Assertion)]
         asserted, negated = tuple(asserted), tuple(negated)
-        translation = Translation(tbox, asserted, negated)
+        translation = Translation(tbox, asserted, negated, self._budget)
         program = self.program = translation.program
         classes = [a.iri for a in tbox if isinstance(a, ax.Declaration) and a.kind == 'class']
         for name in (*classes, THING, NOTHING):
             if name not in (THING, NOTHING):
                 program.cls(name)
+        self._budget.look()
         spell_out_chains(program)
         self._report_partial()
         labels = [program.labels[expression] for expression in asserted]
         fillers = [e.filler for e in program.existentials if isinstance(e.filler, Predicate)]
         simplify(program, [*labels, *fillers])
-        self._contexts = Contexts(program)
+        self._contexts = Contexts(program, self._budget)
         self._above: dict[str, frozenset[str]] = {}
         self._impossible: set[str] = set()
         self.within: dict[str, frozenset[str]] = {}
@@ -105,7 +110,7 @@ class Classification:
         program = self.program
         if not program.partial:
             return
-        contexts = Contexts(program)
+        contexts = Contexts(program, self._budget)
         counted: set[object] = {least.filler for least in program.at_least}
         counted.update(most.filler for most in program.at_most)
         counted.update(key.cls for key in program.keys)
@@ -376,6 +381,7 @@ class Classification:
             for backwards in (False, True)
         }
         for place, prop in enumerate(props):
+            self._budget.count(len(props) - place)
             for other in props[place:]:
                 for backwards in (False, True):
                     pair = (prop, False, other, backwards)

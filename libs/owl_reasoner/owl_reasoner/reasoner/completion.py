@@ -101,7 +101,7 @@ class Completion:
             self._forget_classes()
             self._left_out = (*self._native, 'the assertions: too many for reasoning by cases')
             return
-        reasoner = CaseReasoner([*self._schema, *assertions])
+        reasoner = CaseReasoner([*self._schema, *assertions], budget=engine.budget)
         if not reasoner.consistent():
             engine.take_from_cases(None)
             self._forget_classes()
@@ -129,7 +129,7 @@ class Completion:
         """Tell whether a fact that was not derived follows all the same."""
         axioms = list(axioms)
         few = len(axioms) - len(self._schema) <= _MOST_ASSERTIONS
-        return few and bool(entails(axioms, fact))
+        return few and bool(entails(axioms, fact, self._engine.budget))
 
     def _may_lack(self, program: Program) -> bool:
         """Tell whether the clauses may leave something out without saying so.

@@ -21,6 +21,8 @@ from typing import Any, TypeAlias, TypeGuard
 
 from owl_reasoner.owl.axiom_text import axiom_text
 from owl_reasoner.owl.axioms import Axiom
+from owl_reasoner.owl.vocabulary import local_name
+from owl_reasoner.reasoner.budget import Budget
 from owl_reasoner.reasoner.clauses import (
     AtLeast,
     AtMost,
@@ -130,6 +132,11 @@ class Context:
         self.unclosed: list[Token] = list(core)
         self.unrelated: list[Token] = list(core)
 
+    def describe(self) -> str:
+        """Return whom the context stands for, in words."""
+        named = [local_name(one.name) for one in self.core if isinstance(one, Predicate)]
+        return 'what is implied by ' + (', '.join(sorted(named)) or 'owl:Thing')
+
 
 class _Body:
     """What a clause's body says of each term, and of each pair of terms.
@@ -187,8 +194,8 @@ class _Body:
 class Contexts:
     """Completes contexts of one program; rules of SWRL take no part."""
 
-    def __init__(self, program: Program) -> None:
-        self._program = program
+    def __init__(self, program: Program, budget: Budget) -> None:
+        self._program, self._budget = program, budget
         self._gaps: dict[Context, dict[_Gap, AtLeast | AtMost | None]] = {}
         self._known: dict[tuple[Tokens, bool], Context] = {}
         self._opened: list[Context] = []
@@ -343,6 +350,7 @@ class Contexts:
     def context(self, core: Iterable[Token], bare: bool = False) -> Context:
         """Return the completed context of a core; `bare`: without what classes alone imply."""
         found = self._open(frozenset(core), bare)
+        self._budget.stage = 'classifying'
         while self._opened or self._waiting:
             # What an individual is by itself comes before what its neighbours make of it.
             self._complete(self._opened.pop() if self._opened else self._waiting.popitem()[0])
@@ -437,12 +445,15 @@ class Contexts:
 
     def _complete(self, context: Context) -> None:
         known = len(context.tokens) if context.begun else -1
+        self._budget.at_work = context.describe
         self._changed = True
         while self._changed and not context.clash:
             self._changed = False
+            self._budget.count(len(context.edges) + 1)
             self._close(context)
             self._relate(context)
             for edge in tuple(context.edges):
+                self._budget.tick()
                 if edge in context.edges:
                     self._along(context, edge)
             self._loops(context)
@@ -702,6 +713,7 @@ class Contexts:
 
         def extend(place: int, total: int) -> None:
             nonlocal best
+            self._budget.tick()
             best = max(best, total)
             for next_place in range(place, len(order)):
                 edge = order[next_place]
@@ -829,6 +841,7 @@ class Contexts:
         best = 0
         for size in range(len(counted), 0, -1):
             for chosen in combinations(counted, size):
+                self._budget.tick()
                 if all((a.values & b.values).is_empty for a, b in combinations(chosen, 2)):
                     best = max(best, sum(held.count for held in chosen))
         return best

@@ -11,9 +11,12 @@ reaches.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from fractions import Fraction
+from functools import partial
 from itertools import combinations
 
 from owl_reasoner.owl.assertions import Assertions, is_assertion
+from owl_reasoner.owl.axiom_text import axiom_text
 from owl_reasoner.owl.axioms import (
     Axiom,
     ClassAssertion,
@@ -27,6 +30,7 @@ from owl_reasoner.owl.axioms import (
 from owl_reasoner.owl.entities import entities_of
 from owl_reasoner.owl.expressions import ClassExpression, Literal
 from owl_reasoner.owl.vocabulary import NOTHING, THING, local_name
+from owl_reasoner.reasoner.budget import Budget
 from owl_reasoner.reasoner.clauses import AtMost, Fact, Predicate, Premises, Program
 from owl_reasoner.reasoner.datatypes import Value, literal_of, value_of
 from owl_reasoner.reasoner.difference import Difference
@@ -37,6 +41,11 @@ from owl_reasoner.reasoner.proofs import ProofSearch
 
 Classes = Mapping[str, Iterable[str]]
 _MOST_VALUES = 20_000
+_FACTS_A_LOOK = 64
+"""Facts between two looks at the limits."""
+LONGEST = 100_000
+"""The characters or digits of the longest value that rules make."""
+_LONGEST_BITS = LONGEST * 10 // 3
 LEAST_VALUES = 2_000
 """So many values of literals are remembered before those that nobody asserts are forgotten."""
 BY_CASES = 'every case leads to it'
@@ -54,6 +63,8 @@ class Engine:
     Args:
         program: What to run; its predicates hold the facts and belong to this engine.
         told: The axioms that are asserted (as of the current `update`).
+        budget: What an update may use. The error by which it ends an update leaves the engine
+            unusable.
 
     Attributes:
         equality: Who stands for whom.
@@ -68,8 +79,9 @@ class Engine:
             reset.
     """
 
-    def __init__(self, program: Program, told: Assertions) -> None:
+    def __init__(self, program: Program, told: Assertions, budget: Budget | None = None) -> None:
         self.program = program
+        self.budget = budget or Budget()
         self.told = told
         self.equality = Equality()
         self.spelling: dict[Value, Literal] = {}
@@ -98,6 +110,8 @@ class Engine:
             self._queue.append,
             self._overdeleted.append,
             self._request,
+            self.budget.due,
+            self._looker,
         )
         self._nothing = program.nothing
         self._nothing.supports.append((self._conflict_supports, 'one individual, yet different'))
@@ -109,6 +123,31 @@ class Engine:
             self._attach_touching(predicate)
         for fire in self._network.initial:
             fire()
+
+    # --- limits ---
+
+    def _looker(self, origin: Axiom | None) -> Callable[[], None]:
+        """Return what the joins of an axiom's clauses call to look at the limits."""
+        budget = self.budget
+        if origin is None:
+            return budget.count_due
+        text = partial(axiom_text, origin)
+
+        def look() -> None:
+            budget.at_work = text
+            budget.count_due()
+
+        return look
+
+    def _name_work(self, fact: Fact) -> None:
+        """Have an error name the axiom by which a fact was derived."""
+        self.budget.at_work = lambda: self._reason_of(fact)
+
+    def _reason_of(self, fact: Fact) -> str:
+        for support, origin in fact[0].supports:
+            if isinstance(origin, Axiom) and next(iter(support(*fact[1:])), None) is not None:
+                return axiom_text(origin)
+        return f'the facts of {local_name(fact[0].name)}'
 
     # --- assertions as facts ---
 
@@ -402,6 +441,7 @@ class Engine:
         equality, merged = self.equality, False
         filled = self._filled() if pending else []  # Merging takes facts away and adds none.
         for merge in pending:
+            self.budget.tick()
             origin = merge.origin
             if isinstance(origin, SameIndividual) and origin not in self.told.axioms:
                 continue
@@ -686,12 +726,15 @@ class Engine:
 
     def _overdelete(self, fresh: list[Fact]) -> None:
         overdeleted, asserted, proves = self._overdeleted, self.asserted, self.proofs.proves
+        due = self.budget.due
         while overdeleted or self._doubtful:
             while self._doubtful:
                 self._split(self._doubtful.popitem()[0], fresh)
             if not overdeleted:
                 break
             fact = overdeleted.pop()
+            if due():
+                self.budget.count_due()
             if not fact[0].holds(fact):
                 continue
             if self.equality.members:
@@ -713,6 +756,7 @@ class Engine:
             index.settle()
         queue, names = self._queue, self.equality.representative
         for fact in self._removed:
+            self.budget.tick()
             if names and self.current(fact) != fact:
                 continue
             if self._follows(fact):
@@ -732,12 +776,19 @@ class Engine:
 
     def _propagate(self) -> None:
         queue, touched, flushes = self._queue, self._touched, self._flushes
+        budget, left = self.budget, _FACTS_A_LOOK
+        budget.stage = 'deriving facts'
         changed = self.changed
         values_left = _MOST_VALUES + 4 * len(self.asserted)
         while True:
             while queue:
                 fact = queue.pop()
                 predicate = fact[0]
+                left -= 1
+                if left < 0:
+                    left = _FACTS_A_LOOK
+                    self._name_work(fact)
+                    budget.count(_FACTS_A_LOOK)
                 if len(fact) == 2:
                     x = fact[1]
                     if x in predicate.members:
@@ -755,8 +806,8 @@ class Engine:
                     continue
                 if predicate.kind == 'data':
                     values_left -= 1
-                    if values_left < 0 and fact not in self.asserted:
-                        self._stop_generating(predicate)
+                    if (values_left < 0 or _is_long(y)) and fact not in self.asserted:
+                        self._stop_generating(predicate, values_left >= 0)
                         continue
                 if values is None:
                     succ[x] = {y: None}
@@ -782,12 +833,17 @@ class Engine:
                 if not queue:
                     return
 
-    def _stop_generating(self, predicate: Predicate) -> None:
+    def _stop_generating(self, predicate: Predicate, is_long: bool) -> None:
         """End a rule that makes a new value of every value; what it made so far stays."""
         text = (
             f'the rules on {local_name(predicate.name)} make values without end:'
             f' stopped after {_MOST_VALUES} in one step'
         )
+        if is_long:
+            text = (
+                f'the rules on {local_name(predicate.name)} make values that grow without end:'
+                f' none above {LONGEST} characters or digits is kept'
+            )
         if text not in self.program.unsupported:
             self.program.unsupported.append(text)
 
@@ -795,6 +851,7 @@ class Engine:
         pending = self._related_by_difference(self._touched)
         self._touched.clear()
         for one in pending:
+            self.budget.tick()
             for touch in self._network.touch_insert:
                 touch(one)
 
@@ -802,6 +859,17 @@ class Engine:
 def individuals_of(axiom: Axiom) -> set[str]:
     """Return the individuals that an axiom mentions."""
     return {name for kind, name in entities_of(axiom) if kind == 'individual'}
+
+
+def _is_long(value: Value) -> bool:
+    """Tell whether rules may not make a value: one that they grow would fill the memory."""
+    if isinstance(value, str):
+        return len(value) > LONGEST
+    if isinstance(value, int):
+        return value.bit_length() > _LONGEST_BITS
+    if isinstance(value, Fraction):
+        return value.denominator.bit_length() + value.numerator.bit_length() > _LONGEST_BITS
+    return False
 
 
 def is_public(predicate: Predicate) -> bool:

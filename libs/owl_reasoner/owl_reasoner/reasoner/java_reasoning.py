@@ -63,13 +63,15 @@ class JavaKnowledgeBase(KnowledgeBase):
         super().__init__(iri, axioms)
         self._kind = kind
 
-    def reason(self) -> bool:
+    def reason(self, *args: Any, **limits: Any) -> bool:
         """Bring what is derived up to date; whether the ontology is consistent.
+
+        The limits are those of the native reasoner; the Java reasoner has a timeout of its own.
 
         Raises:
             JavaReasonerError: The Java reasoner failed; what the native one derives is up to date.
         """
-        consistent = super().reason()
+        consistent = super().reason(*args, **limits)
         assert isinstance(self._completion, _JavaCompletion)
         if self._completion.failure:
             raise JavaReasonerError(self._completion.failure)

@@ -14,6 +14,7 @@ from functools import lru_cache
 from types import CodeType
 from typing import Any
 
+from owl_reasoner.owl.axioms import Axiom
 from owl_reasoner.reasoner.clauses import (
     BodyAtom,
     ComputedAtom,
@@ -44,18 +45,23 @@ class JoinContext:
         representative: From an individual to the one that stands for it, where that is another.
         different: Whether two individuals are known to be different.
         different_predicate: Names difference in premises.
+        due: A join calls it before each of its inner loops; where it is true, also what `looker`
+            returns for the clause's axiom, which may raise an error to end the join.
     """
 
     representative: dict[str, str]
     different: Callable[[str, str], bool]
     different_predicate: Predicate
+    due: Callable[[], bool]
+    looker: Callable[[Axiom | None], Callable[[], None]]
 
 
 class _Writer:
     """Writes one join function; objects it uses become parameters of an enclosing factory."""
 
-    def __init__(self, context: JoinContext) -> None:
-        self.context = context
+    def __init__(self, context: JoinContext, origin: Axiom | None) -> None:
+        self.context, self.look = context, context.looker(origin)
+        self.loops = 0
         self.lines: list[str] = []
         self.depth = 2
         self.objects: list[object] = []
@@ -74,6 +80,14 @@ class _Writer:
             self._continue()
         self.line(text)
         self.depth += 1
+
+    def loop(self, text: str) -> None:
+        """Begin a loop. Those inside another one count, as only these can take long."""
+        if self.loops:
+            due, look = self.use(self.context.due), self.use(self.look)
+            self.line(f'if {due}(): {look}()')
+        self.loops += 1
+        self.open(text)
 
     def _continue(self) -> None:
         """Go on in a further function: Python nests no more than 20 blocks in one."""
@@ -145,7 +159,7 @@ class _Writer:
             if self.is_bound(result):
                 self.open(f'if {self.text(result)} in {values}:')
             else:
-                self.open(f'for v{result} in {values}:')
+                self.loop(f'for v{result} in {values}:')
                 self.bound.add(result)  # type: ignore[arg-type]
 
     def _class_step(self, atom: PredicateAtom) -> None:
@@ -154,7 +168,7 @@ class _Writer:
         if self.is_bound(term):
             self.open(f'if {self.text(term)} in {members}:')
         else:
-            self.open(f'for v{term} in {members}:')
+            self.loop(f'for v{term} in {members}:')
             self.bound.add(term)  # type: ignore[arg-type]
 
     def _property_step(self, atom: PredicateAtom) -> None:
@@ -163,24 +177,24 @@ class _Writer:
         if self.is_bound(x) and self.is_bound(y):
             self.open(f'if {self.text(y)} in {succ}.get({self.text(x)}, {empty}):')
         elif self.is_bound(x):
-            self.open(f'for v{y} in {succ}.get({self.text(x)}, {empty}):')
+            self.loop(f'for v{y} in {succ}.get({self.text(x)}, {empty}):')
             self.bound.add(y)  # type: ignore[arg-type]
         elif self.is_bound(y):
-            self.open(f'for v{x} in {self.use(atom.predicate.pred)}.get({self.text(y)}, {empty}):')
+            self.loop(f'for v{x} in {self.use(atom.predicate.pred)}.get({self.text(y)}, {empty}):')
             self.bound.add(x)  # type: ignore[arg-type]
         elif x == y:
             values = self.temporary()
-            self.open(f'for v{x}, {values} in {succ}.items():')
+            self.loop(f'for v{x}, {values} in {succ}.items():')
             self.bound.add(x)  # type: ignore[arg-type]
             self.kept = [values]
             self.open(f'if v{x} in {values}:')
             self.kept = []
         else:
             values = self.temporary()
-            self.open(f'for v{x}, {values} in {succ}.items():')
+            self.loop(f'for v{x}, {values} in {succ}.items():')
             self.bound.add(x)  # type: ignore[arg-type]
             self.kept = [values]
-            self.open(f'for v{y} in {values}:')
+            self.loop(f'for v{y} in {values}:')
             self.kept = []
             self.bound.add(y)  # type: ignore[arg-type]
 
@@ -248,6 +262,7 @@ def compile_trigger(
     head: PredicateAtom,
     emit: Callable[[Fact], None],
     present: bool,
+    origin: Axiom | None = None,
 ) -> Callable[..., None]:
     """Return a function of the values of `terms` that emits each head of an instance of the body.
 
@@ -259,8 +274,9 @@ def compile_trigger(
         head: What to emit.
         emit: Called with head facts.
         present: Emit only heads that hold (True: they may have to go) or do not hold yet (False).
+        origin: The clause's axiom, named where the join has to end early.
     """
-    writer = _Writer(context)
+    writer = _Writer(context, origin)
     signature = _arguments(writer, terms)
     predicate = head.predicate
 
@@ -289,9 +305,10 @@ def compile_call(
     terms: Sequence[Term],
     outputs: Sequence[Term],
     call: Callable[..., None],
+    origin: Axiom | None = None,
 ) -> Callable[..., None]:
     """Like `compile_trigger`, but calls `call` with the values of `outputs` for each instance."""
-    writer = _Writer(context)
+    writer = _Writer(context, origin)
     signature = _arguments(writer, terms)
     writer.join([atom for atom in body if atom is not given])
     writer.line(f'{writer.use(call)}({", ".join(map(writer.text, outputs))})')
@@ -303,13 +320,14 @@ def compile_support(
     body: Sequence[BodyAtom],
     terms: Sequence[Term],
     outputs: Sequence[Term] = (),
+    origin: Axiom | None = None,
 ) -> Callable[..., Iterator[Any]]:
     """Return a generator of the premises of each instance of the body in which `terms` have the
     given values.
 
     With `outputs` it yields pairs (values of the outputs, premises).
     """
-    writer = _Writer(context)
+    writer = _Writer(context, origin)
     writer.calling = 'yield from '
     signature = _arguments(writer, terms)
     writer.join(body)

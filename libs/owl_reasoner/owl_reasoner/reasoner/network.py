@@ -67,11 +67,15 @@ class Network:
         enqueue: Emit,
         overdelete: Emit,
         merge: MergeRequest,
+        due: Callable[[], bool],
+        looker: Callable[[Axiom | None], Callable[[], None]],
     ) -> None:
         self._program = program
         self._difference = difference
         self._enqueue, self._overdelete, self._merge = enqueue, overdelete, merge
-        self.context = JoinContext(representative, difference.different, program.different)
+        self.context = JoinContext(
+            representative, difference.different, program.different, due, looker
+        )
         self.initial: list[Callable[[], None]] = []
         self.naming: list[Callable[[], None]] = []
         self.merging: list[Callable[[str, str], None]] = []
@@ -117,16 +121,18 @@ class Network:
             hooks.append((place, what))
 
         context, body, head = self.context, clause.body, clause.head
-        support = compile_support(context, body, head.terms)
+        support = compile_support(context, body, head.terms, origin=clause.origin)
         gain: Callable[[BodyAtom | None, Sequence[Term]], Callable[..., None]]
         if isinstance(head, SameAtom):
             request = self._request_of(clause, head, support)
             hook(self.merging, request)
-            gain = partial(compile_call, context, body, outputs=head.terms, call=request)
+            gain = partial(
+                compile_call, context, body, outputs=head.terms, call=request, origin=clause.origin
+            )
             lose = None  # Who is the same is split by what its merges rest on.
         else:
             hook(head.predicate.supports, (support, clause.origin))
-            trigger = partial(compile_trigger, context, body, head=head)
+            trigger = partial(compile_trigger, context, body, head=head, origin=clause.origin)
             gain = partial(trigger, emit=self._enqueue, present=False)
             lose = partial(trigger, emit=self._overdelete, present=True)
         triggered = False
@@ -162,7 +168,7 @@ class Network:
         head = clause.head
         assert isinstance(head, PredicateAtom)
         emit = self._overdelete if holding else self._enqueue
-        compile_trigger(self.context, clause.body, None, (), head, emit, holding)()
+        compile_trigger(self.context, clause.body, None, (), head, emit, holding, clause.origin)()
 
     def _request_of(
         self, clause: Clause, head: SameAtom, support: Callable[..., Iterator[Premises]]

@@ -200,20 +200,21 @@ class ThresholdIndex:
         self._unsorted: list[tuple[Any, Row]] = []
         self._lost: set[tuple[bool, Row]] = set()
         self._emitted: Any = None
+        origin = clause.origin
         for atom in split.keyed:
             if isinstance(atom, PredicateAtom):
                 predicate, body = atom.predicate, split.keyed
                 arguments = (context, body, atom, atom.terms, self._key_terms)
-                predicate.on_insert.append(compile_call(*arguments, self._gain_key))
-                predicate.on_delete.append(compile_call(*arguments, self._lose_key))
+                predicate.on_insert.append(compile_call(*arguments, self._gain_key, origin))
+                predicate.on_delete.append(compile_call(*arguments, self._lose_key, origin))
         for atom in split.reaching:
             if isinstance(atom, PredicateAtom):
                 predicate, body = atom.predicate, split.reaching
                 arguments = (context, body, atom, atom.terms, self._reach_terms)
-                gain = compile_call(*arguments, self._gain_reach)
+                gain = compile_call(*arguments, self._gain_reach, origin)
                 predicate.on_insert.append(gain)
                 predicate.early.append(gain)
-                predicate.on_delete.append(compile_call(*arguments, self._lose_reach))
+                predicate.on_delete.append(compile_call(*arguments, self._lose_reach, origin))
         self._key_support = compile_support(context, split.keyed, head.terms, self._key_terms)
         self._key_exists = compile_support(context, split.keyed, self._key_terms)
         self._reach_exists = compile_support(context, split.reaching, self._reach_terms)

@@ -27,6 +27,7 @@ from owl_reasoner.owl.vocabulary import (
     TOP_LITERAL,
     local_name,
 )
+from owl_reasoner.reasoner.budget import Budget
 from owl_reasoner.reasoner.clauses import (
     AtLeast,
     AtMost,
@@ -185,6 +186,7 @@ class Translation:
         axioms: The ontology's axioms; assertions and annotations among them are passed over.
         asserted: Complex class expressions that individuals are asserted to belong to.
         negated: Properties with negative assertions, as pairs (kind, IRI), kind 'object' or 'data'.
+        budget: What it may use.
 
     Attributes:
         program: The result.
@@ -196,7 +198,10 @@ class Translation:
         axioms: Iterable[Axiom],
         asserted: Iterable[ClassExpression] = (),
         negated: Iterable[tuple[str, str]] = (),
+        budget: Budget | None = None,
     ) -> None:
+        budget = budget or Budget()
+        budget.stage, budget.at_work = 'reading axioms', self._subject
         tbox = [axiom for axiom in axioms if not isinstance(axiom, (ax.Assertion, ax.Annotation))]
         self.program = Program()
         self._variables = _Y
@@ -214,6 +219,7 @@ class Translation:
         self.hierarchy = PropertyHierarchy(tbox)
         for axiom in tbox:
             self._origin = axiom
+            budget.tick()
             self._attempt(self._axiom, axiom)
         self._origin = None
         for expression in asserted:
@@ -247,8 +253,10 @@ class Translation:
             self.program.unsupported.append(text)
 
     def _sentence(self, reason: str) -> str:
-        subject = self._context if self._origin is None else axiom_text(self._origin)
-        return f'{subject}: {reason}'
+        return f'{self._subject()}: {reason}'
+
+    def _subject(self) -> str:
+        return self._context if self._origin is None else axiom_text(self._origin)
 
     def _attempt(self, add: Callable[..., object], *parts: Any) -> None:
         """Add what can be added of an axiom; the rest is reported."""
