@@ -31,7 +31,8 @@ from surveillance_runtime.files import KeptFile
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.place import described_place
 from surveillance_runtime.process import run_node
-from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
+from surveillance_runtime.qos import SENSOR_QOS
+from surveillance_runtime.state_topics import OwnedTopic
 from surveillance_runtime.waiting import AwaitedEvent
 
 _BUILD_SECONDS = 20.0
@@ -77,7 +78,7 @@ class InitialState(PatrolNode):
         self._inquiry = MarkerInquiry(self, self._survey, self._events)
         self._camera = CameraScanner(self, pictures, patience)
         self._reference = ServiceCaller(self, ReferenceName, 'ontology_map/reference_name')
-        self._map = self.create_publisher(OntologyMap, 'ontology_map/build_map', STATE_QOS)
+        self._map = OwnedTopic(self, OntologyMap, 'ontology_map/build_map')
         self.create_subscription(Odometry, 'odom', self._on_odometry, SENSOR_QOS)
         self.create_service(Empty, 'start', self._on_start, callback_group=ReentrantCallbackGroup())
         if look_again > 0.0 and self._configured is None:

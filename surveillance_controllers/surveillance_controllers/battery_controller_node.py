@@ -1,6 +1,7 @@
 """The node `battery_controller`: says how full the battery is, and charges it.
 
-Publishes `battery_level` (percent) and `state/battery_low`, and serves `recharge`. Where the level
+Publishes `battery_level` (percent), `battery_low`, and its changes alone as `state/battery_low`,
+and serves `recharge`. Where the level
 comes from is the execution mode's matter: the operator (MANUAL), chance (RANDOM), or a model of the
 battery that watches the robot move and charges at the station only (SIMULATED).
 """
@@ -31,12 +32,13 @@ from surveillance_controllers.manual.commands import BATTERY, BATTERY_SET, Parse
 from surveillance_controllers.manual.requests import CommandConsole
 from surveillance_runtime.conversions import (
     pose_of_serialized,
+    stamp_of_serialized,
     trajectory_from,
 )
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.process import run_node
-from surveillance_runtime.qos import STATE_QOS
 from surveillance_runtime.state_file import StateFile
+from surveillance_runtime.state_topics import OwnedTopic, StateSubscription
 from surveillance_runtime.waiting import AwaitedEvent
 
 RECHARGE_STEPS = 50
@@ -62,8 +64,11 @@ class BatteryController(PatrolNode):
         self._wait = ClockWait(self)
         self._lock = threading.RLock()
         self._said: tuple[int, bool] | None = None
-        self._level_topic = self.create_publisher(UInt8, 'battery_level', STATE_QOS)
-        self._low_topic = self.create_publisher(Bool, 'state/battery_low', STATE_QOS)
+        self._level_topic = OwnedTopic(self, UInt8, 'battery_level')
+        self._low_topic = OwnedTopic(self, Bool, 'battery_low')
+        # The seeds' machine takes each message for a change: a repeated True would trap it on its
+        # way to the station.
+        self._change_topic = OwnedTopic(self, Bool, 'state/battery_low', repeat=None)
         self._recharging = False
         self._recharged = AwaitedEvent(self)
         group = ReentrantCallbackGroup()
@@ -92,6 +97,7 @@ class BatteryController(PatrolNode):
                 self._level_topic.publish(UInt8(data=said[0]))
             if before is None or said[1] != before[1]:
                 self._low_topic.publish(Bool(data=said[1]))
+                self._change_topic.publish(Bool(data=said[1]))
                 word = 'low' if said[1] else 'not low'
                 self.get_logger().info(
                     f'battery {word}: {said[0]} % (low below {self._low_below} %)'
@@ -191,9 +197,14 @@ class RobotBattery:
             # From then on no setting of the clock counts.
             since += self._wait.elapsed() - self._wait.now()
         self._use = BatteryInUse(battery, settings.station, settings.dock_reach, since)
-        self._states = node.create_publisher(BatteryState, 'battery_state', STATE_QOS)
-        node.create_subscription(
-            PoseWithCovarianceStamped, 'amcl_pose', self._on_pose, STATE_QOS, raw=True
+        self._states = OwnedTopic(node, BatteryState, 'battery_state', repeat=None)
+        StateSubscription(
+            node,
+            PoseWithCovarianceStamped,
+            'amcl_pose',
+            self._on_pose,
+            raw=True,
+            stamp=stamp_of_serialized,
         )
         node.create_subscription(JointTrajectory, 'arm/joint_trajectory', self._on_trajectory, 1)
         node.create_subscription(Float32, 'battery_drain', self._on_drain, 10)

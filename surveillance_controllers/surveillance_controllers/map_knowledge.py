@@ -23,8 +23,9 @@ from surveillance_ontology.armor_client import (
     FactSubscription,
 )
 from surveillance_ontology.patrol_ontology import DOORS, OntologyNotReadyError, PatrolOntology
+from surveillance_runtime.conversions import seconds_of
 from surveillance_runtime.node import PatrolNode
-from surveillance_runtime.qos import STATE_QOS
+from surveillance_runtime.state_topics import StateSubscription
 
 RETRY_PERIOD = 0.1
 """Pause before the ontology is asked again where the robot is, seconds."""
@@ -53,7 +54,13 @@ class MapKnowledge:
         self._on_doors: list[Callable[[], None]] = []
         self._known: dict[str, Points] = {}
         self._robot_place = ''
-        node.create_subscription(RobotPlace, 'robot_place', self._on_robot_place, STATE_QOS)
+        StateSubscription(
+            node,
+            RobotPlace,
+            'robot_place',
+            self._on_robot_place,
+            stamp=lambda told: seconds_of(told.header.stamp),
+        )
 
     def assume(self, positions: Mapping[str, Points]) -> None:
         """Take points of places, so that the map builder need not be asked for them."""

@@ -27,7 +27,7 @@ from surveillance_ontology.patrol_ontology import OntologyNotReadyError
 from surveillance_runtime.conversions import point_messages
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.process import run_node
-from surveillance_runtime.qos import STATE_QOS
+from surveillance_runtime.state_topics import OwnedTopic
 
 if TYPE_CHECKING:
     from surveillance_controllers.planning.map_planner import NavigationPlanning
@@ -56,7 +56,7 @@ class PlannerController(PatrolNode):
 
             timeout = self._settings.peer_timeout
             self._simulated = NavigationPlanning(self, self._knowledge, timeout)
-        self._shown = self.create_publisher(Path, 'plan', STATE_QOS)
+        self._shown = OwnedTopic(self, Path, 'plan')
         GoalServer(self, ComputePath, 'compute_path', self._compute_path)
         GoalServer(self, Plan, 'motion/planner', self._plan)
         self.get_logger().info(f'{self._mode} mode')

@@ -27,7 +27,7 @@ from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.parameters import ParameterError
 from surveillance_runtime.place import Place, PlaceError, described_place
 from surveillance_runtime.process import run_node
-from surveillance_runtime.qos import STATE_QOS
+from surveillance_runtime.state_topics import StateSubscription
 from surveillance_runtime.waiting import AwaitedEvent, AwaitedWork
 
 SECONDS_PER_ROOM = 0.005
@@ -109,9 +109,7 @@ class OntologyMapBuilder(PatrolNode):
             (SetDoor, 'set_door', self._on_set_door),
         ):
             self.create_service(kind, f'ontology_map/{name}', callback, callback_group=group)
-        self.create_subscription(
-            OntologyMap, 'ontology_map/build_map', self._on_build_map, STATE_QOS
-        )
+        StateSubscription(self, OntologyMap, 'ontology_map/build_map', self._on_build_map)
 
     def on_stop(self) -> None:
         """End the worker."""

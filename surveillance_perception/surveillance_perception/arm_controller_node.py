@@ -35,7 +35,8 @@ from surveillance_runtime.conversions import seconds_of
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.parameters import converted, parameter
 from surveillance_runtime.process import run_node
-from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
+from surveillance_runtime.qos import SENSOR_QOS
+from surveillance_runtime.state_topics import OwnedTopic
 from surveillance_runtime.robot_arm import ARM, REST_PATIENCE, Arm, Array
 from surveillance_runtime.settled_frames import SettledFrames
 from surveillance_runtime.stamp_offset import StampOffset
@@ -127,7 +128,7 @@ class ArmController(PatrolNode):
         self._rest_since: float | None = None
         self._stamps = StampOffset('aruco_detector/detections')
         self._trajectories = self.create_publisher(JointTrajectory, 'arm/joint_trajectory', 10)
-        self._at_rest = self.create_publisher(Bool, 'arm/at_rest', STATE_QOS)
+        self._at_rest = OwnedTopic(self, Bool, 'arm/at_rest')
         self._driver = ArmDriver(
             ARM,
             lambda motion: self._trajectories.publish(trajectory_to_ros(motion, ARM.names)),

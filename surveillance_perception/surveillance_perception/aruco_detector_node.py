@@ -30,8 +30,9 @@ from surveillance_runtime.conversions import seconds_of
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.parameters import parameter
 from surveillance_runtime.process import run_node
-from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
+from surveillance_runtime.qos import SENSOR_QOS
 from surveillance_runtime.stamp_offset import StampOffset
+from surveillance_runtime.state_topics import StateSubscription
 
 try:
     # the wheels on PyPI hold no tf2_msgs; an installed ROS 2 does
@@ -96,7 +97,7 @@ class ArucoDetector(PatrolNode):
         self.create_subscription(
             CameraInfo, 'camera/rgb/camera_info', self._on_camera_info, SENSOR_QOS
         )
-        self.create_subscription(Bool, 'arm/at_rest', self._on_rest, STATE_QOS)
+        StateSubscription(self, Bool, 'arm/at_rest', self._on_rest)
         self.create_timer(REPORT_PERIOD, self._report)
         self.spawn(self._work, 'marker detection')
 

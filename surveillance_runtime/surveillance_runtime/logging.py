@@ -119,3 +119,7 @@ class CleanLogger(rcutils.RcutilsLogger):
         if left_out:
             text += f' ({left_out} lines left out before this one)'
         return bool(super().log(text, severity, **options))
+
+    def always(self, message: str, severity: LoggingSeverity) -> None:
+        """Log a line that must not be left out; whoever calls this bounds how often."""
+        super().log(clean(message), severity)

@@ -30,6 +30,7 @@ from rclpy.event_handler import (
     SubscriptionEventCallbacks,
 )
 from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValueException
+from rclpy.logging import LoggingSeverity
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.publisher import Publisher
@@ -47,6 +48,7 @@ from surveillance_runtime.configuration import (
     read_schema,
 )
 from surveillance_runtime.diagnostics import Health
+from surveillance_runtime.incidents import Incidents, Severity, Told
 from surveillance_runtime.logging import CleanLogger, clean
 from surveillance_runtime.parameters import ParameterError, ParameterSpec, specs_of, with_values
 
@@ -100,6 +102,7 @@ class PatrolNode(Node):
         unusable: Whether that is its configuration.
         finished: Whether the node ended on purpose.
         health: What the node says of itself on `/diagnostics`.
+        incidents: What a person should know of; each also is a finding of the health.
         declared: Its parameters, by name.
         prefixes: Prefixes below which it takes parameters of any name.
     """
@@ -111,6 +114,7 @@ class PatrolNode(Node):
         self.unusable = False
         self.finished = False
         self.health = Health()
+        self.incidents = Incidents(self._tell_incident)
         self.declared: dict[str, ParameterSpec] = {}
         self.prefixes: set[str] = set()
         self._on_change: dict[str, Callable[[Any], None]] = {}
@@ -427,6 +431,18 @@ class PatrolNode(Node):
         if late:
             self.get_logger().warn(f'{late} did not end in {JOIN_SECONDS} s')
         return not late
+
+    def _tell_incident(self, told: Told) -> None:
+        subject, log = str(told.cause), self.get_logger()
+        if told.over:
+            self.health.clear(subject)
+            log.always(told.line(), LoggingSeverity.INFO)
+        elif told.severity is Severity.ALARM:
+            self.health.error(subject, told.text)
+            log.always(told.line(), LoggingSeverity.ERROR)
+        else:
+            self.health.warn(subject, told.text)
+            log.always(told.line(), LoggingSeverity.WARN)
 
     def _check_parameters(self, parameters: list[Parameter]) -> SetParametersResult:
         try:

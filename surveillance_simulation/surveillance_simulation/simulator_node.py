@@ -32,6 +32,7 @@ from surveillance_runtime.place.rooms import PLACE_TABLES
 from surveillance_runtime.process import run_node
 from surveillance_runtime.qos import STATE_QOS
 from surveillance_runtime.state_file import StateFile
+from surveillance_runtime.state_topics import StateSubscription
 from surveillance_simulation import conversions
 from surveillance_simulation.clock_rate import (
     DRIVING,
@@ -111,12 +112,15 @@ class Simulator(PatrolNode):
         FaultServices(self, self.robot, self._changing, self._changed)
         self._unmonitored = self.create_subscription(Twist, 'cmd_vel', self._obey, 1)
         self.create_subscription(Twist, 'cmd_vel_monitored', self._on_monitored, 1)
-        self.create_subscription(
-            PoseWithCovarianceStamped, 'amcl_pose', self._on_estimate, STATE_QOS, raw=True
+        StateSubscription(
+            self, PoseWithCovarianceStamped, 'amcl_pose', self._on_estimate, raw=True
         )
-        self.create_subscription(Time, 'mission_waits_until', self._on_mission_waits, STATE_QOS)
-        self.create_subscription(RobotPlace, 'robot_place', self._on_place, STATE_QOS)
-        self.create_subscription(Time, 'robot_place_written', self._on_place_written, STATE_QOS)
+        # The same word twice is two waits.
+        StateSubscription(
+            self, Time, 'mission_waits_until', self._on_mission_waits, each=True
+        )
+        StateSubscription(self, RobotPlace, 'robot_place', self._on_place)
+        StateSubscription(self, Time, 'robot_place_written', self._on_place_written)
         for action in (*PLANNING, *DRIVING):
             self.create_subscription(
                 GoalStatusArray,
@@ -125,7 +129,7 @@ class Simulator(PatrolNode):
                 STATE_QOS,
             )
         self.create_subscription(JointTrajectory, 'arm/joint_trajectory', self._on_trajectory, 1)
-        self.create_subscription(Bool, 'arm/at_rest', self._on_arm_rest, STATE_QOS)
+        StateSubscription(self, Bool, 'arm/at_rest', self._on_arm_rest)
         self.create_subscription(
             MarkerDetectionArray, 'aruco_detector/detections', self._on_detections, 10
         )

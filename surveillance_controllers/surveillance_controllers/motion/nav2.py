@@ -36,7 +36,7 @@ from surveillance_controllers.motion.place_regions import PlaceMap
 from surveillance_runtime.conversions import pose_from, pose_message
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.parameters import ParameterError
-from surveillance_runtime.qos import STATE_QOS
+from surveillance_runtime.state_topics import StateSubscription
 
 SPACING = 1.5
 """The largest distance of the poses that Nav2 is led through, metres."""
@@ -100,8 +100,14 @@ class Nav2Motion:
         self._places.set_positions(positions)
         knowledge.assume(positions)
         knowledge.follow_places(self._set_positions)
-        node.create_subscription(OccupancyGrid, 'map', self._on_map, STATE_QOS)
-        node.create_subscription(PoseWithCovarianceStamped, 'amcl_pose', self._on_pose, STATE_QOS)
+        StateSubscription(node, OccupancyGrid, 'map', self._on_map)
+        StateSubscription(
+            node,
+            PoseWithCovarianceStamped,
+            'amcl_pose',
+            self._on_pose,
+            stamp=lambda told: seconds_of(told.header.stamp),
+        )
 
     def follow(self, path: Points, run: GoalRun, report: Callable[[Points], None]) -> Points:
         """Send the robot along a path of shape (n, 3).

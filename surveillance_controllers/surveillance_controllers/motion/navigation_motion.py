@@ -47,7 +47,8 @@ from surveillance_runtime.conversions import (
     seconds_of,
 )
 from surveillance_runtime.node import PatrolNode
-from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
+from surveillance_runtime.qos import SENSOR_QOS
+from surveillance_runtime.state_topics import OwnedTopic, StateSubscription
 
 POSE_PERIOD = 0.19
 """Least time between two messages on amcl_pose, seconds: with every second scan at 10 Hz."""
@@ -93,16 +94,16 @@ class NavigationMotion:
         self._base = CommandPublisher(
             node, 'cmd_vel', ('scan', 'odom'), self._robot.deceleration, self._warn_of_silence
         )
-        self._poses = node.create_publisher(PoseWithCovarianceStamped, 'amcl_pose', STATE_QOS)
-        self._obstacles = node.create_publisher(PointCloud2, 'obstacles', STATE_QOS)
+        self._poses = OwnedTopic(node, PoseWithCovarianceStamped, 'amcl_pose', repeat=None)
+        self._obstacles = OwnedTopic(node, PointCloud2, 'obstacles')
         self._map_frame = MapFrame(node)
         positions = place_positions(node)
         self._set_positions(positions)
         knowledge.assume(positions)
         # The places that come and go change what the robot's place can be.
         knowledge.follow_places(self._set_positions)
-        node.create_subscription(OccupancyGrid, 'map', self._on_map, STATE_QOS)
-        node.create_subscription(DoorStates, 'door_states', self._on_doors, STATE_QOS)
+        StateSubscription(node, OccupancyGrid, 'map', self._on_map)
+        StateSubscription(node, DoorStates, 'door_states', self._on_doors)
         node.create_subscription(Odometry, 'odom', self._on_odometry, SENSOR_QOS, raw=True)
         node.create_subscription(LaserScan, 'scan', self._on_scan, SENSOR_QOS)
         node.create_subscription(PoseWithCovarianceStamped, 'initialpose', self._on_initial_pose, 1)

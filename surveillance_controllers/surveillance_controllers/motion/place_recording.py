@@ -17,8 +17,8 @@ from surveillance_interfaces.msg import OntologyMap, RobotPlace
 from surveillance_ontology.armor_client import FactSubscription
 from surveillance_runtime.conversions import nanoseconds_of
 from surveillance_runtime.node import PatrolNode
-from surveillance_runtime.qos import STATE_QOS
 from surveillance_runtime.state_file import StateFile
+from surveillance_runtime.state_topics import OwnedTopic, StateSubscription
 
 CHANGES_DELAY = 0.5
 """How long the ontology's change messages may be behind what was written, seconds."""
@@ -61,14 +61,12 @@ class PlaceRecorder:
         self._written: RobotPlace | None = None
         self._written_at = 0.0
         self._facts: FactSubscription | None = None
-        self._topic = node.create_publisher(RobotPlace, 'robot_place', STATE_QOS)
-        self._done = node.create_publisher(Time, 'robot_place_written', STATE_QOS)
+        self._topic = OwnedTopic(node, RobotPlace, 'robot_place')
+        self._done = OwnedTopic(node, Time, 'robot_place_written', repeat=None)
         self._news = Interrupt()
         keep_up(node, 'place recorder', self._news, self._catch_up)
         if start == '':
-            node.create_subscription(
-                OntologyMap, 'ontology_map/build_map', self._on_build_map, STATE_QOS
-            )
+            StateSubscription(node, OntologyMap, 'ontology_map/build_map', self._on_build_map)
 
     def tell(self, place: str | None, stamp: Time | None = None) -> None:
         """Take where the robot is; from any thread, without waiting.

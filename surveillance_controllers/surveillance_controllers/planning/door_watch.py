@@ -17,7 +17,7 @@ from surveillance_interfaces.srv import SetDoor
 from surveillance_ontology.patrol_ontology import OntologyNotReadyError
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.place.floor_plan import Segment
-from surveillance_runtime.qos import STATE_QOS
+from surveillance_runtime.state_topics import StateSubscription
 
 RETRY_PERIOD = 1.0
 """Pause before a peer that did not answer is asked again, seconds."""
@@ -50,7 +50,7 @@ class DoorWatch:
         self._set_door = ServiceCaller(node, SetDoor, 'ontology_map/set_door')
         self._news = Interrupt()
         keep_up(node, 'door watch', self._news, self._catch_up, RETRY_PERIOD)
-        node.create_subscription(DoorStates, 'door_states', self._on_states, STATE_QOS)
+        StateSubscription(node, DoorStates, 'door_states', self._on_states)
 
     def rooms_of(self, interrupt: Interrupt) -> dict[str, set[str]]:
         """Return the places that each door leads into; empty while the ontology does not say.

@@ -32,7 +32,7 @@ from surveillance_runtime.conversions import (
     values_from_cloud,
 )
 from surveillance_runtime.node import PatrolNode
-from surveillance_runtime.qos import STATE_QOS
+from surveillance_runtime.state_topics import StateSubscription
 
 
 class NavigationPlanning:
@@ -58,10 +58,15 @@ class NavigationPlanning:
         self._planner: GridPlanner | None = None
         self._obstacles: tuple[Points, NDArray[np.bool_] | None] = np.zeros((0, 2)), None
         self._pose: Pose | None = None
-        node.create_subscription(OccupancyGrid, 'map', self._on_map, STATE_QOS)
-        node.create_subscription(PointCloud2, 'obstacles', self._on_obstacles, STATE_QOS)
-        node.create_subscription(
-            PoseWithCovarianceStamped, 'amcl_pose', self._on_pose, STATE_QOS, raw=True
+        StateSubscription(node, OccupancyGrid, 'map', self._on_map)
+        StateSubscription(node, PointCloud2, 'obstacles', self._on_obstacles)
+        StateSubscription(
+            node,
+            PoseWithCovarianceStamped,
+            'amcl_pose',
+            self._on_pose,
+            raw=True,
+            stamp=stamp_of_serialized,
         )
 
     def start(self, target: str, run: GoalRun) -> Points:

@@ -16,7 +16,7 @@ from surveillance_interfaces.msg import DoorStates
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.parameters import parameter
 from surveillance_runtime.place import occupancy_grid
-from surveillance_runtime.qos import STATE_QOS
+from surveillance_runtime.state_topics import OwnedTopic
 from surveillance_simulation import conversions
 from surveillance_simulation.robot.robot import Robot
 
@@ -39,6 +39,10 @@ class PublishedOptions:
     )
 
 
+MAP_REPEAT = 5.0
+"""Seconds of real time between two repetitions of the map, which is large."""
+
+
 class SensorFeed:
     """The topics of a robot's sensors, of the map and of simulated time."""
 
@@ -53,9 +57,9 @@ class SensorFeed:
         self._scan = node.create_publisher(LaserScan, 'scan', SENSOR_DEPTH)
         self._joints = node.create_publisher(JointState, 'joint_states', SENSOR_DEPTH)
         self._truth = node.create_publisher(PoseStamped, 'ground_truth', SENSOR_DEPTH)
-        self._collisions = node.create_publisher(UInt32, 'collisions', STATE_QOS)
-        self._doors = node.create_publisher(DoorStates, 'door_states', STATE_QOS)
-        self._map = node.create_publisher(OccupancyGrid, 'map', STATE_QOS)
+        self._collisions = OwnedTopic(node, UInt32, 'collisions')
+        self._doors = OwnedTopic(node, DoorStates, 'door_states')
+        self._map = OwnedTopic(node, OccupancyGrid, 'map', repeat=MAP_REPEAT)
         self._tf = None if TFMessage is None else node.create_publisher(TFMessage, 'tf', 10)
         self._told_collisions = -1
         options = node.declare_fields(PublishedOptions())

@@ -1,0 +1,230 @@
+"""State topics: latched, with one owner that repeats its word and answers whoever else speaks.
+
+The owner (`OwnedTopic`) publishes each change, repeats its state about each second, answers every
+foreign value with its own, and tells of a second publisher in an incident with that node's name. A reader (`StateSubscription`) takes a new state once,
+refuses stamps ahead of its clock, and believes the owner: see `belief`.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections import deque
+from collections.abc import Callable
+from typing import Any, Generic, TypeVar
+
+from rclpy.clock import Clock, ClockType
+from rclpy.serialization import deserialize_message, serialize_message
+from rclpy.timer import Timer
+
+from surveillance_runtime.belief import UNKNOWN, Belief
+from surveillance_runtime.node import PatrolNode
+from surveillance_runtime.qos import STATE_QOS
+
+M = TypeVar('M')
+
+REPEAT = 1.0
+"""Seconds of real time after which an owner repeats a state that did not change."""
+AHEAD, AHEAD_SIMULATED = 2.0, 60.0
+"""A stamp that is further ahead of the reader's clock is refused, seconds. The reader hears
+simulated time by another topic, which may be late."""
+REMEMBERED = 32
+"""Of how many of its last messages an owner knows that they are its own."""
+FOREIGN_FOR = 10.0
+"""How long the last foreign value counts as going on, seconds."""
+
+
+class OwnedTopic(Generic[M]):
+    """A state topic of which a node is the owner; any thread may publish.
+
+    Args:
+        node: The owner.
+        kind: Type of the messages.
+        name: Of the topic.
+        repeat: Seconds of real time between two repetitions; None: a state is published once, as
+            where readers take each message for a change. Foreign values are answered all the same.
+    """
+
+    def __init__(
+        self, node: PatrolNode, kind: type[M], name: str, *, repeat: float | None = REPEAT
+    ) -> None:
+        self._node = node
+        self._kind = kind
+        self.name = name
+        self._publisher = node.create_publisher(kind, name, STATE_QOS)
+        self._lock = threading.Lock()
+        self._said: bytes | None = None
+        self._count = 0
+        self._own: deque[tuple[int, bytes]] = deque(maxlen=REMEMBERED)
+        self._others: tuple[str, ...] = ()
+        self._foreign_at = -FOREIGN_FOR
+        self._told = ''
+        node.create_subscription(kind, name, self._on_heard, STATE_QOS, raw=True)
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self._repeats = repeat is not None
+        self._said_at = 0.0
+        node.create_timer(repeat or REPEAT, self._on_period, clock=steady)
+
+    def publish(self, message: M) -> None:
+        """Publish a state."""
+        with self._lock:
+            self._say(serialize_message(message))
+
+    def _say(self, state: bytes) -> None:
+        self._said, self._said_at = state, time.monotonic()
+        self._count += 1
+        self._own.append((self._count, state))
+        self._publisher.publish(state)
+
+    def _on_period(self) -> None:
+        with self._lock:
+            # A state that has just changed need not be said twice within a moment.
+            if self._repeats and self._said is not None:
+                if time.monotonic() - self._said_at >= REPEAT / 2:
+                    self._say(self._said)
+        self._look_for_others()
+
+    def _on_heard(self, heard: bytes, info: dict[str, Any]) -> None:
+        number = info['publication_sequence_number'] or UNKNOWN
+        with self._lock:
+            if any(
+                heard == state and (number in (count, UNKNOWN)) for count, state in self._own
+            ):
+                return
+            foreign = deserialize_message(heard, self._kind)
+            own = None if self._said is None else deserialize_message(self._said, self._kind)
+            if own == foreign:
+                return
+            self._foreign_at = time.monotonic()
+            if self._said is not None:
+                self._say(self._said)
+        self._look_for_others()
+
+    def _look_for_others(self) -> None:
+        """Tell of other publishers, until they have been gone for a while."""
+        now = time.monotonic()
+        foreign = now - self._foreign_at < FOREIGN_FOR
+        if not foreign and not self._told and self._publisher_count() <= 1:
+            return
+        names = self._other_names()
+        if names:
+            self._others = names
+        if not names and not foreign:
+            self._others = ()
+            if self._told:
+                self._told = ''
+                self._node.incidents.end(('topic', self.name))
+            return
+        who = ', '.join(self._others) or 'a node that has left'
+        text = f'{self.name} is published by {who}, too: expected only {self._node.get_name()}'
+        if text != self._told:
+            self._told = text
+            self._node.incidents.begin(('topic', self.name), text)
+
+    def _publisher_count(self) -> int:
+        return int(self._node.count_publishers(self.name))
+
+    def _other_names(self) -> tuple[str, ...]:
+        """Return the nodes that publish the topic beside this one."""
+        names = sorted(
+            f'{end.node_namespace.rstrip("/")}/{end.node_name}'
+            for end in self._node.get_publishers_info_by_topic(self._publisher.topic_name)
+        )
+        own = self._node.get_fully_qualified_name()
+        if own in names:
+            names.remove(own)
+        return tuple(names)
+
+
+class StateSubscription(Generic[M]):
+    """What a node believes of a state topic that another one owns.
+
+    Args:
+        node: The node that reads.
+        kind: Type of the messages.
+        name: Of the topic.
+        take: Called with each new state, in the executor's thread.
+        raw: Give `take` the bytes of a message.
+        stamp: Returns the stamp of what `take` is given, seconds; None: it has none.
+        each: Give every message of the owner, also one that repeats the state.
+    """
+
+    def __init__(
+        self,
+        node: PatrolNode,
+        kind: type[M],
+        name: str,
+        take: Callable[[Any], object],
+        *,
+        raw: bool = False,
+        stamp: Callable[[Any], float] | None = None,
+        each: bool = False,
+    ) -> None:
+        self._node = node
+        self._kind = kind
+        self._name = name
+        self._take = take
+        self._raw = raw
+        self._stamp = stamp
+        self._each = each
+        self._belief = Belief()
+        self._timer: Timer | None = None
+        self._steady = Clock(clock_type=ClockType.STEADY_TIME)
+        simulated = bool(node.get_parameter('use_sim_time').value)
+        self._ahead = AHEAD_SIMULATED if simulated else AHEAD
+        self._subscription = node.create_subscription(
+            kind, name, self._on_heard, STATE_QOS, raw=True
+        )
+
+    def _on_heard(self, heard: bytes, info: dict[str, Any]) -> None:
+        number = info['publication_sequence_number'] or UNKNOWN
+        if self._is_ahead(heard):
+            return
+        before = self._belief.value
+        if self._belief.hear(heard, number, time.monotonic(), self._alone):
+            if self._each or heard != before:
+                self._give(heard)
+        elif (due := self._belief.due) is not None:
+            self._wake_at(due)
+
+    def _alone(self) -> bool:
+        return int(self._node.count_publishers(self._name)) <= 1
+
+    def _give(self, heard: bytes) -> None:
+        self._take(heard if self._raw else deserialize_message(heard, self._kind))
+
+    def _wake_at(self, due: float) -> None:
+        period = max(1, int(1e9 * (due - time.monotonic())))
+        if self._timer is None:
+            self._timer = self._node.create_timer(
+                1e-9 * period, self._on_due, clock=self._steady
+            )
+        elif self._timer.is_canceled():
+            self._timer.timer_period_ns = period
+            self._timer.reset()
+
+    def _on_due(self) -> None:
+        assert self._timer is not None
+        self._timer.cancel()
+        before = self._belief.value
+        if self._belief.settle(time.monotonic()):
+            heard = self._belief.value
+            assert heard is not None
+            if self._each or heard != before:
+                self._give(heard)
+        elif (due := self._belief.due) is not None:
+            self._wake_at(due)
+
+    def _is_ahead(self, heard: bytes) -> bool:
+        """Refuse a stamp that no clock has reached yet."""
+        if self._stamp is None or heard == self._belief.value:
+            return False
+        message = heard if self._raw else deserialize_message(heard, self._kind)
+        ahead = self._stamp(message) - 1e-9 * self._node.get_clock().now().nanoseconds
+        if ahead <= self._ahead:
+            return False
+        self._node.get_logger().error(
+            f'{self._name}: a stamp {ahead:.1f} s ahead of this clock is refused; expected at most '
+            f'{self._ahead:g} s'
+        )
+        return True
