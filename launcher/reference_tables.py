@@ -63,7 +63,10 @@ themselves; a test compares. The fields of the types, with units, stand in
 
 - Names are relative, so `--namespace robot2` gives a second robot. A name that begins with a slash
   is the same for all robots.
-- *Latched* topics are reliable and transient_local: a late subscriber gets the last message.
+- *Latched* topics are reliable and transient_local: a late subscriber gets the last message. Most
+  are state topics: their owner repeats them and answers whoever else publishes them
+  ([architecture.md](architecture.md#threads-and-time)). `state/battery_low` is published on change
+  only; `battery_low` is the same, repeated.
 - Each node publishes its health on `/diagnostics` ([long_runs.md](long_runs.md#health)).
 - A node that calls `ontology_map/reference_name` uses the ontology after that: it calls
   `armor_interface_srv` or `armor_interface_serialized_srv`, and some subscribe `fact_changes`. Only
@@ -264,7 +267,9 @@ def interfaces_page(found: Survey) -> str:
 
 
 def _interface_row(name: str, interface: Interface) -> str:
-    servers, clients = _named(interface.servers), _named(interface.clients)
+    # Who owns a state topic hears it as well, to answer whoever else publishes it.
+    owners = interface.servers if interface.latched else set()
+    servers, clients = _named(interface.servers), _named(interface.clients - owners)
     latched = ', latched' if interface.latched else ''
     return f'| `{name}` | {interface.type}{latched} | {servers} | {clients} |\n'
 

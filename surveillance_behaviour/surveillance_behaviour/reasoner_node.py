@@ -37,8 +37,8 @@ from surveillance_interfaces.srv import Reason
 from surveillance_runtime.conversions import seconds_of
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.process import run_node
-from surveillance_runtime.qos import STATE_QOS
 from surveillance_runtime.run_parameters import BEHAVIOUR_NODE
+from surveillance_runtime.state_topics import StateSubscription
 
 
 class Reasoner(PatrolNode):
@@ -68,7 +68,13 @@ class Reasoner(PatrolNode):
         self._next: Future | None = None
         self._sharing = threading.Lock()
         hear_battery(self, battery)
-        self.create_subscription(MissionStatus, 'mission_status', self._on_status, STATE_QOS)
+        StateSubscription(
+            self,
+            MissionStatus,
+            'mission_status',
+            self._on_status,
+            stamp=lambda told: seconds_of(told.stamp),
+        )
         self._owner = f'{self.get_namespace().rstrip("/")}/{BEHAVIOUR_NODE}'
         self.create_subscription(ParameterEvent, '/parameter_events', self._on_parameters, 1000)
         self.create_service(

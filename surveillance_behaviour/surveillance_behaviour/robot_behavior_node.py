@@ -1,6 +1,6 @@
 """The node `robot_behavior`: runs one of the machines until it is told to stop.
 
-Subscribes `battery_level`, `state/battery_low`, `battery_state` and `robot_place`, publishes
+Subscribes `battery_level`, `battery_low`, `battery_state` and `robot_place`, publishes
 `mission_status`, and calls the services and actions of the machine that `behaviour` names. Below
 `robot_behavior/fsm` the machine can be watched, paused and stepped. In the behaviour `surveillance`
 this node decides: it publishes `decision` and offers `why_not` and `go_to`; in `patrol` the node
@@ -38,12 +38,14 @@ from surveillance_behaviour.ros_adapters.peers import (
     ros_ontology,
 )
 from surveillance_behaviour.ros_adapters.reason_client import ReasonClient
+from surveillance_runtime.conversions import seconds_of
 from surveillance_runtime.files import FileError
 from surveillance_runtime.introspection import IntrospectionServer
 from surveillance_runtime.launch_protocol import NotNowError
 from surveillance_runtime.node import JOIN_SECONDS, PatrolNode
 from surveillance_runtime.process import run_node
 from surveillance_runtime.qos import SENSOR_QOS
+from surveillance_runtime.state_topics import StateSubscription
 
 
 class RobotBehavior(PatrolNode):
@@ -75,11 +77,13 @@ class RobotBehavior(PatrolNode):
         self._introspection = IntrospectionServer(self, self.get_name(), self.machine, '/')
         self._introspection.start()
         hear_battery(self, battery)
-        self.create_subscription(
+        StateSubscription(
+            self,
             BatteryState,
             'battery_state',
             lambda m: battery.set_charging(conversions.charging_from(m)),
-            SENSOR_QOS,
+            stamp=lambda told: seconds_of(told.header.stamp),
+            qos=SENSOR_QOS,
         )
         self._machine_thread = self.spawn(self._run, name='machine')
 

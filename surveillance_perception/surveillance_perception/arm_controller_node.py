@@ -36,10 +36,10 @@ from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.parameters import converted, parameter
 from surveillance_runtime.process import run_node
 from surveillance_runtime.qos import SENSOR_QOS
-from surveillance_runtime.state_topics import OwnedTopic
 from surveillance_runtime.robot_arm import ARM, REST_PATIENCE, Arm, Array
 from surveillance_runtime.settled_frames import SettledFrames
 from surveillance_runtime.stamp_offset import StampOffset
+from surveillance_runtime.state_topics import OwnedTopic
 
 _POSES = {
     MarkerRoutine.Request.LEFT: 'left',

@@ -1,8 +1,9 @@
 """State topics: latched, with one owner that repeats its word and answers whoever else speaks.
 
 The owner (`OwnedTopic`) publishes each change, repeats its state about each second, answers every
-foreign value with its own, and tells of a second publisher in an incident with that node's name. A reader (`StateSubscription`) takes a new state once,
-refuses stamps ahead of its clock, and believes the owner: see `belief`.
+foreign value with its own, and tells of a second publisher in an incident with that node's name.
+A reader (`StateSubscription`) takes a new state once, refuses stamps ahead of its clock, and
+believes the owner: see `belief`.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from collections.abc import Callable
 from typing import Any, Generic, TypeVar
 
 from rclpy.clock import Clock, ClockType
+from rclpy.qos import QoSProfile
 from rclpy.serialization import deserialize_message, serialize_message
 from rclpy.timer import Timer
 
@@ -79,17 +81,15 @@ class OwnedTopic(Generic[M]):
     def _on_period(self) -> None:
         with self._lock:
             # A state that has just changed need not be said twice within a moment.
-            if self._repeats and self._said is not None:
-                if time.monotonic() - self._said_at >= REPEAT / 2:
-                    self._say(self._said)
+            old = time.monotonic() - self._said_at >= REPEAT / 2
+            if self._repeats and self._said is not None and old:
+                self._say(self._said)
         self._look_for_others()
 
     def _on_heard(self, heard: bytes, info: dict[str, Any]) -> None:
         number = info['publication_sequence_number'] or UNKNOWN
         with self._lock:
-            if any(
-                heard == state and (number in (count, UNKNOWN)) for count, state in self._own
-            ):
+            if any(heard == state and (number in (count, UNKNOWN)) for count, state in self._own):
                 return
             foreign = deserialize_message(heard, self._kind)
             own = None if self._said is None else deserialize_message(self._said, self._kind)
@@ -147,6 +147,7 @@ class StateSubscription(Generic[M]):
         raw: Give `take` the bytes of a message.
         stamp: Returns the stamp of what `take` is given, seconds; None: it has none.
         each: Give every message of the owner, also one that repeats the state.
+        qos: How it is heard, where the owner may be another program.
     """
 
     def __init__(
@@ -159,6 +160,7 @@ class StateSubscription(Generic[M]):
         raw: bool = False,
         stamp: Callable[[Any], float] | None = None,
         each: bool = False,
+        qos: QoSProfile = STATE_QOS,
     ) -> None:
         self._node = node
         self._kind = kind
@@ -172,9 +174,7 @@ class StateSubscription(Generic[M]):
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
         simulated = bool(node.get_parameter('use_sim_time').value)
         self._ahead = AHEAD_SIMULATED if simulated else AHEAD
-        self._subscription = node.create_subscription(
-            kind, name, self._on_heard, STATE_QOS, raw=True
-        )
+        self._subscription = node.create_subscription(kind, name, self._on_heard, qos, raw=True)
 
     def _on_heard(self, heard: bytes, info: dict[str, Any]) -> None:
         number = info['publication_sequence_number'] or UNKNOWN
@@ -196,9 +196,7 @@ class StateSubscription(Generic[M]):
     def _wake_at(self, due: float) -> None:
         period = max(1, int(1e9 * (due - time.monotonic())))
         if self._timer is None:
-            self._timer = self._node.create_timer(
-                1e-9 * period, self._on_due, clock=self._steady
-            )
+            self._timer = self._node.create_timer(1e-9 * period, self._on_due, clock=self._steady)
         elif self._timer.is_canceled():
             self._timer.timer_period_ns = period
             self._timer.reset()

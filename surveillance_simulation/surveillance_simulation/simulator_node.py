@@ -112,13 +112,9 @@ class Simulator(PatrolNode):
         FaultServices(self, self.robot, self._changing, self._changed)
         self._unmonitored = self.create_subscription(Twist, 'cmd_vel', self._obey, 1)
         self.create_subscription(Twist, 'cmd_vel_monitored', self._on_monitored, 1)
-        StateSubscription(
-            self, PoseWithCovarianceStamped, 'amcl_pose', self._on_estimate, raw=True
-        )
+        StateSubscription(self, PoseWithCovarianceStamped, 'amcl_pose', self._on_estimate, raw=True)
         # The same word twice is two waits.
-        StateSubscription(
-            self, Time, 'mission_waits_until', self._on_mission_waits, each=True
-        )
+        StateSubscription(self, Time, 'mission_waits_until', self._on_mission_waits, each=True)
         StateSubscription(self, RobotPlace, 'robot_place', self._on_place)
         StateSubscription(self, Time, 'robot_place_written', self._on_place_written)
         for action in (*PLANNING, *DRIVING):

@@ -81,7 +81,7 @@ def test_it_gathers_what_topics_ontology_and_parameters_tell(graph: Any) -> None
     say(graph, 'mission_status', MissionStatus(machine='surveillance', state='MOVE', place='A'))
     say(graph, 'decision', Decision(sequence=4, from_place='A', place='B', rule='URGENT'))
     say(graph, 'battery_level', UInt8(data=15))
-    say(graph, 'state/battery_low', Bool(data=True))
+    say(graph, 'battery_low', Bool(data=True))
     say(graph, 'door_states', DoorStates(closed=['D']))
     say(graph, 'obstacles', cloud_from_points(np.array([[2.0, 1.0]])))
     pose = PoseWithCovarianceStamped()

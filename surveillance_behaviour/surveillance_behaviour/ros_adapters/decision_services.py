@@ -21,7 +21,7 @@ from surveillance_interfaces.msg import Decision as DecisionMessage
 from surveillance_interfaces.srv import GoTo, WhyNot
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.parameters import parameter
-from surveillance_runtime.qos import STATE_QOS
+from surveillance_runtime.state_topics import OwnedTopic
 from surveillance_runtime.waiting import AwaitedWork
 
 
@@ -67,7 +67,7 @@ def world_model_of(
     if experience.problem:
         log.warn(experience.problem)
     generator = random.Random(memory.random_seed if memory.random_seed >= 0 else None)
-    topic = node.create_publisher(DecisionMessage, 'decision', STATE_QOS)
+    topic = OwnedTopic(node, DecisionMessage, 'decision')
     count = 0
 
     def announce(decision: Decision) -> None:

@@ -42,10 +42,11 @@ from surveillance_runtime.conversions import (
     point_from,
     point_message,
     point_messages,
+    seconds_of,
 )
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.parameters import parameter
-from surveillance_runtime.qos import STATE_QOS
+from surveillance_runtime.state_topics import OwnedTopic, StateSubscription
 
 ASK_AGAIN = 10.0
 """How long one question to a service that takes long waits for its answer, seconds."""
@@ -66,7 +67,7 @@ class MissionClock(ClockWait):
         super().__init__(node)
         self._topic = None
         if node.get_parameter('use_sim_time').value:
-            self._topic = node.create_publisher(Time, 'mission_waits_until', STATE_QOS)
+            self._topic = OwnedTopic(node, Time, 'mission_waits_until', repeat=None)
 
     def sleep(self, seconds: float, interrupt: fsm.Interrupt | None = None) -> bool:
         """Wait; return False when the interrupt ended it early."""
@@ -141,11 +142,12 @@ def ros_ontology(node: PatrolNode, deadlines: Deadlines) -> ArmorKnowledge:
         node, 'armor_interface_srv', 'armor_interface_serialized_srv', deadlines.answer, wake
     )
     whereabouts = Whereabouts()
-    node.create_subscription(
+    StateSubscription(
+        node,
         RobotPlace,
         'robot_place',
         lambda told: whereabouts.note(told.place, nanoseconds_of(told.header.stamp)),
-        STATE_QOS,
+        stamp=lambda told: seconds_of(told.header.stamp),
     )
     return ArmorKnowledge(
         node.get_name(),
@@ -159,13 +161,9 @@ def ros_ontology(node: PatrolNode, deadlines: Deadlines) -> ArmorKnowledge:
 
 
 def hear_battery(node: PatrolNode, battery: BatteryMonitor) -> None:
-    """Have a monitor follow the topics ``battery_level`` and ``state/battery_low``."""
-    node.create_subscription(
-        UInt8, 'battery_level', lambda m: battery.set_level(float(m.data)), STATE_QOS
-    )
-    node.create_subscription(
-        Bool, 'state/battery_low', lambda m: battery.set_low(m.data), STATE_QOS
-    )
+    """Have a monitor follow the topics ``battery_level`` and ``battery_low``."""
+    StateSubscription(node, UInt8, 'battery_level', lambda m: battery.set_level(float(m.data)))
+    StateSubscription(node, Bool, 'battery_low', lambda m: battery.set_low(m.data))
 
 
 class RosPlaces:
@@ -390,7 +388,7 @@ class RosAnnouncer:
         self._text = ''
         self._waiting = False
         self._status: Callable[[], MissionStatus] = MissionStatus
-        self._topic = node.create_publisher(MissionStatus, 'mission_status', STATE_QOS)
+        self._topic = OwnedTopic(node, MissionStatus, 'mission_status')
 
     def attach(self, mission: Mission, machine: fsm.StateMachine) -> None:
         """Report this machine's state from now on, at every transition and every message."""

@@ -17,7 +17,7 @@ from surveillance_behaviour.ros_adapters.peers import Deadlines
 from surveillance_interfaces.msg import Decision as DecisionMessage
 from surveillance_interfaces.srv import Reason
 from surveillance_runtime.node import PatrolNode
-from surveillance_runtime.qos import STATE_QOS
+from surveillance_runtime.state_topics import StateSubscription
 
 DECISION_SECONDS = 1.0
 """How long the message about a decision may come after the answer of `reason`, seconds."""
@@ -45,7 +45,7 @@ class ReasonClient(Reasoner):
         self._told = threading.Condition()
         self._decision: Decision | None = None
         self._reason = ServiceCaller(node, Reason, 'reason')
-        node.create_subscription(DecisionMessage, 'decision', self._on_decision, STATE_QOS)
+        StateSubscription(node, DecisionMessage, 'decision', self._on_decision)
 
     def _on_decision(self, message: DecisionMessage) -> None:
         with self._told:

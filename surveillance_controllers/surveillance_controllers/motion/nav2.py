@@ -33,7 +33,7 @@ from surveillance_controllers.map_knowledge import MapKnowledge
 from surveillance_controllers.motion.arrival import Motion, MotionFailedError, expect_place
 from surveillance_controllers.motion.place_recording import PlaceRecorder
 from surveillance_controllers.motion.place_regions import PlaceMap
-from surveillance_runtime.conversions import pose_from, pose_message
+from surveillance_runtime.conversions import pose_from, pose_message, seconds_of
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.parameters import ParameterError
 from surveillance_runtime.state_topics import StateSubscription

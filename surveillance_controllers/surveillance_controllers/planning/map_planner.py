@@ -29,6 +29,7 @@ from surveillance_controllers.planning.grid_planning import (
 from surveillance_runtime.conversions import (
     points_from_cloud,
     pose_of_serialized,
+    stamp_of_serialized,
     values_from_cloud,
 )
 from surveillance_runtime.node import PatrolNode

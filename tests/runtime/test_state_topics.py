@@ -1,0 +1,114 @@
+"""State topics have one owner, whose word wins."""
+
+from __future__ import annotations
+
+import itertools
+from typing import Any
+
+from std_msgs.msg import Bool, Header, UInt8
+
+from surveillance_interfaces.msg import RobotPlace
+from surveillance_runtime.conversions import seconds_of
+from surveillance_runtime.node import PatrolNode
+from surveillance_runtime.qos import STATE_QOS
+from surveillance_runtime.state_topics import OwnedTopic, StateSubscription
+
+
+def reader(graph: Any, kind: Any, topic: str, **options: Any) -> list[Any]:
+    taken: list[Any] = []
+
+    def take(message: Any) -> None:
+        taken.append(message)
+        graph.touch()
+
+    StateSubscription(graph.add(PatrolNode, name='reader'), kind, topic, take, **options)
+    return taken
+
+
+def test_a_foreign_message_changes_nothing_and_is_answered(graph: Any) -> None:
+    owner = graph.add(PatrolNode, name='owner')
+    level = OwnedTopic(owner, UInt8, 'level')
+    for percent in (100, 99, 98):
+        level.publish(UInt8(data=percent))
+    levels = reader(graph, UInt8, 'level')
+    heard = graph.listen(UInt8, 'level', STATE_QOS)
+    graph.until(lambda: levels and heard)
+    stranger = graph.add(PatrolNode, name='stranger')
+    stranger.create_publisher(UInt8, 'level', STATE_QOS).publish(UInt8(data=0))
+    graph.until(lambda: any(each.data == 0 for each in heard))
+    graph.until(lambda: heard[-1].data == 98)
+    graph.until(lambda: ('topic', 'level') in owner.incidents.open())
+    (_, told), *_ = [each for each in owner.health.findings() if 'level' in each[1]]
+    assert told == 'level is published by /stranger, too: expected only owner'
+    graph.drop(stranger)
+    level.publish(UInt8(data=97))
+    graph.until(lambda: levels[-1].data == 97)
+    assert [each.data for each in levels] == [98, 97]
+
+
+def test_an_owner_repeats_itself_and_its_reader_takes_each_state_once(graph: Any) -> None:
+    owner = graph.add(PatrolNode, name='owner')
+    topic = OwnedTopic(owner, UInt8, 'level', repeat=0.05)
+    levels = reader(graph, UInt8, 'level')
+    heard = graph.listen(UInt8, 'level', STATE_QOS)
+    topic.publish(UInt8(data=5))
+    graph.until(lambda: len(heard) >= 3)
+    assert [each.data for each in levels] == [5]
+
+
+def test_a_topic_of_changes_is_not_repeated_by_an_equal_foreign_value(graph: Any) -> None:
+    owner = graph.add(PatrolNode, name='owner')
+    low = OwnedTopic(owner, Bool, 'low', repeat=None)
+    heard = graph.listen(Bool, 'low', STATE_QOS)
+    low.publish(Bool(data=True))
+    graph.until(lambda: len(heard) == 1)
+    publisher = graph.node.create_publisher(Bool, 'low', STATE_QOS)
+    publisher.publish(Bool(data=True))
+    graph.until(lambda: len(heard) == 2)
+    publisher.publish(Bool(data=False))
+    graph.until(lambda: len(heard) == 4)
+    assert [each.data for each in heard] == [True, True, False, True]
+
+
+def test_an_owner_that_was_started_again_is_heard(graph: Any) -> None:
+    first = graph.add(PatrolNode, name='owner')
+    topic = OwnedTopic(first, UInt8, 'level')
+    for percent in range(10, 20):
+        topic.publish(UInt8(data=percent))
+    levels = reader(graph, UInt8, 'level')
+    graph.until(lambda: levels)
+    graph.drop(first)
+    again = OwnedTopic(graph.add(PatrolNode, name='owner'), UInt8, 'level')
+    again.publish(UInt8(data=50))
+    graph.until(lambda: levels[-1].data == 50, timeout=5.0)
+
+
+def test_a_stamp_ahead_of_the_clock_is_refused(graph: Any) -> None:
+    places = reader(
+        graph, RobotPlace, 'robot_place', stamp=lambda told: seconds_of(told.header.stamp)
+    )
+    said = graph.said()
+    publisher = graph.node.create_publisher(RobotPlace, 'robot_place', STATE_QOS)
+
+    def tell(place: str, ahead: float) -> None:
+        stamp = graph.node.get_clock().now().to_msg()
+        stamp.sec += int(ahead)
+        publisher.publish(RobotPlace(header=Header(stamp=stamp), place=place))
+
+    graph.until(lambda: publisher.get_subscription_count())
+    tell('R1', 3600.0)
+    graph.until(lambda: any('ahead of this clock' in line for line in said))
+    tell('R2', 0.0)
+    graph.until(lambda: places)
+    assert [each.place for each in places] == ['R2']
+
+
+def test_more_than_one_second_publisher_is_named_once_each(graph: Any) -> None:
+    owner = graph.add(PatrolNode, name='owner')
+    topic = OwnedTopic(owner, UInt8, 'level')
+    topic.publish(UInt8(data=1))
+    said = graph.said()
+    for name, value in itertools.product(('one', 'two'), (7, 8)):
+        node = graph.node if name == 'one' else owner
+        node.create_publisher(UInt8, 'level', STATE_QOS).publish(UInt8(data=value))
+    graph.until(lambda: any('incident [topic level, warning]' in line for line in said))
