@@ -184,6 +184,9 @@ class ArucoDetector(PatrolNode):
                 f'{self._watch.left_out} candidates of an image were left unread to bound the work '
                 '(max_candidates); /diagnostics counts them from now on'
             )
+        other = self._watch.other_family
+        if other is not None:
+            self._warn_once_a_minute(_another_family(other, self._settings.detector.dictionary))
         for marker_id in new:
             self._ids.publish(Int32(data=marker_id))
         self._detections.publish(detections_to_ros(message.header, sightings))
@@ -223,6 +226,11 @@ class ArucoDetector(PatrolNode):
             health.warn('stamps', '; '.join(odd))
         else:
             health.clear('stamps')
+        if self._watch.other_family is not None:
+            ours = self._settings.detector.dictionary
+            health.warn('dictionary', _another_family(self._watch.other_family, ours))
+        else:
+            health.clear('dictionary')
         health.figure('images', statistics.images)
         health.figure('refused', statistics.refused)
         health.figure('candidates_left_out', statistics.left_out)
@@ -230,6 +238,10 @@ class ArucoDetector(PatrolNode):
         health.figure('dropped_in_all', self._images.dropped)
         health.figure('taken_in_motion_in_all', self.skipped)
         health.figure('confirmed_ids', ' '.join(map(str, sorted(self._watch.confirmed))))
+
+
+def _another_family(theirs: str, ours: str) -> str:
+    return f'no marker of {ours} is seen, and several that look like {theirs} (marker_dictionary)'
 
 
 def main(args: Sequence[str] | None = None) -> int:

@@ -64,6 +64,9 @@ def _detect(detector: MarkerDetector, path: Path, folder: Path | None, written: 
         replace_file(target, encoded.tobytes())
         said += f', drawn in {target}'
     print(said)
+    if not detections:
+        for name, ids in detector.other_families(image).items():
+            print(f'  looks like {name}: {", ".join(map(str, ids))}')
     for detection in sorted(detections, key=lambda each: each.marker_id):
         x, y = detection.corners.mean(axis=0)
         note = '' if detection.known else '  not on the known list'

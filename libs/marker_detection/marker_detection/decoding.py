@@ -71,25 +71,29 @@ class MarkerReader:
     Args:
         codes: The codes to choose from.
         blur: Standard deviation in pixels of the lens's blur in a sharp image.
+
+    Attributes:
+        codes: The codes to choose from.
+        fit: Compares images with them.
     """
 
     def __init__(self, codes: MarkerCodes, blur: float) -> None:
         self.codes = codes
         self._blur = blur
         self._rough = TemplateFit(codes, _ROUGH_SAMPLES)
-        self._fit = TemplateFit(codes)
+        self.fit = TemplateFit(codes)
         self._differences = CellDifferences(codes)
 
     def read_cells(self, pyramid: ImagePyramid, homographies: Array) -> CellReadings:
         """Read candidates (m, 3, 3) by the differences between their cells."""
-        levels = self._fit.levels(homographies)
-        patches = self._fit.sample(pyramid, homographies, levels)
-        return self._differences.read(self._fit.cells(patches))
+        levels = self.fit.levels(homographies)
+        patches = self.fit.sample(pyramid, homographies, levels)
+        return self._differences.read(self.fit.cells(patches))
 
     def aligned(self, pyramid: ImagePyramid, homographies: Array, cells: CellReadings) -> Array:
         """Homographies (m, 3, 3) moved to where what was read lies, unless that agrees less."""
         blur = np.full((len(homographies), 2), self._blur)
-        moved = self._fit.refine(pyramid, homographies, cells.entries, blur, _ROUGH_ITERATIONS)
+        moved = self.fit.refine(pyramid, homographies, cells.entries, blur, _ROUGH_ITERATIONS)
         again = self.read_cells(pyramid, moved)
         better = (again.entries == cells.entries) & (again.correlation >= cells.correlation)
         return np.where(better[:, None, None], moved, homographies)
@@ -142,7 +146,7 @@ class MarkerReader:
         blur = blur[owner[best]]
         aligned, listed = aligned[best], entries[best]
         start, blur = self._softened(aligned, patches[best], listed, correlation[best, 0], blur)
-        aligned = self._fit.refine(pyramid, aligned, start, blur, _FINE_ITERATIONS)
+        aligned = self.fit.refine(pyramid, aligned, start, blur, _FINE_ITERATIONS)
         return self._judged(pyramid, aligned, blur, listed)
 
     def _judged(
@@ -150,10 +154,10 @@ class MarkerReader:
     ) -> Readings:
         """Return readings of aligned candidates (m, 3, 3), with codes out of (m, j)."""
         entries, correlation, patches, footprint = self._score(
-            self._fit, pyramid, homographies, blur, listed
+            self.fit, pyramid, homographies, blur, listed
         )
-        inner = self._fit.inner_correlations(patches, entries[:, :_RIVALS], footprint)
-        cells = self._fit.cells(patches)
+        inner = self.fit.inner_correlations(patches, entries[:, :_RIVALS], footprint)
+        cells = self.fit.cells(patches)
         shown = self._differences.read(cells)
         wrong, wrong_border = self._differences.wrong(cells, entries[:, 0])
         return Readings(

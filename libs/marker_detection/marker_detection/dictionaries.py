@@ -13,13 +13,15 @@ import os
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
 
 import cv2
 import numpy as np
 import numpy.typing as npt
 import yaml
 
-_FILE_SUFFIXES = ('.yaml', '.yml', '.json')
+_FILE_SUFFIXES = ('.yaml', '.yml', '.json', '.xml')
 _LARGEST_FILE = 10_000_000
 _MOST_MARKERS = 100_000
 _SMALLEST_SIDE, _LARGEST_SIDE = 3, 16
@@ -35,8 +37,9 @@ def dictionary_named(name: str) -> cv2.aruco.Dictionary:
     """Return a predefined dictionary by its name, such as `DICT_5X5_100`, or one of the user's own.
 
     Args:
-        name: One of `DICTIONARY_NAMES`, or the path of a YAML or JSON file as OpenCV writes and
-            reads them: `nmarkers`, `markersize`, `maxCorrectionBits`, `marker_0`, `marker_1`, ...
+        name: One of `DICTIONARY_NAMES`, or the path of a YAML, JSON or XML file as OpenCV writes
+            and reads them: `nmarkers`, `markersize`, `marker_0`, `marker_1`, ...; without
+            `maxCorrectionBits` that is 0, as for OpenCV.
 
     Raises:
         ValueError: OpenCV has no dictionary of that name, and there is no usable file.
@@ -65,22 +68,15 @@ def _dictionary_in(path: Path) -> cv2.aruco.Dictionary:
         raise ValueError(f'{what}: {error.strerror}') from None
     except UnicodeDecodeError as error:
         raise ValueError(f'{what} is no text') from error
-    expected = "expected OpenCV's form: nmarkers, markersize, maxCorrectionBits, marker_0, ..."
-    if text.startswith('%YAML'):
-        # OpenCV's first line is no YAML of any version
-        text = text.partition('\n')[2]
+    expected = "expected OpenCV's form: nmarkers, markersize, marker_0, ..."
+    values = _values_in(text, what, expected)
     try:
-        values = yaml.load(text, yaml.BaseLoader)
-    except (yaml.YAMLError, RecursionError) as error:
-        raise ValueError(f'{what} is not valid YAML, {expected}') from error
-    try:
-        count, side, correction = (
-            int(values[key]) for key in ('nmarkers', 'markersize', 'maxCorrectionBits')
-        )
+        count, side = (int(values[key]) for key in ('nmarkers', 'markersize'))
+        correction = int(values.get('maxCorrectionBits', 0))
         codes = [str(values[f'marker_{index}']) for index in range(min(count, _MOST_MARKERS))]
     except KeyError as error:
         raise ValueError(f'{what} lacks {error.args[0]}, {expected}') from error
-    except (TypeError, ValueError) as error:
+    except (AttributeError, TypeError, ValueError) as error:
         raise ValueError(f'{what} cannot be read, {expected}') from error
     if not 1 <= count == len(codes) or not _SMALLEST_SIDE <= side <= _LARGEST_SIDE:
         raise ValueError(f'{what} has {count} markers of {side}x{side} cells, {expected}')
@@ -92,6 +88,30 @@ def _dictionary_in(path: Path) -> cv2.aruco.Dictionary:
     bits = np.array([list(code) for code in codes]).astype(np.uint8).reshape(count, side, side)
     stored = np.concatenate([cv2.aruco.Dictionary.getByteListFromBits(each) for each in bits])
     return cv2.aruco.Dictionary(stored, side, correction)
+
+
+def _values_in(text: str, what: str, expected: str) -> Any:
+    """Return what OpenCV's FileStorage has at the top of a file, as text.
+
+    Raises:
+        ValueError: It is neither YAML nor XML.
+    """
+    if text.lstrip().startswith('<?xml'):
+        if '<!DOCTYPE' in text:
+            raise ValueError(f'{what} has a document type, {expected}')
+        try:
+            root = ElementTree.fromstring(text)
+        except ElementTree.ParseError as error:
+            raise ValueError(f'{what} is not valid XML ({error}), {expected}') from error
+        # strings of digits are in quotes: they would be numbers otherwise
+        return {each.tag: (each.text or '').strip().strip('"') for each in root}
+    if text.startswith('%YAML'):
+        # OpenCV's first line is no YAML of any version
+        text = text.partition('\n')[2]
+    try:
+        return yaml.load(text, yaml.BaseLoader)
+    except (yaml.YAMLError, RecursionError) as error:
+        raise ValueError(f'{what} is not valid YAML, {expected}') from error
 
 
 @dataclass(frozen=True)
@@ -134,11 +154,25 @@ class MarkerCodes:
         bits = int(dictionary.markerSize)
         cells = np.ones((len(chosen) * 4, bits + 4, bits + 4), np.float32)
         cells[:, 1:-1, 1:-1] = -1.0
-        for index, marker_id in enumerate(chosen):
-            drawn = dictionary.generateImageMarker(marker_id, bits + 2, borderBits=1)
-            code = np.where(drawn[1:-1, 1:-1] > 127, 1.0, -1.0)
-            for turn in range(4):
-                cells[index * 4 + turn, 2:-2, 2:-2] = np.rot90(code, -turn)
+        code = np.where(_bits_of(dictionary)[list(chosen)], np.float32(1.0), np.float32(-1.0))
+        for turn in range(4):
+            cells[turn::4, 2:-2, 2:-2] = np.rot90(code, -turn, axes=(1, 2))
         ids = np.repeat(np.array(list(chosen), np.int64), 4)
         turns = np.tile(np.arange(4), len(chosen))
         return cls(bits, ids, turns, cells)
+
+
+def _bits_of(dictionary: cv2.aruco.Dictionary) -> npt.NDArray[np.bool_]:
+    """Return the cells (n, bits, bits) of all codes, true for white.
+
+    OpenCV packs them row by row into bytes, the last of which has the rest in its lowest bits.
+    (Drawing each marker takes ten times as long.)
+    """
+    side = int(dictionary.markerSize)
+    stored = np.ascontiguousarray(dictionary.bytesList, np.uint8)
+    # four rotations one after the other, although the array's shape says otherwise
+    packed = stored.reshape(len(stored), 4, -1)[:, 0]
+    whole, rest = divmod(side * side, 8)
+    bits = np.unpackbits(packed, axis=1)
+    last = bits[:, 8 * whole + 8 - rest : 8 * whole + 8] if rest else bits[:, :0]
+    return np.concatenate([bits[:, : 8 * whole], last], axis=1).astype(bool).reshape(-1, side, side)

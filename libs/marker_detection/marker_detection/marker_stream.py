@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections import defaultdict, deque
+from collections import Counter, defaultdict, deque
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -18,6 +18,11 @@ from marker_detection.settings import converted, parameter, parameters
 
 # images that count, as a multiple of those that must show an id: half of them may miss it
 _WINDOW = 2
+# images without a marker after which other dictionaries' are looked for, and how many more each
+# time: it takes as long as several images
+_FIRST_LOOK, _LATER_LOOKS = 5, 10
+# such markers from which a scene is taken to be another dictionary's: one may hang anywhere
+_SEVERAL = 2
 
 
 def sizes_from(entries: Sequence[str]) -> dict[int, float]:
@@ -173,7 +178,12 @@ class Confirmation:
 
 
 class MarkerStream:
-    """Detects in image after image; what was seen in one is expected in the next."""
+    """Detects in image after image; what was seen in one is expected in the next.
+
+    Attributes:
+        other_family: What the markers look like that are seen instead of the dictionary's; None
+            while there are some of the dictionary, or none at all.
+    """
 
     def __init__(self, settings: StreamSettings) -> None:
         self.statistics = Statistics()
@@ -181,6 +191,11 @@ class MarkerStream:
         self._expected: list[Array] = []
         self._settings = settings
         self._detector = MarkerDetector(settings.detector)
+        self._forget_others()
+
+    def _forget_others(self) -> None:
+        self.other_family: str | None = None
+        self._empty, self._next_look, self._others = 0, _FIRST_LOOK, Counter[str]()
 
     @property
     def confirmed(self) -> frozenset[int]:
@@ -206,6 +221,7 @@ class MarkerStream:
             settings.known_frames, settings.unknown_frames, confirmed=before
         )
         self._settings, self._detector = settings, detector
+        self._forget_others()
 
     def look(
         self, image: npt.NDArray[np.uint8], camera: CameraModel | None
@@ -225,6 +241,7 @@ class MarkerStream:
         start = time.perf_counter()
         detections = self._detector.detect(image, self._expected)
         self._expected = [np.array(detection.corners) for detection in detections]
+        self._look_for_others(image, bool(detections))
         new = self._confirmation.image((each.marker_id, each.known) for each in detections)
         confirmed = self._confirmation.confirmed
         sightings = []
@@ -236,6 +253,19 @@ class MarkerStream:
         self.statistics.left_out += self.left_out
         self.statistics.seconds += time.perf_counter() - start
         return sightings, new
+
+    def _look_for_others(self, image: npt.NDArray[np.uint8], found: bool) -> None:
+        if found:
+            self._forget_others()
+            return
+        self._empty += 1
+        if self._empty < self._next_look or self.other_family is not None:
+            return
+        self._next_look *= _LATER_LOOKS
+        seen = self._detector.other_families(image)
+        self._others.update({name: len(ids) for name, ids in seen.items()})
+        if self._others and max(self._others.values()) >= _SEVERAL:
+            self.other_family = self._others.most_common(1)[0][0]
 
     def refuse(self) -> None:
         """Count an image that could not be used."""

@@ -6,12 +6,18 @@ import cv2
 import numpy as np
 import pytest
 
-from marker_detection import DetectorSettings, MarkerDetector, dictionary_named
+from marker_detection import (
+    DICTIONARY_NAMES,
+    DetectorSettings,
+    MarkerDetector,
+    dictionary_named,
+)
+from marker_detection.dictionaries import MarkerCodes
 
 
-@pytest.fixture
-def own(tmp_path):
-    path = tmp_path / 'own.yml'
+@pytest.fixture(params=['yml', 'json', 'xml'])
+def own(request, tmp_path):
+    path = tmp_path / f'own.{request.param}'
     storage = cv2.FileStorage(str(path), cv2.FILE_STORAGE_WRITE)
     dictionary = cv2.aruco.extendDictionary(8, 6)
     dictionary.writeDictionary(storage)
@@ -28,11 +34,38 @@ def test_own_dictionary_in_opencvs_file_is_read_and_detected(own):
     assert [each.marker_id for each in found] == [3]
 
 
+def test_file_without_correction_bits_is_read_as_opencv_reads_it(tmp_path):
+    path = tmp_path / 'own.yaml'
+    path.write_text(
+        '%YAML:1.0\n---\nnmarkers: 2\nmarkersize: 4\n'
+        'marker_0: "1011010011100101"\nmarker_1: "0010111010011100"\n'
+    )
+    theirs = cv2.aruco.Dictionary()
+    assert theirs.readDictionary(cv2.FileStorage(str(path), cv2.FILE_STORAGE_READ).root())
+    ours = dictionary_named(str(path))
+    assert (ours.bytesList == theirs.bytesList).all()
+    assert ours.maxCorrectionBits == theirs.maxCorrectionBits == 0
+
+
+@pytest.mark.parametrize('name', DICTIONARY_NAMES)
+def test_codes_are_what_opencv_draws(name):
+    dictionary = dictionary_named(name)
+    codes = MarkerCodes.of(dictionary)
+    for marker_id in range(0, len(dictionary.bytesList), 97):
+        drawn = dictionary.generateImageMarker(marker_id, codes.side)
+        assert ((drawn > 127) == (codes.cells[4 * marker_id, 1:-1, 1:-1] > 0)).all()
+        turned = np.rot90(codes.cells[4 * marker_id], -1)
+        assert (codes.cells[4 * marker_id + 1] == turned).all()
+
+
 @pytest.mark.parametrize(
     ('text', 'reason'),
     [
         ('', 'cannot be read'),
         ('{', 'not valid YAML'),
+        ('<?xml version="1.0"?><a>', 'not valid XML'),
+        ('<?xml version="1.0"?><!DOCTYPE a><a/>', 'document type'),
+        ('nmarkers: 1', 'lacks markersize'),
         (
             'nmarkers: 2\nmarkersize: 3\nmaxCorrectionBits: 1\nmarker_0: "010101010"',
             'lacks marker_1',
