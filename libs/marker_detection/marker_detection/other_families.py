@@ -38,14 +38,14 @@ class _Family(NamedTuple):
     Attributes:
         fit: Compares images with them.
         differences: Reads them by their cells.
-        index: (k,) of the dictionary in `names` that each entry is from.
+        source: (k,) of the dictionary in `names` that each entry is from.
         ids: (k,) its id there.
         names: Dictionaries.
     """
 
     fit: TemplateFit
     differences: CellDifferences
-    index: Indices
+    source: Indices
     ids: Indices
     names: tuple[str, ...]
 
@@ -124,7 +124,7 @@ class OtherFamilies:
             read = family.differences.read(fit.cells(patches))
             for row in np.flatnonzero(read.error < _LARGEST_ERROR).tolist():
                 entry = int(read.entries[row])
-                name = family.names[int(family.index[entry])]
+                name = family.names[int(family.source[entry])]
                 shown.append((float(read.error[row]), name, int(family.ids[entry]), outlines[row]))
         kept: list[Array] = []
         ids = defaultdict[str, set[int]](set)
@@ -174,7 +174,7 @@ def _family_without(bits: int, own: frozenset[bytes]) -> _Family:
     """Return all codes of so many cells a side but some; the same ones serve every detector."""
     names = _families()[bits]
     each = [MarkerCodes.of(dictionary_named(name)) for name in names]
-    index = np.concatenate([np.full(len(codes.ids), at) for at, codes in enumerate(each)])
+    source = np.concatenate([np.full(len(codes.ids), at) for at, codes in enumerate(each)])
     cells = np.concatenate([codes.cells for codes in each])
     foreign = np.array([key not in own for key in _keys(cells)])
     ids, turns = (
@@ -182,7 +182,7 @@ def _family_without(bits: int, own: frozenset[bytes]) -> _Family:
         for name in ('ids', 'turns')
     )
     codes = MarkerCodes(bits, ids, turns, cells[foreign])
-    return _Family(TemplateFit(codes), CellDifferences(codes), index[foreign], ids, names)
+    return _Family(TemplateFit(codes), CellDifferences(codes), source[foreign], ids, names)
 
 
 def _keys(cells: Patches) -> list[bytes]:
