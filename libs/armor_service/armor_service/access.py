@@ -74,6 +74,23 @@ class Settings:
     sparql_timeout: float = parameter(
         30.0, 'Longest time a SPARQL query may take, seconds.', 0.01, 3600.0
     )
+    reasoning_timeout: float = parameter(
+        0.5,
+        'Seconds of processor time that reasoning over a change may take, beside twenty times what '
+        'the ontology took when it was new and 0.2 ms for each axiom; a change that takes longer '
+        'is taken back.',
+        0.01,
+        86_400.0,
+    )
+    loading_timeout: float = parameter(
+        600.0,
+        'Seconds of processor time that reasoning over a document may take at LOAD.',
+        0.01,
+        86_400.0,
+    )
+    reasoning_memory: int = parameter(
+        1024, 'MiB by which the process may grow while it reasons.', 1, 1_000_000
+    )
     sparql_rows: int = 100_000
     worlds: bool = parameter(
         True, 'Keep each reference in the store as a World of owlready2 as well, in worlds/.'

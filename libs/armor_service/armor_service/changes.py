@@ -14,8 +14,9 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from armor_service.facts import FactChange
-from armor_service.rendering import short_facts
+from armor_service.rendering import render_entity, short_facts
 from owl_reasoner.knowledge_base import Changes, KnowledgeBase
+from owl_reasoner.owl.axiom_text import axiom_text
 from owl_reasoner.owl.axioms import (
     Axiom,
     DataPropertyAssertion,
@@ -79,6 +80,16 @@ class RemoveEntity:
 
 
 Change = AddAxiom | RemoveAxiom | SetAssertion | RenameEntity | RemoveEntity
+
+
+def change_text(change: Change) -> str:
+    """Return a change as people write it."""
+    if isinstance(change, RenameEntity):
+        return f'rename {render_entity(change.old)} to {render_entity(change.new)}'
+    if isinstance(change, RemoveEntity):
+        return f'remove {render_entity(change.iri)}'
+    word = {AddAxiom: 'add', RemoveAxiom: 'remove', SetAssertion: 'set'}[type(change)]
+    return f'{word} {axiom_text(change.axiom)}'
 
 
 def apply_all(kb: KnowledgeBase, changes: Iterable[Change]) -> None:

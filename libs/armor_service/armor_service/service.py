@@ -13,6 +13,7 @@ from __future__ import annotations
 import contextlib
 import itertools
 import threading
+import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -29,14 +30,13 @@ from armor_service.protocol import (
     ListResponse,
     StoreError,
 )
-from armor_service.reference import Reference, Registry
+from armor_service.reference import Limits, Reference, Registry, Told, TooHardError
 from armor_service.rendering import one_line, shown
 from armor_service.sparql import SparqlEngine
 from armor_service.store import Store
 from armor_service.worlds import Worlds
 from owl_reasoner import memory
 from owl_reasoner.knowledge_base import Changes
-from owl_reasoner.reasoner.java_reasoning import JavaReasonerError
 
 LONG_ARGUMENTS = 1000
 """Arguments from which on a directive is not quick."""
@@ -55,6 +55,7 @@ class ArmorService:
         screen: Writes a line of LOG SCREEN.
         warn: Told in one line of what went wrong inside and of what a client should know.
         store: Makes references durable; those it holds are there at once.
+        clock: Seconds since the epoch, for what is told of changes that are taken back.
 
     Raises:
         StoreError: What is in the store cannot be read.
@@ -70,6 +71,7 @@ class ArmorService:
         worlds: Writes them for programs that use owlready2; None: nobody does.
         states: Numbers the states that are taken to be saved.
         saved: The newest state that each file holds.
+        limits: What reasoning over changes may use.
     """
 
     def __init__(
@@ -78,6 +80,7 @@ class ArmorService:
         screen: Callable[[str], None] = print,
         warn: Callable[[str], None] = print,
         store: Store | None = None,
+        clock: Callable[[], float] = time.time,
     ) -> None:
         self.settings = settings or Settings()
         readable = (*self.settings.directories, *self.settings.read_only_directories)
@@ -92,19 +95,26 @@ class ArmorService:
         self.saved: dict[Path, int] = {}
         self._saving: dict[Path, threading.Lock] = {}
         self._warn = warn
+        self._clock = clock
+        memory_limit = self.settings.reasoning_memory * 2**20
+        self.limits = Limits(self.settings.reasoning_timeout, memory_limit)
         self._watchers: list[Watcher] = [self.sparql.note]
         if store:
             store.warn = self.warn
             if self.settings.worlds:
                 self.worlds = Worlds(store.directory / 'worlds', self.warn)
             with memory.uncollected():
-                for ref in store.recover():
+                recovered = store.recover()
+                for ref in recovered:
                     self.register(ref)
                     memory.settle(len(ref.kb))
             if self.worlds:
                 self.worlds.keep_only(self.references.names())
             for note in store.notes:
                 warn(note)
+            threading.Thread(
+                target=self._open_all, args=(recovered,), name='opener', daemon=True
+            ).start()
 
     def warn(self, text: str) -> None:
         """Write a line for the operator."""
@@ -128,11 +138,29 @@ class ArmorService:
         def on_changes(changes: Changes) -> None:
             self.tell(ref.name, changes)
 
+        taken_back = ref.on_taken_back
+
+        def on_taken_back(lines: list[str], undo: list[Change]) -> None:
+            taken_back(lines, undo)
+            for line in lines:
+                self.warn(f'{ref.name}: taken back: {line}')
+
+        ref.limits, ref.on_taken_back = self.limits, on_taken_back
         ref.kb.subscribe(on_changes)
         if self.worlds:
             self.worlds.follow(ref)
         self.references.add(ref)
         self.tell(ref.name, None)
+
+    def _open_all(self, references: Sequence[Reference]) -> None:
+        """Reason over what was there before this process, one reference after the other.
+
+        Whoever asks for one does not wait for the others.
+        """
+        for ref in references:
+            with ref.lock, memory.uncollected(), contextlib.suppress(StoreError):
+                if not ref.dropped:
+                    ref.open()
 
     def saving(self, path: Path) -> threading.Lock:
         """Return what is held while a state is written to a file."""
@@ -158,8 +186,8 @@ class ArmorService:
             response = error.response
         except StoreError as error:
             response = _refusal(f'{request.words}: nothing was done: {error}')
-        except JavaReasonerError as error:
-            response = _refusal(f'{request.words}: {error}; native derivations only')
+        except TooHardError as error:
+            response = DirectiveError(f'{request.words}: {error}', timeout=True).response
         except Exception as error:
             problem = f'{request.words}: internal error, {type(error).__name__}: {error}'
             self.warn(problem)
@@ -194,7 +222,7 @@ class ArmorService:
             return None
         try:
             slow = directive.kind.may_reason and ref.is_slow
-            if slow or (directive.gathers and len(ref.kb) > LARGE):
+            if slow or not ref.opened or (directive.gathers and len(ref.kb) > LARGE):
                 return None
             return self.execute(request)
         finally:
@@ -225,6 +253,9 @@ class ArmorService:
     def close(self) -> None:
         """End helper processes and close files."""
         self.sparql.close()
+        for name in self.references.names():
+            if (ref := self.references.get(name)) is not None:
+                ref.cancel.set()
         if self.worlds:
             self.worlds.close()
         if self.store:
@@ -251,6 +282,7 @@ class ArmorService:
             with ref.lock:
                 if ref.dropped:
                     return self._execute(request)
+                ref.open()
                 if directive.kind is Kind.QUERY:
                     response = directive.run(ref, *self._values(directive, request, ref))
                 else:
@@ -264,20 +296,26 @@ class ArmorService:
         """Carry out a manipulation; return what a client should know of it."""
         self.check_free(ref, request.client_name)
         if directive.kind is Kind.CONTROL:
-            if self.store and ref.queue:
+            if self.store and ref.waiting:
                 self.store.flushed(ref.name)
-            directive.run(ref)
-            return ''
+            remark: str = directive.run(ref, *self._values(directive, request, ref))
+            return remark
         changes: list[Change] = directive.run(ref, *self._values(directive, request, ref))
+        told = Told(request.client_name, self._clock(), tuple(changes))
         if self.store and changes:
-            self.store.changed(ref.name, changes)
+            self.store.changed(ref.name, told)
         ref.heavy |= directive.schema
         remark = ref.missing(changes)
         if not changes:
-            waiting = f'; {len(ref.queue)} changes wait for APPLY' if ref.queue else ''
+            waiting = f'; {len(ref.queue)} changes wait for APPLY' if ref.waiting else ''
             remark = f'{request.words}: nothing to change{waiting}'
-        ref.submit(changes)
-        return remark
+        try:
+            problem = ref.submit(told)
+        except TooHardError as error:
+            return '; '.join(filter(None, (remark, f'done, but nothing is derived: {error}')))
+        if problem:
+            raise DirectiveError(f'{request.words}: taken back: {problem}')
+        return '; '.join(filter(None, (remark, ref.too_hard)))
 
     def _values(self, directive: Directive, request: DirectiveRequest, ref: Reference) -> list[Any]:
         return directive.read(request.args, ref.kb.iri, narrow_doubles=self.settings.narrow_doubles)

@@ -353,8 +353,8 @@ class GraphChanges:
     def version(self, ref: Reference, derived: bool) -> Version:
         """Return the version of a reference's graph as it is now."""
         log = self._log(ref)
-        # What a Java reasoner derives is not told fact by fact.
-        sequence = ref.revision if ref.origin.reasoner else log.sequence
+        # That derived facts are given up is not told fact by fact.
+        sequence = ref.revision if ref.too_hard else log.sequence
         return Version(log.epoch, derived, sequence, ref.kb.classified)
 
     def update(self, ref: Reference, derived: bool, known: Version | None) -> GraphUpdate | None:
@@ -377,7 +377,7 @@ class GraphChanges:
         self, ref: Reference, log: _Log, known: Version, now: Version
     ) -> tuple[list[Axiom], list[Axiom]] | None:
         """Return what came and what went since a version; None where only all of it will do."""
-        if ref.origin.reasoner or known.sequence < log.oldest:
+        if ref.too_hard or known.sequence < log.oldest:
             return None
         touched = dict.fromkeys(fact for at, fact in log.touched if at > known.sequence)
         before = hierarchy = log.hierarchy

@@ -26,16 +26,16 @@ import zlib
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import fields, is_dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any, get_args
 
 from armor_service.changes import Change, apply_all
 from armor_service.protocol import StoreError
-from armor_service.reference import Origin, Reference, knowledge_base
+from armor_service.reference import WHOLE, Origin, Reference, Told, knowledge_base
 from owl_reasoner.owl import axioms, expressions
 from owl_reasoner.owl.axioms import Axiom
 from owl_reasoner.owl.expressions import Literal
-from owl_reasoner.reasoner.java_reasoning import JavaReasonerError
 
 Record = list[Any]
 """``[what, reference name, ...]``."""
@@ -43,6 +43,9 @@ CHUNK = 100
 """Axioms in one record of a snapshot."""
 COMPACT_FROM = 1 << 20
 """Bytes of journal from which on a snapshot is written, if the last one is not larger."""
+MOST_UNTESTED = 100
+"""Directives that were not reasoned over yet, up to which a snapshot waits: it does not tell which
+of them to leave out should reasoning over them end the process."""
 CLOSING = 1.0
 """Seconds for which a store that is closed waits for the snapshot that is being written."""
 RETRY_SECONDS = 1.0
@@ -423,6 +426,7 @@ class Store:
         self.directory = directory
         self.warn: Callable[[str], None] = print
         self._journal = Journal(directory)
+        self._reasoning = _Reasoning(directory / 'reasoning')
         self.notes = list(self._journal.notes)
         self._compact_from = compact_from
         self._lock = threading.Lock()
@@ -434,7 +438,7 @@ class Store:
         self._closed = threading.Event()
 
     def recover(self) -> list[Reference]:
-        """Make the references as they were answered for; their derived facts are up to date.
+        """Make the references as they were answered for; what follows is derived by their `open`.
 
         Raises:
             StoreError: A record that this version does not know.
@@ -452,13 +456,28 @@ class Store:
                 'were left out'
             )
         for ref in recovery.references.values():
-            with suppress(JavaReasonerError):
-                ref.kb.reason()
+            ref.opened = False
+            ref.deaths, ref.died_at = self._reasoning.left(ref.name)
+            self.follow(ref)
         return list(recovery.references.values())
+
+    def follow(self, ref: Reference) -> None:
+        """Remember what a reference takes back, and over what it reasons."""
+
+        def on_reasoning(place: int | None) -> None:
+            self._reasoning.note(ref.name, place)
+
+        def on_taken_back(lines: list[str], undo: list[Change]) -> None:
+            if not ref.dropped:
+                self._write(['taken back', ref.name, lines, [encode(change) for change in undo]])
+
+        ref.on_reasoning, ref.on_taken_back = on_reasoning, on_taken_back
+        ref.on_completed = partial(self._reasoning.completed, ref.name)
 
     def loaded(self, ref: Reference) -> None:
         """Remember a new reference."""
         self._write(*_records(*_state(ref)))
+        self.follow(ref)
 
     def dropped(self, name: str) -> None:
         """Forget a reference."""
@@ -472,9 +491,10 @@ class Store:
         """Remember that buffered manipulation was switched."""
         self._write(['buffer', name, on])
 
-    def changed(self, name: str, changes: Iterable[Change]) -> None:
+    def changed(self, name: str, told: Told) -> None:
         """Remember changes, applied or queued as the reference is set up."""
-        self._write(['change', name, [encode(change) for change in changes]])
+        changes = [encode(change) for change in told.changes]
+        self._write(['change', name, changes, told.time, told.client])
 
     def flushed(self, name: str) -> None:
         """Remember that the queue was applied."""
@@ -518,6 +538,8 @@ class Store:
                         # What waits is in the references already. Or one of them came or went
                         # meanwhile, or is in use. The next change tries again.
                         return
+                    if any(0 < len(ref.untested) <= MOST_UNTESTED for ref in kept):
+                        return
                     if journal.is_incomplete:
                         self.warn(
                             f'{self.directory}: the journal was cut; '
@@ -551,6 +573,7 @@ class Store:
             if not self._written_at_last():
                 self.warn(f'{self.directory}: {len(self._waiting)} changes are not kept')
             self._journal.close()
+            self._reasoning.close()
 
     def _write(self, *records: Record) -> None:
         """Make records durable, now or with the batch.
@@ -604,7 +627,7 @@ class Store:
         return True
 
 
-_State = tuple[str, dict[str, Any], list[Axiom], list[Change]]
+_State = tuple[str, dict[str, Any], list[Axiom], list[Told]]
 
 
 def _state(ref: Reference) -> _State:
@@ -613,29 +636,31 @@ def _state(ref: Reference) -> _State:
         'path': ref.origin.path,
         'format': ref.origin.format,
         'prefixes': dict(ref.origin.prefixes),
-        'reasoner': ref.origin.reasoner,
         'buffered_manipulation': ref.buffered_manipulation,
         'buffered_reasoner': ref.buffered_reasoner,
         'mounted': ref.mounted,
+        'base': ref.base,
+        'quarantine': list(ref.quarantine),
     }
-    return ref.name, settings, list(ref.kb.axioms()), list(ref.queue)
+    return ref.name, settings, list(ref.kb.axioms()), list(ref.waiting)
 
 
 def _records(
     name: str,
     settings: dict[str, Any],
     axioms: list[Axiom],
-    queue: list[Change],
+    waiting: list[Told],
 ) -> Iterator[Record]:
     """Return the records of a reference: short ones, since damage costs a whole record."""
-    yield ['load', name, settings, [], [encode(change) for change in queue]]
+    queue = [[[encode(change) for change in t.changes], t.time, t.client] for t in waiting]
+    yield ['load', name, settings, [], queue]
     for start in range(0, len(axioms), CHUNK):
         yield ['axioms', name, [encode(axiom) for axiom in axioms[start : start + CHUNK]]]
     # Once more, should damage have hit the first.
     yield ['loaded', name, settings]
 
 
-_KINDS = frozenset({'axioms', 'mount', 'change', 'flush', 'buffer', 'past'})
+_KINDS = frozenset({'axioms', 'mount', 'change', 'flush', 'buffer', 'taken back', 'past'})
 """Kinds of records; 'past' is of stores of before, and says nothing of what is asserted now."""
 
 
@@ -657,7 +682,7 @@ class _Recovery:
         if what == 'load':
             settings, axioms, queue = rest
             self._load(name, settings, [decode(axiom) for axiom in axioms])
-            self.references[name].queue = [decode(change) for change in queue]
+            self.references[name].waiting = [_told(*parts) for parts in queue]
             return
         if what == 'loaded':
             if name not in self.references:
@@ -680,11 +705,17 @@ class _Recovery:
         elif what == 'mount':
             ref.mounted = rest[0]
         elif what == 'change':
-            changes = [decode(change) for change in rest[0]]
+            told = _told(*rest)
             if ref.buffered_manipulation:
-                ref.queue += changes
+                ref.waiting.append(told)
             else:
-                apply_all(ref.kb, changes)
+                self._apply(ref, [told])
+        elif what == 'taken back':
+            ref.quarantine += rest[0]
+            apply_all(ref.kb, [decode(change) for change in rest[1]])
+            # What is left was reasoned over.
+            ref.untested.clear()
+            ref.origin_axioms = tuple(ref.kb.axioms())
         elif what == 'flush':
             self._flush(ref)
         elif what == 'buffer':
@@ -696,20 +727,86 @@ class _Recovery:
         try:
             self.references[name] = Reference(
                 name,
-                knowledge_base(settings['iri'], axioms, settings['reasoner']),
+                knowledge_base(settings['iri'], axioms),
                 Origin(
                     settings['path'],
                     settings['format'],
                     settings['prefixes'],
-                    settings['reasoner'],
                 ),
                 settings['buffered_manipulation'],
                 settings['buffered_reasoner'],
                 settings['mounted'],
+                base=settings.get('base', 0.0),
+                quarantine=list(settings.get('quarantine', ())),
             )
         except KeyError as error:
             raise ValueError(f'no setting {error}') from None
 
     def _flush(self, ref: Reference) -> None:
-        queue, ref.queue = ref.queue, []
-        apply_all(ref.kb, queue)
+        waiting, ref.waiting = ref.waiting, []
+        self._apply(ref, waiting)
+
+    def _apply(self, ref: Reference, told: list[Told]) -> None:
+        if not ref.untested:
+            ref.origin_axioms = tuple(ref.kb.axioms())
+        ref.untested += told
+        for one in told:
+            apply_all(ref.kb, one.changes)
+
+
+def _told(changes: list[Any], time: float = 0.0, client: str = '') -> Told:
+    return Told(client, time, tuple(decode(change) for change in changes))
+
+
+class _Reasoning:
+    """A file that says over what the process reasons, so that the next one knows what ended it.
+
+    It is not synced: it outlives the process, not the machine.
+
+    Args:
+        path: The file.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._lock = threading.Lock()
+        self._running: dict[str, list[int]] = {}
+        self._left: dict[str, list[int]] = {}
+        with suppress(OSError, ValueError):
+            found = json.loads(path.read_bytes())
+            self._left = {str(name): [int(n) for n in value] for name, value in found.items()}
+        self._file = path.open('wb', buffering=0)
+        self._write()
+
+    def left(self, name: str) -> tuple[int, int]:
+        """Return how often processes ended while they reasoned over a reference, and where."""
+        deaths, place = self._left.get(name, (0, WHOLE))
+        return deaths, place
+
+    def note(self, name: str, place: int | None) -> None:
+        """Note over what is reasoned; None: no more."""
+        with self._lock:
+            deaths = self._left.get(name, (0,))[0]
+            if place is None:
+                self._running.pop(name, None)
+            else:
+                self._running[name] = [deaths + 1, place]
+            self._write()
+
+    def completed(self, name: str) -> None:
+        """Forget the ends of before."""
+        self._left.pop(name, None)
+
+    def close(self) -> None:
+        """Leave an empty file."""
+        with self._lock:
+            self._running, self._left = {}, {}
+            self._write()
+            self._file.close()
+
+    def _write(self) -> None:
+        # Those that were not opened yet are to be known to the next process as well.
+        text = _TO_JSON.encode({**self._left, **self._running}).encode()
+        with suppress(OSError, ValueError):
+            # Full, or closed while one still reasons.
+            os.pwrite(self._file.fileno(), text, 0)
+            os.ftruncate(self._file.fileno(), len(text))

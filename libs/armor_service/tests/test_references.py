@@ -439,3 +439,15 @@ def test_the_web_when_it_is_allowed(tmp_path: Path) -> None:
             assert words in bad.error_description
         server.shutdown()
         service.close()
+
+
+@pytest.mark.parametrize('reasoner', ['HERMIT', 'SNOROCKET', 'org.other.Factory'])
+def test_another_reasoner_is_accepted_and_the_answer_says_which_one_is_used(
+    service: ArmorService, reasoner: str
+) -> None:
+    answer = asker(service)('LOAD FILE', ONTOLOGY, IRI, 'false', reasoner, 'false')
+    assert answer.success
+    assert f"reasoner '{reasoner}' is not available, the native one" in answer.error_description
+    for native in ('', 'pellet'):
+        ask = asker(service, native or 'empty')
+        assert not ask('LOAD FILE', ONTOLOGY, IRI, 'false', native, 'false').error_description

@@ -231,8 +231,8 @@ def test_a_snapshot_waits_for_an_ontology_in_use_and_holds_no_other_meanwhile(
 ) -> None:
     monkeypatch.setattr(reference_module, 'UNUSED_WITHIN', 60.0)
     server = Server(tmp_path / 'store', compact_from=1)
-    server.ask(*LOAD, 'false', '', 'true')
-    server.ask(*LOAD, 'false', '', 'true', reference='used')
+    server.ask(*LOAD, 'false', '', 'false')
+    server.ask(*LOAD, 'false', '', 'false', reference='used')
     used = server.service.references.find('used')
     with used.lock:
         answers: list[bool] = []
@@ -253,13 +253,13 @@ def test_references_that_come_and_go_while_a_snapshot_begins_are_not_mistaken(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     server = Server(tmp_path / 'store', compact_from=1)
-    server.ask(*LOAD, 'false', '', 'true')
-    server.ask(*LOAD, 'false', '', 'true', reference='early')
+    server.ask(*LOAD, 'false', '', 'false')
+    server.ask(*LOAD, 'false', '', 'false', reference='early')
     registry = server.service.references
     held = registry.held_briefly
 
     def held_late() -> AbstractContextManager[list[Reference]]:
-        server.ask(*LOAD, 'false', '', 'true', reference='late')
+        server.ask(*LOAD, 'false', '', 'false', reference='late')
         server.ask('DROP', reference='early')
         return held()
 

@@ -246,6 +246,16 @@ def _unsupported(ref: Reference) -> DirectiveResponse:
 
 
 @query(
+    'QUERY TAKEN BACK',
+    native=False,
+    summary='The changes that were taken back because reasoning over them took too long or ended '
+    'the process: what, whose, when and why, one line each.',
+)
+def _taken_back(ref: Reference) -> DirectiveResponse:
+    return DirectiveResponse(queried_objects=list(ref.quarantine), error_description=ref.too_hard)
+
+
+@query(
     'QUERY FACT',
     text('pattern'),
     flag('asserted', 'false'),

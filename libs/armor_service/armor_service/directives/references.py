@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import threading
 import time
 from pathlib import Path
@@ -28,12 +29,14 @@ from owl_reasoner.documents.reading import read_ontology
 from owl_reasoner.documents.xml_reading import OntologyFileError
 from owl_reasoner.knowledge_base import KnowledgeBase
 from owl_reasoner.owl.axioms import Axiom
-from owl_reasoner.reasoner.java_reasoning import JavaKnowledgeBase, JavaReasonerError
+from owl_reasoner.reasoner.budget import ReasoningBudgetError
 
 if TYPE_CHECKING:
     from armor_service.service import ArmorService
 
 RELEASE_AFTER = 0.2
+DROP_WITHIN = 0.5
+"""Seconds for which DROP waits for who uses the reference; it goes in any case."""
 WRITTEN = {
     'turtle': 'ntriples',
     'jsonld': 'ntriples',
@@ -141,19 +144,27 @@ def _rebuffer(service: ArmorService, request: DirectiveRequest, buffered: bool) 
     slow=True,
 )
 def _drop(service: ArmorService, request: DirectiveRequest) -> DirectiveResponse:
-    with service.references.locked_if_there(request.reference_name) as ref:
-        if ref is not None:
-            service.check_free(ref, request.client_name)
-            if service.store:
-                service.store.dropped(ref.name)
-            service.references.remove(ref)
-            if service.worlds:
-                service.worlds.drop(ref)
-            service.tell(ref.name, None)
-            # Not yet: this directive and those that wait for the lock still refer to it.
-            release = threading.Timer(RELEASE_AFTER, _release, args=(service, ref))
-            release.daemon = True
-            release.start()
+    ref = service.references.get(request.reference_name)
+    if ref is None:
+        return DirectiveResponse()
+    service.check_free(ref, request.client_name)
+    service.references.remove(ref)
+    # Whoever reasons over it ends soon, and writes nothing after this.
+    ref.cancel.set()
+    free = ref.lock.acquire(timeout=DROP_WITHIN)
+    try:
+        if service.store:
+            service.store.dropped(ref.name)
+    finally:
+        if free:
+            ref.lock.release()
+    if service.worlds:
+        service.worlds.drop(ref)
+    service.tell(ref.name, None)
+    # Not yet: this directive and those that wait for the lock still refer to it.
+    release = threading.Timer(RELEASE_AFTER, _release, args=(service, ref))
+    release.daemon = True
+    release.start()
     return DirectiveResponse()
 
 
@@ -321,18 +332,46 @@ def _invalid(_: ArmorService, __: DirectiveRequest) -> DirectiveResponse:
 
 
 @control('APPLY', summary='Applies the changes that wait; derived facts follow only at REASON.')
-def _apply(ref: Reference) -> None:
+def _apply(ref: Reference) -> str:
     ref.flush()
+    return ''
 
 
 @control(
     'REASON',
-    summary='Applies the changes that wait and brings the derived facts up to date.',
+    text('seconds', ''),
+    summary='Applies the changes that wait and brings the derived facts up to date. With seconds '
+    'of processor time it ends after them, and leaves all changes as they are.',
     differs='Recovers from an inconsistent ontology once its cause is retracted; ARMOR does not '
-    'with buffering.',
+    'with buffering. A change over which reasoning takes too long is taken back, and named.',
 )
-def _reason(ref: Reference) -> None:
-    ref.reason()
+def _reason(ref: Reference, seconds: str) -> str:
+    if (taken_back := ref.reason(_seconds(seconds))) != '':
+        return f'taken back: {taken_back}'
+    return ''
+
+
+def _seconds(text: str) -> float:
+    try:
+        seconds = float(text) if text else math.inf
+    except ValueError:
+        seconds = math.nan
+    if not seconds > 0.0:
+        raise DirectiveError(f'REASON: argument seconds {shown(text)}: expected a number above 0')
+    return seconds
+
+
+@utility(
+    'CANCEL',
+    native=False,
+    summary='Ends the reasoning over the reference that runs, whoever asked for it. Changes stay, '
+    'and nothing is derived until the next REASON.',
+)
+def _cancel(service: ArmorService, request: DirectiveRequest) -> DirectiveResponse:
+    ref = service.references.find(request.reference_name)
+    service.check_free(ref, request.client_name)
+    ref.cancel.set()
+    return DirectiveResponse()
 
 
 def _read_document(
@@ -374,7 +413,7 @@ def _read_document(
     if document.iri and document.iri.rstrip('#') != base:
         notes.append(f'the document is of {document.iri}, names are completed with {base}')
     begin = time.thread_time()
-    kb = _reasoned(base, document.axioms, reasoner, notes)
+    kb = _reasoned(service, base, document.axioms, reasoner, notes)
     took = (time.thread_time() - begin) / FIRST
     if not kb.consistent:
         notes.append('the ontology is inconsistent')
@@ -383,23 +422,21 @@ def _read_document(
         more = f' and {len(unsupported) - MAX_NAMED} more' if len(unsupported) > MAX_NAMED else ''
         named = '; '.join(unsupported[:MAX_NAMED])
         notes.append(f'{len(unsupported)} statements not supported by the reasoner: {named}{more}')
-    used = reasoner if isinstance(kb, JavaKnowledgeBase) else ''
     form = WRITTEN.get(document.format, document.format)
-    origin = Origin(path, form, document.prefixes, used)
-    return Reference(request.reference_name, kb, origin, took=took), notes
+    origin = Origin(path, form, document.prefixes)
+    return Reference(request.reference_name, kb, origin, took=took, base=took * FIRST), notes
 
 
-def _reasoned(base: str, axioms: list[Axiom], reasoner: str, notes: list[str]) -> KnowledgeBase:
-    kb = knowledge_base(base, axioms, reasoner)
+def _reasoned(
+    service: ArmorService, base: str, axioms: list[Axiom], reasoner: str, notes: list[str]
+) -> KnowledgeBase:
+    if reasoner.upper() not in NATIVE:
+        notes.append(f'reasoner {shown(reasoner)} is not available, the native one is used')
+    kb = knowledge_base(base, axioms)
     try:
-        kb.reason()
-    except JavaReasonerError as error:
-        notes.append(f'reasoner {shown(reasoner)} cannot be used, the native one is: {error}')
-        kb = KnowledgeBase(base, axioms)
-        kb.reason()
-    else:
-        if reasoner.upper() not in NATIVE and not isinstance(kb, JavaKnowledgeBase):
-            notes.append(f'reasoner {shown(reasoner)} is not available, the native one is used')
+        kb.reason(service.settings.loading_timeout, memory=service.limits.memory)
+    except ReasoningBudgetError as error:
+        raise DirectiveError(f'LOAD: {error}; nothing is loaded', timeout=True) from None
     return kb
 
 

@@ -315,9 +315,9 @@ def query(words: str, *arguments: Argument, **properties: Any) -> Callable[[Run]
     return _enter(Kind.QUERY, words, arguments, **properties)
 
 
-def control(words: str, **properties: Any) -> Callable[[Run], Run]:
-    """Enter APPLY or REASON: ``run(reference)``; see `manipulation`."""
-    return _enter(Kind.CONTROL, words, (), **properties)
+def control(words: str, *arguments: Argument, **properties: Any) -> Callable[[Run], Run]:
+    """Enter APPLY or REASON: ``run(reference, *values) -> remark``; see `manipulation`."""
+    return _enter(Kind.CONTROL, words, arguments, **properties)
 
 
 def utility(words: str, *arguments: Argument, **properties: Any) -> Callable[[Run], Run]:

@@ -6,5 +6,5 @@ classes alone imply is completed (`classification`); the clauses run as compiled
 `threshold_rules`) that explains what it holds (`proofs`, `explanation`). Values are compared by
 `datatypes` and `swrl_builtins`. What takes reasoning by cases is found by `cases` (`case_rules`,
 `case_search`) and added by `completion`; what is left out is reported by
-`KnowledgeBase.unsupported`. `java_reasoning` runs HermiT or Pellet beside it.
+`KnowledgeBase.unsupported`.
 """
