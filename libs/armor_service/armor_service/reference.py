@@ -303,8 +303,7 @@ class Reference:
         return self.mounted in (NOBODY, client)
 
     def _apply(self, told: list[Told]) -> None:
-        for one in told:
-            apply_all(self.kb, one.changes)
+        apply_all(self.kb, (change for one in told for change in one.changes))
         self.untested += told
         self.revision += 1
         if not self.buffered_reasoner and not self.too_hard:

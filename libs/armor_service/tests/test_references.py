@@ -98,7 +98,13 @@ def test_mounting_can_be_left_unenforced(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ('reasoner', 'note'),
-    [('', ''), ('pellet', ''), ('NATIVE', ''), ('FACT', "'FACT'"), ('SNOROCKET', "'SNOROCKET'")],
+    [
+        ('', ''),
+        ('pellet', ''),
+        ('NATIVE', ''),
+        ('HERMIT', "'HERMIT'"),
+        ('SNOROCKET', "'SNOROCKET'"),
+    ],
 )
 def test_reasoner_names(service: ArmorService, reasoner: str, note: str) -> None:
     answer = asker(service)('LOAD FILE', ONTOLOGY, IRI, 'false', reasoner, 'false')
@@ -439,15 +445,3 @@ def test_the_web_when_it_is_allowed(tmp_path: Path) -> None:
             assert words in bad.error_description
         server.shutdown()
         service.close()
-
-
-@pytest.mark.parametrize('reasoner', ['HERMIT', 'SNOROCKET', 'org.other.Factory'])
-def test_another_reasoner_is_accepted_and_the_answer_says_which_one_is_used(
-    service: ArmorService, reasoner: str
-) -> None:
-    answer = asker(service)('LOAD FILE', ONTOLOGY, IRI, 'false', reasoner, 'false')
-    assert answer.success
-    assert f"reasoner '{reasoner}' is not available, the native one" in answer.error_description
-    for native in ('', 'pellet'):
-        ask = asker(service, native or 'empty')
-        assert not ask('LOAD FILE', ONTOLOGY, IRI, 'false', native, 'false').error_description
