@@ -144,6 +144,7 @@ class ArmController(PatrolNode):
         )
         self._read = SettledFrames(self)
         self._fused = FusedPositions()
+        self._twins: dict[int, str] = {}
         self._markers = self.create_publisher(MarkerDetectionArray, 'arm/markers', 10)
         self.create_subscription(
             MarkerDetectionArray, 'aruco_detector/detections', self._on_detections, 10
@@ -177,11 +178,24 @@ class ArmController(PatrolNode):
         frame, base = self._base
         camera = base @ ARM.camera_frame(self._driver.posture)
         taken = fuse_views(self._fused, message, camera)
+        self._report_twins(frame)
         fused = [(each, self._fused.position_of(each)) for each in taken]
         seen = MarkerDetectionArray(header=Header(stamp=message.header.stamp, frame_id=frame))
         seen.detections = [fused_to_ros(each, at) for each, at in fused if at is not None]
         if seen.detections:
             self._markers.publish(seen)
+
+    def _report_twins(self, frame: str) -> None:
+        """Say of each id, once, that two panels show it; the finding stays."""
+        for marker_id in self._fused.twins:
+            places = self._fused.two_places(marker_id)
+            if marker_id in self._twins or places is None:
+                continue
+            self._twins[marker_id] = f'marker {marker_id} hangs at ' + ' and at '.join(
+                '(' + ', '.join(f'{value:.2f}' for value in each.position) + ')' for each in places
+            )
+            self.get_logger().warn(f'{self._twins[marker_id]} in {frame}: two panels with one id')
+            self.health.warn('markers', '; '.join(self._twins.values()))
 
     async def _on_move(self, request: Any, response: Any) -> Any:
         def work() -> str:

@@ -155,6 +155,7 @@ def fuse_views(fused: FusedPositions, message: MarkerDetectionArray, camera: Arr
         The ids whose view counts.
     """
     taken = []
+    fused.next_image()
     for each in message.detections:
         place = each.pose.position
         covariance = np.array(each.pose_covariance).reshape(6, 6)[:3, :3]

@@ -108,6 +108,23 @@ def test_arm_tells_where_markers_are_in_the_frame_of_the_odometry(graph: Any) ->
     assert 0.02 < math.sqrt(marker.pose_covariance[0]) < 0.1
 
 
+def test_two_panels_with_one_id_are_a_finding_with_both_positions(
+    graph: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    node = graph.add(ArmController)
+    log = Log()
+    monkeypatch.setattr(node, 'get_logger', lambda: log)
+    node._base, node._rest_since = ('odom', np.eye(4)), -math.inf
+    for _ in range(4):
+        node._on_detections(
+            MarkerDetectionArray(detections=[seen(7, 0.0, 0.0, 3.0), seen(7, 1.0, 0.0, 3.0)])
+        )
+    assert len(log.warnings) == 1
+    assert log.warnings[0].startswith('marker 7 hangs at (')
+    assert log.warnings[0].endswith(') in odom: two panels with one id')
+    assert any('marker 7 hangs at' in text for _, text in node.health.findings())
+
+
 def room() -> Any:
     """Return an image of markers 12 and 17."""
     generator = np.random.default_rng(3)

@@ -8,6 +8,7 @@ import cv2
 import numpy as np
 import pytest
 
+from marker_detection import CameraModel, FusedPositions, MarkerDetector, pose_of
 from surveillance_runtime.place import PlaceError
 from surveillance_runtime.place.floor_plan import Marker
 from surveillance_simulation.camera.model import LIGHTINGS, Camera, Conditions, expose, lit
@@ -15,10 +16,11 @@ from surveillance_simulation.camera.rendering import Renderer
 from surveillance_simulation.world import textures
 from surveillance_simulation.world.world import World, read_world
 
-from .places import CONFIG, camera_pose, two_rooms
+from .places import CONFIG, camera_pose, changed, two_rooms
 
 CLEAN = Conditions(noise=0.0, blur=0.0)
 CAMERA = Camera.from_field_of_view(640, 480, math.radians(60))
+LENS = CameraModel.from_field_of_view(640, 480, math.radians(60))
 
 
 def ids_in(picture: np.ndarray) -> set[int]:
@@ -199,3 +201,24 @@ def test_dark_walls_leave_the_panels_white() -> None:
     dark = look(world, *pose)
     assert np.median(dark) < 0.6 * np.median(light)
     assert np.percentile(dark, 99) > 0.9 * np.percentile(light, 99)
+
+
+def test_two_panels_with_one_id_can_be_staged_and_are_found_as_such() -> None:
+    world = World.from_parameters(
+        changed(markers={'m1': [7, 0.06, 0.5, 1.0, 0.0], 'm2': [7, 0.06, 1.5, 1.0, 0.0]})
+    )
+    renderer, fused = Renderer(world, CAMERA), FusedPositions()
+    detector = MarkerDetector()
+    for y in (0.9, 1.0, 1.1):
+        pose = camera_pose(1.6, y, 1.0, math.pi)
+        picture = expose(renderer.ideal(pose), CLEAN, np.random.default_rng(0))
+        fused.next_image()
+        for found in detector.detect(picture):
+            seen = pose_of(found.corners, 0.2, LENS)
+            assert seen is not None
+            covariance = seen.covariance[:3, :3]
+            fused.add(found.marker_id, pose, seen.position, covariance, seen.ambiguity)
+    both = fused.two_places(7)
+    assert both is not None
+    places = sorted((each.position for each in both), key=lambda place: float(place[1]))
+    assert np.allclose(places, [[0.06, 0.5, 1.0], [0.06, 1.5, 1.0]], atol=0.05)

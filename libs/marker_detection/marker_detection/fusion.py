@@ -8,7 +8,7 @@ are surer than each alone: the information filter adds inverse covariances (Thru
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
@@ -20,6 +20,8 @@ _MOST_AMBIGUOUS = 0.95
 # 99.9 % of a chi-squared distribution with three degrees of freedom
 _SAME_PLACE = 16.27
 _MOVED_VIEWS = 5
+# images that show an id at two places until it hangs there twice, and places that are kept of one
+_TOGETHER, _MOST_PLACES = 3, 4
 _CARRIER_DEVIATION = 0.02
 
 
@@ -49,23 +51,106 @@ def is_measured(position: Array, covariance: Array) -> bool:
     return bool(np.linalg.eigvalsh((covariance + covariance.T) / 2.0)[0] > 0.0)
 
 
+class _Place:
+    """Somewhere an id was seen: a sum of views.
+
+    Attributes:
+        views: How many.
+        in_a_row: How many since the id was last seen at the place that is told.
+        told: Whether it was ever told as the marker's position.
+        image: The last one that shows the id here; 0 where images are not told apart.
+    """
+
+    def __init__(self) -> None:
+        self._information = np.zeros((3, 3))
+        self._weighed = np.zeros(3)
+        self.views = self.in_a_row = 0
+        self.told = False
+        self.image = 0
+
+    def add(self, place: Array, covariance: Array, image: int) -> None:
+        information = np.linalg.inv(covariance)
+        self._information += information
+        self._weighed += information @ place
+        self.views += 1
+        self.in_a_row += 1
+        self.image = image
+
+    @property
+    def fused(self) -> FusedPosition:
+        # what all views share does not become less with their number
+        covariance = np.linalg.inv(self._information) + np.eye(3) * _CARRIER_DEVIATION**2
+        position = np.asarray(np.linalg.solve(self._information, self._weighed), dtype=float)
+        return FusedPosition(position, covariance, self.views)
+
+    def square_to(self, place: Array, covariance: Array) -> float:
+        """Return the squared Mahalanobis distance of a view (3,) with its covariance (3, 3)."""
+        fused = self.fused
+        apart = place - fused.position
+        return float(apart @ np.linalg.solve(fused.covariance + covariance, apart))
+
+
 @dataclass
-class _Sum:
-    information: Array
-    weighed: Array
-    views: int = 0
-    elsewhere: int = 0
+class _Panels:
+    """The places at which one id was seen.
+
+    Attributes:
+        places: All of them, the one that is told first.
+        together: Images that show the id at two of them.
+        two: Whether there are two panels with this id.
+    """
+
+    places: list[_Place] = field(default_factory=list)
+    together: int = 0
+    two: bool = False
+
+    def place_of(self, place: Array, covariance: Array) -> _Place:
+        """Return the place that a view fits, a new one where it fits none."""
+        by_distance = [(each.square_to(place, covariance), each) for each in self.places]
+        square, nearest = min(by_distance, key=lambda pair: pair[0], default=(np.inf, None))
+        if nearest is not None and square <= _SAME_PLACE:
+            return nearest
+        if len(self.places) == _MOST_PLACES:
+            self.places.remove(min(self.places[1:], key=lambda each: (each.told, each.views)))
+        self.places.append(_Place())
+        return self.places[-1]
+
+    def note(self, seen: _Place) -> None:
+        """Take note of where the id was seen last: it may hang elsewhere now, or twice."""
+        self.together += any(
+            each.image == seen.image > 0 for each in self.places if each is not seen
+        )
+        if seen is self.places[0]:
+            for each in self.places[1:]:
+                each.in_a_row = 0
+            seen.told = True
+        elif seen.in_a_row >= _MOVED_VIEWS:
+            # a marker that was moved does not come back
+            self.two |= seen.told
+            if not self.two:
+                self.places.remove(seen)
+                self.places.insert(0, seen)
+                self.places[1].in_a_row = 0
+                seen.told = True
+        self.two |= self.together >= _TOGETHER
 
 
 class FusedPositions:
     """Positions of markers in a fixed frame, fused over views.
 
     A view that lies elsewhere by more than its covariance allows is left out; after several in a
-    row the marker is taken to have been moved, and its position begins anew.
+    row the marker is taken to have been moved, and its position begins anew. If it is seen at the
+    former place again, or at both in the same images, there are two panels with one id: the
+    position stays, and `two_places` tells both.
     """
 
     def __init__(self) -> None:
-        self._sums: dict[int, _Sum] = {}
+        self._panels: dict[int, _Panels] = {}
+        self._image = 0
+
+    def next_image(self) -> None:
+        """Begin an image: what is added until the next one was seen at the same time."""
+        self._image += 1
 
     def add(
         self, marker_id: int, camera: Array, position: Array, covariance: Array, ambiguity: float
@@ -80,39 +165,35 @@ class FusedPositions:
             ambiguity: Of the pose, 0 to 1; near 1 the distance is as doubtful as the tilt.
 
         Returns:
-            Whether it counts: it is a finite view, not too ambiguous, of where the marker was.
+            Whether it counts: it is a finite view, not too ambiguous, of where the marker is.
         """
         # the arm and its base are not exact either
         covariance = covariance + np.eye(3) * _CARRIER_DEVIATION**2
         if ambiguity > _MOST_AMBIGUOUS or not is_measured(position, covariance):
             return False
         turn = camera[:3, :3]
-        seen = turn @ covariance @ turn.T
+        covariance = turn @ covariance @ turn.T
         place = turn @ position + camera[:3, 3]
-        fused = self.position_of(marker_id)
-        if fused is not None:
-            apart = place - fused.position
-            total = self._sums[marker_id]
-            if apart @ np.linalg.solve(fused.covariance + seen, apart) > _SAME_PLACE:
-                total.elsewhere += 1
-                if total.elsewhere < _MOVED_VIEWS:
-                    return False
-                del self._sums[marker_id]
-        total = self._sums.setdefault(marker_id, _Sum(np.zeros((3, 3)), np.zeros(3)))
-        information = np.linalg.inv(seen)
-        total.information += information
-        total.weighed += information @ place
-        total.views += 1
-        total.elsewhere = 0
-        return True
+        panels = self._panels.setdefault(marker_id, _Panels())
+        seen = panels.place_of(place, covariance)
+        seen.add(place, covariance, self._image)
+        panels.note(seen)
+        return seen is panels.places[0]
 
     def position_of(self, marker_id: int) -> FusedPosition | None:
         """Return where a marker is; None when it was not seen."""
-        total = self._sums.get(marker_id)
-        if total is None:
+        panels = self._panels.get(marker_id)
+        return None if panels is None else panels.places[0].fused
+
+    def two_places(self, marker_id: int) -> tuple[FusedPosition, FusedPosition] | None:
+        """Return the positions of two panels with one id; None while one explains all views."""
+        panels = self._panels.get(marker_id)
+        if panels is None or not panels.two:
             return None
-        covariance = np.linalg.inv(total.information)
-        # what all views share does not become less with their number
-        covariance = covariance + np.eye(3) * _CARRIER_DEVIATION**2
-        position = np.asarray(np.linalg.solve(total.information, total.weighed), dtype=float)
-        return FusedPosition(position, covariance, total.views)
+        other = max(panels.places[1:], key=lambda each: (each.told, each.views))
+        return panels.places[0].fused, other.fused
+
+    @property
+    def twins(self) -> list[int]:
+        """The ids of which there are two panels."""
+        return sorted(marker_id for marker_id, panels in self._panels.items() if panels.two)

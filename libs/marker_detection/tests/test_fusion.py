@@ -65,3 +65,52 @@ def test_one_wrong_view_is_left_out_and_a_moved_marker_is_followed() -> None:
     for _ in range(5):
         fused.add(7, np.eye(4), there, np.eye(3) * 1e-4, 0.0)
     assert fused.position_of(7).position == pytest.approx(there)
+
+
+HERE, THERE = np.array([0.0, 0.0, 2.0]), np.array([1.0, 0.0, 2.0])
+EXACT = np.eye(3) * 1e-4
+
+
+def looked(fused: FusedPositions, *places: np.ndarray) -> None:
+    fused.next_image()
+    for place in places:
+        fused.add(7, np.eye(4), place, EXACT, 0.0)
+
+
+def both(fused: FusedPositions) -> list[np.ndarray]:
+    found = fused.two_places(7)
+    assert found is not None
+    return [each.position for each in found]
+
+
+def test_two_panels_with_one_id_in_the_same_images_are_told_with_both_positions() -> None:
+    fused = FusedPositions()
+    for _ in range(2):
+        looked(fused, HERE, THERE)
+    assert fused.two_places(7) is None
+    looked(fused, THERE, HERE)
+    assert np.allclose(both(fused), [HERE, THERE])
+    assert fused.twins == [7]
+
+
+def test_two_panels_with_one_id_seen_in_turn_are_told_and_the_position_stays() -> None:
+    fused = FusedPositions()
+    positions = []
+    for view in range(64):
+        looked(fused, HERE if view // 8 % 2 == 0 else THERE)
+        positions.append(fused.position_of(7).position)
+    assert sorted(map(tuple, np.round(both(fused), 3).tolist())) == [tuple(HERE), tuple(THERE)]
+    assert np.allclose(positions[24:], positions[24])
+
+
+def test_moved_marker_and_a_wrong_view_are_no_second_panel() -> None:
+    fused = FusedPositions()
+    for _ in range(20):
+        looked(fused, HERE)
+    looked(fused, THERE, HERE)
+    for _ in range(20):
+        looked(fused, THERE)
+    for _ in range(3):
+        looked(fused, HERE)
+    assert fused.two_places(7) is None
+    assert fused.twins == []
