@@ -2,6 +2,10 @@
 
 A set-up has three steps: the environment itself, the Python packages, the compiled interfaces. A
 journal in the environment says which are complete, so that the next run does only what is left.
+
+An environment that a process runs in is never touched: a mission's nodes are started again from it.
+What has to change then is set up beside it, in a folder of its own. Each interpreter has its own
+environment, too. `.venv` is the first one made, or a link to the one set up last.
 """
 
 from __future__ import annotations
@@ -20,6 +24,7 @@ from collections import deque
 from collections.abc import Iterable, Iterator, MutableMapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import asdict, dataclass, field
+from itertools import chain, count
 from pathlib import Path
 from typing import Any
 
@@ -51,9 +56,10 @@ FOLDERS = (*(f'libs/{name}' for name in LIBRARIES), *PACKAGES)
 """Where the packages lie in the checkout, libraries first."""
 JOURNAL = 'surveillance-setup.json'
 INTERFACES = 'surveillance_interfaces'
+_FIRST = '.venv'
 SPACE = 900_000_000
 """Bytes that the environment takes, with what is needed meanwhile."""
-VENV_STEP = 'virtual environment in .venv'
+VENV_STEP = 'virtual environment'
 PACKAGES_STEP = 'Python packages, ROS 2 Jazzy among them'
 INTERFACES_STEP = 'messages, services and actions'
 PATH_FILE = 'surveillance_checkout.pth'
@@ -151,20 +157,72 @@ class Environment:
 
     def __init__(self, checkout: Path = CHECKOUT, extras: Sequence[str] = ()) -> None:
         self.checkout = checkout
-        self.venv = checkout / '.venv'
-        self.python = self.venv / 'bin' / 'python'
         self._wanted_extras = tuple(extras)
+        complete_ones = (each for each in self._folders() if self._complete(each))
+        self.venv = next(complete_ones, checkout / _FIRST)
+
+    @property
+    def python(self) -> Path:
+        """The environment's interpreter."""
+        return self.venv / 'bin' / 'python'
 
     def active(self) -> bool:
-        """Tell whether this very process runs in the environment."""
-        return Path(sys.prefix).resolve() == self.venv.resolve()
+        """Tell whether this very process runs in the environment, and not through a link to it."""
+        prefix = Path(sys.prefix)
+        return prefix.name == self.venv.name and prefix.resolve() == self.venv.resolve()
 
     def ready(self) -> bool:
         """Tell whether the set-up is complete and made for the present sources; takes
         milliseconds.
         """
-        journal = Journal.read(self.venv)
-        return self.python.exists() and journal == complete(self.checkout, self._extras(journal))
+        return self._complete(self.venv)
+
+    def _complete(self, venv: Path) -> bool:
+        journal = Journal.read(venv)
+        found = (venv / 'bin' / 'python').exists()
+        return found and journal == complete(self.checkout, self._extras(journal))
+
+    def _folders(self) -> list[Path]:
+        """Return the environments of the checkout, the first one first."""
+        found = sorted(self.checkout.glob(f'{_FIRST}*'))
+        return [each for each in found if each.is_dir() and not each.is_symlink()]
+
+    def _choose(self) -> None:
+        """Choose the environment that is complete, or may be brought up to date.
+
+        One of another interpreter, and one that a process runs in, stay as they are.
+        """
+        folders = self._folders()
+        python = complete(self.checkout, ()).python
+        for venv in folders:
+            if self._complete(venv):
+                self.venv = venv
+                return
+        for venv in folders:
+            own = Journal.read(venv).python in ('', python)
+            broken = not (venv / 'bin' / 'python').exists()
+            if (own or broken) and not users_of(venv):
+                self.venv = venv
+                return
+        further = (f'{_FIRST}-{python.partition(" ")[0]}-{number}' for number in count(1))
+        paths = (self.checkout / name for name in chain([_FIRST], further))
+        self.venv = next(path for path in paths if not os.path.lexists(path))
+
+    def _settle(self) -> None:
+        """Point `.venv` to this environment, and remove older ones of its interpreter that nobody
+        uses.
+        """
+        python = Journal.read(self.venv).python
+        for venv in self._folders():
+            stale = Journal.read(venv).python == python and not self._complete(venv)
+            if venv != self.venv and stale and not users_of(venv):
+                shutil.rmtree(venv, ignore_errors=True)
+        first = self.checkout / _FIRST
+        if self.venv != first and (first.is_symlink() or not first.exists()):
+            draft = self.checkout / f'{_FIRST}.link'
+            draft.unlink(missing_ok=True)
+            draft.symlink_to(self.venv.name)
+            os.replace(draft, first)
 
     def prepare(self) -> None:
         """Bring the environment up to date; do nothing when it is.
@@ -185,8 +243,10 @@ class Environment:
         if note := system.note_of_unused_ros(self.checkout):
             print(note, flush=True)
         with self._alone() as lock:
+            self._choose()
             if not self.ready():  # another launch may have done it in the meantime
                 self._set_up(lock)
+                self._settle()
 
     def drop_missing_middleware(self, environ: MutableMapping[str, str]) -> list[str]:
         """Take a middleware that is not installed out of an environment; rcl would exit with 102.
@@ -202,7 +262,7 @@ class Environment:
             if asked and not (self.venv / 'lib' / f'lib{Path(asked).name}.so').exists():
                 del environ[name]
                 lines.append(
-                    f'environment variable {name}: {asked} is not installed in .venv, '
+                    f'environment variable {name}: {asked} is not installed in {self.venv.name}, '
                     'going on with its own middleware, rmw_fastrtps_cpp'
                 )
         return lines
@@ -211,8 +271,13 @@ class Environment:
         return sorted({*journal.extras, *self._wanted_extras})
 
     def _set_up(self, lock: int) -> None:
-        journal = Journal.read(self.venv)
         python = complete(self.checkout, ()).python
+        if busy := self._seed(python):
+            print(
+                f'{busy[0].name} is in use by process {busy[1]} and stays as it is: '
+                f'{self.venv.name} is set up beside it.'
+            )
+        journal = Journal.read(self.venv)
         fresh = not self._usable(journal, python)
         if fresh:
             journal = Journal()
@@ -276,6 +341,31 @@ class Environment:
                 shutil.rmtree(wheels)
                 journal.interfaces = wanted.interfaces
 
+    def _seed(self, python: str) -> tuple[Path, int] | None:
+        """Begin a new environment with what one in use has: files are shared until they change.
+
+        pip and Python replace files and never write into one, so the other stays as it is.
+
+        Returns:
+            The environment in use and a process that runs in it, if there is one.
+        """
+        if self.venv.exists():
+            return None
+        for venv in self._folders():
+            if Journal.read(venv).python != python or not (users := users_of(venv)):
+                continue
+            draft = self.venv.with_name(self.venv.name.replace(_FIRST, '.draft-venv'))
+            shutil.rmtree(draft, ignore_errors=True)
+            with suppress(OSError, shutil.Error):  # a file system without links: made from nothing
+                shutil.copytree(venv, draft, symlinks=True, copy_function=_link)
+                for path in (*draft.glob('bin/*'), draft / 'pyvenv.cfg'):
+                    if path.is_file() and not path.is_symlink():
+                        _name_anew(path, str(venv), str(self.venv))
+                os.replace(draft, self.venv)
+            shutil.rmtree(draft, ignore_errors=True)
+            return venv, users[0]
+        return None
+
     def _pip(self, command: str, *words: str) -> list[str]:
         options = ['--disable-pip-version-check', '--no-input', '--progress-bar=off']
         return [str(self.python), '-m', 'pip', command, *options, *words]
@@ -301,7 +391,7 @@ class Environment:
     def _write_path_file(self) -> None:
         """Make the packages importable where they lie: an edit needs no installation."""
         lines = [str(self.checkout / folder) for folder in FOLDERS]
-        (self._site_packages() / PATH_FILE).write_text('\n'.join(lines) + '\n', encoding='utf-8')
+        replace_text(self._site_packages() / PATH_FILE, '\n'.join(lines) + '\n')
 
     def _remove_half_installed(self) -> None:
         """Take away the records of packages that were not installed to their end.
@@ -324,11 +414,58 @@ class Environment:
             try:
                 fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except BlockingIOError:
-                print('Another set-up of this checkout is at work: waiting for it.', flush=True)
+                who = f' (process {holder})' if (holder := _holder(lock)) else ''
+                print(
+                    f'Another set-up of this checkout is at work{who}: waiting for it.', flush=True
+                )
                 fcntl.flock(lock, fcntl.LOCK_EX)
             yield lock
         finally:
             os.close(lock)
+
+
+def users_of(venv: Path) -> list[int]:
+    """Return the processes, other than this one, that run in an environment or loaded a part of it.
+
+    Those of other users cannot be looked at.
+    """
+    inside = os.fsencode(f'{venv.resolve()}/')
+    by_name = os.fsencode(f'{venv}/')
+    found = []
+    for folder in Path('/proc').glob('[0-9]*'):
+        if int(folder.name) == os.getpid():
+            continue
+        with suppress(OSError):
+            program = (folder / 'cmdline').read_bytes().partition(b'\0')[0]
+            if program.startswith((inside, by_name)) or inside in (folder / 'maps').read_bytes():
+                found.append(int(folder.name))
+    return found
+
+
+def _link(source: str, target: str) -> None:
+    """Share a file; scripts and settings, which name their environment, are copied."""
+    if os.path.basename(os.path.dirname(source)) == 'bin' or source.endswith('.cfg'):
+        shutil.copy2(source, target)
+    else:
+        os.link(source, target)
+
+
+def _name_anew(path: Path, old: str, new: str) -> None:
+    data = path.read_bytes()
+    if b'\0' not in data:
+        path.write_bytes(data.replace(os.fsencode(old), os.fsencode(new)))
+
+
+def _holder(lock: int) -> int:
+    """Return the process that holds a lock (flock) on an open file; 0 where it cannot be told."""
+    held = os.fstat(lock)
+    place = f'{os.major(held.st_dev):02x}:{os.minor(held.st_dev):02x}:{held.st_ino}'
+    with suppress(OSError, ValueError):
+        for line in Path('/proc/locks').read_text().splitlines():
+            words = line.split()
+            if 'FLOCK' in words and place in words and '->' not in words:
+                return int(words[words.index(place) - 1])
+    return 0
 
 
 class _Command:

@@ -101,8 +101,8 @@ def prepare(checkout: Path, **more: str) -> subprocess.CompletedProcess[str]:
     )
 
 
-def value(checkout: Path) -> str:
-    python = checkout / '.venv' / 'bin' / 'python'
+def value(checkout: Path, venv: Path | None = None) -> str:
+    python = (venv or checkout / '.venv') / 'bin' / 'python'
     code = 'import surveillance_interfaces as i; print(i.VALUE)'
     return subprocess.check_output([python, '-c', code], env=environ(), text=True).strip()
 
@@ -138,7 +138,7 @@ def test_a_set_up_from_nothing_to_an_edit(checkout, start):
     cut.end(signal.SIGKILL)
     assert json.loads((checkout / '.venv' / JOURNAL).read_text())['working'].startswith('messages')
     following = start('-u', '-c', PREPARE, str(checkout), environ=environ())
-    following.until('Another set-up of this checkout is at work')
+    following.until(r'Another set-up of this checkout is at work \(process')
     with open(f'{reached}.go', 'w') as go:
         go.write('x')
     following.until('ready True')
@@ -169,7 +169,7 @@ def test_two_set_ups_at_once_are_one_after_the_other(checkout, start):
         (checkout / INTERFACES / 'source.py').write_text('VALUE = 3\n')
         both = [start('-u', '-c', PREPARE, str(checkout), environ=environ()) for _ in range(2)]
         for one in both:
-            one.until('Another set-up of this checkout is at work')
+            one.until(r'Another set-up of this checkout is at work \(process')
     finally:
         os.close(lock)
     for one in both:
@@ -189,6 +189,45 @@ def test_half_an_environment_without_pip_is_made_anew(tmp_path, checkout, start)
     anew = start('-u', '-c', PREPARE, str(checkout), environ=environ())
     anew.until(r'\[1/3\] virtual environment')
     anew.end(signal.SIGINT)  # the rest is as from nothing
+
+
+def test_an_environment_in_use_stays_and_a_new_one_is_set_up_beside_it(checkout):
+    (checkout / INTERFACES / 'source.py').write_text('VALUE = 4\n')
+    assert 'ready True' in prepare(checkout).stdout
+    first = checkout / '.venv'
+    words = [first / 'bin' / 'python', '-c', 'input()']
+    with subprocess.Popen(words, stdin=subprocess.PIPE, env=environ()) as running:
+        # A pull changes the interfaces below a mission.
+        (checkout / INTERFACES / 'source.py').write_text('VALUE = 5\n')
+        done = prepare(checkout)
+        assert f'.venv is in use by process {running.pid}' in done.stdout
+        assert '[1/1] messages' in done.stdout, 'what both have is not installed twice'
+        assert 'ready True' in done.stdout
+        assert value(checkout) == '4', 'a node that is started again finds what it had'
+        (second,) = checkout.glob('.venv-*')
+        assert (second / 'bin' / 'pip').read_text().startswith(f'#!{second}/bin/python')
+        assert value(checkout, second) == '5'
+        running.communicate(b'\n')
+    # The mission has ended: the next change takes its environment away.
+    (checkout / INTERFACES / 'source.py').write_text('VALUE = 6\n')
+    assert 'ready True' in prepare(checkout).stdout
+    (left,) = [each for each in checkout.glob('.venv*') if not each.is_symlink()]
+    assert value(checkout, left) == '6'
+    assert value(checkout) == '6'
+
+
+def test_another_interpreter_gets_an_environment_of_its_own(checkout):
+    assert 'ready True' in prepare(checkout).stdout
+    before = value(checkout)
+    journal = (checkout / '.venv').resolve() / JOURNAL
+    others = json.loads(journal.read_text())
+    journal.write_text(json.dumps({**others, 'python': '3.12 /elsewhere'}))
+    (checkout / INTERFACES / 'source.py').write_text('VALUE = 7\n')
+    done = prepare(checkout)
+    assert 'ready True' in done.stdout
+    assert '[1/3] virtual environment' in done.stdout
+    assert value(checkout, journal.parent) == before
+    assert prepare(checkout).stdout == 'ready True\n'
 
 
 def test_compiled_modules_are_kept_where_python_may_not_write_them_beside_the_sources(tmp_path):
