@@ -239,7 +239,7 @@ def _test(argv: list[str]) -> int:
     if argv in (['-h'], ['--help']):
         print(_TEST_HELP)
         return 0
-    for path in (word.partition('::')[0] for word in argv if word.startswith('tests/')):
+    for path in (word.partition('::')[0] for word in argv if word.startswith(('tests/', 'libs/'))):
         # Spread over processes, pytest does not say which file it lacks.
         if not (CHECKOUT / path).exists():
             missing = FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), CHECKOUT / path)

@@ -15,11 +15,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
-from urllib.parse import urlsplit
 
 from launcher import package_commands
-from surveillance_runtime import node_table
-from surveillance_runtime.command_line import CommandParser
+from surveillance_runtime import node_table, parameter_checks
+from surveillance_runtime.command_line import CommandParser, page_address
 from surveillance_runtime.discovery import LAST_DOMAIN
 from surveillance_runtime.files import FileError
 
@@ -225,6 +224,13 @@ class Run:
         help='address of the page; implies --web; other addresses than 127.0.0.1 need the printed '
         'token even to look (default: 127.0.0.1:8080)',
     )
+    web_origin: str | None = _option(
+        '--web-origin',
+        group=_PAGE_GROUP,
+        metavar='URL',
+        help='what browsers know the page by behind a TLS proxy, as https://robot.example.org; '
+        'implies --web; then everybody needs the printed token',
+    )
 
     def check(self) -> None:
         """Look at everything that can be wrong before a process is started.
@@ -247,6 +253,8 @@ class Run:
                 raise ValueError(f'--map {error}') from None
         if self.web_address is not None:
             page_address(self.web_address)
+        if expected := parameter_checks.web_origin(self.web_origin or ''):
+            raise ValueError(f'--web-origin {self.web_origin!r}: expected {expected}')
         try:
             alarm = shlex.split(self.alarm)
         except ValueError as error:
@@ -273,24 +281,9 @@ class Run:
 
     @property
     def has_page(self) -> bool:
-        """Whether the mission is shown in browsers; an address alone asks for that, too."""
-        return self.web or self.web_control or self.web_address is not None
-
-
-def page_address(text: str) -> tuple[str, int]:
-    """Return host and port of the page's address.
-
-    Raises:
-        ValueError: It is not of the form HOST:PORT.
-    """
-    try:
-        found = urlsplit(f'//{text}')
-        port = found.port
-    except ValueError:  # of the port, or of brackets that are not closed
-        port = None
-    if port is None or found.netloc != text or found.username is not None:
-        raise ValueError(f'--web-address {text!r}: expected HOST:PORT like 0.0.0.0:8080')
-    return found.hostname or '127.0.0.1', port
+        """Whether the mission is shown in browsers; an address or origin asks for that, too."""
+        given = (self.web_address, self.web_origin)
+        return self.web or self.web_control or any(each is not None for each in given)
 
 
 def shared_options() -> argparse.ArgumentParser:

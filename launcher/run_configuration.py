@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import os
-import secrets
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from launcher.run import PAGE, RECORDER, Run, page_address
+from launcher.run import PAGE, RECORDER, Run
 from surveillance_runtime import node_table
+from surveillance_runtime.command_line import page_address
 from surveillance_runtime.configuration import (
     Configuration,
     Entry,
@@ -98,12 +98,14 @@ def _observer_entries(run: Run, folder: Path) -> Iterator[Entry]:
     yield for_node(RECORDER, 'keep', float(run.keep), '--keep')
     if run.has_page:
         yield for_node(PAGE, 'control', run.web_control, '--web-control')
-        # Made here, so that a page that is started again keeps it.
-        yield for_node(PAGE, 'token', secrets.token_urlsafe(24), 'this run')
+        # In a file, so that a page that is started again keeps it, and no peer can ask for it.
+        yield for_node(PAGE, 'token_file', str(folder.resolve() / 'page_token'), 'this run')
     if run.web_address is not None:
         host, port = page_address(run.web_address)
         yield for_node(PAGE, 'host', host, '--web-address')
         yield for_node(PAGE, 'port', port, '--web-address')
+    if run.web_origin is not None:
+        yield for_node(PAGE, 'origin', run.web_origin, '--web-origin')
 
 
 def _check_behaviour(merged: Configuration, run: Run) -> None:

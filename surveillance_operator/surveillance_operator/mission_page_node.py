@@ -5,20 +5,25 @@ It only listens and asks; with `control` it also does what a person at the page 
 
 from __future__ import annotations
 
+import os
+import secrets
 import threading
 import time
 from collections.abc import Sequence
+from contextlib import suppress
 from typing import Any
 
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import Image as ImageMessage
 
+from state_machines.files import read_file
 from surveillance_operator.images import ANNOTATED, PLAIN, jpeg_from
 from surveillance_operator.mission_actions import MissionActions
 from surveillance_operator.mission_feed import MissionFeed
 from surveillance_operator.page.hub import Hub
 from surveillance_operator.page.server import Action, Page
 from surveillance_operator.polled_subscription import PolledSubscription
+from surveillance_runtime import parameter_checks
 from surveillance_runtime.launch_protocol import NotNowError
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.process import run_node
@@ -48,7 +53,21 @@ class MissionPage(PatrolNode):
         control = self.parameter(
             'control', False, 'Allow actions to whoever has the token.', read_only=True
         )
-        token = self.parameter('token', '', 'The token; empty: a new one.', read_only=True)
+        origin = self.parameter(
+            'origin',
+            '',
+            'What browsers know the page by behind a TLS proxy, as https://robot.example.org; then '
+            'everybody needs the token.',
+            check=parameter_checks.web_origin,
+            read_only=True,
+        )
+        # Not the token itself: any peer may ask a node for the values of its parameters.
+        token_file = self.parameter(
+            'token_file',
+            '',
+            'File with the token, made if missing; empty: a new one.',
+            read_only=True,
+        )
         self._hub = Hub()
         self._camera = Camera(self)
         self._actions = MissionActions(self)
@@ -60,7 +79,9 @@ class MissionPage(PatrolNode):
                 picture=self._camera.jpeg,
                 host=host,
                 port=port,
-                token=token,
+                origin=origin,
+                token=_kept_token(token_file),
+                report=self.get_logger().warning,
             )
         except OSError as error:
             raise NotNowError(str(error)) from error
@@ -112,6 +133,21 @@ class MissionPage(PatrolNode):
             'policy': actions.set_policy,
             'command': actions.command,
         }
+
+
+def _kept_token(path: str) -> str:
+    """Return the token in a file that its owner alone reads, so that it outlives the process.
+
+    Raises:
+        OSError: The file cannot be read or made; the error has its name.
+    """
+    if not path:
+        return ''
+    with suppress(FileExistsError):
+        descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o600)
+        with open(descriptor, 'w', encoding='ascii') as file:
+            file.write(secrets.token_urlsafe(24) + '\n')
+    return read_file(path, 4096).decode('ascii', 'replace').strip()
 
 
 class Camera:

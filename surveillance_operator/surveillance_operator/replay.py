@@ -20,7 +20,7 @@ from surveillance_operator.page.hub import Hub
 from surveillance_operator.page.server import Action, Page
 from surveillance_operator.recording.runs import Recording, find_recording, run_parser
 from surveillance_operator.recording.timeline import MARKS, Timeline
-from surveillance_runtime.command_line import EXIT_BAD_INPUT
+from surveillance_runtime.command_line import EXIT_BAD_INPUT, page_address
 from surveillance_runtime.files import TIMELINE, FileError
 from surveillance_runtime.suggestions import nearest
 
@@ -183,10 +183,18 @@ class Player:
 def main(argv: Sequence[str] | None = None) -> int:
     """Show a recorded mission on a page until Ctrl-C; the exit code is 2 for bad input."""
     parser = run_parser('replay', 'Shows a recorded mission in a browser, with a slider.')
-    parser.add_argument('--port', type=int, default=8080, metavar='N', help='default: %(default)d')
+    parser.add_argument(
+        '--web-address',
+        default='127.0.0.1:8080',
+        metavar='HOST:PORT',
+        help='address of the page; others than 127.0.0.1 need the printed token (default: '
+        '%(default)s)',
+    )
     options = parser.parse_args(argv)
-    if not 0 <= options.port <= 65535:
-        parser.error(f'--port {options.port}: expected a number from 0 to 65535')
+    try:
+        host, port = page_address(options.web_address)
+    except ValueError as error:
+        parser.error(str(error))
     with contextlib.ExitStack() as stack:
         try:
             recording = find_recording(options.run, options.runs)
@@ -197,7 +205,8 @@ def main(argv: Sequence[str] | None = None) -> int:
                 questions={},
                 actions=player.actions(),
                 picture=player.jpeg,
-                port=options.port,
+                host=host,
+                port=port,
                 replay=True,
             )
         except (FileError, OSError) as error:

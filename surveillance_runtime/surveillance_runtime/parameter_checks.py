@@ -1,9 +1,10 @@
-"""What lists have to hold to be a parameter, for nodes and for whoever reads parameter files."""
+"""What lists and texts have to hold to be a parameter: for nodes, and for who reads their files."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from urllib.parse import urlsplit
 
 MOST_TILT = 0.1
 """A lidar that is tilted by more than this does not look along the floor, rad."""
@@ -32,3 +33,16 @@ def rectangle(values: Sequence[float]) -> str | None:
     """Ask for the sides of an upright rectangle."""
     good = len(values) == 4 and values[0] < values[1] and values[2] < values[3]
     return None if good else 'four numbers [x_min, x_max, y_min, y_max], each pair rising'
+
+
+def web_origin(text: str) -> str | None:
+    """Ask for an origin as browsers write it (RFC 6454), if for anything."""
+    wanted = text.rstrip('/')
+    try:
+        parts = urlsplit(wanted)
+        whole = f'{parts.scheme}://{parts.netloc}' == wanted and parts.username is None
+        good = whole and parts.scheme in ('http', 'https') and bool(parts.hostname)
+        good = good and parts.port != 0
+    except ValueError:  # of the port, or of brackets that are not closed
+        good = False
+    return None if good or not wanted else 'an origin like https://robot.example.org'

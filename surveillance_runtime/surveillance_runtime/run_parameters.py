@@ -59,7 +59,7 @@ def run_layers(
         layers.append(Layer(origin, (Entry('/**', 'map_source', 'markers', origin),)))
         asked.append(for_node(BEHAVIOUR_NODE, 'behaviour', behaviour, origin))
     layers.append(Layer('this run', tuple(chosen)))
-    layers += [file_layer(path.resolve()) for path in files]
+    layers += [file_layer(path.absolute()) for path in files]
     layers.append(Layer('options', (*asked, *options)))
     return tuple(layers)
 

@@ -21,7 +21,6 @@ from launcher.run import (
     RECORDER,
     Run,
     make_parser,
-    page_address,
     wanted_run,
 )
 from launcher.run_configuration import check_assignments, check_clocks, configuration, with_mode_of
@@ -36,6 +35,7 @@ from launcher.run_mission import (
 from launcher.run_processes import command, node_environ, ros_arguments
 from surveillance_behaviour.mission.mission_log import MissionRecord
 from surveillance_runtime import discovery
+from surveillance_runtime.command_line import page_address
 from surveillance_runtime.files import RECORD, TIMELINE
 from surveillance_runtime.node_table import DEFAULT_MODE
 from surveillance_runtime.run_parameters import place_file, run_layers, write_parameters
@@ -357,3 +357,16 @@ def test_an_unfinished_run_of_other_options_is_told_at_the_start(tmp_path):
         f'{old.name} was started with other options and is not finished; --resume continues it'
     )
     assert chosen_folder(Run(mode='MANUAL', fresh=True), tmp_path, None)[1] == ''
+
+
+def test_an_address_behind_a_switch_names_the_option_that_takes_it(capsys):
+    with pytest.raises(SystemExit):
+        make_parser().parse_args(['--web', '0.0.0.0:8080'])
+    assert '--web takes no value, expected --web-address 0.0.0.0:8080' in capsys.readouterr().err
+
+
+def test_the_pages_token_is_no_parameter_that_a_peer_could_ask_for(tmp_path):
+    merged = configuration(CONFIG, Run(web_control=True), tmp_path)
+    settings = merged.resolve('mission_page', '/mission_page')
+    assert 'token' not in settings
+    assert settings['token_file'].value == str(tmp_path / 'page_token')

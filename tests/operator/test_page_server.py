@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import http.client
 import json
+import socket
 from collections.abc import Iterator
 
 import pytest
@@ -13,6 +14,7 @@ from surveillance_operator.page.server import Page
 from surveillance_operator.snapshot import Snapshot
 
 done: list[object] = []
+told: list[str] = []
 
 
 def door(door: object) -> str:
@@ -24,6 +26,10 @@ def facts(place: object) -> object:
     return {'ok': True, 'facts': [place]}
 
 
+def broken(place: object) -> object:
+    raise KeyError(place)
+
+
 def refuse() -> str:
     raise ValueError('no such door')
 
@@ -31,12 +37,14 @@ def refuse() -> str:
 @pytest.fixture
 def page() -> Iterator[Page]:
     done.clear()
+    told.clear()
     page = Page(
         Hub(),
-        questions={'facts': facts},
+        questions={'facts': facts, 'broken': broken},
         actions={'door': door, 'refused': refuse},
         port=0,
         token='secret',
+        report=told.append,
     )
     page.start()
     yield page
@@ -122,6 +130,36 @@ def test_what_cannot_be_done_is_said(page: Page, path: str, body: str, status: i
 def test_another_name_for_this_machine_is_refused(page: Page) -> None:
     assert ask(page, 'GET', '/', Host='evil.example')[0] == 403
     assert ask(page, 'GET', '/', Host=f'localhost:{page.port}')[0] == 200
+
+
+@pytest.mark.parametrize('host', ['[', '[::1', ']', '[zz]:1', ''])
+def test_a_host_that_is_none_costs_nothing(page: Page, host: str) -> None:
+    assert ask(page, 'GET', '/', Host=host)[0] in (400, 403)
+    assert told == []
+
+
+def test_a_request_that_fails_costs_one_line_and_one_answer(page: Page) -> None:
+    status, text = ask(page, 'GET', '/ask/broken?place=R1')
+    assert status == 500
+    assert 'Traceback' not in text
+    with socket.create_connection(('127.0.0.1', page.port), timeout=30) as raw:
+        raw.sendall(b'\x16\x03\x01 no HTTP at all\r\n\r\n')
+        assert raw.recv(100).startswith(b'HTTP/1.1 400')
+    assert len(told) == 2
+    assert not any('\n' in line for line in told)
+
+
+def test_who_comes_by_another_address_is_told_which_option_it_takes(page: Page) -> None:
+    foreign = {**own(page), 'Origin': 'https://robot.example.org'}
+    status, text = ask(page, 'POST', '/act/door', '{}', **foreign)
+    assert status == 403
+    assert '--web-origin https://robot.example.org' in text
+
+
+def test_an_origin_that_is_none_is_refused() -> None:
+    for text in ('robot.example.org', 'ftp://x', 'https://', 'https://x/path', 'https://[x'):
+        with pytest.raises(ValueError, match=r'expected an origin like https'):
+            Page(Hub(), questions={}, actions={}, port=0, origin=text)
 
 
 def test_beyond_this_machine_even_looking_needs_the_token() -> None:

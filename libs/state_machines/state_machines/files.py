@@ -45,6 +45,8 @@ def read_file(path: str | Path, most: int) -> bytes:
             raise OSError(errno.EFBIG, problem, str(path))
         with open(descriptor, 'rb', closefd=False) as file:
             return file.read(most)  # files of /proc say that they are empty
+    except OSError as error:  # one that was only read has no name yet
+        raise OSError(error.errno, error.strerror, str(path)) from None
     finally:
         os.close(descriptor)
 

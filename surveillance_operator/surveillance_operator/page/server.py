@@ -3,12 +3,17 @@
 On the loopback address everybody on this machine may look. Elsewhere a token is needed: the address
 that is printed holds it once, and it becomes a cookie. Whatever changes something needs the token
 in any case, comes from the page's own origin, and only where control was switched on.
+
+Behind a proxy that adds TLS, browsers know the page by another origin (`https://robot.example.org`),
+which is told by its option. Then everybody needs the token, also to look: requests of anybody come
+from the proxy, which is on this machine.
 """
 
 from __future__ import annotations
 
 import inspect
 import ipaddress
+import logging
 import secrets
 import socket
 import threading
@@ -35,6 +40,7 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 from state_machines.exceptions import CallError
 from state_machines.files import parse_json
 from surveillance_operator.page.hub import Hub
+from surveillance_runtime import parameter_checks
 
 STATIC = Path(__file__).with_name('static')
 LONGEST_BODY = 65_536
@@ -61,11 +67,16 @@ class Page:
         actions: Done for whoever may act, by name; none without control.
         picture: The camera's image as JPEG, or None when there is none.
         host, port: Where to listen; port 0 takes any.
+        origin: What browsers know the page by behind a proxy, as ``https://robot.example.org``;
+            empty: there is no proxy.
         token: What gives access; one is made unless given.
         replay: Whether a recording is shown: then anybody who may look may move in time.
+        report: Told one line about a request that failed, and about what was no request of HTTP;
+            keep the number of lines small, anybody can send them.
 
     Raises:
         OSError: The address cannot be used.
+        ValueError: The origin is none.
     """
 
     def __init__(
@@ -77,8 +88,10 @@ class Page:
         picture: Callable[[], bytes | None] = lambda: None,
         host: str = '127.0.0.1',
         port: int = 8080,
+        origin: str = '',
         token: str = '',
         replay: bool = False,
+        report: Callable[[str], Any] = lambda _: None,
     ) -> None:
         self._hub = hub
         self._questions, self._actions = questions, actions
@@ -88,7 +101,10 @@ class Page:
         self._socket = _bound(host, port)
         self.port: int = self._socket.getsockname()[1]
         self._host = host
-        self._is_local = _is_loopback(host)
+        if expected := parameter_checks.web_origin(origin):
+            raise ValueError(f'{origin!r}: expected {expected}')
+        self._origin = origin.rstrip('/').lower()
+        self._is_local = _is_loopback(host) and not self._origin
         self._cookie = f'mission_{self.port}'
         routes = [
             Route('/', self._index),
@@ -98,7 +114,8 @@ class Page:
             Route('/act/{name}', self._act, methods=['POST']),
             Mount('/static', StaticFiles(directory=STATIC)),
         ]
-        app = _Guard(Starlette(routes=routes), self._refusal)
+        app = _Guard(Starlette(routes=routes), self._refusal, report)
+        _report_for_uvicorn(report)
         config = uvicorn.Config(
             app,
             log_config=None,
@@ -113,6 +130,8 @@ class Page:
     @property
     def address(self) -> str:
         """Where to look; with the token where one is needed."""
+        if self._origin:
+            return f'{self._origin}/?token={self.token}'
         shown = f'[{self._host}]' if ':' in self._host else self._host
         if self._host in ('0.0.0.0', '::'):
             shown = socket.gethostname()
@@ -135,14 +154,17 @@ class Page:
         if self._thread is not None:
             self._thread.join(3.0)
 
-    def _refusal(self, request: Request) -> str | None:
-        """Say why a request may not even look; None when it may."""
-        host = urlsplit(f'//{request.headers.get("host", "")}').hostname or ''
+    def _refusal(self, request: Request) -> tuple[int, str] | None:
+        """Say with which status and why a request may not even look; None when it may."""
+        try:
+            host = urlsplit(f'//{request.headers.get("host", "")}').hostname or ''
+        except ValueError:  # brackets that are not closed
+            return 400, 'the Host of this request is no name and no address'
         # Another site's name that leads here would make a browser send that site's requests.
         if self._is_local and host != 'localhost' and not _is_loopback(host):
-            return f'host {host[:80]!r} is not this page'
+            return 403, f'host {host[:80]!r} is not this page'
         if not self._is_local and not self._has_token(request):
-            return 'a token is needed: open the address that the mission printed'
+            return 403, 'a token is needed: open the address that the mission printed'
         return None
 
     def _has_token(self, request: Request) -> bool:
@@ -155,7 +177,12 @@ class Page:
                 return PlainTextResponse('this token is not valid any more', 403)
             answer = RedirectResponse('/', 303)
             answer.set_cookie(
-                self._cookie, self.token, httponly=True, samesite='strict', max_age=30 * 86400
+                self._cookie,
+                self.token,
+                httponly=True,
+                samesite='strict',
+                secure=self._origin.startswith('https:'),
+                max_age=30 * 86400,
             )
             return answer
         text = (STATIC / 'index.html').read_text(encoding='utf-8')
@@ -186,8 +213,12 @@ class Page:
                 {'ok': False, 'text': 'control is off: start with --web-control'}, 403
             )
         origin = request.headers.get('origin', '')
-        if origin != f'http://{request.headers.get("host", "")}':
-            return JSONResponse({'ok': False, 'text': 'refused: not from this page'}, 403)
+        own = self._origin or f'http://{request.headers.get("host", "")}'
+        if origin != own:
+            # The browser says where the person looks: the one value that the option has to have.
+            known = urlsplit(origin).scheme in ('http', 'https') and len(origin) < 300
+            hint = f'; behind a proxy start with --web-origin {origin}' if known else ''
+            return JSONResponse({'ok': False, 'text': f'refused: not from this page{hint}'}, 403)
         if not self._replay and not self._has_token(request):
             text = 'refused: open the address with the token that the mission printed'
             return JSONResponse({'ok': False, 'text': text}, 403)
@@ -208,23 +239,38 @@ class Page:
 class _Guard:
     """Refuses who may not look, and gives every answer its headers."""
 
-    def __init__(self, app: ASGIApp, refusal: Callable[[Request], str | None]) -> None:
+    def __init__(
+        self,
+        app: ASGIApp,
+        refusal: Callable[[Request], tuple[int, str] | None],
+        report: Callable[[str], Any],
+    ) -> None:
         self._app = app
         self._refusal = refusal
+        self._report = report
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         if scope['type'] != 'http':
             return
 
+        begun = False
+
         async def send_with_headers(message: Any) -> None:
+            nonlocal begun
+            begun = True
             if message['type'] == 'http.response.start':
                 extra = [(k.lower().encode(), v.encode()) for k, v in HEADERS.items()]
                 message['headers'] = [*message.get('headers', []), *extra]
             await send(message)
 
-        refused = self._refusal(Request(scope))
-        app = self._app if refused is None else PlainTextResponse(refused, 403)
-        await app(scope, receive, send_with_headers)
+        try:
+            refused = self._refusal(Request(scope))
+            app = self._app if refused is None else PlainTextResponse(refused[1], refused[0])
+            await app(scope, receive, send_with_headers)
+        except Exception as error:  # one request costs one line, whatever it was
+            self._report(f'a request for {scope["path"][:80]!r} failed: {error!r:.200}')
+            if not begun:
+                await PlainTextResponse('failed', 500)(scope, receive, send_with_headers)
 
 
 async def _answered(call: Action, fields: Mapping[str, Any]) -> Response:
@@ -234,6 +280,25 @@ async def _answered(call: Action, fields: Mapping[str, Any]) -> Response:
     except (ValueError, TypeError, CallError) as error:
         return JSONResponse({'ok': False, 'text': str(error)}, 422)
     return JSONResponse({'ok': True, 'text': result} if isinstance(result, str) else result)
+
+
+class _OneLine(logging.Handler):
+    """Passes on what uvicorn has to say, a line each and without tracebacks."""
+
+    def __init__(self, report: Callable[[str], Any]) -> None:
+        super().__init__(logging.WARNING)
+        self._report = report
+
+    def emit(self, record: logging.LogRecord) -> None:
+        error = record.exc_info[1] if record.exc_info else None
+        cause = f': {error!r:.200}' if error else ''
+        self._report(record.getMessage().split('\n')[0][:200] + cause)
+
+
+def _report_for_uvicorn(report: Callable[[str], Any]) -> None:
+    logger = logging.getLogger('uvicorn.error')
+    logger.handlers[:] = [_OneLine(report)]
+    logger.propagate = False
 
 
 def _is_loopback(host: str) -> bool:
