@@ -232,6 +232,10 @@ class Environment:
             ValueError: the machine lacks something that only its owner can give.
         """
         if self.ready():
+            first = self.checkout / _FIRST
+            if first.resolve() != self.venv.resolve() and not users_of(first):
+                with self._alone():
+                    self._settle()
             return
         machine = (platform.system(), platform.machine(), platform.libc_ver()[0])
         if reason := system.why_no_wheels(*machine, sys.version_info[:2]):

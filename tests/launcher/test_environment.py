@@ -208,12 +208,11 @@ def test_an_environment_in_use_stays_and_a_new_one_is_set_up_beside_it(checkout)
         assert (second / 'bin' / 'pip').read_text().startswith(f'#!{second}/bin/python')
         assert value(checkout, second) == '5'
         running.communicate(b'\n')
-    # The mission has ended: the next change takes its environment away.
-    (checkout / INTERFACES / 'source.py').write_text('VALUE = 6\n')
-    assert 'ready True' in prepare(checkout).stdout
+    # The mission has ended: the next start takes its environment away.
+    assert prepare(checkout).stdout == 'ready True\n'
     (left,) = [each for each in checkout.glob('.venv*') if not each.is_symlink()]
-    assert value(checkout, left) == '6'
-    assert value(checkout) == '6'
+    assert left == second
+    assert value(checkout) == '5'
 
 
 def test_another_interpreter_gets_an_environment_of_its_own(checkout):
