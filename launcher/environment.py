@@ -167,9 +167,8 @@ class Environment:
         return self.venv / 'bin' / 'python'
 
     def active(self) -> bool:
-        """Tell whether this very process runs in the environment, and not through a link to it."""
-        prefix = Path(sys.prefix)
-        return prefix.name == self.venv.name and prefix.resolve() == self.venv.resolve()
+        """Tell whether this very process runs in the environment."""
+        return Path(sys.prefix).resolve() == self.venv.resolve()
 
     def ready(self) -> bool:
         """Tell whether the set-up is complete and made for the present sources; takes
@@ -426,6 +425,16 @@ class Environment:
             yield lock
         finally:
             os.close(lock)
+
+
+def interpreter() -> str:
+    """Return this process's interpreter by the real name of its environment.
+
+    The link by which it may have been started leads to another one after the next set-up.
+    """
+    if sys.prefix == sys.base_prefix:
+        return sys.executable
+    return str(Path(sys.prefix).resolve() / 'bin' / Path(sys.executable).name)
 
 
 def users_of(venv: Path) -> list[int]:

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import os
-import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from launcher.environment import interpreter
 from launcher.log_merge import ROS_FORMAT
 from launcher.run import MARKERS, PAGE, RECORDER, Run
 from launcher.supervisor import Program
@@ -76,7 +76,7 @@ def command(nodes: Sequence[node_table.Node], arguments: Sequence[str], parent: 
     # comes last.
     ordered = sorted(nodes, key=lambda node: node.name == BEHAVIOUR_NODE)
     targets = ','.join(f'{n.name}={n.module}:{n.class_name}' for n in ordered)
-    return [sys.executable, '-P', str(CHILD), str(parent), targets, *arguments]
+    return [interpreter(), '-P', str(CHILD), str(parent), targets, *arguments]
 
 
 def programs_of(

@@ -51,7 +51,9 @@ def unit_text(checkout: Path, arguments: Sequence[str], memory: int) -> str:
         arguments: Of the command `run`.
         memory: Megabytes that the whole service may hold.
     """
-    words = [sys.executable, str(checkout / 'launch.py'), 'run', *arguments]
+    # The interpreter below the environment, which outlives it.
+    python = getattr(sys, '_base_executable', sys.executable)
+    words = [python, str(checkout / 'launch.py'), 'run', *arguments]
     # Also within quotes systemd reads a backslash as C does, % as a specifier, $ as a variable.
     command = shlex.join(words).replace('\\', '\\\\').replace('%', '%%').replace('$', '$$')
     folder = str(checkout).replace('%', '%%')
