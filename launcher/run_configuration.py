@@ -77,7 +77,13 @@ def _folders_of(folder: Path) -> Iterator[Entry]:
     """Yield where the nodes of a run write, if the user's file names no other place."""
     for name, part in (('ontologies_folder', ONTOLOGIES), ('store', STORE)):
         yield for_node('armor_server', name, str(folder / part), 'this run')
-    for node in ('battery_controller', 'motion_controller', 'ontology_map_builder', 'simulator'):
+    for node in (
+        'battery_controller',
+        'collision_monitor',
+        'motion_controller',
+        'ontology_map_builder',
+        'simulator',
+    ):
         yield for_node(node, 'state_file', str(folder / f'{node}.json'), 'this run')
 
 

@@ -1,10 +1,10 @@
 """The node `robot_behavior`: runs one of the machines until it is told to stop.
 
 Subscribes `battery_level`, `battery_low`, `battery_state` and `robot_place`, publishes
-`mission_status`, and calls the services and actions of the machine that `behaviour` names. Below
-`robot_behavior/fsm` the machine can be watched, paused and stepped. In the behaviour `surveillance`
-this node decides: it publishes `decision` and offers `why_not` and `go_to`; in `patrol` the node
-`reasoner` does.
+`mission_status` and `paused`, and calls the services and actions of the machine that `behaviour`
+names. Below `robot_behavior/fsm` the machine can be watched, paused and stepped. In the behaviour
+`surveillance` this node decides: it publishes `decision` and offers `why_not` and `go_to`; in
+`patrol` the node `reasoner` does.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from sensor_msgs.msg import BatteryState
+from std_msgs.msg import Bool
 
 import state_machines as fsm
 from patrol_policy.decision import DecisionSettings
@@ -45,7 +46,7 @@ from surveillance_runtime.launch_protocol import NotNowError
 from surveillance_runtime.node import JOIN_SECONDS, PatrolNode
 from surveillance_runtime.process import run_node
 from surveillance_runtime.qos import SENSOR_QOS
-from surveillance_runtime.state_topics import StateSubscription
+from surveillance_runtime.state_topics import OwnedTopic, StateSubscription
 
 
 class RobotBehavior(PatrolNode):
@@ -74,7 +75,12 @@ class RobotBehavior(PatrolNode):
         self.mission = Mission(self._behaviour, settings, ports, battery, clock, self._record)
         self.machine = MACHINES[self._behaviour](self.mission)
         self._announcer.attach(self.mission, self.machine)
-        self._introspection = IntrospectionServer(self, self.get_name(), self.machine, '/')
+        # A pause lets no further state begin; what moves the robot has it stand at once.
+        self._paused = OwnedTopic(self, Bool, 'paused')
+        self._paused.publish(Bool(data=False))
+        self._introspection = IntrospectionServer(
+            self, self.get_name(), self.machine, '/', self._on_pause
+        )
         self._introspection.start()
         hear_battery(self, battery)
         StateSubscription(
@@ -86,6 +92,9 @@ class RobotBehavior(PatrolNode):
             qos=SENSOR_QOS,
         )
         self._machine_thread = self.spawn(self._run, name='machine')
+
+    def _on_pause(self, paused: bool) -> None:
+        self._paused.publish(Bool(data=paused))
 
     def _ports(
         self,

@@ -1,9 +1,12 @@
-"""The node `collision_monitor`: lets no command through that the lidar does not allow.
+"""The node `collision_monitor`: lets no command through that the lidar does not allow, or a person.
 
 It stands between whoever commands `cmd_vel` (`motion_controller`, a joystick, any other program)
 and the base, which listens to `cmd_vel_monitored`. A command is slowed down so that the robot can
 brake before the nearest thing on its arc; without a fresh scan, or without a fresh command, the
 robot stands. As a process of its own it also stops a robot whose controller hangs.
+
+A person stops the robot with the service `stop`: from then on it stands, whoever commands it, over
+restarts of this node too, until a person releases it. The topic `stopped` tells of it.
 """
 
 from __future__ import annotations
@@ -16,10 +19,13 @@ from typing import Any
 import numpy as np
 from geometry_msgs.msg import Twist
 from sensor_msgs.msg import LaserScan
+from std_msgs.msg import Bool
+from std_srvs.srv import SetBool
 
 from surveillance_controllers import conversions
 from surveillance_controllers.geometry import Points, Scan
 from surveillance_controllers.motion.command_publisher import STANDSTILL, CommandPublisher
+from surveillance_controllers.motion.holding import STOPPED
 from surveillance_controllers.motion.path_following import (
     Velocity,
     as_forwards,
@@ -32,7 +38,10 @@ from surveillance_runtime.parameters import parameter
 from surveillance_runtime.process import run_node
 from surveillance_runtime.qos import SENSOR_QOS
 from surveillance_runtime.robot_base import robot_deceleration, robot_radius
+from surveillance_runtime.state_file import StateFile
+from surveillance_runtime.state_topics import OwnedTopic
 
+STOP_CAUSE = ('person', 'stop')
 MONITORED = 'cmd_vel_monitored'
 """Topic that the base listens to."""
 UNGUARDED_AFTER = 5.0
@@ -54,6 +63,12 @@ class MonitorSettings:
         's of ROS time.',
         0.05,
         10.0,
+    )
+
+    state_file: str = parameter(
+        '',
+        'File that keeps over a restart of the process whether the robot is stopped; empty: none.',
+        read_only=True,
     )
 
     @property
@@ -97,6 +112,9 @@ class CollisionMonitor(PatrolNode):
         self._scan: Scan | None = None
         self._lidars: list[str] = []
         self._is_held_back = False
+        self._kept = StateFile(self, self._settings.state_file)
+        self._stopped = self._kept.text('stopped') == 'yes'
+        self._stopped_topic = OwnedTopic(self, Bool, STOPPED)
         self._base = CommandPublisher(
             self,
             MONITORED,
@@ -107,6 +125,8 @@ class CollisionMonitor(PatrolNode):
         )
         self.create_subscription(Twist, 'cmd_vel', self._on_command, 1)
         self.create_subscription(LaserScan, 'scan', self._on_scan, SENSOR_QOS)
+        self.create_service(SetBool, 'stop', self._on_stop)
+        self._tell_stop()
         self._unguarded = self.create_timer(UNGUARDED_AFTER, self._look_for_base)
 
     def _on_command(self, message: Twist) -> None:
@@ -139,7 +159,30 @@ class CollisionMonitor(PatrolNode):
                     'remap one of them'
                 )
 
+    def _on_stop(self, request: Any, response: Any) -> Any:
+        response.success = True
+        if request.data == self._stopped:
+            response.message = 'the robot is stopped' if self._stopped else 'it is not stopped'
+            return response
+        self._stopped = request.data
+        self._kept.save({'stopped': 'yes' if self._stopped else 'no'})
+        if self._stopped:
+            self._base.command(Velocity())
+        self._tell_stop()
+        response.message = 'the robot is stopped' if self._stopped else 'the robot may move again'
+        self.get_logger().warn(f'{response.message}: a person wants it so')
+        return response
+
+    def _tell_stop(self) -> None:
+        self._stopped_topic.publish(Bool(data=self._stopped))
+        if self._stopped:
+            self.incidents.begin(STOP_CAUSE, 'the robot is stopped, until a person releases it')
+        else:
+            self.incidents.end(STOP_CAUSE, 'a person has released the robot')
+
     def _allowed(self) -> Velocity:
+        if self._stopped:
+            return Velocity()
         if self._scan is None:
             return self._wanted  # Nothing was seen yet, so the publisher lets nothing through.
         velocity = self._wanted

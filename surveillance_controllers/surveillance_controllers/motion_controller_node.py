@@ -21,6 +21,7 @@ from surveillance_controllers.manual.commands import MOTION, ParsedCommand
 from surveillance_controllers.manual.requests import CommandConsole
 from surveillance_controllers.map_knowledge import MapKnowledge
 from surveillance_controllers.motion.arrival import Motion, MotionFailedError, place_reached
+from surveillance_controllers.motion.holding import Hold
 from surveillance_controllers.motion.place_recording import PlaceRecorder
 from surveillance_controllers.stimuli import glide
 from surveillance_interfaces.action import Control, FollowPath
@@ -54,6 +55,8 @@ class MotionController(PatrolNode):
         self._robot: Motion | None = None
         if self._mode == 'SIMULATED':
             self._robot = self._make_robot()
+        else:
+            self._hold = Hold(self)
         GoalServer(self, FollowPath, 'follow_path', self._follow_path)
         GoalServer(self, Control, 'motion/controller', self._control)
         self.get_logger().info(f'{self._mode} mode')
@@ -156,7 +159,8 @@ class MotionController(PatrolNode):
         else:
             seconds, delta = stimuli.move(self._draw)
         end = stimuli.reached(self._draw, path[-1], delta)
-        return glide(path, seconds, end, run, report, self._settings.feedback_period)
+        period = self._settings.feedback_period
+        return glide(path, seconds, end, run, report, period, lambda: self._hold.active)
 
 
 def _checked(points: Sequence[Any]) -> Points:

@@ -59,6 +59,7 @@ def glide(
     pace: GoalRun,
     on_position: Callable[[Points], None],
     period: float,
+    stands: Callable[[], bool] = lambda: False,
 ) -> Points:
     """Go along a path in a given time.
 
@@ -69,6 +70,7 @@ def glide(
         pace: Passes the time.
         on_position: Told the position at the start, every `period` seconds, and at the end.
         period: Seconds between two reports.
+        stands: Whether the motion rests at present; it goes on afterwards.
 
     Returns:
         `end`, or where the motion was when it was ended early.
@@ -81,7 +83,10 @@ def glide(
             break
         position = geometry.point_at(path, total * elapsed / seconds)
         on_position(position)
+        slept = pace.now()
         if not pace.sleep(min(period, seconds - elapsed)):
             return position
+        if stands():
+            began += pace.now() - slept
     on_position(end)
     return np.asarray(end, dtype=float)

@@ -109,6 +109,7 @@ def status_line(snapshot: Snapshot) -> str:
         return f' no mission on {snapshot.where} '
     battery = '–' if snapshot.battery is None else f'{snapshot.battery:.0f} %'
     paused = 'PAUSED · ' if snapshot.paused else ''
+    paused = 'STOPPED · ' if snapshot.stopped else paused
     return f' {paused}{status.state} · {status.whereabouts} · battery {battery} '
 
 

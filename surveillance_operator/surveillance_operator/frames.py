@@ -196,6 +196,7 @@ PARTS: Mapping[str, tuple[tuple[str, ...], Callable[[Snapshot], Any]]] = {
     'scan': (('scan',), lambda s: _points(s.scan)),
     'obstacles': (('obstacles',), lambda s: _points(s.obstacles)),
     'machine': (('containers',), lambda s: [asdict(each) for each in s.containers]),
+    'stopped': (('stopped',), lambda s: s.stopped),
     'active': (('active', 'paused'), lambda s: {'paths': list(s.active), 'paused': s.paused}),
     'transitions': (('transitions',), _transitions),
     'markers': (

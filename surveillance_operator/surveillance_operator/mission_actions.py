@@ -38,6 +38,7 @@ from surveillance_ontology.armor_client import (
     ArmorServiceInternalError,
 )
 from surveillance_ontology.patrol_ontology import PatrolOntology, facts_of
+from surveillance_operator.stop_button import StopButton
 from surveillance_operator.topics import BEHAVIOUR, CONTROLLERS
 from surveillance_runtime.configuration import argument_value, declared
 from surveillance_runtime.node import PatrolNode
@@ -96,6 +97,7 @@ class MissionActions:
         self._node = node
         self._timeout = timeout
         self._callers = {name: ServiceCaller(node, _KINDS[name], name) for name in _KINDS}
+        self._stop = StopButton(node)
         self._armor: ArmorClient | None = None
         self._found_by = time.monotonic() + min(_DISCOVERY, timeout)
 
@@ -153,6 +155,10 @@ class MissionActions:
             raise ValueError(answer.message or f'{word} was refused')
         done = {'pause': 'paused', 'step': 'one step made', 'resume': 'going on'}
         return str(answer.message) or f'state machine: {done[word]}'
+
+    def stop(self, on: bool) -> str:
+        """Have the robot stand, whoever commands it, or release it."""
+        return self._stop.press(bool(on))
 
     def set_threshold(self, seconds: str) -> str:
         """Set after how long a place is URGENT, seconds."""

@@ -129,6 +129,7 @@ class MissionPage(PatrolNode):
             'go': actions.go_to,
             'arm': actions.move_arm,
             'machine': actions.machine,
+            'stop': actions.stop,
             'threshold': actions.set_threshold,
             'policy': actions.set_policy,
             'command': actions.command,

@@ -1,4 +1,4 @@
-"""The node `mission_view`: shows a running mission in its terminal; it only listens and asks.
+"""The node `mission_view`: shows a running mission in its terminal, and stops the robot there.
 
 In a terminal that can it draws, elsewhere it prints one line for each change.
 """
@@ -12,8 +12,10 @@ from typing import Any
 
 from rich.console import Console
 
+from state_machines.exceptions import CallError
 from surveillance_operator.mission_feed import MissionFeed
 from surveillance_operator.snapshot import Change, Snapshot
+from surveillance_operator.stop_button import StopButton
 from surveillance_operator.watch.view import show_moving, show_once
 from surveillance_runtime.logging import clean, print_lines
 from surveillance_runtime.node import PatrolNode
@@ -36,8 +38,12 @@ class MissionViewNode(PatrolNode):
         self._draws = self._once or (
             self._console.is_terminal and not self._console.is_dumb_terminal
         )
+        self._said = ''
+        self._stop: StopButton | None = None
         self._feed = MissionFeed(self, POLL_PERIOD, self._tell)
         if self._draws:
+            if not self._once:
+                self._stop = StopButton(self)
             self.spawn(self._draw, 'display')
         else:
             self._print(f'watching {self.snapshot.where}')
@@ -60,7 +66,9 @@ class MissionViewNode(PatrolNode):
     def _draw(self) -> None:
         try:
             if not self._once:
-                show_moving(self.see, self.stopping, self._console)
+                show_moving(
+                    self.see, self.stopping, self._console, self._press_stop, lambda: self._said
+                )
             elif not show_once(self.see, self.stopping, self._console, self._timeout):
                 where = f'{self.snapshot.where} within {self._timeout:g} s'
                 print(f'watch: no mission on {where}', file=sys.stderr)
@@ -69,6 +77,19 @@ class MissionViewNode(PatrolNode):
             pass
         finally:
             self.finish()
+
+    def _press_stop(self, stop: bool) -> None:
+        """Stop the robot, or release it, on a thread of its own."""
+
+        def press() -> None:
+            assert self._stop is not None
+            try:
+                self._said = self._stop.press(stop)
+            except CallError as error:
+                self._said = f'NOT {"stopped" if stop else "released"}: {error}'
+
+        self._said = 'stopping the robot' if stop else 'releasing it'
+        self.spawn(press, 'stop')
 
     def _print(self, line: str) -> None:
         try:

@@ -26,6 +26,7 @@ BATTERY_STEP = 10
 """Percent between two lines about the battery."""
 KEPT_EVENTS = 50
 WAITS_FOR_HELP = 'the robot waits for help'
+STOPPED = 'the robot is stopped'
 STALE = 3
 """The level of health of what no longer reports."""
 HISTORY_SECONDS = 3600.0
@@ -176,6 +177,7 @@ class Snapshot:
         containers: The state machine, outermost container first.
         active: Paths of the states that are active, outermost first.
         paused: Whether the machine enters no further state.
+        stopped: Whether a person has stopped the robot.
         transitions: The latest transitions.
         detections: The markers of the latest image: id, whether the list of markers has it, whether
             it is confirmed, confidence.
@@ -224,6 +226,7 @@ class Snapshot:
     containers: tuple[Container, ...] = ()
     active: tuple[str, ...] = ()
     paused: bool = False
+    stopped: bool = False
     transitions: tuple[Transition, ...] = ()
     detections: tuple[tuple[int, bool, bool, float], ...] = ()
     markers: Mapping[int, tuple[float, float]] = field(default_factory=dict)
@@ -297,6 +300,8 @@ def changes(old: Snapshot, new: Snapshot) -> Iterator[Change]:
             yield Change(f'something stands at ({x:.1f}, {y:.1f})')
         elif had and not has:
             yield Change('nothing stands about any more')
+    if old.stopped != new.stopped:
+        yield Change(STOPPED if new.stopped else 'the robot is released')
     if old.paused != new.paused:
         yield Change('the state machine is paused' if new.paused else 'the state machine continues')
     yield from _node_changes(old, new)
@@ -312,6 +317,8 @@ def _decision_line(snapshot: Snapshot) -> str:
 def why(snapshot: Snapshot) -> tuple[str, str] | None:
     """Return what the robot is about and the reason: the decision, or what it waits for."""
     status, decision = snapshot.status, snapshot.decision
+    if snapshot.stopped:
+        return STOPPED, 'until a person releases it'
     if status is not None and status.waiting_for_help:
         return WAITS_FOR_HELP, status.text
     return None if decision is None else (_decision_line(snapshot), decision.reason)

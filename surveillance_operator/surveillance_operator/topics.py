@@ -442,6 +442,7 @@ TOPICS: tuple[Topic, ...] = (
     Topic('decision', Decision, lambda m, _: {'decision': decision_from(m), 'number': m.sequence}),
     Topic('battery_level', UInt8, _sets('battery', percent_from)),
     Topic('battery_low', Bool, lambda m, _: {'battery_low': m.data}),
+    Topic('stopped', Bool, lambda m, _: {'stopped': m.data}),
     Topic('map', OccupancyGrid, _on_map),
     Topic('door_states', DoorStates, _sets('doors', doors_from)),
     Topic('obstacles', PointCloud2, _sets('obstacles', cloud_from)),

@@ -49,9 +49,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser = _mission_parser(
         'watch',
         'Shows a running mission, simulated or real, until q or Ctrl-C: the map with robot, doors '
-        'and obstacles, what the robot does and why. Keys: p holds the picture, d shows the '
-        'decision, n the nodes, e the events. Where the output is no terminal, it prints a line '
-        'for each change.',
+        'and obstacles, what the robot does and why. Keys: s stops the robot, r releases it, '
+        'p holds the picture, d shows the decision, n the nodes, e the events. Where the output is '
+        'no terminal, it prints a line for each change.',
     )
     parser.add_argument('--once', action='store_true', help='print one picture and end')
     parser.add_argument(
@@ -74,7 +74,7 @@ def console(argv: Sequence[str] | None = None) -> int:
     parser = _mission_parser(
         'console',
         'One prompt for a running mission: answers in mode MANUAL, doors, rooms, obstacles, '
-        'policy, why, go, pause. `help` lists the commands.',
+        'policy, why, go, stop, pause. `help` lists the commands.',
     )
     return console_node.main(_ros_arguments(parser, parser.parse_args(argv)))
 

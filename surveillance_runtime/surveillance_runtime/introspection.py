@@ -75,9 +75,17 @@ class IntrospectionServer:
         state: The root.
         path: The root's name in paths; a leading slash is dropped, as is ``/`` alone, for the name
             the root has.
+        on_pause: Told when the machine is paused, and when it goes on or makes a step.
     """
 
-    def __init__(self, node: Node, server_name: str, state: Container, path: str) -> None:
+    def __init__(
+        self,
+        node: Node,
+        server_name: str,
+        state: Container,
+        path: str,
+        on_pause: Callable[[bool], object] = lambda _paused: None,
+    ) -> None:
         self._node = node
         self._root = state
         if path.strip('/'):
@@ -104,10 +112,18 @@ class IntrospectionServer:
         self._smach_status = publisher(SmachContainerStatus, status, CONTAINERS)
         node.create_subscription(SmachContainerInitialStatusCmd, init, self._on_initial_state, 10)
         control = state.control
+
+        def pausing(change: Callable[[], None], paused: bool) -> Callable[[Any], None]:
+            def act(_request: Any) -> None:
+                change()
+                on_pause(paused)
+
+            return act
+
         for kind, name, action in (
-            (Trigger, 'pause', lambda _: control.pause()),
-            (Trigger, 'resume', lambda _: control.resume()),
-            (Trigger, 'step', lambda _: control.step()),
+            (Trigger, 'pause', pausing(control.pause, True)),
+            (Trigger, 'resume', pausing(control.resume, False)),
+            (Trigger, 'step', pausing(control.step, False)),
             (ForceOutcome, 'force_outcome', lambda r: control.force_outcome(r.path, r.outcome)),
             (
                 SetInitialState,

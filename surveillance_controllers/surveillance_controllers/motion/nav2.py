@@ -21,6 +21,7 @@ import numpy as np
 from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped
 from nav_msgs.msg import OccupancyGrid
 
+from state_machines import Interrupt
 from state_machines.ros import CallError, CallInterruptedError, GoalCaller, GoalRun
 from surveillance_controllers import conversions
 from surveillance_controllers.controller_parameters import (
@@ -28,9 +29,17 @@ from surveillance_controllers.controller_parameters import (
     door_segments,
     place_positions,
 )
-from surveillance_controllers.geometry import Points, equally_spaced, length, point_of
+from surveillance_controllers.geometry import (
+    Points,
+    distance_nearest,
+    equally_spaced,
+    length,
+    point_of,
+    points_passed,
+)
 from surveillance_controllers.map_knowledge import MapKnowledge
 from surveillance_controllers.motion.arrival import Motion, MotionFailedError, expect_place
+from surveillance_controllers.motion.holding import Hold
 from surveillance_controllers.motion.place_recording import PlaceRecorder
 from surveillance_controllers.motion.place_regions import PlaceMap
 from surveillance_runtime.conversions import pose_from, pose_message, seconds_of
@@ -93,6 +102,7 @@ class Nav2Motion:
         (self._type,) = nav2_actions('navigator', 'nav2', 'own', 'NavigateThroughPoses')
         self._timeout = settings.peer_timeout
         self._navigator = GoalCaller(node, self._type, 'navigate_through_poses')
+        self._hold = Hold(node)
         self._lock = threading.Lock()
         self._places = PlaceMap(door_segments(node).values())
         self._point: Points | None = None
@@ -127,18 +137,30 @@ class Nav2Motion:
                 position = point
                 report(point)
 
-        try:
-            end = self._navigator.run(
-                self._type.Goal(poses=self._poses(path)),
-                accept_timeout=self._timeout,
-                interrupt=run.interrupt,
-                on_feedback=on_feedback,
-            )
-        except CallInterruptedError:
-            # It was cancelled, which is no failure.
-            return path[0] if position is None else position
-        except CallError as error:
-            raise MotionFailedError(str(error), position) from error
+        while True:
+            self._hold.await_end(run.interrupt)
+            # A robot that is to stand has its goal cancelled, and gets what is left of it again.
+            either = Interrupt()
+            forget = run.interrupt.subscribe(either.set), self._hold.begun.subscribe(either.set)
+            try:
+                end = self._navigator.run(
+                    self._type.Goal(poses=self._poses(path)),
+                    accept_timeout=self._timeout,
+                    interrupt=either,
+                    on_feedback=on_feedback,
+                )
+                break
+            except CallInterruptedError:
+                if run.interrupt.is_set() or not either.is_set():
+                    # It was cancelled, which is no failure.
+                    return path[0] if position is None else position
+                if position is not None:
+                    path = rest_of(path, position)
+            except CallError as error:
+                raise MotionFailedError(str(error), position) from error
+            finally:
+                for each in forget:
+                    each()
         if end.status != 'succeeded':
             raise MotionFailedError(f'Nav2 {end.status} the goal{reason_of(end.result)}', position)
         if self._point is not None:
@@ -199,6 +221,12 @@ class Nav2Motion:
 
     def look_around(self, _run: GoalRun) -> None:
         """Nothing: Nav2's own behaviours turn the robot where that is wanted."""
+
+
+def rest_of(path: Points, position: Points) -> Points:
+    """Return what is left of a path from where the robot is, shape (n, 3), n of at least 2."""
+    passed = points_passed(path, distance_nearest(path, position))
+    return np.vstack([position, path[min(passed, len(path) - 1) :]])
 
 
 class DockingMotion:

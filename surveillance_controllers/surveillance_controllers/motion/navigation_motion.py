@@ -1,8 +1,8 @@
 """Motion for `motion_controller` by its own navigation (SIMULATED mode): sensors, navigator, base.
 
-Reads `map`, `door_states`, `odom`, `scan` and `initialpose`; commands `cmd_vel`; publishes where
-the robot is (`amcl_pose`) and what stands about that the map does not have (`obstacles`). Asks
-`compute_path` for another path when a drive does not go on.
+Reads `map`, `door_states`, `odom`, `scan`, `initialpose`, `stopped` and `paused`; commands
+`cmd_vel`; publishes where the robot is (`amcl_pose`) and what stands about that the map does not
+have (`obstacles`). Asks `compute_path` for another path when a drive does not go on.
 """
 
 from __future__ import annotations
@@ -31,6 +31,7 @@ from surveillance_controllers.map_knowledge import MapKnowledge
 from surveillance_controllers.motion.arrival import MotionFailedError, expect_place
 from surveillance_controllers.motion.command_publisher import CommandPublisher
 from surveillance_controllers.motion.driving import Drive, Spin, State
+from surveillance_controllers.motion.holding import Hold
 from surveillance_controllers.motion.navigator import Navigator
 from surveillance_controllers.motion.path_following import DriveParameters, Velocity
 from surveillance_controllers.motion.place_recording import PlaceRecorder
@@ -102,6 +103,7 @@ class NavigationMotion:
         knowledge.assume(positions)
         # The places that come and go change what the robot's place can be.
         knowledge.follow_places(self._set_positions)
+        self._hold = Hold(node, self._on_hold)
         StateSubscription(node, OccupancyGrid, 'map', self._on_map)
         StateSubscription(node, DoorStates, 'door_states', self._on_doors)
         node.create_subscription(Odometry, 'odom', self._on_odometry, SENSOR_QOS, raw=True)
@@ -214,6 +216,7 @@ class NavigationMotion:
         """Hands a task to the navigator; before and afterwards the robot stands."""
         with self._lock:
             self._navigator.task, self._on_step = task, on_step
+            self._navigator.stands = self._hold.active
             # A simulator in lockstep waits for a command from the moment the goal is executed on,
             # and the scan of that moment may have come before the task.
             self._base.command(Velocity())
@@ -259,6 +262,13 @@ class NavigationMotion:
     def _on_doors(self, message: DoorStates) -> None:
         with self._lock:
             self._navigator.set_closed(message.closed)
+
+    def _on_hold(self) -> None:
+        with self._lock:
+            self._navigator.stands = self._hold.active
+            if self._hold.active and self._navigator.task is not None:
+                # At once: the next scan may be a tenth of a second away.
+                self._base.command(Velocity())
 
     def _on_odometry(self, serialized: bytes) -> None:
         with conversions.refusing(self._node, 'odom'):

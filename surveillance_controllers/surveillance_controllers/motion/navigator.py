@@ -48,6 +48,7 @@ class Navigator:
 
     Attributes:
         task: What is carried out at the moment.
+        stands: The robot is to stand where it is; no time passes for the task, which then goes on.
         before_search: Called before the robot looks for its pose everywhere, which takes a while in
             which it sees nothing else.
         obstacles_changed: Set when the obstacles changed; the reader clears it.
@@ -71,6 +72,8 @@ class Navigator:
         self._believed: Pose | None = None
         self._candidate: tuple[str | None, float] | None = None
         self._stamp, self._now = -math.inf, 0.0
+        self._stood = 0.0
+        self.stands = False
         self.task: Drive | Spin | None = None
         self.before_search: Callable[[], None] = lambda: None
         self.obstacles_changed = False
@@ -163,7 +166,9 @@ class Navigator:
         """
         if self._grid is None or self._odometry is None:
             return None
-        now = self._passed(stamp)
+        before, now = self._now, self._passed(stamp)
+        if self.stands:
+            self._stood += now - before
         if self._localiser is None:
             self._localiser = self._first_localiser(scan, self._odometry)
         used = self._localiser.see(scan, now)
@@ -174,9 +179,11 @@ class Navigator:
         if self._localiser.plausible:
             self._settle_place(now)
         pose = self._localiser.pose
+        if self.stands:
+            return None if self.task is None else Velocity()
         if isinstance(self.task, Drive):
             return self.task.step(
-                now,
+                now - self._stood,
                 pose,
                 scan.points,
                 movers=self._movers_near(pose),

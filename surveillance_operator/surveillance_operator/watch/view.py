@@ -46,14 +46,16 @@ SETTLING = 2.0
 PLAIN_SIZE = 100, 40
 """Columns and rows of a single picture where there is no terminal, and COLUMNS and LINES are not
 set."""
-KEY_NOTE = 'q quit · p hold · d decision · n nodes · e events'
+KEY_NOTE = 's STOP · r release · q quit · p hold · d decision · n nodes · e events'
 KEYS = {
     'm': 'map',
     'd': 'decision',
     'n': 'nodes',
     'e': 'events',
 }
-"""Keys that choose a page; `p` holds the picture, `q` ends."""
+"""Keys that choose a page; `p` holds the picture, `q` ends, `s` stops the robot and `r` releases
+it."""
+STOP_KEYS = {'s': True, 'r': False}
 BAR = 20
 MARGIN = 1.5
 """Around the places, where there is no map, metres."""
@@ -172,8 +174,11 @@ def header_line(snapshot: Snapshot) -> Text:
     if snapshot.ended:
         ended = ', '.join(sorted(snapshot.ended))
         return Text(f' ended: {ended} · {snapshot.where} ', style=ALARM)
+    if snapshot.stopped:
+        return Text(f' STOPPED until a person releases it (r) · {snapshot.where} ', style=ALARM)
     name = snapshot.status.machine if snapshot.status else 'mission'
     mode = f' in mode {snapshot.mode}' if snapshot.mode else ''
+    mode += ' · PAUSED' if snapshot.paused else ''
     return Text(f' {name}{mode} · {snapshot.where} ', style=HEADER)
 
 
@@ -209,7 +214,7 @@ def decision_lines(snapshot: Snapshot) -> list[Text]:
     said = why(snapshot)
     if said is None:
         return [_nothing(snapshot, 'decision')]
-    waits = snapshot.status is not None and snapshot.status.waiting_for_help
+    waits = snapshot.stopped or (snapshot.status is not None and snapshot.status.waiting_for_help)
     return [Text(said[0], URGENT if waits else 'bold'), Text(said[1])]
 
 
@@ -411,8 +416,22 @@ class _Chosen:
             self.page = 'map' if self.page == KEYS[key] else KEYS[key]
 
 
-def show_moving(see: See, stopping: Interrupt, console: Console) -> None:
-    """Draw on the terminal's other screen until `q` or told to stop; give the first one back."""
+def show_moving(
+    see: See,
+    stopping: Interrupt,
+    console: Console,
+    press_stop: Callable[[bool], None] = lambda _stop: None,
+    said: Callable[[], str] = lambda: '',
+) -> None:
+    """Draw on the terminal's other screen until `q` or told to stop; give the first one back.
+
+    Args:
+        see: Returns what is known.
+        stopping: Ends it.
+        console: The terminal.
+        press_stop: Called with True to stop the robot, False to release it; must not block.
+        said: What came of that, shown in the last line.
+    """
     chosen = _Chosen()
     with (
         _keyboard() as read_keys,
@@ -420,9 +439,11 @@ def show_moving(see: See, stopping: Interrupt, console: Console) -> None:
     ):
         while not stopping.is_set() and not chosen.ended:
             seen = chosen.held or see()
-            shown = 'HELD: p continues' if chosen.held else KEY_NOTE
+            shown = 'HELD: p continues' if chosen.held else said() or KEY_NOTE
             live.update(MissionView(seen, page=chosen.page, note=shown), refresh=True)
             for key in read_keys(PERIOD, stopping):
+                if key in STOP_KEYS:
+                    press_stop(STOP_KEYS[key])
                 chosen.press(key, seen)
 
 

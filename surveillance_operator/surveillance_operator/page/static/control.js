@@ -37,6 +37,11 @@ export class Control {
         $('machine-answer').textContent = (await act('machine', {word: button.dataset.machine})).text;
       });
     }
+    for (const [id, on] of [['stop', true], ['release', false]]) {
+      $(id).addEventListener('click', async () => {
+        $('stop-answer').textContent = (await act('stop', {on})).text;
+      });
+    }
     this.place = select('place', 'Place');
     this.door = select('door', 'Door');
     this.room = select('name', 'Room');

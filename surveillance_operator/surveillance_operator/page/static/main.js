@@ -80,6 +80,10 @@ const SHOW = {
     lightMachine($('machine'), state.active?.paths ?? [], state.transitions ?? []);
     $('paused').hidden = !state.active?.paused;
   }],
+  stopped: [['stopped'], () => {
+    $('stopped').hidden = !state.stopped;
+    $('release').hidden = !state.stopped;
+  }],
   control: [['places', 'doors', 'mission', 'requests', 'health'], () => control.show()],
   strips: [['history', 'places', 'mission'], () => drawStrips($('strips'), state, now())],
   map: [MAP_PARTS, (parts) => map.show(state, parts, now())],
