@@ -34,6 +34,7 @@ from libs.owl_reasoner.tests.java_reasoner import KINDS, JavaReasoner, JavaReaso
 from owl_reasoner import (
     KnowledgeBase,
     OntologyFileError,
+    Unknown,
     read_ontology,
     write_ontology,
 )
@@ -64,7 +65,7 @@ class Result:
     unsupported: int = 0
 
 
-def follows(kb: KnowledgeBase, axiom: Axiom) -> bool | None:
+def follows(kb: KnowledgeBase, axiom: Axiom) -> bool | Unknown | None:
     """Tell whether an axiom follows; None where that cannot be asked for."""
     try:
         return kb.entails(axiom)
@@ -110,11 +111,15 @@ def judge_case(case: dict[str, Any]) -> list[Result]:
         answers = [(axiom, follows(kb, axiom)) for axiom in stated]
         asked = [axiom for axiom, answer in answers if answer is not None]
         lacking = [axiom for axiom, answer in answers if answer is False]
+        unknown = [answer for _, answer in answers if isinstance(answer, Unknown)]
         if kind == 'NegativeEntailmentTest':
             if stated and len(asked) == len(stated):
-                results.append(Result(name, 'right' if lacking else 'unsound', field))
+                left_open = 'named' if unknown else 'unsound'
+                results.append(Result(name, 'right' if lacking else left_open, field))
         elif lacking:
             results.append(Result(name, missing, f'not derived: {lacking[0]}'))
+        elif unknown:
+            results.append(Result(name, 'named', str(unknown[0])))
         else:
             results.append(Result(name, 'right' if len(asked) == len(stated) else 'not asked'))
     return results

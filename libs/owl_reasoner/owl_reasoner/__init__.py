@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from owl_reasoner.documents.xml_reading import OntologyFileError as OntologyFileError
     from owl_reasoner.knowledge_base import Changes as Changes
     from owl_reasoner.knowledge_base import KnowledgeBase as KnowledgeBase
+    from owl_reasoner.reasoner.answers import Unknown as Unknown
     from owl_reasoner.reasoner.budget import Progress as Progress
     from owl_reasoner.reasoner.budget import ReasoningBudgetError as ReasoningBudgetError
     from owl_reasoner.reasoner.explanation import Explanation as Explanation
@@ -36,6 +37,7 @@ _HOME = {
     'OntologyFileError': 'documents.xml_reading',
     'Progress': 'reasoner.budget',
     'ReasoningBudgetError': 'reasoner.budget',
+    'Unknown': 'reasoner.answers',
     'ontology_bytes': 'documents.writing',
     'read_ontology': 'documents.reading',
     'write_ontology': 'documents.writing',

@@ -38,6 +38,7 @@ from owl_reasoner.owl.entities import entities_of, renamed
 from owl_reasoner.owl.expressions import ClassExpression, Literal
 from owl_reasoner.owl.vocabulary import NOTHING, THING
 from owl_reasoner.reasoner.absence import Absence, Absences
+from owl_reasoner.reasoner.answers import Unknown
 from owl_reasoner.reasoner.budget import Budget, Cancel, Progress, ReasoningBudgetError
 from owl_reasoner.reasoner.cases import entails
 from owl_reasoner.reasoner.classification import Classification
@@ -209,7 +210,7 @@ def follows(axioms: Iterable[Axiom], goal: Axiom | None) -> bool:
     """Tell whether a fact, or with None a contradiction, follows from axioms."""
     axioms = list(axioms)
     found = entails(axioms, goal)
-    if found is not None:
+    if not isinstance(found, Unknown):
         return found
     # What follows for everything follows for an individual that no axiom names.
     asked = () if goal is None else entities_of(goal)
@@ -360,6 +361,18 @@ class KnowledgeBase:
     def consistent(self) -> bool:
         """Whether the last `reason` found no contradiction."""
         return self._consistent
+
+    @property
+    def consistency(self) -> bool | Unknown:
+        """What the last `reason` found out: False where there is a contradiction, True where
+        there is none, Unknown where it found none and left out something.
+        """
+        if not self._consistent:
+            return False
+        if self._engine is None or self._completion is None:
+            return Unknown(('nothing was reasoned over',))
+        left_out = self._completion.unsupported
+        return Unknown(left_out) if left_out else True
 
     @property
     def stale(self) -> bool:
@@ -638,10 +651,14 @@ class KnowledgeBase:
 
     def entails(
         self, axiom: Axiom, timeout: float = math.inf, cancel: Cancel | None = None
-    ) -> bool:
-        """Whether an axiom of any kind follows from what is asserted now.
+    ) -> bool | Unknown:
+        """Tell whether an axiom of any kind follows from what is asserted now.
 
         Unlike `holds` it searches a model without the axiom, which takes longer.
+
+        Returns:
+            Unknown, which has no truth value, where something is left out that the answer may
+            depend on.
 
         Raises:
             UnsupportedError: The axiom is a key, a rule, a datatype definition or about anonymous
@@ -649,7 +666,7 @@ class KnowledgeBase:
         """
         self._budget.begin(timeout, cancel)
         try:
-            return self.holds(axiom) or bool(entails(self._told.axioms, axiom, self._budget))
+            return self.holds(axiom) or entails(self._told.axioms, axiom, self._budget)
         finally:
             self._budget.finish()
 

@@ -7,7 +7,7 @@ and functional properties, and the individuals that must be the same because onl
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from itertools import combinations, islice, product
+from itertools import combinations, product
 from typing import Any
 
 from owl_reasoner.owl.axioms import Axiom
@@ -25,7 +25,6 @@ from owl_reasoner.reasoner.value_sets import ValueSet
 
 Emit = Callable[[Fact], None]
 MergeRequest = Callable[[str, str, Axiom | None, Premises], None]
-_MAX_CHOICES = 50
 
 
 class _Counter:
@@ -75,14 +74,15 @@ class _Counter:
         return tuple(facts)
 
     def choices(self, values: list[Any], size: int) -> Iterator[list[Any]]:
-        """Ways to choose `size` different ones, some dozens at most."""
+        """Return the ways to choose `size` different ones, one after the other.
+
+        There may be very many: whoever asks takes the first that serves.
+        """
         if len(values) < size:
-            return
+            return iter(())
         if self.is_data:
-            found: Iterator[list[Any]] = map(list, combinations(sorted(values, key=repr), size))
-        else:
-            found = cliques(sorted(values), size, self.difference.different)
-        yield from islice(found, _MAX_CHOICES)
+            return map(list, combinations(sorted(values, key=repr), size))
+        return cliques(sorted(values), size, self.difference.different)
 
     def differences(self, values: list[str]) -> Premises:
         """Return the facts by which the values are pairwise different; values of data just are."""

@@ -18,6 +18,7 @@ from owl_reasoner.owl.axiom_text import axiom_text, expression_text
 from owl_reasoner.owl.axioms import Axiom
 from owl_reasoner.owl.expressions import ClassExpression, Literal
 from owl_reasoner.owl.vocabulary import NOTHING, THING, TOP, TOP_LITERAL, local_name
+from owl_reasoner.reasoner.answers import Unknown
 from owl_reasoner.reasoner.budget import Budget
 from owl_reasoner.reasoner.case_model import Choices
 from owl_reasoner.reasoner.case_rules import ANYBODY, FRESH, CaseRules
@@ -510,12 +511,12 @@ def _fails(role: AnyRole, one: str = _A, other: str = _B) -> Axiom:
 
 def entails(
     axioms: Iterable[Axiom], goal: Axiom | None, budget: Budget | None = None
-) -> bool | None:
+) -> bool | Unknown:
     """Tell whether an axiom (None: a contradiction) follows: its denial contradicts the others.
 
     Returns:
-        None where some axioms are not covered, or the search was given up, and no contradiction was
-        found.
+        Unknown where some axioms are not covered, or the search was given up, and no contradiction
+        was found.
 
     Raises:
         UnsupportedError: The goal is a key, a rule, a datatype definition or about anonymous
@@ -525,11 +526,13 @@ def entails(
         raise UnsupportedError('an axiom about anonymous individuals')
     axioms = list(axioms)
     against: list[_Denial] = [()] if goal is None else list(_denials(goal))
-    certain = True
+    because: dict[str, None] = {}
     for denial in against:
         reasoner = CaseReasoner([*axioms, *denial], _QUESTION_STEPS, budget)
         if reasoner.consistent():
             if not reasoner.gaps and not reasoner.stopped:
                 return False
-            certain = False
-    return True if certain else None
+            because.update(reasoner.gaps)
+            if reasoner.stopped:
+                because['reasoning by cases took too many steps'] = None
+    return Unknown((*because,)) if because else True

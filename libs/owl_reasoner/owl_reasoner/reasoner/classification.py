@@ -43,7 +43,7 @@ from owl_reasoner.reasoner.contexts import (
     Token,
     Tokens,
 )
-from owl_reasoner.reasoner.property_chains import spell_out_chains
+from owl_reasoner.reasoner.property_chains import report_counted_chains, spell_out_chains
 from owl_reasoner.reasoner.simplify import drop_implied_atoms, simplify
 from owl_reasoner.reasoner.translation import Translation, directed
 from owl_reasoner.reasoner.value_sets import ValueSet
@@ -82,6 +82,7 @@ class Classification:
             if name not in (THING, NOTHING):
                 program.cls(name)
         self._budget.look()
+        report_counted_chains(program)
         spell_out_chains(program)
         self._report_partial()
         labels = [program.labels[expression] for expression in asserted]

@@ -129,7 +129,7 @@ class Completion:
         """Tell whether a fact that was not derived follows all the same."""
         axioms = list(axioms)
         few = len(axioms) - len(self._schema) <= _MOST_ASSERTIONS
-        return few and bool(entails(axioms, fact, self._engine.budget))
+        return few and entails(axioms, fact, self._engine.budget) is True
 
     def _may_lack(self, program: Program) -> bool:
         """Tell whether the clauses may leave something out without saying so.

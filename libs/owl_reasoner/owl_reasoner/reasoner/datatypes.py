@@ -30,7 +30,8 @@ _DECIMAL = re.compile(r'[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)')
 _FLOAT = re.compile(r'[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?')
 _HEXADECIMAL = re.compile(r'(?:[0-9a-fA-F]{2})*')
 _SPACES = ' \t\n\r'
-_MAX_DIGITS = 4000
+_DIGITS_AT_ONCE = 4000
+"""What Python converts, which has a limit of 4,300 digits (`sys.set_int_max_str_digits`)."""
 
 BOUNDS: dict[str, tuple[int | None, int | None]] = {
     'integer': (None, None),
@@ -58,10 +59,37 @@ STRING_PATTERNS = {
 """The types of strings but xsd:string itself, and what is in them."""
 
 
+def integer_of(text: str) -> int:
+    """Return a whole number of any number of decimal digits, with or without a sign."""
+    if len(text) <= _DIGITS_AT_ONCE:
+        return int(text)
+    if text[0] in '+-':
+        number = integer_of(text[1:])
+        return -number if text[0] == '-' else number
+    # By halves: the multiplication of large numbers is faster than digit by digit.
+    low = len(text) // 2
+    shifted: int = integer_of(text[:-low]) * 10**low
+    return shifted + integer_of(text[-low:])
+
+
+def digits_of(number: int) -> str:
+    """Return the decimal digits of a whole number of any size."""
+    if number.bit_length() < 3 * _DIGITS_AT_ONCE:
+        return str(number)
+    if number < 0:
+        return '-' + digits_of(-number)
+    low = number.bit_length() // 7  # Some half of the digits: a digit has 3.3 bits.
+    high, rest = divmod(number, 10**low)
+    return digits_of(high) + digits_of(rest).rjust(low, '0')
+
+
 def _number(text: str) -> int | Fraction:
-    if len(text) > _MAX_DIGITS:
-        raise ValueError
-    fraction = Fraction(text)
+    if len(text) > _DIGITS_AT_ONCE:
+        digits, _, behind = text.partition('.')
+        whole = integer_of(digits + behind if digits + behind not in '+-' else '0')
+        fraction = Fraction(whole, 10 ** len(behind))
+    else:
+        fraction = Fraction(text)
     return fraction.numerator if fraction.denominator == 1 else fraction
 
 
@@ -74,6 +102,14 @@ def _floating(space: str, text: str) -> Value:
     else:
         raise ValueError
     return floating_value(space, number)
+
+
+def nearest_float(number: float | Fraction) -> float:
+    """Return the nearest double; an infinite one where a number is beyond all."""
+    try:
+        return float(number)
+    except OverflowError:
+        return math.inf if number > 0 else -math.inf
 
 
 def single(number: float) -> float:
@@ -112,9 +148,9 @@ def parse_value(literal: Literal) -> Value:
         bounds = BOUNDS.get(name)
         if bounds is not None:
             text = text.strip(_SPACES)
-            if not _INTEGER.fullmatch(text) or len(text) > _MAX_DIGITS:
+            if not _INTEGER.fullmatch(text):
                 raise ValueError
-            number = int(text)
+            number = integer_of(text)
             low, high = bounds
             if (low is not None and number < low) or (high is not None and number > high):
                 raise ValueError
@@ -158,9 +194,9 @@ def parse_value(literal: Literal) -> Value:
         numerator, _, denominator = text.partition('/')
         if not (_INTEGER.fullmatch(numerator.strip()) and _INTEGER.fullmatch(denominator.strip())):
             raise ValueError
-        if int(denominator) <= 0:
+        if integer_of(denominator.strip()) <= 0:
             raise ValueError
-        fraction = Fraction(int(numerator), int(denominator))
+        fraction = Fraction(integer_of(numerator.strip()), integer_of(denominator.strip()))
         return fraction.numerator if fraction.denominator == 1 else fraction
     return ('other', datatype, text)
 
@@ -178,14 +214,15 @@ def value_of(literal: Literal) -> Value:
 def literal_of(value: Value) -> Literal:
     """Return a literal that denotes the value, in the most general datatype that suits it."""
     if isinstance(value, int):
-        return Literal(str(value), XSD + 'integer')
+        return Literal(digits_of(value), XSD + 'integer')
     if isinstance(value, str):
         return Literal(value)
     if isinstance(value, Fraction):
         digits = _terminating(value)
         if digits is not None:
             return Literal(digits, XSD + 'decimal')
-        return Literal(f'{value.numerator}/{value.denominator}', OWL + 'rational')
+        numerator, denominator = map(digits_of, (value.numerator, value.denominator))
+        return Literal(f'{numerator}/{denominator}', OWL + 'rational')
     space = value[0]
     if space == 'langString':
         return Literal(value[1], RDF + 'langString', value[2])
@@ -222,7 +259,8 @@ def _terminating(number: Fraction) -> str | None:
     if rest != 1:
         return None
     places = max(twos, fives)
-    digits = str(abs(number.numerator) * 10**places // number.denominator).rjust(places + 1, '0')
+    shifted = abs(number.numerator) * 10**places // number.denominator
+    digits = digits_of(shifted).rjust(places + 1, '0')
     sign = '-' if number < 0 else ''
     return f'{sign}{digits[:-places]}.{digits[-places:]}' if places else sign + digits
 

@@ -18,9 +18,12 @@ from typing import Any, TypeAlias
 from owl_reasoner.owl.axiom_text import axiom_text
 from owl_reasoner.owl.axioms import Axiom
 from owl_reasoner.reasoner.clauses import (
+    AtLeast,
+    AtMost,
     BodyAtom,
     Clause,
     Constant,
+    Existential,
     HeadAtom,
     Predicate,
     PredicateAtom,
@@ -42,6 +45,24 @@ _CIRCLE = 'its property chains depend on each other in a circle'
 def spell_out_chains(program: Program) -> None:
     """Add the steps of every chain to a program's clauses, where classes relate their members."""
     _Spelling(program).run()
+
+
+def report_counted_chains(program: Program) -> None:
+    """Report what counts by a property that a chain or transitivity implies.
+
+    OWL 2 DL admits none (Structural Specification, 11.2): it makes reasoning undecidable. What is
+    found is right, but it is not all.
+    """
+    chains = _Spelling(program).chains
+    counting: list[AtLeast | AtMost | Existential] = [*program.at_most]
+    counting += [least for least in program.at_least if least.n > 1]
+    counting += [existential for existential in program.existentials if existential.n > 1]
+    for one in counting:
+        if one.prop.kind == 'object' and chains.is_complex((one.prop, one.inverse)):
+            subject = 'the ontology' if one.origin is None else axiom_text(one.origin)
+            sentence = f'{subject}: a property with chains is counted'
+            if sentence not in program.unsupported:
+                program.unsupported.append(sentence)
 
 
 def chains_take_cases(program: Program) -> bool:

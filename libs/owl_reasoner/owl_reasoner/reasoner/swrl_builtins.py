@@ -22,6 +22,7 @@ from owl_reasoner.reasoner.datatypes import (
     Value,
     floating_value,
     lexical_of,
+    nearest_float,
     order,
     schema_pattern,
     single,
@@ -47,9 +48,9 @@ def _numbers(values: Iterable[Value]) -> tuple[str, list[_Number]] | None:
         else:
             return None
     if space == 'float':
-        numbers = [single(float(number)) for number in numbers]
+        numbers = [single(nearest_float(number)) for number in numbers]
     elif space == 'double':
-        numbers = [float(number) for number in numbers]
+        numbers = [nearest_float(number) for number in numbers]
     return space, numbers
 
 
