@@ -140,16 +140,20 @@ def _node(argv: list[str]) -> int:
     _enter(['node', *argv])
     from launcher import run_configuration, run_processes
     from surveillance_runtime.configuration import split_arguments
+    from surveillance_runtime.profile import remappings
     from surveillance_runtime.run_parameters import full_name
 
     run = wanted_run(options)
     given = split_arguments(rest)
+    run, profile = run_configuration.with_profile(run, CONFIG)
     merged = run_configuration.configuration(CONFIG, run, more=given)
     run_configuration.check_assignments(merged, [node])
     renamed = any('__ns:=' in word or '__node:=' in word for word in rest)
     name = given.full_name(node.name) if renamed else full_name(run.namespace, node.name)
     file = run_configuration.parameters_in_memory(name, merged.resolve(node.name, name))
-    arguments = run_processes.ros_arguments([file], run)
+    whole = [each.name for each in run.nodes(monitored=profile.is_monitored)]
+    mode = run.mode or node_table.DEFAULT_MODE
+    arguments = run_processes.ros_arguments([file], run, remappings(profile, whole, mode))
     arguments += [word for word in given.rest if word not in ('--ros-args', '--')]
     if not renamed:
         for descriptor in claim([node], run_processes.ros_domain(run), run.namespace):

@@ -323,9 +323,12 @@ class Environment:
             self._remove_half_installed()
             if INTERFACES_STEP in steps:
                 shutil.rmtree(wheels, ignore_errors=True)
-                interfaces = str(self.checkout / INTERFACES)
+                own = self.checkout / INTERFACES
+                # Below it: messages that an installed ROS has and the wheels lack.
+                lacking = (file.parent for file in sorted(own.glob('*/pyproject.toml')))
+                sources = [str(folder) for folder in (own, *lacking)]
                 # The compilers work while the packages are fetched: they need none of them.
-                build = start(self._pip('wheel', '-v', '--no-deps', '-w', str(wheels), interfaces))
+                build = start(self._pip('wheel', '-v', '--no-deps', '-w', str(wheels), *sources))
             if step := steps.get(PACKAGES_STEP):
                 journal.working = PACKAGES_STEP
                 journal.write(self.venv)
@@ -338,9 +341,9 @@ class Environment:
                 journal.write(self.venv)
                 with step:
                     build.watch(step)
-                    (wheel,) = wheels.iterdir()
+                    built = [str(wheel) for wheel in wheels.iterdir()]
                     options = ['--no-deps', '--force-reinstall']
-                    start(self._pip('install', *options, str(wheel))).watch(step)
+                    start(self._pip('install', *options, *built)).watch(step)
                 shutil.rmtree(wheels)
                 journal.interfaces = wanted.interfaces
 

@@ -21,9 +21,17 @@ from surveillance_runtime import node_table, parameter_checks
 from surveillance_runtime.command_line import CommandParser, page_address
 from surveillance_runtime.discovery import LAST_DOMAIN
 from surveillance_runtime.files import FileError
+from surveillance_runtime.run_options import (
+    BUILT_IN_ROBOT,
+    KINEMATIC,
+    OPTIONS,
+    SIMULATORS,
+    left_out,
+)
 
 NOT_RECORDED = 'off'
 RECORDER, MARKERS, PAGE = 'mission_recorder', 'mission_markers', 'mission_page'
+_REMAP = re.compile(r'[~/\w]+:=[~/\w]+\Z', re.ASCII)
 _NAMESPACE = re.compile(r'/?[A-Za-z]\w*(/[A-Za-z]\w*)*\Z', re.ASCII)
 _DESCRIPTION = """\
 Runs a patrol until Ctrl-C, each node in its own process, or runs COMMAND. The first start sets up
@@ -109,27 +117,46 @@ class Run:
         choices=node_table.MODES,
         type=str.upper,
         metavar='|'.join(node_table.MODES),
-        help='what replaces the hardware: a simulation, random values, or you at the console '
-        f'(default: {node_table.DEFAULT_MODE})',
+        help=f'{OPTIONS["mode"].help} (default: {node_table.DEFAULT_MODE})',
     )
     behaviour: str = _option(
         '--behaviour',
         node_table.DEFAULT_BEHAVIOUR,
         choices=node_table.BEHAVIOURS,
         metavar='|'.join(node_table.BEHAVIOURS),
-        help='surveillance starts with a map, patrol learns it from markers (default: %(default)s)',
+        help=f'{OPTIONS["behaviour"].help} (default: %(default)s)',
     )
     place: Path | None = _option(
         '--map',
         type=Path,
         metavar='FILE',
-        help='the place (default: config/seven_rooms.yaml, for patrol config/patrol_world.yaml)',
+        help=OPTIONS['map'].help,
+    )
+    robot: str = _option(
+        '--robot',
+        BUILT_IN_ROBOT,
+        metavar='NAME|FILE',
+        help=f'{OPTIONS["robot"].help} (default: %(default)s)',
+    )
+    simulator: str = _option(
+        '--simulator',
+        KINEMATIC,
+        choices=SIMULATORS,
+        metavar='|'.join(SIMULATORS),
+        help=f'{OPTIONS["simulator"].help} (default: %(default)s)',
+    )
+    remaps: Sequence[str] = _option(
+        '--remap',
+        (),
+        action='append',
+        metavar='FROM:=TO',
+        help=OPTIONS['remap'].help,
     )
     parameters: Path | None = _option(
         '--params',
         type=Path,
         metavar='FILE',
-        help='a ROS parameter file; it overrides config/parameters.yaml and the place',
+        help=OPTIONS['params'].help,
     )
     assignments: Sequence[str] = _option(
         '-p',
@@ -143,11 +170,9 @@ class Run:
         choices=node_table.LOG_LEVELS,
         type=str.lower,
         metavar='|'.join(node_table.LOG_LEVELS),
-        help='lowest severity that the nodes print (default: info)',
+        help=f'{OPTIONS["log_level"].help} (default: {OPTIONS["log_level"].default})',
     )
-    namespace: str | None = _option(
-        '--namespace', metavar='NAME', help='prefix of all ROS names, for a second robot'
-    )
+    namespace: str | None = _option('--namespace', metavar='NAME', help=OPTIONS['namespace'].help)
     domain: int | None = _option(
         '--domain',
         type=int,
@@ -165,12 +190,8 @@ class Run:
     composed: bool = _switch(
         '--composed', 'run all nodes in one process: less memory, faster start', _PROCESSES
     )
-    only: Sequence[str] = _nodes_option(
-        '--only', 'start only these nodes; the others run elsewhere'
-    )
-    without: Sequence[str] = _nodes_option(
-        '--without', 'do not start these nodes; they run elsewhere'
-    )
+    only: Sequence[str] = _nodes_option('--only', OPTIONS['only'].help)
+    without: Sequence[str] = _nodes_option('--without', OPTIONS['without'].help)
     memory: int = _option(
         '--memory',
         2048,
@@ -202,7 +223,7 @@ class Run:
         group=_TRACES,
         default=None,
         metavar='off|DIR',
-        help='folder for the files of runs; off: no recording (default: runs)',
+        help=f'{OPTIONS["record"].help}; off: no recording (default: runs)',
     )
     keep: float = _option(
         '--keep',
@@ -213,23 +234,19 @@ class Run:
         help='delete the oldest recordings when all together exceed this (default: %(default)g)',
     )
     fresh: bool = _switch('--fresh', 'begin a new run even if the last one was killed', _TRACES)
-    web: bool = _switch('--web', 'serve a live page; its address is printed', _PAGE_GROUP)
-    web_control: bool = _switch(
-        '--web-control', 'like --web, with controls for whoever has the printed token', _PAGE_GROUP
-    )
+    web: bool = _switch('--web', OPTIONS['web'].help, _PAGE_GROUP)
+    web_control: bool = _switch('--web-control', OPTIONS['web_control'].help, _PAGE_GROUP)
     web_address: str | None = _option(
         '--web-address',
         group=_PAGE_GROUP,
         metavar='HOST:PORT',
-        help='address of the page; implies --web; other addresses than 127.0.0.1 need the printed '
-        'token even to look (default: 127.0.0.1:8080)',
+        help=f'{OPTIONS["web_address"].help} (default: 127.0.0.1:8080)',
     )
     web_origin: str | None = _option(
         '--web-origin',
         group=_PAGE_GROUP,
         metavar='URL',
-        help='what browsers know the page by behind a TLS proxy, as https://robot.example.org; '
-        'implies --web; then everybody needs the printed token',
+        help=OPTIONS['web_origin'].help,
     )
 
     def check(self) -> None:
@@ -251,6 +268,9 @@ class Run:
                 read_place_file(self.place)
             except FileError as error:
                 raise ValueError(f'--map {error}') from None
+        for text in self.remaps:
+            if not _REMAP.match(text):
+                raise ValueError(f'--remap {text!r}: expected FROM:=TO like scan:=front/scan')
         if self.web_address is not None:
             page_address(self.web_address)
         if expected := parameter_checks.web_origin(self.web_origin or ''):
@@ -262,9 +282,14 @@ class Run:
         if alarm and shutil.which(alarm[0]) is None:
             raise ValueError(f'--alarm {self.alarm!r}: {alarm[0]!r} cannot be run')
 
-    def nodes(self) -> tuple[node_table.Node, ...]:
+    def nodes(self, *, monitored: bool = True) -> tuple[node_table.Node, ...]:
+        """Return the nodes that work; without what monitors a base that others monitor."""
         chosen = node_table.select(
-            self.mode or node_table.DEFAULT_MODE, self.behaviour, self.only, self.without
+            self.mode or node_table.DEFAULT_MODE,
+            self.behaviour,
+            self.only,
+            left_out(self.simulator, self.without),
+            monitored=monitored,
         )
         asks = self.mode == 'MANUAL' and any(node.has_modes for node in chosen)
         # First, so that it is there for what is typed at once.

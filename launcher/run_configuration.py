@@ -7,9 +7,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from launcher.run import PAGE, RECORDER, Run
+from launcher.run import RECORDER, Run
 from surveillance_runtime import node_table
-from surveillance_runtime.command_line import page_address
 from surveillance_runtime.configuration import (
     Configuration,
     Entry,
@@ -19,13 +18,22 @@ from surveillance_runtime.configuration import (
     resolved_text,
 )
 from surveillance_runtime.files import RECORD, RECORDING, FileError
+from surveillance_runtime.profile import (
+    ProfileFile,
+    RobotProfile,
+    find_profile,
+    read_profile,
+    unmonitored_entries,
+)
 from surveillance_runtime.run_parameters import (
     BEHAVIOUR_NODE,
     for_node,
     full_name,
     mode_entries,
+    page_entries,
     record_entries,
     run_layers,
+    simulator_entries,
 )
 
 ONTOLOGIES = 'ontologies'
@@ -57,6 +65,27 @@ def configuration(
     return merged
 
 
+def profile_of(config: Path, run: Run) -> ProfileFile:
+    """Read the profile of the robot that a run asks for.
+
+    Raises:
+        FileError: There is none, or it cannot be used.
+    """
+    return read_profile(find_profile(config, run.robot))
+
+
+def with_profile(run: Run, config: Path) -> tuple[Run, RobotProfile]:
+    """Return the run with what the profile says where the run asked for nothing, and the profile.
+
+    Raises:
+        FileError: There is no such profile, or it cannot be used.
+    """
+    profile = profile_of(config, run).profile
+    if run.namespace is None and profile.namespace:
+        run = replace(run, namespace=profile.namespace)
+    return run, profile
+
+
 def _merged(
     config: Path, run: Run, folder: Path | None, more: RosArguments | None
 ) -> Configuration:
@@ -65,12 +94,24 @@ def _merged(
         config,
         run.behaviour,
         place=run.place,
+        robot=profile_of(config, run),
         chosen=_folders_of(folder.resolve()) if folder is not None else (),
         files=[*files, *(Path(file) for file in (more.files if more else ()))],
-        options=_option_entries(run, folder),
+        options=[
+            *_option_entries(run, folder),
+            *simulator_entries(run.simulator),
+            *_unmonitored(config, run),
+        ],
     )
     assignments = (*run.assignments, *(more.assignments if more else ()))
     return Configuration((*layers, argument_layer(assignments)))
+
+
+def _unmonitored(config: Path, run: Run) -> Iterator[Entry]:
+    """Yield what the controller is told when no collision monitor is started."""
+    file = profile_of(config, run)
+    names = {node.name for node in run.nodes(monitored=file.profile.is_monitored)}
+    return unmonitored_entries(file, names)
 
 
 def _folders_of(folder: Path) -> Iterator[Entry]:
@@ -103,15 +144,9 @@ def _observer_entries(run: Run, folder: Path) -> Iterator[Entry]:
     yield for_node(RECORDER, 'folder', str(folder / RECORDING), 'this run')
     yield for_node(RECORDER, 'keep', float(run.keep), '--keep')
     if run.has_page:
-        yield for_node(PAGE, 'control', run.web_control, '--web-control')
-        # In a file, so that a page that is started again keeps it, and no peer can ask for it.
-        yield for_node(PAGE, 'token_file', str(folder.resolve() / 'page_token'), 'this run')
-    if run.web_address is not None:
-        host, port = page_address(run.web_address)
-        yield for_node(PAGE, 'host', host, '--web-address')
-        yield for_node(PAGE, 'port', port, '--web-address')
-    if run.web_origin is not None:
-        yield for_node(PAGE, 'origin', run.web_origin, '--web-origin')
+        yield from page_entries(
+            folder, control=run.web_control, address=run.web_address, origin=run.web_origin
+        )
 
 
 def _check_behaviour(merged: Configuration, run: Run) -> None:

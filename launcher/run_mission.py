@@ -12,7 +12,13 @@ from launcher import run_folder
 from launcher.instance_lock import claim
 from launcher.log_merge import MergedLog
 from launcher.run import NOT_RECORDED, Run
-from launcher.run_configuration import check_assignments, check_clocks, configuration, with_mode_of
+from launcher.run_configuration import (
+    check_assignments,
+    check_clocks,
+    configuration,
+    with_mode_of,
+    with_profile,
+)
 from launcher.run_processes import COMPOSED, node_environ, programs_of, ros_domain
 from launcher.service import is_service
 from launcher.supervisor import Supervisor
@@ -21,6 +27,7 @@ from surveillance_behaviour.mission.recovery import WAITING_FOR_HELP
 from surveillance_runtime import node_table
 from surveillance_runtime.files import PLACE, RECORD, TIMELINE, FileError
 from surveillance_runtime.place.writing import copy_place
+from surveillance_runtime.profile import remappings
 from surveillance_runtime.run_parameters import BEHAVIOUR_NODE, place_file, write_parameters
 
 NOTHING_RECORDED = 'Mission: nothing was recorded.'
@@ -31,8 +38,8 @@ EXIT_NOTHING_DONE = 1
 def run_mission(run: Run, config: Path, runs: Path, resume: Path | None = None) -> int:
     """Start the nodes, supervise them to the end, print the summary; return the exit code."""
     merged = configuration(config, run)  # before anything is written
-    run = with_mode_of(run, merged)
-    nodes = run.nodes()
+    run, profile = with_profile(with_mode_of(run, merged), config)
+    nodes = run.nodes(monitored=profile.is_monitored)
     observers = run.observers()
     check_assignments(merged, (*nodes, *observers))
     check_clocks(merged, run, (*nodes, *observers))
@@ -45,13 +52,17 @@ def run_mission(run: Run, config: Path, runs: Path, resume: Path | None = None) 
     merged = configuration(config, run, folder)
     everyone = (*nodes, *observers)
     files = write_parameters(folder / 'parameters', run.namespace, merged, everyone)
-    programs = programs_of(run, nodes, observers, files, node_environ(run, folder / 'ros'))
+    names = [node.name for node in nodes]
+    mode = run.mode or node_table.DEFAULT_MODE
+    renamed = remappings(profile, names, mode)
+    environ = node_environ(run, folder / 'ros')
+    programs = programs_of(run, nodes, observers, files, environ, renamed)
     place = place_file(config, run.behaviour, run.place)
     copy_place(place, folder / PLACE)
     names = [*(node.name for node in everyone), *([COMPOSED] if run.composed else [])]
     log = MergedLog(None, names, path=folder / 'launch.log')
     log.say(
-        f'{run.behaviour} in mode {run.mode or node_table.DEFAULT_MODE}, '
+        f'{run.behaviour} in mode {mode}, robot {profile.name}, '
         f'place {place.name}, '
         f'ROS domain {ros_domain(run)}, files in {_short(folder)}'
     )

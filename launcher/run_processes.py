@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -38,11 +38,22 @@ def ros_domain(run: Run) -> str:
     return str(int(given))
 
 
-def ros_arguments(files: Sequence[Path], run: Run) -> list[str]:
-    """Return the ROS arguments of a node of a run."""
+def ros_arguments(
+    files: Sequence[Path], run: Run, renamed: Iterable[tuple[str, str]] = ()
+) -> list[str]:
+    """Return the ROS arguments of a node of a run.
+
+    Args:
+        files: Of parameters.
+        run: What the command line asks for.
+        renamed: From which name to which the robot's profile renames topics.
+    """
     arguments = ['--ros-args']
     for path in files:
         arguments += ['--params-file', str(path)]
+    # Of two rules for a name the first counts.
+    for rule in (*run.remaps, *(f'{old}:={new}' for old, new in renamed)):
+        arguments += ['-r', rule]
     if run.namespace is not None:
         arguments += ['-r', f'__ns:=/{run.namespace.strip("/")}']
     if run.log_level is not None:
@@ -85,11 +96,12 @@ def programs_of(
     observers: Sequence[node_table.Node],
     files: Mapping[str, Path],
     environ: Mapping[str, str],
+    renamed: Sequence[tuple[str, str]] = (),
 ) -> list[Program]:
     """Return the processes of a run, each with the nodes that share it."""
 
     def program(members: Sequence[node_table.Node]) -> Program:
-        arguments = ros_arguments([files[node.name] for node in members], run)
+        arguments = ros_arguments([files[node.name] for node in members], run, renamed)
         # It prints into the launcher's log; one of its own, as ROS writes it, grows without bound.
         words = command(members, [*arguments, '--disable-external-lib-logs'], os.getpid())
         memory = run.memory * 2**20

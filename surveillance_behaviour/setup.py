@@ -14,6 +14,7 @@ setup(
         ('share/' + package_name, ['package.xml']),
         ('share/' + package_name + '/launch', glob('launch/*.launch.py')),
         ('share/' + package_name + '/config', glob('../config/*.yaml')),
+        ('share/' + package_name + '/config/robots', glob('../config/robots/*.yaml')),
     ],
     zip_safe=True,
     maintainer='Surveillance robot maintainers',

@@ -2,7 +2,7 @@
 
 `ros2 launch surveillance_behaviour surveillance.launch.py`; arguments follow it as `name:=value`.
 
-Arguments: `mode`, `behaviour`, `map`, `params`, `record`, `namespace`, `log_level`; see
+The arguments are options of `launch.py` (`surveillance_runtime/run_options.py`); see
 `ros2 launch surveillance_behaviour surveillance.launch.py --show-args`. Without an installed ROS,
 `python3 launch.py` does the same.
 """
@@ -12,6 +12,7 @@ from __future__ import annotations
 import atexit
 import shutil
 import tempfile
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 from ament_index_python.packages import get_package_share_directory
@@ -21,52 +22,41 @@ from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 
 from launch import LaunchContext, LaunchDescription
-from surveillance_runtime.configuration import Configuration
+from surveillance_runtime.configuration import Configuration, Entry
+from surveillance_runtime.files import RECORD, RECORDING
 from surveillance_runtime.launch_protocol import EXIT_CANNOT_START, EXIT_NOT_NOW
-from surveillance_runtime.node_table import (
-    BEHAVIOURS,
-    DEFAULT_MODE,
-    LOG_LEVELS,
-    MODES,
-    find,
-    select,
+from surveillance_runtime.node_table import Node as NodeOfTable
+from surveillance_runtime.node_table import find, select
+from surveillance_runtime.parameters import ParameterError
+from surveillance_runtime.profile import (
+    find_profile,
+    read_profile,
+    remappings,
+    unmonitored_entries,
 )
+from surveillance_runtime.run_options import OPTIONS, left_out
 from surveillance_runtime.run_parameters import (
+    PAGE,
+    for_node,
     full_name,
     mode_entries,
+    page_entries,
     record_entries,
     run_layers,
+    simulator_entries,
     write_parameters,
 )
 
-MARKERS = 'mission_markers'
+MARKERS, RECORDER = 'mission_markers', 'mission_recorder'
 
 ARGUMENTS = [
     DeclareLaunchArgument(
-        'mode',
-        default_value=DEFAULT_MODE,
-        choices=list(MODES),
-        description='How the controllers work. For MANUAL start the prompt in a terminal of its '
-        'own: ros2 run surveillance_operator console',
-    ),
-    DeclareLaunchArgument(
-        'behaviour',
-        default_value=BEHAVIOURS[0],
-        choices=list(BEHAVIOURS),
-        description='The state machine that patrols.',
-    ),
-    DeclareLaunchArgument(
-        'map', default_value='', description='File of the place; empty: the one of the behaviour.'
-    ),
-    DeclareLaunchArgument('params', default_value='', description='Further parameter file.'),
-    DeclareLaunchArgument('record', default_value='', description='File for the mission record.'),
-    DeclareLaunchArgument('namespace', default_value='', description='Namespace of all nodes.'),
-    DeclareLaunchArgument(
-        'log_level',
-        default_value='info',
-        choices=list(LOG_LEVELS),
-        description='Least severity logged.',
-    ),
+        option.name,
+        default_value=option.default,
+        description=option.help,
+        **({'choices': list(option.choices)} if option.choices else {}),
+    )
+    for option in OPTIONS.values()
 ]
 
 
@@ -78,22 +68,39 @@ def start_nodes(context: LaunchContext) -> list[Node]:
             parameters or the place; then no node is started.
     """
     given = {each.name: LaunchConfiguration(each.name).perform(context) for each in ARGUMENTS}
-    mode, behaviour, namespace = given['mode'], given['behaviour'], given['namespace']
-    record = record_entries(Path(given['record'])) if given['record'] else ()
+    mode, behaviour = given['mode'], given['behaviour']
+    config = Path(get_package_share_directory('surveillance_behaviour'), 'config')
+    robot = read_profile(find_profile(config, given['robot']))
+    namespace = given['namespace'] or robot.profile.namespace
+    nodes = select(
+        mode,
+        behaviour,
+        _names(given['only']),
+        left_out(given['simulator'], _names(given['without'])),
+        monitored=robot.profile.is_monitored,
+    )
+    names = [node.name for node in nodes]
+    folder = Path(tempfile.mkdtemp(prefix='surveillance-'))
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
     merged = Configuration(
         run_layers(
-            Path(get_package_share_directory('surveillance_behaviour'), 'config'),
+            config,
             behaviour,
             place=Path(given['map']) if given['map'] else None,
+            robot=robot,
             files=[Path(given['params'])] if given['params'] else [],
-            options=[*mode_entries(mode, prompts=False), *record],
+            options=[
+                *mode_entries(mode, prompts=False),
+                *simulator_entries(given['simulator']),
+                *unmonitored_entries(robot, names),
+                *_traces(given, folder),
+            ],
         )
     )
     merged.check()
     merged.place('simulator', full_name(namespace, 'simulator'))
-    folder = Path(tempfile.mkdtemp(prefix='surveillance-'))
-    atexit.register(shutil.rmtree, folder, ignore_errors=True)
-    nodes = (*select(mode, behaviour), find(MARKERS))
+    nodes = (*nodes, *_observers(given))
+    renamed = [*_remaps(given['remap']), *remappings(robot.profile, names, mode)]
     files = write_parameters(folder, namespace, merged, nodes)
     return [
         Node(
@@ -102,6 +109,7 @@ def start_nodes(context: LaunchContext) -> list[Node]:
             name=node.name,
             namespace=namespace,
             parameters=[str(files[node.name])],
+            remappings=renamed,
             ros_arguments=['--log-level', given['log_level']],
             output='screen',
             emulate_tty=True,
@@ -111,6 +119,53 @@ def start_nodes(context: LaunchContext) -> list[Node]:
         )
         for node in nodes
     ]
+
+
+def _names(text: str) -> list[str]:
+    return [name for name in text.replace(' ', '').split(',') if name]
+
+
+def _remaps(text: str) -> list[tuple[str, str]]:
+    """Return what `remap:=FROM:=TO,FROM:=TO` renames."""
+    pairs = []
+    for rule in _names(text):
+        old, sign, new = rule.partition(':=')
+        if not (old and sign and new):
+            raise ParameterError(f'remap {rule!r}: expected FROM:=TO like scan:=front/scan')
+        pairs.append((old, new))
+    return pairs
+
+
+def _has_page(given: Mapping[str, str]) -> bool:
+    return 'true' in (given['web'], given['web_control']) or bool(
+        given['web_address'] or given['web_origin']
+    )
+
+
+def _observers(given: Mapping[str, str]) -> list[NodeOfTable]:
+    """Return the nodes that only look on."""
+    names = [MARKERS]
+    if given['record']:
+        names.append(RECORDER)
+    if _has_page(given):
+        names.append(PAGE)
+    return [find(name) for name in names]
+
+
+def _traces(given: Mapping[str, str], folder: Path) -> Iterator[Entry]:
+    """Yield where the run leaves its files, and what the page is told."""
+    if given['record']:
+        kept = Path(given['record'])
+        kept.mkdir(parents=True, exist_ok=True)
+        yield from record_entries(kept / RECORD)
+        yield for_node(RECORDER, 'folder', str(kept / RECORDING), 'record')
+    if _has_page(given):
+        yield from page_entries(
+            folder,
+            control=given['web_control'] == 'true',
+            address=given['web_address'] or None,
+            origin=given['web_origin'] or None,
+        )
 
 
 def stop_if_unusable(event: ProcessExited, _context: LaunchContext) -> list[Shutdown] | None:

@@ -6,8 +6,6 @@ import math
 from collections.abc import Iterable
 from typing import Any
 
-from sensor_msgs.msg import BatteryState
-
 from patrol_policy.world import Decision
 from surveillance_behaviour.map_from_markers.assembly import PlaceNote
 from surveillance_interfaces.msg import Decision as DecisionMessage
@@ -64,17 +62,6 @@ def decision_from(message: DecisionMessage) -> Decision:
         reason=message.reason,
         scores=scores,
     )
-
-
-def charging_from(message: BatteryState) -> bool | None:
-    """Tell whether a battery is being charged, or is full at its charger; None: it does not say."""
-    status = message.power_supply_status
-    if status in (
-        BatteryState.POWER_SUPPLY_STATUS_CHARGING,
-        BatteryState.POWER_SUPPLY_STATUS_FULL,
-    ):
-        return True
-    return None if status == BatteryState.POWER_SUPPLY_STATUS_UNKNOWN else False
 
 
 def place_note_from(response: Any) -> PlaceNote | None:

@@ -17,7 +17,6 @@ from std_msgs.msg import Bool
 
 import state_machines as fsm
 from patrol_policy.decision import DecisionSettings
-from surveillance_behaviour import conversions
 from surveillance_behaviour.charging import BatteryMonitor
 from surveillance_behaviour.machines import MACHINES
 from surveillance_behaviour.mission.mission import Mission, MissionSettings
@@ -39,7 +38,7 @@ from surveillance_behaviour.ros_adapters.peers import (
     ros_ontology,
 )
 from surveillance_behaviour.ros_adapters.reason_client import ReasonClient
-from surveillance_runtime.conversions import seconds_of
+from surveillance_runtime.conversions import charging_from, seconds_of
 from surveillance_runtime.files import FileError
 from surveillance_runtime.introspection import IntrospectionServer
 from surveillance_runtime.launch_protocol import NotNowError
@@ -87,7 +86,7 @@ class RobotBehavior(PatrolNode):
             self,
             BatteryState,
             'battery_state',
-            lambda m: battery.set_charging(conversions.charging_from(m)),
+            lambda m: battery.set_charging(charging_from(m)),
             stamp=lambda told: seconds_of(told.header.stamp),
             qos=SENSOR_QOS,
         )

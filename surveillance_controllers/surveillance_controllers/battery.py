@@ -259,6 +259,12 @@ class BatteryInUse:
         if self.docked:
             self._battery.charge(passed)
 
+    def skip(self, now: float) -> None:
+        """Let time pass up to `now` (seconds) that somebody else accounts for."""
+        self._last = now
+        self._count_arm(now)
+        self._metres = self._radians = self._arm_seconds = 0.0
+
     def why_not_charging(self) -> str | None:
         """Say why the battery cannot charge now; None when it can."""
         if self.docked:

@@ -1,9 +1,10 @@
 """The node `battery_controller`: says how full the battery is, and charges it.
 
 Publishes `battery_level` (percent), `battery_low`, and its changes alone as `state/battery_low`,
-and serves `recharge`. Where the level
-comes from is the execution mode's matter: the operator (MANUAL), chance (RANDOM), or a model of the
-battery that watches the robot move and charges at the station only (SIMULATED).
+and serves `recharge`. Where the level comes from is the execution mode's matter: the operator
+(MANUAL), chance (RANDOM), a model of the battery that watches the robot move and charges at the
+station only (SIMULATED), or the driver of a real battery (ROBOT), in whose place the model stands
+while it is silent.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ from trajectory_msgs.msg import JointTrajectory
 from state_machines.ros import ClockWait
 from surveillance_controllers import conversions, stimuli
 from surveillance_controllers.battery import Battery, BatteryInUse
+from surveillance_controllers.battery_driver import DrivenBattery
 from surveillance_controllers.controller_parameters import (
     BatterySettings,
     battery_settings,
@@ -31,12 +33,14 @@ from surveillance_controllers.controller_parameters import (
 from surveillance_controllers.manual.commands import BATTERY, BATTERY_SET, ParsedCommand
 from surveillance_controllers.manual.requests import CommandConsole
 from surveillance_runtime.conversions import (
+    charging_from,
     pose_of_serialized,
     stamp_of_serialized,
     trajectory_from,
 )
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.process import run_node
+from surveillance_runtime.qos import SENSOR_QOS
 from surveillance_runtime.state_file import StateFile
 from surveillance_runtime.state_topics import OwnedTopic, StateSubscription
 from surveillance_runtime.waiting import AwaitedEvent
@@ -82,7 +86,7 @@ class BatteryController(PatrolNode):
             self._console.open(console_source)
         elif self._mode == 'RANDOM':
             self.spawn(self._switch_at_random)
-        elif self._mode == 'SIMULATED':
+        elif self._settings.drives:
             since = self._kept.number('time')
             self._robot = RobotBattery(self, self._settings, self._battery, self._change, since)
 
@@ -139,7 +143,7 @@ class BatteryController(PatrolNode):
         # Only here: a node that is never asked to recharge starts without the import.
         from surveillance_controllers.manual.terminal import charge_display
 
-        charge = self._await_full if self._mode == 'SIMULATED' else self._fill
+        charge = self._await_full if self._settings.drives else self._fill
         try:
             say, bar = self.get_logger().info, not self._console.has_terminal
             with charge_display(self._battery.level, say, bar=bar) as show:
@@ -157,8 +161,9 @@ class BatteryController(PatrolNode):
             show(self._battery.level)
 
     def _await_full(self, show: Callable[[float], None]) -> None:
+        asked_at = self._wait.elapsed()
         while self._battery.level < 100.0:
-            problem = self._robot.why_not_charging()
+            problem = self._robot.why_not_charging(asked_at)
             if problem is not None:
                 self.get_logger().warn(f'recharge: {problem}; it is at {self._battery.percent} %')
                 return
@@ -168,10 +173,11 @@ class BatteryController(PatrolNode):
 
 
 class RobotBattery:
-    """Lets a battery drain and charge with the robot, in SIMULATED mode.
+    """Lets a battery drain and charge with the robot, in the modes SIMULATED and ROBOT.
 
     Reads `amcl_pose` (how far the robot drove, and whether it stands at the station),
-    `arm/joint_trajectory` (how long its arm moves) and `battery_drain`; publishes `battery_state`.
+    `arm/joint_trajectory` (how long its arm moves) and `battery_drain`; publishes `battery_state`,
+    unless that is a driver's: then it reads it, and the model counts while the driver is silent.
 
     Args:
         node: The battery controller's node.
@@ -197,7 +203,23 @@ class RobotBattery:
             # From then on no setting of the clock counts.
             since += self._wait.elapsed() - self._wait.now()
         self._use = BatteryInUse(battery, settings.station, settings.dock_reach, since)
-        self._states = OwnedTopic(node, BatteryState, 'battery_state', repeat=None)
+        self._driver: DrivenBattery | None = None
+        self._states: OwnedTopic[BatteryState] | None = None
+        self._begun = self._wait.elapsed()
+        self._speaks: bool | None = None
+        if settings.execution_mode != 'ROBOT':
+            self._states = OwnedTopic(node, BatteryState, 'battery_state', repeat=None)
+        elif settings.driver.source == 'topic':
+            self._driver = DrivenBattery(settings.driver)
+            self._timeout = settings.driver.timeout
+            self._topic = str(node.resolve_topic_name('battery_state'))
+            # As a driver publishes: its messages are not kept, and may get lost.
+            node.create_subscription(BatteryState, 'battery_state', self._on_driver, SENSOR_QOS)
+        else:
+            # On a real robot the topic is a driver's, even where nobody reads it.
+            node.get_logger().warn(
+                'the charge is computed from the way driven: the profile says battery.source: model'
+            )
         StateSubscription(
             node,
             PoseWithCovarianceStamped,
@@ -210,9 +232,38 @@ class RobotBattery:
         node.create_subscription(Float32, 'battery_drain', self._on_drain, 10)
         node.create_timer(settings.update_period, self._update)
 
-    def why_not_charging(self) -> str | None:
-        """Say why the battery cannot charge now; None when it can."""
+    def why_not_charging(self, asked_at: float) -> str | None:
+        """Say why the battery cannot charge now, as was asked at a time, s; None when it can."""
+        now = self._wait.elapsed()
+        if self._driver is not None and self._driver.speaks(now):
+            return self._driver.why_not_charging(asked_at, now)
         return self._use.why_not_charging()
+
+    def _on_driver(self, message: BatteryState) -> None:
+        driver, now = self._driver, self._wait.elapsed()
+        assert driver is not None
+        with conversions.refusing(self._node, self._topic):
+            charging = charging_from(message)
+            driver.hear(message.percentage, message.voltage, charging, now)
+            self._take_driver(driver, now)
+
+    def _take_driver(self, driver: DrivenBattery, now: float) -> bool:
+        """Take the charge from the driver, unless it is silent; say so when that changes."""
+        speaks = driver.speaks(now)
+        if not speaks and now - self._begun < self._timeout and self._speaks is None:
+            return False  # It may still start.
+        if speaks != self._speaks:
+            self._speaks = speaks
+            if speaks:
+                self._node.get_logger().info(f'the charge comes from {self._topic}')
+            else:
+                self._node.get_logger().warn(
+                    f'nothing of use on {self._topic} for {self._timeout:g} s: the charge is '
+                    'computed from the way driven'
+                )
+        if speaks and driver.level is not None:
+            self._change(partial(self._battery.set_level, driver.level))
+        return speaks
 
     def _on_pose(self, serialized: bytes) -> None:
         with conversions.refusing(self._node, 'amcl_pose'):
@@ -227,7 +278,13 @@ class RobotBattery:
         self._change(lambda: self._battery.set_level(self._battery.level - percent))
 
     def _update(self) -> None:
-        self._change(partial(self._use.advance, self._wait.elapsed()))
+        now = self._wait.elapsed()
+        if self._driver is not None and self._take_driver(self._driver, now):
+            self._use.skip(now)
+            return
+        self._change(partial(self._use.advance, now))
+        if self._states is None:
+            return
         state = conversions.battery_state(self._battery, charging=self._use.docked)
         state.header.stamp = self._node.get_clock().now().to_msg()
         self._states.publish(state)

@@ -36,7 +36,7 @@ from surveillance_controllers.motion.transforms import ScanReader
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.parameters import parameter
 from surveillance_runtime.process import run_node
-from surveillance_runtime.qos import SENSOR_QOS
+from surveillance_runtime.profile.parameters import declared_frames
 from surveillance_runtime.robot_base import robot_deceleration, robot_radius
 from surveillance_runtime.state_file import StateFile
 from surveillance_runtime.state_topics import OwnedTopic
@@ -107,10 +107,11 @@ class CollisionMonitor(PatrolNode):
     def __init__(self, **node_options: Any) -> None:
         super().__init__('collision_monitor', **node_options)
         self._settings = self.declare_fields(MonitorSettings())
-        self._lidar = ScanReader(self, self._settings.radius)
+        frames = declared_frames(self, 'base')
+        self._lidar = ScanReader(self, self._settings.radius, frames.base)
         self._wanted = Velocity()
-        self._scan: Scan | None = None
-        self._lidars: list[str] = []
+        self._seen: dict[str, Scan] = {}
+        self._lidars: dict[str, list[str]] = {}
         self._is_held_back = False
         self._kept = StateFile(self, self._settings.state_file)
         self._stopped = self._kept.text('stopped') == 'yes'
@@ -118,13 +119,14 @@ class CollisionMonitor(PatrolNode):
         self._base = CommandPublisher(
             self,
             MONITORED,
-            ('scan', 'cmd_vel'),
+            (*self._lidar.settings.scans, 'cmd_vel'),
             self._settings.deceleration,
             self._warn_of_silence,
             self._settings.longest_silence,
+            frames.base,
         )
         self.create_subscription(Twist, 'cmd_vel', self._on_command, 1)
-        self.create_subscription(LaserScan, 'scan', self._on_scan, SENSOR_QOS)
+        self._lidar.subscribe(self._on_scan)
         self.create_service(SetBool, 'stop', self._on_stop)
         self._tell_stop()
         self._unguarded = self.create_timer(UNGUARDED_AFTER, self._look_for_base)
@@ -138,25 +140,26 @@ class CollisionMonitor(PatrolNode):
         self._base.hear('cmd_vel')
         self._base.command(self._allowed())
 
-    def _on_scan(self, message: LaserScan) -> None:
-        with conversions.refusing(self, 'scan'):
-            self._scan = self._lidar.read(message)
-            self._note_lidar(message.header.frame_id)
-            self._base.hear('scan')
+    def _on_scan(self, topic: str, message: LaserScan) -> None:
+        with conversions.refusing(self, topic):
+            self._seen[topic] = self._lidar.read(message, topic)
+            self._note_lidar(topic, message.header.frame_id)
+            self._base.hear(topic)
             allowed_now = self._allowed()
             # Only what cannot wait for the next command.
             if abs(allowed_now.speed) < abs(self._base.wanted.speed):
                 self._base.command(allowed_now)
 
-    def _note_lidar(self, frame: str) -> None:
-        """Warn once of a second lidar on the topic: a scan takes the place of the one before."""
-        if len(self._lidars) < 2 and frame not in self._lidars:
-            self._lidars.append(frame)
-            if len(self._lidars) == 2:
+    def _note_lidar(self, topic: str, frame: str) -> None:
+        """Warn once of a second lidar on a topic: a scan takes the place of the one before."""
+        frames = self._lidars.setdefault(topic, [])
+        if len(frames) < 2 and frame not in frames:
+            frames.append(frame)
+            if len(frames) == 2:
                 self.get_logger().warn(
-                    f'scan: lidars with the frames {" and ".join(map(repr, self._lidars))} '
-                    'share the topic and hide each other: expected one; merge their scans, or '
-                    'remap one of them'
+                    f'{topic}: lidars with the frames {" and ".join(map(repr, frames))} '
+                    'share the topic and hide each other: expected one; give each its own topic '
+                    'and name both in topics.scans of the robot profile'
                 )
 
     def _on_stop(self, request: Any, response: Any) -> Any:
@@ -183,13 +186,13 @@ class CollisionMonitor(PatrolNode):
     def _allowed(self) -> Velocity:
         if self._stopped:
             return Velocity()
-        if self._scan is None:
-            return self._wanted  # Nothing was seen yet, so the publisher lets nothing through.
+        # While nothing was seen the publisher lets nothing through.
         velocity = self._wanted
-        nearest = float(np.fmin.reduce(self._scan.ranges)) - math.hypot(*self._scan.mount[:2])
+        far = self._settings.reach + self._settings.way_to_stand(velocity.speed)
         # Most of the time nothing is so near that the arc must be looked at.
-        if nearest <= self._settings.reach + self._settings.way_to_stand(velocity.speed):
-            velocity = allowed(velocity, self._scan.points, self._settings)
+        near = [scan.points for scan in self._seen.values() if _nearest(scan) <= far]
+        if near:
+            velocity = allowed(velocity, np.concatenate(near), self._settings)
         held_back = abs(velocity.speed) < 0.5 * abs(self._wanted.speed)
         if held_back and not self._is_held_back:
             self.get_logger().warn('an obstacle is in the way: the robot is slowed down or stopped')
@@ -208,6 +211,11 @@ class CollisionMonitor(PatrolNode):
                 f'the base is not protected: nobody subscribes to {MONITORED}; let the base '
                 'take its commands from there instead of from cmd_vel'
             )
+
+
+def _nearest(scan: Scan) -> float:
+    """Return a distance from the robot's centre within which a scan shows nothing, metres."""
+    return float(np.fmin.reduce(scan.ranges)) - math.hypot(*scan.mount[:2])
 
 
 def main(args: Sequence[str] | None = None) -> int:

@@ -9,13 +9,16 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from surveillance_controllers.battery import BatteryParameters
+from surveillance_controllers.battery_driver import DriverSettings
 from surveillance_controllers.geometry import Points, Pose
 from surveillance_runtime import parameter_checks
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.parameters import ParameterError, converted, parameter
 from surveillance_runtime.place.floor_plan import Door, Segment
 
-EXECUTION_MODES = ('MANUAL', 'RANDOM', 'SIMULATED')
+EXECUTION_MODES = ('MANUAL', 'RANDOM', 'SIMULATED', 'ROBOT')
+DRIVING_MODES = ('SIMULATED', 'ROBOT')
+"""In these a base drives, simulated or real."""
 
 
 @dataclass(frozen=True)
@@ -24,7 +27,7 @@ class ControllerSettings:
 
     execution_mode: str = parameter(
         'RANDOM',
-        'Where the node takes its actions from: the operator, chance, or the simulated robot.',
+        'Where the node takes its actions from: the operator, chance, a simulated or a real robot.',
         choices=EXECUTION_MODES,
     )
     random_seed: int = parameter(
@@ -34,6 +37,11 @@ class ControllerSettings:
         True,
         'In MANUAL mode, read commands from standard input; they always come by ~/command too.',
     )
+
+    @property
+    def drives(self) -> bool:
+        """Whether a base drives, simulated or real."""
+        return self.execution_mode in DRIVING_MODES
 
 
 @dataclass(frozen=True)
@@ -58,7 +66,10 @@ class StationSettings(ControllerSettings):
         check=parameter_checks.pose,
     )
     dock_reach: float = parameter(
-        0.5, 'SIMULATED: the robot is at the station within this distance of it, m.', 0.0, 100.0
+        0.5,
+        'SIMULATED and ROBOT: the robot is at the station within this distance of it, m.',
+        0.0,
+        100.0,
     )
     state_file: str = parameter(
         '',
@@ -76,6 +87,7 @@ class BatterySettings(StationSettings):
     )
     require_recharge: int = 20
     model: BatteryParameters = field(default_factory=BatteryParameters)
+    driver: DriverSettings = field(default_factory=DriverSettings)
     random_battery_time: tuple[float, float] = parameter(
         (10.0, 15.0),
         'RANDOM: shortest and longest time between two changes of the battery, s.',
@@ -86,7 +98,7 @@ class BatterySettings(StationSettings):
     )
     update_period: float = parameter(
         1.0,
-        'SIMULATED: time between two steps of the battery model, s.',
+        'SIMULATED and ROBOT: time between two steps of the battery model, s.',
         0.01,
         60.0,
         name='battery_update_period',
@@ -108,7 +120,8 @@ def battery_settings(
     settings = node.declare_fields(BatterySettings())
     return replace(
         settings,
-        model=node.declare_fields(settings.model, prefix='battery.', mode='SIMULATED'),
+        model=node.declare_fields(settings.model, prefix='battery.', mode='SIMULATED and ROBOT'),
+        driver=node.declare_fields(settings.driver, prefix='source.'),
         require_recharge=node.parameter(
             'battery_require_recharge',
             settings.require_recharge,
@@ -166,12 +179,14 @@ class MotionSettings(PeerSettings, StationSettings):
 
     navigator: str = parameter(
         'own',
-        'SIMULATED: who drives the base: this node, or Nav2 by its action navigate_through_poses.',
+        'SIMULATED and ROBOT: who drives the base: this node, or Nav2 by its action '
+        'navigate_through_poses.',
         choices=('own', 'nav2'),
     )
     docking: str = parameter(
         'none',
-        'SIMULATED: a docking server that docks the robot where a way ends at the station.',
+        'SIMULATED and ROBOT: a docking server that docks the robot where a way ends at the '
+        'station.',
         choices=('none', 'opennav'),
     )
     dock_type: str = parameter('', "The dock's type, as the docking server knows it.")
@@ -191,7 +206,7 @@ class MotionSettings(PeerSettings, StationSettings):
 
 @dataclass(frozen=True)
 class NavigationSettings:
-    """What `motion_controller` is told of its own navigation in SIMULATED mode."""
+    """What `motion_controller` is told of its own navigation where a base drives."""
 
     sensor_timeout: float = parameter(
         5.0, 'how long map, odom and scan may be silent, s of real time.', 0.1, 3600.0

@@ -97,6 +97,8 @@ MOST_RAYS = 100_000
 """Rays of the largest scan that is taken."""
 LONGEST_RANGE = 1000.0
 """No ray of a lidar goes farther, metres."""
+LONGEST_SWEEP = 2.0
+"""No lidar turns slower, seconds: what a scan says beyond that counts for nothing."""
 LEAST_TOLD = 0.05
 """A scan of which a smaller share of the rays tells something is that of a lidar that is covered or
 broken."""
@@ -118,7 +120,9 @@ def grid_from(message: OccupancyGrid) -> Grid:
 _LEVEL = Mount()
 
 
-def scan_from(message: LaserScan, mount: Mount = _LEVEL, radius: float = 0.0) -> Scan:
+def scan_from(
+    message: LaserScan, mount: Mount = _LEVEL, radius: float = 0.0, sweep: float = 0.0
+) -> Scan:
     """Return a turn of a lidar.
 
     Rays beyond its reach met nothing; those that are 0 or not a number tell nothing; those of minus
@@ -129,6 +133,7 @@ def scan_from(message: LaserScan, mount: Mount = _LEVEL, radius: float = 0.0) ->
         message: The scan; of a lidar that turns clockwise, its rays come back the other way round.
         mount: Where the lidar sits on the robot.
         radius: Of the robot, metres.
+        sweep: How long a turn takes whose scan does not say it, seconds.
 
     Raises:
         ValueError: Angles or reach are no lidar's, there are too many rays, next to none of them
@@ -166,8 +171,11 @@ def scan_from(message: LaserScan, mount: Mount = _LEVEL, radius: float = 0.0) ->
             f'a scan of which less than {LEAST_TOLD:.0%} of the rays tells something: expected '
             'distances, or infinity where nothing is met; the lidar may be covered or broken'
         )
-    turns = (angles, ranges) if step >= 0 else (angles[::-1], ranges[::-1])
-    return Scan(*turns, reach, mount.pose)
+    told = message.time_increment * count
+    times = np.arange(count) * ((told if 0.0 < told <= LONGEST_SWEEP else sweep) / count)
+    if step < 0:
+        angles, ranges, times = angles[::-1], ranges[::-1], times[::-1]
+    return Scan(angles, ranges, reach, mount.pose, times if times.any() else None)
 
 
 def _edge(mount: Mount, angles: Points, radius: float) -> Points:

@@ -142,12 +142,14 @@ class Scan:
             that is not known.
         range_max: The lidar's reach, metres.
         mount: Where the lidar sits on the robot, robot's frame.
+        times: When each ray was measured after the first, shape (n,), seconds; None: all at once.
     """
 
     angles: Points
     ranges: Points
     range_max: float
     mount: Pose = (0.0, 0.0, 0.0)
+    times: Points | None = None
 
     @cached_property
     def points(self) -> Points:
@@ -160,4 +162,5 @@ class Scan:
     def thinned(self, count: int) -> Scan:
         """About `count` of the rays, evenly taken."""
         step = max(1, len(self.angles) // count)
-        return Scan(self.angles[::step], self.ranges[::step], self.range_max, self.mount)
+        times = None if self.times is None else self.times[::step]
+        return Scan(self.angles[::step], self.ranges[::step], self.range_max, self.mount, times)

@@ -2,8 +2,8 @@
 
 Actions: `follow_path` along a path, and `motion/controller` through via points into a place. How
 the robot moves is the execution mode's matter: as the operator says (MANUAL), by chance (RANDOM),
-or as the base drives (SIMULATED). It publishes the place that the robot is in as `robot_place` and
-writes it into the ontology.
+or as the base drives (SIMULATED and ROBOT). It publishes the place that the robot is in as
+`robot_place` and writes it into the ontology.
 """
 
 from __future__ import annotations
@@ -47,13 +47,13 @@ class MotionController(PatrolNode):
         self._console: CommandConsole[tuple[float, float]] = CommandConsole(
             self, MOTION, self._carry_out
         )
-        localises = self._mode == 'SIMULATED' and self._settings.navigator == 'own'
+        localises = self._settings.drives and self._settings.navigator == 'own'
         start = None if localises else self._settings.robot_room
         reach = self._settings.place_reach
         state_file = self._settings.state_file
         self._recorder = PlaceRecorder(self, self._knowledge, reach, start, state_file)
         self._robot: Motion | None = None
-        if self._mode == 'SIMULATED':
+        if self._settings.drives:
             self._robot = self._make_robot()
         else:
             self._hold = Hold(self)

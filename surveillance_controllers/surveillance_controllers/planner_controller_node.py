@@ -3,7 +3,7 @@
 Actions: `compute_path` between two points, and `motion/planner` from where the robot is to a place,
 as equally spaced via points. What was planned last is on the topic `plan`, latched, for viewers.
 Where a path comes from is the execution mode's matter: the operator (MANUAL), chance (RANDOM), or
-the map with its walls, doors and obstacles (SIMULATED).
+the map with its walls, doors and obstacles (SIMULATED and ROBOT).
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ class PlannerController(PatrolNode):
             self, PLANNER, self._carry_out
         )
         self._simulated: NavigationPlanning | None = None
-        if self._mode == 'SIMULATED':
+        if self._settings.drives:
             # Only here, for the libraries of the search take their time to import.
             from surveillance_controllers.planning.map_planner import NavigationPlanning
 

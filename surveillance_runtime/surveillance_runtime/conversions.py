@@ -20,7 +20,7 @@ from builtin_interfaces.msg import Duration, Time
 from geometry_msgs.msg import Point, Pose, PoseWithCovariance, Quaternion
 from nav_msgs.msg import OccupancyGrid
 from numpy.typing import NDArray
-from sensor_msgs.msg import PointCloud2, PointField
+from sensor_msgs.msg import BatteryState, PointCloud2, PointField
 
 from surveillance_runtime.logging import without_controls
 from surveillance_runtime.robot_arm import TrajectoryPoint
@@ -321,3 +321,14 @@ def values_from_cloud(message: PointCloud2, name: str) -> NDArray[np.float64] | 
             points = np.frombuffer(bytes(message.data), dtype=kind, count=count)
             return np.asarray(points[name], dtype=np.float64)
     return None
+
+
+def charging_from(message: BatteryState) -> bool | None:
+    """Tell whether a battery is being charged, or is full at its charger; None: it does not say."""
+    status = message.power_supply_status
+    if status in (
+        BatteryState.POWER_SUPPLY_STATUS_CHARGING,
+        BatteryState.POWER_SUPPLY_STATUS_FULL,
+    ):
+        return True
+    return None if status == BatteryState.POWER_SUPPLY_STATUS_UNKNOWN else False

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from surveillance_runtime.suggestions import nearest
 
-MODES = ('SIMULATED', 'RANDOM', 'MANUAL')
+MODES = ('SIMULATED', 'ROBOT', 'RANDOM', 'MANUAL')
 DEFAULT_MODE = 'SIMULATED'
 BEHAVIOURS = ('surveillance', 'patrol')
 DEFAULT_BEHAVIOUR = BEHAVIOURS[0]
@@ -116,6 +116,7 @@ _OF_PATROL = (
     'arm_controller',
 )
 _OF_BASE = ('simulator', 'collision_monitor')
+_MONITOR = 'collision_monitor'
 RUN_NODES = frozenset((*_ALWAYS, *_OF_PATROL, *_OF_BASE))
 """The nodes of which a robot has one each."""
 
@@ -137,14 +138,18 @@ def select(
     behaviour: str = DEFAULT_BEHAVIOUR,
     only: Iterable[str] = (),
     without: Iterable[str] = (),
+    *,
+    monitored: bool = True,
 ) -> tuple[Node, ...]:
     """Return the nodes that a run starts, in start order.
 
     Args:
-        mode: one of `MODES`; SIMULATED adds the simulator and what guards its base.
+        mode: one of `MODES`; SIMULATED adds the simulator and what guards its base, ROBOT the
+            guard alone.
         behaviour: one of `BEHAVIOURS`; patrol adds what learns the place from its markers.
         only: if not empty, exactly these nodes, also ones that the mode would not start.
         without: nodes to leave out, because they run elsewhere.
+        monitored: whether the base is guarded here; Nav2 does it itself.
 
     Raises:
         ValueError: an unknown name, or nothing is left to start.
@@ -155,8 +160,12 @@ def select(
         wanted = set(_ALWAYS)
         if behaviour == 'patrol':
             wanted.update(_OF_PATROL)
-        if mode == 'SIMULATED':
+        if mode in ('SIMULATED', 'ROBOT'):
             wanted.update(_OF_BASE)
+        if mode == 'ROBOT':
+            wanted.discard('simulator')
+        if not monitored:
+            wanted.discard(_MONITOR)
     chosen = tuple(node for node in _START_ORDER if node.name in wanted - left_out)
     if not chosen:
         raise ValueError('no node is left to start: check --only and --without')

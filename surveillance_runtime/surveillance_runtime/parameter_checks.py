@@ -15,12 +15,16 @@ def pose(values: Sequence[float]) -> str | None:
     return None if len(values) == 3 else 'three numbers: x, y, yaw'
 
 
-def lidar_mount(values: Sequence[float]) -> str | None:
-    """Ask for where a lidar sits on the robot, if for anything; it stands or hangs."""
-    good = len(values) in (0, 3) or (
-        len(values) == 4 and abs(math.sin(values[3])) <= MOST_TILT and abs(values[3]) <= 3.3
+def lidar_mounts(values: Sequence[float]) -> str | None:
+    """Ask for where each lidar sits on the robot, if for anything; it stands or hangs."""
+    good = len(values) % 4 == 0 and all(
+        abs(math.sin(roll)) <= MOST_TILT and abs(roll) <= 3.3 for roll in values[3::4]
     )
-    return None if good else 'x, y, yaw, and roll: 0, or 3.1416 for a lidar that hangs upside down'
+    return (
+        None
+        if good
+        else 'x, y, yaw and roll of each lidar; roll 0, or 3.1416 for one that hangs upside down'
+    )
 
 
 def times(values: Sequence[float]) -> str | None:

@@ -1,8 +1,8 @@
 """The parameters of one run of the robot: where they come from, and which source wins.
 
-Weakest first: `parameters.yaml`, the place's file, what the behaviour needs, what the run itself
-chooses, the user's files, the options. `launch.py` and the launch file for an installed ROS use
-this alike, so that a robot gets the same values from both.
+Weakest first: `parameters.yaml`, the robot's profile, the place's file, what the behaviour needs,
+what the run itself chooses, the user's files, the options. `launch.py` and the launch file for an
+installed ROS use this alike, so that a robot gets the same values from both.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
+from surveillance_runtime.command_line import page_address
 from surveillance_runtime.configuration import (
     Configuration,
     Entry,
@@ -18,8 +19,11 @@ from surveillance_runtime.configuration import (
     resolved_text,
 )
 from surveillance_runtime.node_table import NODES, Node
+from surveillance_runtime.profile import ProfileFile, profile_layer
+from surveillance_runtime.run_options import NO_SIMULATOR
 
 BEHAVIOUR_NODE = 'robot_behavior'
+PAGE = 'mission_page'
 PLACES = {'surveillance': 'seven_rooms.yaml', 'patrol': 'patrol_world.yaml'}
 
 
@@ -33,6 +37,7 @@ def run_layers(
     behaviour: str,
     *,
     place: Path | None = None,
+    robot: ProfileFile | None = None,
     chosen: Iterable[Entry] = (),
     files: Iterable[Path] = (),
     options: Iterable[Entry] = (),
@@ -43,6 +48,7 @@ def run_layers(
         config: The folder with `parameters.yaml` and the places.
         behaviour: One of `node_table.BEHAVIOURS`.
         place: The file of the place, None for the behaviour's own.
+        robot: The robot's profile; None: the nodes' defaults, which are the built-in robot.
         chosen: What the run chooses where the user says nothing, as the folders that it writes to.
         files: The user's parameter files; a later one wins.
         options: What options say as parameters.
@@ -51,6 +57,8 @@ def run_layers(
         FileError, ParameterError: A file cannot be used.
     """
     layers = [file_layer(config / 'parameters.yaml')]
+    if robot is not None:
+        layers.append(profile_layer(robot))
     layers.append(file_layer(place_file(config, behaviour, place)))
     asked = []
     if behaviour == 'patrol':
@@ -81,6 +89,37 @@ def record_entries(record: Path) -> Iterator[Entry]:
     """Yield where the nodes that write the mission's record find it."""
     for node in (BEHAVIOUR_NODE, 'reasoner', 'initial_state'):
         yield for_node(node, 'record', str(record), 'this run')
+
+
+def page_entries(
+    folder: Path, *, control: bool, address: str | None, origin: str | None
+) -> Iterator[Entry]:
+    """Yield what the page is told: who may control the robot, and where it is served.
+
+    Args:
+        folder: Where the run writes.
+        control: Whether it has controls.
+        address: Of the form HOST:PORT; None: the usual one.
+        origin: What browsers know it by; None: its address.
+
+    Raises:
+        ValueError: The address is none.
+    """
+    yield for_node(PAGE, 'control', control, '--web-control')
+    # In a file, so that a page that is started again keeps it, and no peer can ask for it.
+    yield for_node(PAGE, 'token_file', str(folder.resolve() / 'page_token'), 'this run')
+    if address is not None:
+        host, port = page_address(address)
+        yield for_node(PAGE, 'host', host, '--web-address')
+        yield for_node(PAGE, 'port', port, '--web-address')
+    if origin is not None:
+        yield for_node(PAGE, 'origin', origin, '--web-origin')
+
+
+def simulator_entries(simulator: str) -> Iterator[Entry]:
+    """Yield which simulation the simulator is."""
+    if simulator != NO_SIMULATOR:
+        yield for_node('simulator', 'physics', simulator, f'--simulator {simulator}')
 
 
 def for_node(node: str, name: str, value: object, origin: str) -> Entry:

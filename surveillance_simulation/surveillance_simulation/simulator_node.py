@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from action_msgs.msg import GoalStatus, GoalStatusArray
 from builtin_interfaces.msg import Time
-from geometry_msgs.msg import PoseWithCovarianceStamped, Twist
+from geometry_msgs.msg import PoseWithCovarianceStamped, Twist, TwistStamped
 from rclpy.clock import Clock as RclpyClock
 from rclpy.clock import ClockType
 from std_msgs.msg import Bool
@@ -30,7 +30,9 @@ from surveillance_runtime.parameters import ParameterError
 from surveillance_runtime.place import PlaceError
 from surveillance_runtime.place.rooms import PLACE_TABLES
 from surveillance_runtime.process import run_node
+from surveillance_runtime.profile.parameters import CommandSettings
 from surveillance_runtime.qos import STATE_QOS
+from surveillance_runtime.run_options import KINEMATIC, MUJOCO
 from surveillance_runtime.state_file import StateFile
 from surveillance_runtime.state_topics import StateSubscription
 from surveillance_simulation import conversions
@@ -72,6 +74,13 @@ class Simulator(PatrolNode):
         super().__init__('simulator', **node_options)
         seed = self.parameter('random_seed', 0, 'Seed of all noise: the same seed, the same run.')
         rate = self.declare_fields(ClockRateModel())
+        self.parameter(
+            'physics',
+            KINEMATIC,
+            'What moves the robot: kinematic, or mujoco, with wheels, friction and slip.',
+            choices=(KINEMATIC, MUJOCO),
+            read_only=True,
+        )
         try:
             world = World.from_parameters(_place_parameters(self))
         except PlaceError as error:
@@ -110,8 +119,14 @@ class Simulator(PatrolNode):
         rate = replace(rate, look_window=self._camera.period + rate.step)
         self._rate = ClockRate(rate, time.monotonic())
         FaultServices(self, self.robot, self._changing, self._changed)
-        self._unmonitored = self.create_subscription(Twist, 'cmd_vel', self._obey, 1)
-        self.create_subscription(Twist, 'cmd_vel_monitored', self._on_monitored, 1)
+        stamped = self.declare_fields(CommandSettings()).command_type == 'TwistStamped'
+        # Past a collision monitor nobody stamps a command.
+        self._unmonitored = (
+            None if stamped else self.create_subscription(Twist, 'cmd_vel', self._obey, 1)
+        )
+        self.create_subscription(
+            TwistStamped if stamped else Twist, 'cmd_vel_monitored', self._on_monitored, 1
+        )
         StateSubscription(self, PoseWithCovarianceStamped, 'amcl_pose', self._on_estimate, raw=True)
         # The same word twice is two waits.
         StateSubscription(self, Time, 'mission_waits_until', self._on_mission_waits, each=True)
@@ -195,10 +210,12 @@ class Simulator(PatrolNode):
             )
         self._told_of_clock = others > 0
 
-    def _on_monitored(self, message: Twist) -> None:
+    def _on_monitored(self, message: Twist | TwistStamped) -> None:
         """Obey the collision monitor; who commands past it is not heard from now on."""
-        self.destroy_subscription(self._unmonitored)  # does nothing the second time
-        self._obey(message)
+        if self._unmonitored is not None:
+            self.destroy_subscription(self._unmonitored)
+            self._unmonitored = None
+        self._obey(message.twist if isinstance(message, TwistStamped) else message)
 
     def _obey(self, message: Twist) -> None:
         speed, turn_speed = message.linear.x, message.angular.z

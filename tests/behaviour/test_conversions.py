@@ -13,7 +13,12 @@ from sensor_msgs.msg import BatteryState
 from patrol_policy.world import Decision
 from surveillance_behaviour import conversions
 from surveillance_interfaces.msg import Decision as DecisionMessage
-from surveillance_runtime.conversions import point_from, point_message, point_messages
+from surveillance_runtime.conversions import (
+    charging_from,
+    point_from,
+    point_message,
+    point_messages,
+)
 
 numbers = st.floats(allow_nan=False, allow_infinity=False)
 names = st.text('ABCR0123456789_', min_size=1, max_size=6)
@@ -61,6 +66,6 @@ def test_a_point_without_height_lies_on_the_floor() -> None:
 )
 def test_a_battery_says_whether_it_is_charged(status: str, charging: bool) -> None:
     message = BatteryState()
-    assert conversions.charging_from(message) is None
+    assert charging_from(message) is None
     message.power_supply_status = getattr(BatteryState, f'POWER_SUPPLY_STATUS_{status}')
-    assert conversions.charging_from(message) is charging
+    assert charging_from(message) is charging

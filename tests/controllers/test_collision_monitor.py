@@ -105,12 +105,12 @@ def test_a_base_that_goes_round_the_monitor_is_told_of_once(
 
 def test_two_lidars_on_one_topic_are_told_of_once(graph: Any) -> None:
     said = graph.said()
-    monitor = graph.add(CollisionMonitor, {'lidar_mount': [0.0, 0.0, 0.0]})
+    monitor = graph.add(CollisionMonitor, {'lidar_mounts': [0.0, 0.0, 0.0, 0.0]})
 
     def see(frame: str) -> None:
         scan = LaserScan(angle_increment=0.02, range_max=8.0, ranges=[3.0] * 21)
         scan.header.frame_id = frame
-        monitor._on_scan(scan)
+        monitor._on_scan('scan', scan)
 
     def warnings() -> list[str]:
         return [line for line in said if 'hide each other' in line]

@@ -42,6 +42,7 @@ class StartedNode:
     name: str
     namespace: str
     parameters: list[str]
+    remappings: list[tuple[str, str]]
     ros_arguments: list[str]
     output: str
     emulate_tty: bool
@@ -120,9 +121,10 @@ def test_the_users_place_parameters_record_and_namespace_reach_the_nodes(start, 
     own = tmp_path / 'own.yaml'
     own.write_text('/**: {ros__parameters: {urgency_threshold: 33}}')
     office = str(ROOT / 'config' / 'office.yaml')
-    nodes = start(map=office, params=str(own), record='/tmp/it.jsonl', namespace='/robot1')
+    nodes = start(map=office, params=str(own), record=str(tmp_path / 'it'), namespace='/robot1')
     by_name = {node.name: settings(node) for node in nodes}
-    assert by_name['robot_behavior']['record'] == '/tmp/it.jsonl'
+    assert by_name['robot_behavior']['record'] == str(tmp_path / 'it' / 'mission.jsonl')
+    assert by_name['mission_recorder']['folder'] == str(tmp_path / 'it' / 'recording')
     assert 33 in [values.get('urgency_threshold') for values in by_name.values()]
     assert 'office.yaml' in Path(nodes[1].parameters[0]).read_text()
 
@@ -141,6 +143,28 @@ def test_what_is_wrong_is_said_before_a_node_starts(start, tmp_path, given, erro
         start(**{key: str(own) if value == 'TYPO' else value for key, value in given.items()})
 
 
+def test_its_arguments_are_options_of_launch_py(start, tmp_path):
+    nodes = start(
+        mode='ROBOT',
+        robot='turtlebot3_burger',
+        web='true',
+        without='robot_behavior,reasoner',
+        remap='map:=/building/map',
+    )
+    names = [node.name for node in nodes]
+    assert {'simulator', 'robot_behavior'}.isdisjoint(names)
+    assert {'mission_page', 'collision_monitor'} <= set(names)
+    renamed = dict(reversed(nodes[0].remappings))
+    assert renamed['cmd_vel_monitored'] == 'cmd_vel'
+    assert renamed['cmd_vel'] == 'cmd_vel_nav'
+    assert renamed['map'] == '/building/map'
+    by_name = {node.name: settings(node) for node in nodes}
+    assert by_name['collision_monitor']['robot.command_type'] == 'TwistStamped'
+    assert 'simulator' not in [node.name for node in start(simulator='none')]
+    with pytest.raises(FileError, match=r"--robot 'turtlebot3_burgr'.*'turtlebot3_burger'"):
+        start(robot='turtlebot3_burgr')
+
+
 def test_a_node_that_cannot_start_ends_the_launch_and_another_one_does_not(start):
     on_exit = start()[0].on_exit
     refused = types.SimpleNamespace(returncode=2, process_name='armor_server-1')
@@ -152,3 +176,4 @@ def test_it_is_installed_with_the_parameter_files():
     setup = (ROOT / 'surveillance_behaviour' / 'setup.py').read_text()
     assert "glob('launch/*.launch.py')" in setup
     assert "glob('../config/*.yaml')" in setup
+    assert "glob('../config/robots/*.yaml')" in setup

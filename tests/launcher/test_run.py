@@ -38,6 +38,7 @@ from surveillance_runtime import discovery
 from surveillance_runtime.command_line import page_address
 from surveillance_runtime.files import RECORD, TIMELINE
 from surveillance_runtime.node_table import DEFAULT_MODE
+from surveillance_runtime.profile import read_profile
 from surveillance_runtime.run_parameters import place_file, run_layers, write_parameters
 
 
@@ -131,6 +132,9 @@ def test_the_users_file_comes_after_the_projects_and_the_launchers_own_last(tmp_
     layers = run_layers(CONFIG, 'surveillance', place=place, files=[own])
     sources = [Path(layer.source).name for layer in layers]
     assert sources == ['parameters.yaml', 'office.yaml', 'this run', 'own.yaml', 'options']
+    robot = read_profile(CONFIG / 'robots' / 'turtlebot4.yaml')
+    layers = run_layers(CONFIG, 'surveillance', place=place, robot=robot)
+    assert [Path(layer.source).name for layer in layers][1:3] == ['turtlebot4.yaml', 'office.yaml']
 
 
 def settings_of(node: str, run: Run) -> dict[str, object]:
@@ -237,7 +241,7 @@ def test_discovery_is_the_machines_own_unless_asked_for(monkeypatch):
 def test_options_of_a_run_survive_its_launcher(tmp_path):
     run = Run(mode='RANDOM', place=tmp_path / 'p.yaml', assignments=['a:=1'], only=['reasoner'])
     stored = json.loads(json.dumps(options_of(run)))
-    assert run_from(stored) == replace(run, without=[])
+    assert run_from(stored) == replace(run, without=[], remaps=[])
     with pytest.raises(ValueError, match='--resume'):
         run_from({'mode': 'RANDOM', 'place': None, 'seconds': None} | {'place': 7})
 
@@ -319,6 +323,7 @@ def test_the_options_of_the_command_line_become_a_run():
         mode='RANDOM',
         place=Path('m.yaml'),
         parameters=Path('p.yaml'),
+        remaps=[],
         only=['a', 'b'],
         without=[],
         assignments=[],

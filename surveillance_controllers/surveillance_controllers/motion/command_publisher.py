@@ -15,11 +15,12 @@ import threading
 from collections import deque
 from collections.abc import Callable, Iterable
 
-from geometry_msgs.msg import Twist
+from geometry_msgs.msg import Twist, TwistStamped
 
 from surveillance_controllers import conversions
 from surveillance_controllers.motion.path_following import Velocity
 from surveillance_runtime.node import PatrolNode
+from surveillance_runtime.profile.parameters import CommandSettings
 
 WATCH_PERIOD = 0.01
 """Time between two commands of a robot that is stopped, seconds."""
@@ -96,7 +97,8 @@ class CommandPublisher:
 
     Args:
         node: The node that commands.
-        topic: Of the commands, geometry_msgs/Twist.
+        topic: Of the commands.
+        frame: That the commands are in, the robot's own, where they are stamped.
         heard: Topics without which the robot stands; `hear` is to be told of their messages.
         deceleration: With which the base brakes when it must, m/s^2.
         on_silence: Told the topic for whose silence the robot stands, once until it drives again.
@@ -114,13 +116,17 @@ class CommandPublisher:
         deceleration: float,
         on_silence: Callable[[str], None],
         standstill: float = STANDSTILL,
+        frame: str = '',
     ) -> None:
+        stamped = node.declare_fields(CommandSettings()).command_type == 'TwistStamped'
+        self._frame = frame
         self._clock = node.get_clock()
         self._logger = node.get_logger()
         self._on_silence = on_silence
         self._age = SensorAge(heard, deceleration, standstill)
         self._lock = threading.Lock()
-        self._publisher = node.create_publisher(Twist, topic, 1)
+        self._publisher = node.create_publisher(TwistStamped if stamped else Twist, topic, 1)
+        self._is_stamped = stamped
         self._timer = node.create_timer(WATCH_PERIOD, self._limit_again, autostart=False)
         self._silent = ''
         self.wanted = Velocity()
@@ -163,7 +169,13 @@ class CommandPublisher:
             # A new command, too: else it would end what the last one began.
             share = self._age.share(self.wanted.speed, now + LEAD)
         limited = Velocity(share * self.wanted.speed, share * self.wanted.turn)
-        self._publisher.publish(conversions.twist_from(limited))
+        twist = conversions.twist_from(limited)
+        if self._is_stamped:
+            message = TwistStamped(twist=twist)
+            message.header.stamp, message.header.frame_id = self._clock.now().to_msg(), self._frame
+            self._publisher.publish(message)
+        else:
+            self._publisher.publish(twist)
         silent = self._age.left(now)[1] if share == 0.0 and self.wanted != Velocity() else ''
         if silent and not self._silent:
             self._on_silence(silent)

@@ -46,8 +46,10 @@ from surveillance_runtime.conversions import (
     pose_from,
     pose_of_serialized,
     seconds_of,
+    stamp_of_serialized,
 )
 from surveillance_runtime.node import PatrolNode
+from surveillance_runtime.profile.parameters import declared_frames
 from surveillance_runtime.qos import SENSOR_QOS
 from surveillance_runtime.state_topics import OwnedTopic, StateSubscription
 
@@ -77,9 +79,12 @@ class NavigationMotion:
         self._node = node
         self._recorder = recorder
         self._wait_for_peer = settings.peer_timeout
-        self._robot = node.declare_fields(DriveParameters(), prefix='drive.', mode='SIMULATED')
-        self._settings = node.declare_fields(NavigationSettings(), mode='SIMULATED')
-        self._lidar = ScanReader(node, self._robot.radius)
+        self._robot = node.declare_fields(
+            DriveParameters(), prefix='drive.', mode='SIMULATED and ROBOT'
+        )
+        self._settings = node.declare_fields(NavigationSettings(), mode='SIMULATED and ROBOT')
+        self._frames = declared_frames(node, 'map', 'odom', 'base', 'transform_tolerance')
+        self._lidar = ScanReader(node, self._robot.radius, self._frames.base)
         self._navigator = navigator or Navigator(door_segments(node), guesses=[settings.station])
         self._navigator.before_search = self._stand_for_search
         self._stands_for_search = False
@@ -93,11 +98,16 @@ class NavigationMotion:
         self._jumps = 0
         self._planner = GoalCaller(node, ComputePath, 'compute_path')
         self._base = CommandPublisher(
-            node, 'cmd_vel', ('scan', 'odom'), self._robot.deceleration, self._warn_of_silence
+            node,
+            'cmd_vel',
+            (*self._lidar.settings.scans, 'odom'),
+            self._robot.deceleration,
+            self._warn_of_silence,
+            frame=self._frames.base,
         )
         self._poses = OwnedTopic(node, PoseWithCovarianceStamped, 'amcl_pose', repeat=None)
         self._obstacles = OwnedTopic(node, PointCloud2, 'obstacles')
-        self._map_frame = MapFrame(node)
+        self._map_frame = MapFrame(node, self._frames)
         positions = place_positions(node)
         self._set_positions(positions)
         knowledge.assume(positions)
@@ -107,7 +117,7 @@ class NavigationMotion:
         StateSubscription(node, OccupancyGrid, 'map', self._on_map)
         StateSubscription(node, DoorStates, 'door_states', self._on_doors)
         node.create_subscription(Odometry, 'odom', self._on_odometry, SENSOR_QOS, raw=True)
-        node.create_subscription(LaserScan, 'scan', self._on_scan, SENSOR_QOS)
+        self._lidar.subscribe(self._on_scan)
         node.create_subscription(PoseWithCovarianceStamped, 'initialpose', self._on_initial_pose, 1)
 
     def follow(self, path: Points, run: GoalRun, report: Callable[[Points], None]) -> Points:
@@ -273,9 +283,10 @@ class NavigationMotion:
     def _on_odometry(self, serialized: bytes) -> None:
         with conversions.refusing(self._node, 'odom'):
             pose = pose_of_serialized(serialized, texts=1)
+            stamp = stamp_of_serialized(serialized)
             with self._lock:
                 self._base.hear('odom')
-                self._navigator.move(pose)
+                self._navigator.move(pose, stamp if stamp > 0.0 else self._now())
 
     def _on_initial_pose(self, message: PoseWithCovarianceStamped) -> None:
         with conversions.refusing(self._node, 'initialpose'):
@@ -284,21 +295,24 @@ class NavigationMotion:
             with self._lock:
                 self._navigator.believe(pose)
 
-    def _on_scan(self, message: LaserScan) -> None:
-        with conversions.refusing(self._node, 'scan'):
+    def _now(self) -> float:
+        return float(self._node.get_clock().now().nanoseconds) / 1e9
+
+    def _on_scan(self, topic: str, message: LaserScan) -> None:
+        with conversions.refusing(self._node, topic):
             stamp = message.header.stamp
             if stamp == Time():
                 # A lidar without a clock; a drive needs the time that passes.
                 stamp = self._node.get_clock().now().to_msg()
-            self._see(self._lidar.read(message), stamp)
+            self._see(self._lidar.read(message, topic), stamp, topic)
 
-    def _see(self, scan: Scan, stamp: Any) -> None:
+    def _see(self, scan: Scan, stamp: Any, topic: str = 'scan') -> None:
         measured = seconds_of(stamp)
         with self._stepped:
             before = self._place
-            self._base.hear('scan')
+            self._base.hear(topic)
             self._stands_for_search = False
-            velocity = self._navigator.see(scan, measured)
+            velocity = self._navigator.see(scan, measured, topic)
             if velocity is not None and self._navigator.task is not None:
                 if not self._stands_for_search:
                     self._base.command(velocity)
@@ -322,12 +336,16 @@ class NavigationMotion:
         self._node.get_logger().warn(f'nothing on the topic {topic}: the robot stands')
 
     def _publish_pose(self, measured: float, stamp: Any) -> None:
-        navigator = self._navigator
-        if navigator.pose is None or 0 <= measured - self._pose_sent < POSE_PERIOD:
+        told = self._navigator.told_pose(measured)
+        if told is None or 0 <= measured - self._pose_sent < POSE_PERIOD:
             return
+        pose, at = told
+        if at != measured:
+            nanoseconds = round(1e9 * at)
+            stamp = Time(sec=nanoseconds // 10**9, nanosec=nanoseconds % 10**9)
         deviation = (0.03, 0.02) if self._is_sure else (5.0, 3.0)
-        estimate = PoseWithCovarianceStamped(pose=pose_estimate(navigator.pose, *deviation))
-        estimate.header.frame_id, estimate.header.stamp = 'map', stamp
+        estimate = PoseWithCovarianceStamped(pose=pose_estimate(pose, *deviation))
+        estimate.header.frame_id, estimate.header.stamp = self._frames.map, stamp
         self._pose_sent = measured
         self._poses.publish(estimate)
 

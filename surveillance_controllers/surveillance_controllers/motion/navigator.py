@@ -13,10 +13,11 @@ from collections.abc import Callable, Iterable, Mapping
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from surveillance_controllers.geometry import Points, Pose, Scan, in_map, relative
+from surveillance_controllers.geometry import Points, Pose, Scan, composed, in_map, relative
 from surveillance_controllers.motion.driving import Drive, Spin
 from surveillance_controllers.motion.localisation import Localiser
 from surveillance_controllers.motion.obstacle_memory import ObstacleMemory
+from surveillance_controllers.motion.odometry import OdometryBuffer, joined
 from surveillance_controllers.motion.path_following import Velocity
 from surveillance_controllers.motion.place_regions import PlaceMap
 from surveillance_controllers.motion.tracking import Mover, Tracker
@@ -33,6 +34,8 @@ taken for the same thing, and short enough that nothing is forgotten for one wro
 MOST_LATE = 1.0
 """A scan that is older than the one before by this much, seconds, or less came late, as those of
 a second lidar do; by more, the clock began anew."""
+OTHER_LIDAR = 0.5
+"""What another lidar saw counts for so long, seconds."""
 MOVER_REACH = 3.5
 """Who moves within this distance is driven around, metres."""
 MOVER_GAP = 0.15
@@ -69,6 +72,8 @@ class Navigator:
         self._memory: ObstacleMemory | None = None
         self._tracker = Tracker()
         self._odometry: Pose | None = None
+        self._readings = OdometryBuffer()
+        self._others: dict[str, tuple[Scan, float]] = {}
         self._believed: Pose | None = None
         self._candidate: tuple[str | None, float] | None = None
         self._stamp, self._now = -math.inf, 0.0
@@ -148,18 +153,44 @@ class Navigator:
         if self._localiser is not None:
             self._localiser.believe(pose)
 
-    def move(self, odometry: Pose) -> None:
-        """Take a reading of the odometry."""
+    def move(self, odometry: Pose, stamp: float | None = None) -> None:
+        """Take a reading of the odometry.
+
+        Args:
+            odometry: Where it has the robot.
+            stamp: Its time, seconds; None: it says none, and each scan counts as made now.
+        """
+        if stamp is not None:
+            self._readings.add(stamp, odometry)
         self._odometry = odometry
         if self._localiser is not None:
             self._localiser.move(odometry)
 
-    def see(self, scan: Scan, stamp: float) -> Velocity | None:
+    def told_pose(self, stamp: float) -> tuple[Pose, float] | None:
+        """Return where the robot is and the time of that, seconds, at least that of a scan.
+
+        Args:
+            stamp: The time of the scan, seconds.
+        """
+        if self.pose is None:
+            return None
+        latest = self._readings.latest
+        if latest is None or not -OTHER_LIDAR < latest[0] - stamp < LONGEST_STEP:
+            return self.pose, stamp
+        if latest[0] >= stamp:
+            return self.pose, latest[0]
+        if not self._readings.covers(stamp, stamp):
+            return self.pose, stamp
+        x, y, yaw = self._readings.at(np.array([stamp]))[0].tolist()
+        return composed(self.pose, relative(latest[1], (x, y, yaw))), stamp
+
+    def see(self, scan: Scan, stamp: float, lidar: str = '') -> Velocity | None:
         """Take a scan and decide what to do.
 
         Args:
-            scan: What the lidar sees from where the robot is.
-            stamp: Its time by a clock that may jump or begin anew, seconds.
+            scan: What the lidar saw from where the robot was when it measured.
+            stamp: The time of its first ray by a clock that may jump or begin anew, seconds.
+            lidar: Which of several lidars saw it.
 
         Returns:
             The velocity to command; None when there is no task, or something is missing yet.
@@ -169,11 +200,14 @@ class Navigator:
         before, now = self._now, self._passed(stamp)
         if self.stands:
             self._stood += now - before
+        measured, scan = scan, joined(scan, self._readings, stamp)
         if self._localiser is None:
             self._localiser = self._first_localiser(scan, self._odometry)
         used = self._localiser.see(scan, now)
+        seen = np.concatenate([scan.points, *self._seen_by_others(lidar, stamp)])
+        self._others[lidar] = measured, stamp
         if self._localiser.certain:
-            self._track(scan, now)
+            self._track(seen, now)
             if used:
                 self._remember(scan, now)
         if self._localiser.plausible:
@@ -185,7 +219,7 @@ class Navigator:
             return self.task.step(
                 now - self._stood,
                 pose,
-                scan.points,
+                seen,
                 movers=self._movers_near(pose),
                 lost=self._localiser.lost,
             )
@@ -213,11 +247,19 @@ class Navigator:
         localiser.move(odometry)
         return localiser
 
-    def _track(self, scan: Scan, now: float) -> None:
+    def _seen_by_others(self, lidar: str, stamp: float) -> list[Points]:
+        """Return what the other lidars saw last, robot's frame, unless that is long ago."""
+        return [
+            joined(scan, self._readings, at).points
+            for other, (scan, at) in self._others.items()
+            if other != lidar and abs(stamp - at) <= OTHER_LIDAR
+        ]
+
+    def _track(self, seen: Points, now: float) -> None:
         assert self._localiser is not None
         assert self._memory is not None
         pose = self._localiser.pose
-        points = in_map(pose, scan.points)
+        points = in_map(pose, seen)
         self._tracker.update(pose, points[self._memory.is_unknown(points, MOVER_GAP)], now)
 
     def _movers_near(self, pose: Pose) -> list[Mover]:

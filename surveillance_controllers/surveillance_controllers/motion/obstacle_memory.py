@@ -168,9 +168,11 @@ class ObstacleMemory:
         distance = np.hypot(away[:, 0], away[:, 1])
         bearing = np.arctan2(away[:, 1], away[:, 0]) - pose[2]
         count = len(scan.angles)
-        step = float(scan.angles[1] - scan.angles[0]) if count > 1 else math.tau
-        ray = np.round(np.mod(bearing - scan.angles[0] + step / 2, math.tau) / step - 0.5)
-        ray = ray.astype(int)
+        step = float(np.median(np.diff(scan.angles))) if count > 1 else math.tau
+        first = scan.angles[0] - step / 2
+        towards = np.mod(bearing - first, math.tau) + first
+        ray = np.searchsorted((scan.angles[1:] + scan.angles[:-1]) / 2, towards)
+        ray[towards > scan.angles[-1] + step / 2] = count
         beyond = np.minimum(scan.ranges, scan.range_max)
         # The neighbours too: a thin obstacle between two rays is not gone.
         around = [beyond[np.clip(ray + offset, 0, count - 1)] for offset in (-1, 0, 1)]

@@ -1,11 +1,17 @@
-"""Where the robot's frames are to each other: the lidar on the robot, the odometry on the map."""
+"""Where the robot's frames are to each other: the lidars on the robot, the odometry on the map.
+
+The frames are those of REP-105: map -> odom -> base -> lidar. The robot's profile names them.
+"""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
+from builtin_interfaces.msg import Time
 from geometry_msgs.msg import TransformStamped
 from numpy.typing import NDArray
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
@@ -14,8 +20,11 @@ from sensor_msgs.msg import LaserScan
 from surveillance_controllers import conversions
 from surveillance_controllers.geometry import Mount, Pose, Scan, composed, relative
 from surveillance_runtime import parameter_checks
-from surveillance_runtime.conversions import pose_message
+from surveillance_runtime.conversions import nanoseconds_of, pose_message
 from surveillance_runtime.node import PatrolNode
+from surveillance_runtime.profile.parameters import LidarSettings
+from surveillance_runtime.profile.record import Frames
+from surveillance_runtime.qos import SENSOR_QOS
 
 try:
     from tf2_msgs.msg import TFMessage
@@ -23,27 +32,33 @@ except ImportError:
     TFMessage = None
 
 BASE_FRAMES = ('base_link', 'base_footprint', '')
-"""Frames at the robot's centre."""
+"""Frames at the robot's centre, beside the one that the profile names."""
 
 
 class ScanReader:
-    """Reads scans as seen from the robot, by where its lidar sits.
+    """Reads scans as seen from the robot, by where its lidars sit.
 
-    That is given by the parameter `lidar_mount`, or else by `tf_static`, where tf2_msgs is
-    installed.
+    That is given by the parameter `lidar_mounts`, or else by `tf_static`.
 
     Args:
         node: The node that reads.
         radius: Of the robot, metres.
+        base: The frame at the robot's centre.
+
+    Attributes:
+        settings: Which lidars there are.
 
     Raises:
-        ParameterError: `lidar_mount` is of the wrong type.
+        ParameterError: A parameter of the lidars is of the wrong type.
     """
 
-    def __init__(self, node: PatrolNode, radius: float) -> None:
+    def __init__(self, node: PatrolNode, radius: float, base: str = BASE_FRAMES[0]) -> None:
         self._node = node
         self._radius = radius
-        self._given = _given_mount(node)
+        self._base = _plain(base)
+        self.settings = node.declare_fields(LidarSettings())
+        rows = np.array(self.settings.mounts, dtype=float).reshape(-1, 4).tolist()
+        self._given = [Mount((x, y, yaw), math.cos(roll) < 0.0) for x, y, yaw, roll in rows]
         self._parents: dict[str, tuple[str, NDArray[np.float64]]] = {}
         self._mounts: dict[str, Mount] = {}
         self._told: set[str] = set()
@@ -53,20 +68,28 @@ class ScanReader:
                 reliability=ReliabilityPolicy.RELIABLE,
                 durability=DurabilityPolicy.TRANSIENT_LOCAL,
             )
+            # All robots of a domain may share it.
             node.create_subscription(TFMessage, 'tf_static', self._on_static, latched)
 
-    def read(self, message: LaserScan) -> Scan:
-        """Return a scan.
+    def subscribe(self, heard: Callable[[str, LaserScan], None]) -> None:
+        """Hand over each scan with the name of its topic."""
+        for topic in self.settings.scans:
+            self._node.create_subscription(LaserScan, topic, partial(heard, topic), SENSOR_QOS)
+
+    def read(self, message: LaserScan, topic: str = '') -> Scan:
+        """Return a scan of one of the lidars.
 
         Raises:
             ValueError: It is not sound; see `conversions.scan_from`.
         """
-        return conversions.scan_from(message, self.mount_of(message.header.frame_id), self._radius)
+        mount = self.mount_of(message.header.frame_id, topic)
+        return conversions.scan_from(message, mount, self._radius, self.settings.sweep)
 
-    def mount_of(self, frame: str) -> Mount:
+    def mount_of(self, frame: str, topic: str = '') -> Mount:
         """Return where the lidar of a frame is on the robot; at its centre while nobody says."""
-        if self._given is not None:
-            return self._given
+        if self._given:
+            scans = self.settings.scans
+            return self._given[scans.index(topic) if topic in scans else 0]
         if frame not in self._mounts:
             self._mounts[frame] = self._looked_up(frame)
         return self._mounts[frame]
@@ -74,12 +97,12 @@ class ScanReader:
     def _looked_up(self, frame: str) -> Mount:
         matrix = np.eye(4)
         at, passed = _plain(frame), 0
-        while at.rpartition('/')[2] not in BASE_FRAMES:
+        while at != self._base and at.rpartition('/')[2] not in BASE_FRAMES:
             if at not in self._parents or passed > len(self._parents):
                 self._tell_once(
                     f'scan: where its frame {frame!r} is on the robot is not known: expected '
-                    f'it on tf_static below {BASE_FRAMES[0]}, or the parameter lidar_mount; '
-                    "it is taken for the robot's centre"
+                    f'it on tf_static below {self._base}, or lidars.mounts in the robot profile '
+                    "(parameter lidar_mounts); it is taken for the robot's centre"
                 )
                 return Mount()
             at, step = self._parents[at]
@@ -107,41 +130,32 @@ class ScanReader:
         self._mounts.clear()
 
 
-def _given_mount(node: PatrolNode) -> Mount | None:
-    """Declare where the lidar sits on the robot; None: `tf_static` says it."""
-    given: list[float] = node.parameter(
-        'lidar_mount',
-        [],
-        'Where the lidar sits on the robot: x, y in metres, yaw in radians, and roll: 0, or 3.1416 '
-        "for one that hangs upside down; empty: as tf_static says of the scan's frame.",
-        of=float,
-        check=parameter_checks.lidar_mount,
-        read_only=True,
-    )
-    if not given:
-        return None
-    x, y, yaw, *roll = given
-    return Mount((x, y, yaw), bool(roll) and math.cos(roll[0]) < 0.0)
-
-
 class MapFrame:
     """Publishes map -> odom on `tf`, where tf2_msgs is installed.
 
     Args:
         node: The node that localises.
+        frames: Their names, and for how long a transform counts beyond its scan.
     """
 
-    def __init__(self, node: PatrolNode) -> None:
+    def __init__(self, node: PatrolNode, frames: Frames) -> None:
+        self._frames = frames
         self._publisher = None if TFMessage is None else node.create_publisher(TFMessage, 'tf', 10)
 
     def publish(self, pose: Pose, odometry: Pose, stamp: Any) -> None:
-        """Publish the correction that leads from the odometry to the pose."""
+        """Publish the correction that leads from the odometry to the pose.
+
+        It is dated ahead, as AMCL does: whoever asks for the present gets the last correction
+        instead of waiting for the next.
+        """
         if self._publisher is None:
             return
         # map <- odom = (map <- base) (base <- odom)
         x, y, yaw = composed(pose, relative(odometry, (0.0, 0.0, 0.0)))
-        transform = TransformStamped(child_frame_id='odom')
-        transform.header.frame_id, transform.header.stamp = 'map', stamp
+        transform = TransformStamped(child_frame_id=self._frames.odom)
+        transform.header.frame_id = self._frames.map
+        ahead = nanoseconds_of(stamp) + round(1e9 * self._frames.transform_tolerance)
+        transform.header.stamp = Time(sec=ahead // 10**9, nanosec=ahead % 10**9)
         transform.transform.translation.x, transform.transform.translation.y = x, y
         transform.transform.rotation = pose_message((x, y, yaw)).orientation
         self._publisher.publish(TFMessage(transforms=[transform]))

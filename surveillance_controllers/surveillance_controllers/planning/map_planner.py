@@ -50,7 +50,7 @@ class NavigationPlanning:
         self._knowledge = knowledge
         self._timeout = peer_timeout
         self._parameters = node.declare_fields(
-            PlanningParameters(), prefix='planning.', mode='SIMULATED'
+            PlanningParameters(), prefix='planning.', mode='SIMULATED and ROBOT'
         )
         self._segments = door_segments(node)
         self._doors = DoorWatch(node, self._segments, knowledge, peer_timeout)

@@ -14,14 +14,13 @@ from sensor_msgs.msg import CameraInfo, Image
 
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.parameters import parameter
+from surveillance_runtime.profile.parameters import declared_frames
 from surveillance_simulation import conversions
 from surveillance_simulation.camera.model import Camera, Conditions, expose
 from surveillance_simulation.camera.mujoco_rendering import MujocoRenderer
 from surveillance_simulation.camera.rendering import Renderer
 from surveillance_simulation.feeds.sensor_feed import SENSOR_DEPTH
 from surveillance_simulation.robot.robot import Robot
-
-_FRAME = 'camera_optical_frame'
 
 
 @dataclass(frozen=True)
@@ -74,6 +73,7 @@ class CameraFeed:
         self.conditions = node.declare_fields(
             Conditions(), prefix='camera.', on_change=self._take_conditions
         )
+        self._frame = declared_frames(node, 'camera').camera
         self._robot = robot
         options = node.declare_fields(CameraOptions(), prefix='camera.')
         self._camera = Camera.from_field_of_view(
@@ -128,7 +128,7 @@ class CameraFeed:
                 self._renderer.refresh()
                 pose = self._robot.camera_pose()
                 stamp = self._stamp()
-            self._infos.publish(conversions.camera_info_to_ros(self._camera, _FRAME, stamp))
+            self._infos.publish(conversions.camera_info_to_ros(self._camera, self._frame, stamp))
             if self.is_watched:
                 picture = expose(self._renderer.ideal(pose), self.conditions, self._rng)
-                self._images.publish(conversions.image_to_ros(picture, _FRAME, stamp))
+                self._images.publish(conversions.image_to_ros(picture, self._frame, stamp))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
 from builtin_interfaces.msg import Time
 from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped
 from nav_msgs.msg import OccupancyGrid, Odometry
@@ -16,6 +17,9 @@ from surveillance_interfaces.msg import DoorStates
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.parameters import parameter
 from surveillance_runtime.place import occupancy_grid
+from surveillance_runtime.place.floor_plan import Pose
+from surveillance_runtime.profile.parameters import LidarSettings, declared_frames
+from surveillance_runtime.profile.record import Frames
 from surveillance_runtime.state_topics import OwnedTopic
 from surveillance_simulation import conversions
 from surveillance_simulation.robot.robot import Robot
@@ -43,6 +47,21 @@ MAP_REPEAT = 5.0
 """Seconds of real time between two repetitions of the map, which is large."""
 
 
+def _lidars_of(node: PatrolNode, frames: Frames) -> list[tuple[str, str, Pose]]:
+    """Return topic, frame and mount of each lidar; one that tf_static knows is at the centre."""
+    lidars = node.declare_fields(LidarSettings(), without=('sweep',))
+    names = list(frames.scans)
+    rows = np.array(lidars.mounts or [0.0] * 4 * len(lidars.scans)).reshape(-1, 4).tolist()
+    return [
+        (
+            topic,
+            names[i] if i < len(names) else f'{topic}_frame',
+            (rows[i][0], rows[i][1], rows[i][2]),
+        )
+        for i, topic in enumerate(lidars.scans)
+    ]
+
+
 class SensorFeed:
     """The topics of a robot's sensors, of the map and of simulated time."""
 
@@ -53,8 +72,12 @@ class SensorFeed:
         self._clock = node.create_publisher(Clock, '/clock', 1) if drives_clock else None
         self._odometry = node.create_publisher(Odometry, 'odom', SENSOR_DEPTH)
         # One message for all measurements: making a new one takes longer than to publish it.
-        self._told_odometry = conversions.odometry_message('odom', 'base_link')
-        self._scan = node.create_publisher(LaserScan, 'scan', SENSOR_DEPTH)
+        self._frames = declared_frames(node, 'map', 'odom', 'base', 'scans')
+        self._told_odometry = conversions.odometry_message(self._frames.odom, self._frames.base)
+        self._scans = [
+            (node.create_publisher(LaserScan, topic, SENSOR_DEPTH), frame, mount)
+            for topic, frame, mount in _lidars_of(node, self._frames)
+        ]
         self._joints = node.create_publisher(JointState, 'joint_states', SENSOR_DEPTH)
         self._truth = node.create_publisher(PoseStamped, 'ground_truth', SENSOR_DEPTH)
         self._collisions = OwnedTopic(node, UInt32, 'collisions')
@@ -64,7 +87,7 @@ class SensorFeed:
         self._told_collisions = -1
         options = node.declare_fields(PublishedOptions())
         grid = occupancy_grid.draw(robot.world.plan, options.map_resolution)
-        self._map.publish(conversions.grid_to_ros(grid, 'map', Time()))
+        self._map.publish(conversions.grid_to_ros(grid, self._frames.map, Time()))
         self.tell_doors()
         if options.announce_pose:
             self._announce_pose(node)
@@ -83,13 +106,14 @@ class SensorFeed:
         )
         self._odometry.publish(self._told_odometry)
         if self._tf is not None:
-            transform = conversions.transform_to_ros(base.odometry, 'odom', 'base_link', stamp)
-            self._tf.publish(TFMessage(transforms=[transform]))
-        if self._scan.get_subscription_count():
-            ranges = self._robot.scan()
-            self._scan.publish(
-                conversions.scan_to_ros(ranges, self._robot.lidar, 'base_link', stamp)
+            transform = conversions.transform_to_ros(
+                base.odometry, self._frames.odom, self._frames.base, stamp
             )
+            self._tf.publish(TFMessage(transforms=[transform]))
+        for publisher, frame, mount in self._scans:
+            if publisher.get_subscription_count():
+                ranges = self._robot.scan(mount)
+                publisher.publish(conversions.scan_to_ros(ranges, self._robot.lidar, frame, stamp))
         if self._joints.get_subscription_count():
             arm, now = self._robot.arm, self._robot.time
             self._joints.publish(
@@ -98,7 +122,7 @@ class SensorFeed:
                 )
             )
         if self._truth.get_subscription_count():
-            self._truth.publish(conversions.stamped_pose_to_ros(base.pose, 'map', stamp))
+            self._truth.publish(conversions.stamped_pose_to_ros(base.pose, self._frames.map, stamp))
         if base.collisions != self._told_collisions:
             self._told_collisions = base.collisions
             self._collisions.publish(UInt32(data=base.collisions))
@@ -109,7 +133,7 @@ class SensorFeed:
                 stamp = node.get_clock().now().to_msg()
                 publisher.publish(
                     conversions.uncertain_pose_to_ros(
-                        self._robot.base.pose, 'map', stamp, 0.1, 0.05
+                        self._robot.base.pose, self._frames.map, stamp, 0.1, 0.05
                     )
                 )
 

@@ -8,6 +8,7 @@ from collections.abc import Mapping
 import numpy as np
 import numpy.typing as npt
 
+from surveillance_runtime.place.floor_plan import Pose
 from surveillance_runtime.robot_arm import ARM, Arm, Array
 from surveillance_simulation.robot.arm_motion import ArmMotion
 from surveillance_simulation.robot.base import Base, BaseModel
@@ -100,9 +101,13 @@ class Robot:
         self.time = time
         return True
 
-    def scan(self) -> npt.NDArray[np.float32]:
-        """Return the lidar's distances, see `lidar.scan`."""
-        return scan(self.world, self.base.pose, self.lidar, self._rng)
+    def scan(self, mount: Pose = (0.0, 0.0, 0.0)) -> npt.NDArray[np.float32]:
+        """Return the distances of a lidar that sits on the robot somewhere, see `lidar.scan`."""
+        x, y, yaw = self.base.pose
+        dx, dy, turn = mount
+        cos, sin = math.cos(yaw), math.sin(yaw)
+        at = (x + cos * dx - sin * dy, y + sin * dx + cos * dy, yaw + turn)
+        return scan(self.world, at, self.lidar, self._rng)
 
     def camera_pose(self) -> Array:
         """Return the transform (4, 4) from the camera's optical frame to the world, metres."""

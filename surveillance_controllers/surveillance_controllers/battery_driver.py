@@ -1,0 +1,117 @@
+"""What the driver of a real battery says: a charge in percent, from messages of several habits.
+
+`sensor_msgs/BatteryState` has a `percentage` from 0 to 1, NaN where it is not measured; many
+drivers fill it from 0 to 100, others tell the voltage alone. Which it is stands in the robot's
+profile.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from surveillance_runtime.parameters import parameter
+from surveillance_runtime.profile.record import BATTERY_SOURCES, BatterySource, voltage_curve
+
+_SLACK = 1.2
+"""A gauge may say more than full: a TurtleBot3 tells its voltage as a part of the nominal one."""
+CONTACT_SECONDS = 10.0
+"""A dock may take this long until it charges, s."""
+
+
+@dataclass(frozen=True)
+class DriverSettings:
+    """Where the charge comes from in ROBOT mode; units as declared."""
+
+    source: str = parameter(
+        BatterySource.source,
+        'ROBOT: topic: battery_state of a driver; model: computed from the way driven.',
+        choices=BATTERY_SOURCES,
+    )
+    full: float = parameter(
+        BatterySource.full,
+        "What the driver's percentage holds when full: 1, or 100 of many.",
+        0.01,
+        1000.0,
+    )
+    voltages: tuple[float, ...] = parameter(
+        (),
+        'Voltage, V, and the percent that it stands for, pairs that rise; of a driver that tells '
+        'no percentage.',
+        of=float,
+        check=voltage_curve,
+    )
+    timeout: float = parameter(
+        BatterySource.timeout, 'The driver is silent after this, s.', 1.0, 3600.0
+    )
+
+
+def level_from(percentage: float, voltage: float, settings: DriverSettings) -> float:
+    """Return the charge that a driver's message tells, percent.
+
+    Raises:
+        ValueError: It tells none.
+    """
+    if math.isfinite(percentage):
+        share = percentage / settings.full
+        if not 0.0 <= share <= _SLACK:
+            hint = (
+                '; battery.full: 100 in the profile fits it'
+                if settings.full == 1.0 and 0.0 <= percentage <= 100.0 * _SLACK
+                else ''
+            )
+            raise ValueError(f'percentage {percentage:g}: expected 0 to {settings.full:g}{hint}')
+        return min(100.0, 100.0 * share)
+    if not settings.voltages:
+        raise ValueError(
+            'percentage is not a number: expected one, or battery.voltages in the profile'
+        )
+    if not (math.isfinite(voltage) and voltage > 0.0):
+        raise ValueError(f'percentage is not a number and voltage is {voltage:g}: expected V')
+    return float(np.interp(voltage, settings.voltages[::2], settings.voltages[1::2]))
+
+
+class DrivenBattery:
+    """What a driver said last, and whether it still speaks.
+
+    Args:
+        settings: Its habits.
+
+    Attributes:
+        level: The charge, percent; None until it said one.
+        charging: Whether it charges; None where it does not say.
+    """
+
+    def __init__(self, settings: DriverSettings) -> None:
+        self._settings = settings
+        self.level: float | None = None
+        self.charging: bool | None = None
+        self._heard = -math.inf
+        self._not_charging_since: float | None = None
+
+    def hear(self, percentage: float, voltage: float, charging: bool | None, now: float) -> None:
+        """Take a message that came at `now`, seconds.
+
+        Raises:
+            ValueError: It tells no charge.
+        """
+        self.level = level_from(percentage, voltage, self._settings)
+        self._heard = now
+        self.charging = charging
+        if charging is not False:
+            self._not_charging_since = None
+        elif self._not_charging_since is None:
+            self._not_charging_since = now
+
+    def speaks(self, now: float) -> bool:
+        """Tell whether the driver was heard within its timeout."""
+        return now - self._heard <= self._settings.timeout
+
+    def why_not_charging(self, asked_at: float, now: float) -> str | None:
+        """Say why the battery does not charge, which was asked for at a time; None while it may."""
+        since = self._not_charging_since
+        if since is None or now - max(since, asked_at) < CONTACT_SECONDS:
+            return None
+        return f'the driver of the battery says for {CONTACT_SECONDS:g} s that it does not charge'
