@@ -33,7 +33,8 @@ CHECKOUT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(CHECKOUT / 'libs' / 'state_machines'))
 
 import state_machines as fsm
-from state_machines import history
+from state_machines.checkpoint import Checkpointer, load
+from state_machines.transitions import TransitionFeed
 from state_machines.verify import verify
 
 RING = 3
@@ -152,7 +153,7 @@ def with_feed(machine: Any, count: int) -> Callable[[], object]:
 
     def work() -> None:
         seen = deque[int](maxlen=1)
-        feed = history.TransitionFeed(machine, lambda transition: seen.append(transition.sequence))
+        feed = TransitionFeed(machine, lambda transition: seen.append(transition.sequence))
         machine.execute()
         feed.close(timeout=600.0)
         assert seen[0] == count, f'{seen[0]} of {count} transitions came'
@@ -712,7 +713,7 @@ def mission(log: Any, checkpoint: Path, items: int) -> fsm.StateMachine:
         fsm.StateMachine.add('ITEMS', each)
     # Before the checkpointer, which removes the file at the end.
     root.register_termination_cb(lambda *_: log.write('end 0\n') and log.flush())
-    history.Checkpointer(root, checkpoint)
+    Checkpointer(root, checkpoint)
 
     def saved(ud: Any, active: object) -> None:
         # Registered after the checkpointer: what is done here is on the disk.
@@ -766,7 +767,7 @@ def _run_mission(checkpoint: Path, log: Path, items: int) -> None:
         with open(log, 'a', encoding='utf-8') as file:
             machine = mission(file, checkpoint, items)
             if checkpoint.exists():
-                history.load(machine, checkpoint)
+                load(machine, checkpoint)
             machine.execute()
         os._exit(0)
     except BaseException as error:

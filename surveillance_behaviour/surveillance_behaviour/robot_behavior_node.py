@@ -47,6 +47,9 @@ from surveillance_runtime.process import run_node
 from surveillance_runtime.qos import SENSOR_QOS
 from surveillance_runtime.state_topics import OwnedTopic, StateSubscription
 
+HUNG_STATE_SECONDS = 60.0
+"""How long a state may ignore that it is to stop (to charge, say) before the mission goes on."""
+
 
 class RobotBehavior(PatrolNode):
     """The robot's behaviour, as a state machine on a thread of its own."""
@@ -73,6 +76,7 @@ class RobotBehavior(PatrolNode):
         clock = self._mission_clock
         self.mission = Mission(self._behaviour, settings, ports, battery, clock, self._record)
         self.machine = MACHINES[self._behaviour](self.mission)
+        self.machine.preempt_timeout = HUNG_STATE_SECONDS
         self._announcer.attach(self.mission, self.machine)
         # A pause lets no further state begin; what moves the robot has it stand at once.
         self._paused = OwnedTopic(self, Bool, 'paused')

@@ -15,10 +15,10 @@ import state_machines as fsm
 from state_machines.container import Container
 from state_machines.exceptions import CallError
 from state_machines.export import to_ascii
-from state_machines.history import Transition, TransitionFeed
 from state_machines.ros.calls import ServiceCaller
 from state_machines.ros.waiting import seconds
 from state_machines.structure import Structure, state_at
+from state_machines.transitions import Transition, TransitionFeed
 from surveillance_interfaces.msg import (
     FsmStatus,
     FsmStructure,

@@ -10,8 +10,8 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_srvs.srv import Trigger
 
 from libs.state_machines.tests.states import Background, began
-from state_machines.history import Transition
 from state_machines.ros import ServiceCaller
+from state_machines.transitions import Transition
 from surveillance_interfaces.msg import (
     FsmStatus,
     FsmStructure,

@@ -321,7 +321,7 @@ def test_smachs_status_follows_what_an_interrupt_puts_aside_and_goes_on_with(gra
 
 def test_a_container_that_was_added_later_is_no_error(node, monkeypatch):
     errors = []
-    monkeypatch.setattr('state_machines.history.logerr', errors.append)
+    monkeypatch.setattr('state_machines.transitions.logerr', errors.append)
     root, late = (fsm.StateMachine(['done']) for _ in range(2))
     with root:
         fsm.StateMachine.add('FIRST', Answer('done'), {'done': 'LATE'})

@@ -1,7 +1,8 @@
 """A state machine engine with SMACH's interface and without ROS.
 
 ``import state_machines as smach`` runs machines written for SMACH. The rest is in modules of
-their own: `verify`, `export`, `history`, `testing`, and `state_machines.ros` for ROS 2.
+their own: `verify`, `export`, `transitions`, `checkpoint`, `testing`, and `state_machines.ros` for
+ROS 2.
 """
 
 from __future__ import annotations
@@ -10,11 +11,11 @@ from state_machines.clock import Clock, Interrupt, WallClock
 from state_machines.concurrence import Concurrence
 from state_machines.container import Container
 from state_machines.exceptions import (
+    CheckpointError,
     InvalidConstructionError,
     InvalidStateError,
     InvalidTransitionError,
     InvalidUserCodeError,
-    MachineFileError,
     MissingKeyError,
     SmachError,
 )
@@ -27,7 +28,7 @@ from state_machines.log import (
     reset_loggers,
     set_loggers,
 )
-from state_machines.nodes import RESUME, LimitOptions
+from state_machines.program import RESUME, LimitOptions
 from state_machines.state import (
     CBInterface,
     CBState,
@@ -42,6 +43,7 @@ __all__ = [
     'RESUME',
     'CBInterface',
     'CBState',
+    'CheckpointError',
     'Clock',
     'Concurrence',
     'Container',
@@ -52,7 +54,6 @@ __all__ = [
     'InvalidUserCodeError',
     'Iterator',
     'LimitOptions',
-    'MachineFileError',
     'MissingKeyError',
     'Remapper',
     'Sequence',

@@ -31,8 +31,10 @@ class Interrupt:
             if self._set:
                 return
             self._set = True
-            waiters, self._waiters = self._waiters, []
-            callbacks = list(self._callbacks.values())
+            waiters = self._waiters
+            if waiters:
+                self._waiters = []
+            callbacks = list(self._callbacks.values()) if self._callbacks else ()
         for waiter in waiters:
             waiter.release()
         for callback in callbacks:

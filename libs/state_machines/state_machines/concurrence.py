@@ -7,6 +7,7 @@ thread watches. `Concurrence` is the container.
 
 from __future__ import annotations
 
+import enum
 from collections.abc import Callable, Hashable, Iterable, Mapping
 from typing import Any, Self, Unpack
 
@@ -22,10 +23,10 @@ from state_machines.exceptions import (
     shown,
 )
 from state_machines.execution import ExecutionThread, LeftBehindError
-from state_machines.frame import Answer, Frame, History, Move, answer_of
-from state_machines.nodes import SUSPENDED, Exit, LimitOptions, Node
+from state_machines.frame import AGAIN, Frame, Move, answer_of, call, execute_root, run
+from state_machines.program import SUSPENDED, Exit, History, LimitOptions, Node, Program
 from state_machines.state import State, this_thread
-from state_machines.timeouts import leave_behind, settled, supervise
+from state_machines.timeouts import leave_behind, supervise
 
 Outcomes = dict[str, str | None]
 ChildTerminationCallback = Callable[[Outcomes], bool | Iterable[str] | None]
@@ -35,28 +36,48 @@ ENDED = Exit('')
 """Where every outcome of a concurrence's state leads: it has ended."""
 
 
+class ChildState(enum.Flag):
+    """What one state of a concurrence has been asked, and what its end says to that.
+
+    A state may be asked several things while it runs: by a preempt, and by an interrupt, say.
+    """
+
+    RUNS = 0
+    """Nothing was asked of it."""
+    PREEMPTED = enum.auto()
+    """A preempt of the concurrence asked it to stop."""
+    STOPPED = enum.auto()
+    """The concurrence itself asked it to stop, because another state had ended."""
+    MAKES_WAY = enum.auto()
+    """An interrupt asked it to make way; it is executed again afterwards."""
+    SERVED = enum.auto()
+    """It has ended, and acknowledged the preempt."""
+
+
 class ChildFrame(Frame):
     """One execution of one state of a concurrence, on a logical thread of its own.
 
+    Args:
+        within: The execution of the concurrence.
+        node: The state's node.
+        thread: The logical thread.
+
     Attributes:
         node: The state's node.
-        unneeded: The concurrence itself asked it to stop, because another one had ended.
-        served: It has ended, and acknowledged a preempt.
+        state: What it was asked.
     """
 
-    container: Concurrence
-    unneeded = False
-    served = False
+    state = ChildState.RUNS
 
     def __init__(self, within: ConcurrentFrame, node: Node, thread: ExecutionThread) -> None:
-        super().__init__(within.container, thread, within.path, node, None)
-        self.node = node
+        super().__init__(within.program, thread, None)
+        self.current = self.node = node
 
     def successor(self) -> Self:
         """Return a copy for the thread that takes this execution over."""
         frame = super().successor()
         # Not kept: the two would refer to each other, which is left to no garbage collector.
-        within = self.container.fsm_frame
+        within = self.program.frame
         assert isinstance(within, ConcurrentFrame)
         within.replace_child(frame)
         return frame
@@ -65,51 +86,89 @@ class ChildFrame(Frame):
         """Return what the logical thread may end with: the state's, not the concurrence's."""
         return self.node.state.get_registered_outcomes()
 
-    def execute(self, history: History | None = None) -> Any:
-        """Execute the state; its outcome."""
-        node, stack = self.node, self.thread.stack
-        if self.stale:
+    def execute(self) -> Any:
+        """Execute the state on a thread of its own; its outcome."""
+        stack = this_thread.stack
+        if self.abandoned:
             raise LeftBehindError
         try:
-            outcome = node.execute(node.view)
-            node.target(outcome)
-            return outcome
-        except SmachError:
-            raise
-        except Exception as error:
-            raise node.user_fault(error) from error
+            return self._execute(stack, AGAIN)
         finally:
             if stack and stack[-1] is self:
                 stack.pop()
 
-    def run_on(self, outcome: Any) -> Any:
-        """Take `outcome` for that of the state."""
-        return settled(self, outcome)
+    def _execute(self, stack: list[Any], outcome: Any) -> Any:
+        """Execute the state until it is not to be executed again; its outcome.
 
-    def answer(self) -> Answer:
-        """Tell what the state's end answers, and take back what it did not acknowledge."""
-        node = self.node
+        Args:
+            stack: The present thread's frames.
+            outcome: What it has ended with already, or `AGAIN`.
+        """
+        node, hooked = self.node, self.node.entry is not None and self.node.entry.hooked
+        while outcome is AGAIN:
+            if hooked:
+                self.before(node)
+            program = node.program
+            if program is None:
+                outcome = call(node)
+            else:
+                outcome = execute_root(stack, self.thread, program, node.view)
+            if hooked:
+                outcome = self.after(node, outcome)
+        node.target(outcome)
+        return outcome
+
+    def go_on(self, stack: list[Any], outcome: Any) -> Any:
+        """Go on after a state that was left behind, here or in a container inside."""
+        if len(stack) > 1:
+            stack[-1].go_on_after(outcome)
+            outcome = self.after(self.node, run(stack, 1))
+        return self._execute(stack, outcome)
+
+    def note_answer(self) -> bool:
+        """Note what the state's end answers, and take back what it did not acknowledge.
+
+        Returns:
+            Whether it made way.
+        """
+        state = self.state
         answer = answer_of(
-            node.state,
+            self.node.state,
             self.thread.outcome,
-            preempted=self.unneeded or self.preempted is node,
-            cut=self.cut is node,
-            gone=self.gone is node,
+            preempted=bool(state & (ChildState.STOPPED | ChildState.PREEMPTED)),
+            making_way=bool(state & ChildState.MAKES_WAY),
+            left=self.left is self.node,
         )
-        self.served = answer.served and self.preempted is node
-        return answer
+        if answer.served and state & ChildState.PREEMPTED:
+            self.state |= ChildState.SERVED
+        return answer.made_way
 
     # What others want; under the machine's condition.
 
     @property
-    def wanted(self) -> bool:
-        """Whether somebody wants the state to end."""
-        return self.unneeded or super().wanted
+    def making_way(self) -> Node | None:  # type: ignore[override]
+        """The node, if its state was asked to make way for an interrupt."""
+        return self.node if self.state & ChildState.MAKES_WAY else None
 
     @property
-    def asked(self) -> bool:
-        """Whether the state was asked to end; without that there is nothing to answer."""
-        return self.unneeded or self.preempted is not None or self.cut is not None
+    def must_end(self) -> bool:
+        """Whether somebody wants the state to end."""
+        return bool(self.state) or super().must_end
+
+    def preempt(self) -> None:
+        """Ask the state to stop, once: again could come after it served the first request."""
+        if not (self.thread.done or self.state & ChildState.PREEMPTED):
+            self.state |= ChildState.PREEMPTED
+            self.attention = True
+            self.thread.asked()
+            self.node.state.request_preempt()
+
+    def make_way(self) -> None:
+        """Ask the state to make way for an interrupt."""
+        if not (self.thread.done or self.state & ChildState.MAKES_WAY):
+            self.state |= ChildState.MAKES_WAY
+            self.thread.asked()
+            self.node.state.fsm_suspend()
 
     def stop(self) -> None:
         """Ask the state to stop, once: another one has ended.
@@ -117,18 +176,18 @@ class ChildFrame(Frame):
         One that a preempt asked already is not asked again, nor when a third state ends: it may
         have served that, and be at what it does then.
         """
-        if not (self.thread.done or self.unneeded):
-            self.unneeded = True
-            if self.preempted is None:
+        if not (self.thread.done or self.state & ChildState.STOPPED):
+            self.state |= ChildState.STOPPED
+            if not self.state & ChildState.PREEMPTED:
                 self.thread.asked()
                 self.node.state.request_preempt()
 
     def hold(self) -> None:
         """Leave the concurrence to its own frame."""
 
-    def abandoned(self, *, for_good: bool) -> None:
+    def abandon(self, *, for_good: bool) -> None:
         """Note that the machine went on without the thread; the concurrence may go on."""
-        self.stale = self.attention = True
+        self.abandoned = self.attention = True
 
 
 class _AllStates(State):
@@ -142,7 +201,7 @@ class _AllStates(State):
 
     @property
     def _frame(self) -> ConcurrentFrame | None:
-        frame = self._concurrence.fsm_frame
+        frame = self._concurrence.fsm_program.frame
         return frame if isinstance(frame, ConcurrentFrame) else None
 
     def execute(self, ud: Any) -> Any:
@@ -159,11 +218,11 @@ class _AllStates(State):
     def fsm_suspend(self) -> None:
         """Ask those that run to make way; under the machine's condition."""
         if self._frame is not None:
-            self._frame.cut_states()
+            self._frame.suspend_states()
 
     def fsm_forget(self) -> None:
         """Drop how far they have come."""
-        for state in self._concurrence.fsm_states.values():
+        for state in self._concurrence.fsm_program.states.values():
             state.fsm_forget()
 
 
@@ -174,18 +233,9 @@ class ConcurrentFrame(Frame):
         outcomes: What each state ended with; None for those that have not ended.
     """
 
-    container: Concurrence
-
-    def __init__(
-        self,
-        container: Concurrence,
-        thread: ExecutionThread,
-        path: str,
-        current: Node | Exit,
-        parent_ud: Any,
-    ) -> None:
-        super().__init__(container, thread, path, current, parent_ud)
-        self.outcomes: Outcomes = dict.fromkeys(container.fsm_states)
+    def __init__(self, program: Program, thread: ExecutionThread, parent_ud: Any) -> None:
+        super().__init__(program, thread, parent_ud)
+        self.outcomes: Outcomes = dict.fromkeys(program.states)
         self._begin_anew()
 
     def successor(self) -> Self:
@@ -201,7 +251,7 @@ class ConcurrentFrame(Frame):
         # Of all states that were started, by label; most have ended.
         self._children: dict[str, ChildFrame] = {}
         # What an execution that was left behind, or broke off, was asked is not for this one.
-        together = self.container.fsm_first().state
+        together = self.program.first.state
         if together.preempt_requested():
             together.recall_preempt()
 
@@ -219,13 +269,13 @@ class ConcurrentFrame(Frame):
 
     def active_labels(self) -> list[str]:
         """Return the labels of the states that run, or of the interrupt's."""
-        if self.current is not self.container.fsm_first():
+        if self.current is not self.program.first:
             return super().active_labels()
         return [label for label, outcome in self.outcomes.items() if outcome is None]
 
-    def abandoned(self, *, for_good: bool) -> None:
+    def abandon(self, *, for_good: bool) -> None:
         """Note that the machine went on without the thread; it goes on without the states, too."""
-        super().abandoned(for_good=for_good)
+        super().abandon(for_good=for_good)
         for child in self._children.values():
             if child.thread.done:
                 # Its end will not be noted.
@@ -246,7 +296,7 @@ class ConcurrentFrame(Frame):
         for child in running.values():
             child.thread.start(child.execute)
         error = self._await_states(running, error)
-        callbacks = container.fsm_transition_cbs or container.fsm_termination_cbs
+        callbacks = self.program.transition_cbs or self.program.termination_cbs
         if callbacks or control.trace is not None or control.chatty:
             # Its end is not told as that of one state: see `tell`.
             self.attention = True
@@ -275,7 +325,7 @@ class ConcurrentFrame(Frame):
         elif outcome == container.default_outcome:
             # Nothing says that the outcome stands for a preempt: what runs next is asked.
             return outcome
-        container.fsm_first().state.service_preempt()
+        self.program.first.state.service_preempt()
         return outcome
 
     def _served_preempt(self, *, preempted: bool) -> bool:
@@ -284,14 +334,15 @@ class ConcurrentFrame(Frame):
         for label, child in self._children.items():
             state = child.node.state
             # A state that was left behind keeps the request, so that it ends some time.
-            pending = state.preempt_requested() and child.gone is None
+            pending = state.preempt_requested() and child.left is None
             if pending:
                 state.recall_preempt()
-            if pending or (child.preempted is not None and not child.served):
+            asked = child.state & (ChildState.PREEMPTED | ChildState.SERVED)
+            if pending or asked == ChildState.PREEMPTED:
                 ignored.append(label)
         if preempted and ignored:
             log.logwarn(f"'{self.path}': {ignored} did not acknowledge the preempt")
-        return any(child.served for child in self._children.values())
+        return any(child.state & ChildState.SERVED for child in self._children.values())
 
     # The states.
 
@@ -301,22 +352,22 @@ class ConcurrentFrame(Frame):
         Raises:
             LeftBehindError: The machine went on without the concurrence.
         """
-        control, container = self.control, self.container
+        control, program = self.control, self.program
         with control.condition:
             self._check()
             children = {
                 label: ChildFrame(self, node, ExecutionThread(control, node.path, self._wakeup))
-                for label, node in container.fsm_table.items()
+                for label, node in program.table.items()
                 if label in self.outcomes and self.outcomes[label] is None
             }
             for child in children.values():
                 child.thread.stack.append(child)
             self._children |= children
             # What was asked before there was anybody to ask.
-            if container.fsm_first().state.preempt_requested():
+            if program.first.state.preempt_requested():
                 self.preempt_states()
-            elif self.cut is not None:
-                self.cut_states()
+            elif self.making_way is not None:
+                self.suspend_states()
         return children
 
     def _await_states(
@@ -337,7 +388,13 @@ class ConcurrentFrame(Frame):
         self._check()
         while running:
             self.watches_threads = True
-            supervise(self.control, [child.thread for child in running.values()], self._wakeup)
+            try:
+                supervise(self.control, [child.thread for child in running.values()], self._wakeup)
+            except BaseException as interrupt:
+                # From the keyboard, as a rule: passed on when all have ended.
+                first_error = first_error or interrupt
+                self._stop(running)
+                continue
             with self.control.condition:
                 self._check()
                 # From here on it is the callbacks that a preempt waits for.
@@ -359,7 +416,7 @@ class ConcurrentFrame(Frame):
 
     def _check(self) -> None:
         """Raise `LeftBehindError` when the machine went on without the concurrence."""
-        if self.stale:
+        if self.abandoned:
             raise LeftBehindError
 
     def _stop_others(self, running: Iterable[str]) -> SmachError | None:
@@ -386,9 +443,9 @@ class ConcurrentFrame(Frame):
             # A preempt that it was asked for, too, is not served by that.
             outcome = child.forced[1]
             node.state.fsm_forget()
-            if child.gone is None:
+            if child.left is None:
                 node.state.recall_preempt()
-        elif (outcome is SUSPENDED or child.asked) and child.answer().made_way:
+        elif (outcome is SUSPENDED or child.state) and child.note_answer():
             node.release()
             return None
         node.state.fsm_progress = None
@@ -404,8 +461,8 @@ class ConcurrentFrame(Frame):
 
     def tell(self, move: Move) -> None:
         """Tell of interrupts, the beginning and the end; the states' ends are told one by one."""
-        if move.left is self.container.fsm_first() and move.kind != 'interrupt':
-            labels = list(self.container.fsm_states)
+        if move.left is self.program.first and move.kind != 'interrupt':
+            labels = list(self.program.states)
             self.container.call_termination_cbs(labels, move.target.label)
         else:
             super().tell(move)
@@ -417,16 +474,14 @@ class ConcurrentFrame(Frame):
         self._children[child.node.label] = child
 
     def preempt_states(self) -> None:
-        """Ask those that run to stop, each once: again could come after it served the first."""
+        """Ask those that run to stop."""
         for child in self._children.values():
-            if not child.thread.done:
-                child.preempt()
+            child.preempt()
 
-    def cut_states(self) -> None:
+    def suspend_states(self) -> None:
         """Ask those that run to make way."""
         for child in self._children.values():
-            if not child.thread.done:
-                child.cut_short()
+            child.make_way()
 
 
 class Concurrence(Container):
@@ -523,8 +578,8 @@ class Concurrence(Container):
             InvalidStateError: It has no states.
             InvalidTransitionError: The outcome map or an interrupt does not fit the states.
         """
-        if not self.fsm_states:
-            raise InvalidStateError(f"Concurrence '{self.fsm_path}' cannot run: it has no states")
+        if not self.fsm_program.states:
+            raise InvalidStateError(f"Concurrence '{self.get_name()}' cannot run: it has no states")
         super().check_consistency()
 
     def fsm_faults(self) -> list[str]:
@@ -532,7 +587,7 @@ class Concurrence(Container):
         faults = []
         for outcome, wanted in self.outcome_map.items():
             for label, end in wanted.items():
-                state = self.fsm_states.get(label)
+                state = self.fsm_program.states.get(label)
                 if state is None:
                     faults.append(f"outcome '{outcome}' asks for state '{label}', which it lacks")
                 elif end not in state.get_registered_outcomes():
@@ -561,7 +616,7 @@ class Concurrence(Container):
         """
         if self.child_termination_cb is None:
             return frozenset()
-        what = f"The child_termination_cb of '{self.fsm_path}'"
+        what = f"The child_termination_cb of '{self.get_name()}'"
         try:
             stop = self.child_termination_cb(dict(ends))
         except Exception as error:
@@ -593,7 +648,7 @@ class Concurrence(Container):
                 outcome, most = name, len(wanted)
         if self.outcome_cb is None:
             return outcome
-        what = f"The outcome_cb of '{self.fsm_path}'"
+        what = f"The outcome_cb of '{self.get_name()}'"
         try:
             chosen = self.outcome_cb(dict(ends)) or outcome
         except Exception as error:
@@ -608,26 +663,26 @@ class Concurrence(Container):
 
     def fsm_make_table(self) -> dict[str, Node]:
         """Make the nodes of all states, and the one without a label that runs them together."""
-        table = {}
-        for label, state in self.fsm_states.items():
-            node = table[label] = self.fsm_node(label, state)
+        table, program = {}, self.fsm_program
+        for label, state in program.states.items():
+            node = table[label] = program.node(label, state)
             for outcome in state.get_registered_outcomes():
                 node.targets[outcome] = ENDED
             if node.limits is not None and node.limits.late_outcome:
                 node.targets.setdefault(node.limits.late_outcome, ENDED)
-        node = table[''] = self.fsm_node('', _AllStates(self))
+        node = table[''] = program.node('', _AllStates(self))
         node.targets = {outcome: Exit(outcome) for outcome in self.get_registered_outcomes()}
         return table
 
-    def fsm_first(self) -> Node:
+    def fsm_first_of(self, table: Mapping[str, Node]) -> Node:
         """Return the node that runs all states."""
-        return self.fsm_table['']
+        return table['']
 
     # The container's interface.
 
     def get_initial_states(self) -> list[str]:
         """Return the labels of all states."""
-        return list(self.fsm_states)
+        return list(self.fsm_program.states)
 
     def get_internal_edges(self) -> list[tuple[str, str, str | None]]:
         """Return the outcome map as (child outcome, label, outcome)."""

@@ -1,8 +1,8 @@
 """The container: a state that runs other states, built under ``with``.
 
-`Container` holds what its kinds have in common: construction, callbacks, userdata in and out, the
-beginning of an execution, interrupts. How the states inside are run is the matter of the frame that
-is made for each execution (`frame`).
+`Container` is the interface that its kinds have in common: construction, callbacks, execution,
+interrupts. What it was given is in its `Program`, and how that is run is the matter of the loop
+(`frame`).
 """
 
 from __future__ import annotations
@@ -22,29 +22,23 @@ from state_machines.exceptions import (
     shown,
     unknown,
 )
-from state_machines.execution import (
-    DEFAULT_PREEMPT_TIMEOUT,
-    Control,
-    ExecutionThread,
-    LeftBehindError,
-)
-from state_machines.frame import Frame, History
-from state_machines.log import logerr, logwarn
-from state_machines.nodes import (
-    LOWEST,
+from state_machines.execution import Control, ExecutionThread
+from state_machines.frame import Frame, execute_root
+from state_machines.log import logerr
+from state_machines.program import (
     RESUME,
-    RESUMPTION,
     TIMEOUT,
     Branch,
+    Callback,
     Exit,
     LimitOptions,
-    Limits,
     Node,
+    Program,
     make_limits,
 )
 from state_machines.state import State, structure_version, this_thread
-from state_machines.timeouts import block_reentry, limited, supervise
-from state_machines.userdata import Remapper, UserData, raw
+from state_machines.timeouts import supervise
+from state_machines.userdata import UserData
 
 
 class _Construction(threading.local):
@@ -55,17 +49,15 @@ class _Construction(threading.local):
 
 
 _construction = _Construction()
-_entry_lock = threading.Lock()
-_raise_lock = threading.Lock()
-
-Callback = tuple[Callable[..., Any], tuple[Any, ...]]
+_control_lock = threading.Lock()
 
 
 class Container(State):
     """Base of the states that run other states.
 
-    A container that is executed by user code is a root: it runs on a thread of its own while the
-    caller watches over it. One that a container of the engine executes joins that run.
+    A container that is executed by user code is a root. It runs on the thread that calls it, unless
+    a state inside has a time limit or `preempt_timeout` is set: then it runs on another thread,
+    while the caller watches over it. A container inside another one joins that one's run.
 
     Args:
         outcomes: What the container may end with.
@@ -74,20 +66,9 @@ class Container(State):
 
     Attributes:
         userdata: What the states inside share.
-        fsm_states: The states by label.
-        fsm_branches: The interrupts by label.
-        fsm_remappings: From the userdata keys of states and interrupts to the container's, by
-            label.
-        fsm_constants: Values of the states' input keys that come from no userdata, by label.
-        fsm_limits: The states' time limits and retries, by label.
-        fsm_transition_cbs: The registered callbacks, and likewise the others.
-        fsm_frame: The execution of the container, while there is one.
-        fsm_history: Where the next execution goes on, when the last one was put aside.
-        fsm_raised: Interrupts that have been raised and have not begun.
+        fsm_program: What the container was given, compiled, and where its execution is.
         fsm_frame_type: How the container is executed.
         fsm_arguments: What else may be said of a state that is added.
-        fsm_table: The nodes of states and interrupts by label, as they were last made.
-        fsm_data: The dictionary behind the userdata, as it was then.
     """
 
     together = False
@@ -96,23 +77,10 @@ class Container(State):
     fsm_frame_type: ClassVar[type[Frame]] = Frame
     fsm_arguments: ClassVar[tuple[str, ...]] = ('transitions', 'remapping', 'constants')
 
-    fsm_frame: Frame | None = None
-    fsm_history: History | None = None
-    fsm_raised: tuple[Branch, ...] = ()
-    fsm_table: Mapping[str, Node] = {}
-    fsm_data: dict[str, Any]
-    _table_made_for: tuple[int, int, int, str] | None = None
+    fsm_program: Program
     _control: Control | None = None
-    _preempt_timeout: float | None = DEFAULT_PREEMPT_TIMEOUT
-    fsm_of_execution: ClassVar[frozenset[str]] = State.fsm_of_execution | {
-        'fsm_frame',
-        'fsm_history',
-        'fsm_raised',
-        'fsm_table',
-        'fsm_data',
-        '_table_made_for',
-        '_control',
-    }
+    _preempt_timeout: float | None = None
+    fsm_of_execution: ClassVar[frozenset[str]] = State.fsm_of_execution | {'_control'}
 
     def __init__(
         self,
@@ -122,15 +90,7 @@ class Container(State):
     ) -> None:
         super().__init__(outcomes, input_keys, output_keys)
         self.userdata = UserData()
-        self.fsm_states: dict[str, State] = {}
-        self.fsm_branches: dict[str, Branch] = {}
-        self.fsm_remappings: dict[str, Mapping[str, str]] = {}
-        self.fsm_constants: dict[str, Mapping[str, Any]] = {}
-        self.fsm_limits: dict[str, Limits] = {}
-        self.fsm_start_cbs: list[Callback] = []
-        self.fsm_transition_cbs: list[Callback] = []
-        self.fsm_termination_cbs: list[Callback] = []
-        self.fsm_path = type(self).__name__
+        self.fsm_program = Program(self, type(self).__name__)
 
     # What each kind of container defines.
 
@@ -165,32 +125,33 @@ class Container(State):
         """Make the nodes of the states by label, and say where their outcomes lead."""
         raise NotImplementedError
 
-    def fsm_first(self) -> Node | Exit:
-        """Return the node that an execution begins with."""
+    def fsm_first_of(self, table: Mapping[str, Node]) -> Node | Exit:
+        """Return the node of a table that an execution begins with."""
         raise NotImplementedError
 
     # States by label.
 
     def __getitem__(self, key: str) -> State:
         try:
-            return self.fsm_states[key]
+            return self.fsm_program.states[key]
         except KeyError:
             raise KeyError(
-                f"'{self.fsm_path}' has no state '{key}': its states are {sorted(self.fsm_states)}"
+                f"'{self.get_name()}' has no state '{key}': its states are "
+                f'{sorted(self.fsm_program.states)}'
             ) from None
 
     def get_children(self) -> dict[str, State]:
         """Return the children by label."""
-        return dict(self.fsm_states)
+        return dict(self.fsm_program.states)
 
     def get_active_states(self) -> list[str]:
         """Return the labels of the children that are running."""
-        frame = self.fsm_frame
-        return [] if frame is None or frame.ended else frame.active_labels()
+        frame = self.fsm_program.frame
+        return [] if frame is None or frame.ended else list(frame.active_labels())
 
     def is_running(self) -> bool:
         """Tell whether the container is executing."""
-        frame = self.fsm_frame
+        frame = self.fsm_program.frame
         return frame is not None and not frame.ended
 
     # Settings.
@@ -200,7 +161,7 @@ class Container(State):
         """Pausing, stepping, forcing outcomes and watching transitions, while this is the root."""
         control = self._control
         if control is None:
-            with _entry_lock:
+            with _control_lock:
                 control = self._control = self._control or Control(self.get_name)
         return control
 
@@ -209,8 +170,8 @@ class Container(State):
         """Seconds (steady time) that a state may ignore a preempt while this is the root.
 
         After that the run goes on as if the state had ended with ``preempted`` (or ``aborted``, if
-        it has only that), and the log names it. With None a state is waited for as long as it
-        takes, as SMACH does, and a root without time limits runs in the thread that executes it.
+        it has only that), and the log names it. For that the root runs on a thread of its own. With
+        None, as it is at first, a state is waited for as long as it takes, as SMACH does.
         """
         return self._preempt_timeout
 
@@ -218,7 +179,7 @@ class Container(State):
     def preempt_timeout(self, seconds: float | None) -> None:
         if seconds is not None and not seconds > 0:
             raise InvalidStateError(
-                f"'{self.fsm_path}': preempt_timeout is {seconds!r}, expected seconds above 0 or "
+                f"'{self.get_name()}': preempt_timeout is {seconds!r}, expected seconds above 0 or "
                 'None'
             )
         self._preempt_timeout = seconds
@@ -235,41 +196,43 @@ class Container(State):
         """
         if not isinstance(name, str) or not name:
             raise InvalidStateError(f'Name {shown(name)} must be a string that is not empty')
-        self.fsm_path = name
+        self.fsm_program.path = name
 
     def get_name(self) -> str:
         """Return the path of the container: a root's name, or where a run found it."""
-        return self.fsm_path
+        return self.fsm_program.path
 
     # Callbacks.
 
     def register_start_cb(self, start_cb: Callable[..., Any], cb_args: Iterable[Any] = ()) -> None:
         """Call ``start_cb(userdata, initial_states, *cb_args)`` on entry."""
-        self.fsm_start_cbs.append((start_cb, tuple(cb_args)))
+        self.fsm_program.start_cbs.append((start_cb, tuple(cb_args)))
 
     def register_transition_cb(
         self, transition_cb: Callable[..., Any], cb_args: Iterable[Any] = ()
     ) -> None:
         """Call ``transition_cb(userdata, active_states, *cb_args)`` on every transition inside."""
-        self.fsm_transition_cbs.append((transition_cb, tuple(cb_args)))
+        self.fsm_program.transition_cbs.append((transition_cb, tuple(cb_args)))
 
     def register_termination_cb(
         self, termination_cb: Callable[..., Any], cb_args: Iterable[Any] = ()
     ) -> None:
         """Call ``termination_cb(userdata, terminal_states, outcome, *cb_args)`` on exit."""
-        self.fsm_termination_cbs.append((termination_cb, tuple(cb_args)))
+        self.fsm_program.termination_cbs.append((termination_cb, tuple(cb_args)))
 
     def call_start_cbs(self) -> None:
         """Call the start callbacks; what they raise is logged."""
-        self._call(self.fsm_start_cbs, 'start', self.get_initial_states)
+        self._call(self.fsm_program.start_cbs, 'start', self.get_initial_states)
 
     def call_transition_cbs(self) -> None:
         """Call the transition callbacks; what they raise is logged."""
-        self._call(self.fsm_transition_cbs, 'transition', self.get_active_states)
+        self._call(self.fsm_program.transition_cbs, 'transition', self.get_active_states)
 
     def call_termination_cbs(self, terminal_states: Sequence[str], outcome: str | None) -> None:
         """Call the termination callbacks; what they raise is logged."""
-        self._call(self.fsm_termination_cbs, 'termination', lambda: list(terminal_states), outcome)
+        self._call(
+            self.fsm_program.termination_cbs, 'termination', lambda: list(terminal_states), outcome
+        )
 
     def _call(
         self,
@@ -283,29 +246,9 @@ class Container(State):
                 callback(self.userdata, states(), *further, *args)
             except Exception as error:
                 logerr(
-                    f"{kind.capitalize()} callback {shown(callback)} of '{self.fsm_path}' raised "
+                    f"{kind.capitalize()} callback {shown(callback)} of '{self.get_name()}' raised "
                     f'{describe(error)}'
                 )
-
-    # Userdata in and out.
-
-    def fsm_copy_input_keys(self, parent_ud: Any) -> None:
-        """Take the input keys over from the parent's userdata."""
-        if parent_ud is None or not self._input_keys:
-            return
-        if not isinstance(parent_ud, Remapper):
-            parent_ud = Remapper(parent_ud, self._input_keys)
-        for key in parent_ud.fsm_copy_to(self.fsm_data, self._input_keys):
-            logwarn(f"'{self.fsm_path}' starts without its input key '{key}': nobody set it")
-
-    def fsm_copy_output_keys(self, parent_ud: Any) -> None:
-        """Hand the output keys over to the parent's userdata."""
-        if parent_ud is None or not self._output_keys:
-            return
-        if not isinstance(parent_ud, Remapper):
-            parent_ud = Remapper(parent_ud, (), self._output_keys)
-        for key in parent_ud.fsm_take_from(self.fsm_data, self._output_keys):
-            logwarn(f"'{self.fsm_path}' ends without its output key '{key}': nobody set it")
 
     # Construction.
 
@@ -343,7 +286,9 @@ class Container(State):
     def close(self) -> None:
         """End construction and log what the container still lacks to be run."""
         if not self.is_opened():
-            raise InvalidStateError(f"Cannot close '{self.fsm_path}': it is not the open container")
+            raise InvalidStateError(
+                f"Cannot close '{self.get_name()}': it is not the open container"
+            )
         self._leave_construction()
         try:
             self.check_consistency()
@@ -357,7 +302,9 @@ class Container(State):
     def assert_opened(self, msg: str = '') -> None:
         """Raise `InvalidConstructionError` unless the container is open."""
         if not self.is_opened():
-            raise InvalidConstructionError(msg or f"'{self.fsm_path}' is not open for construction")
+            raise InvalidConstructionError(
+                msg or f"'{self.get_name()}' is not open for construction"
+            )
 
     def _leave_construction(self) -> None:
         # Everything opened inside and left open by an error goes with it.
@@ -376,7 +323,7 @@ class Container(State):
         container = _construction.stack[-1][0]
         if not isinstance(container, cls):
             raise InvalidConstructionError(
-                f"{cls.__name__}: the open container '{container.fsm_path}' is a "
+                f"{cls.__name__}: the open container '{container.get_name()}' is a "
                 f'{type(container).__name__}'
             )
         return container
@@ -390,11 +337,11 @@ class Container(State):
         """Raise `InvalidStateError` when `state` cannot be added as `label`."""
         if not isinstance(label, str) or not label or '/' in label:
             raise InvalidStateError(
-                f"Label {shown(label)} in '{self.fsm_path}' must be a string that is not empty and "
-                'has no slash: it is a part of paths'
+                f"Label {shown(label)} in '{self.get_name()}' must be a string that is not empty "
+                'and has no slash: it is a part of paths'
             )
-        path = self.fsm_path_of(label)
-        if label in self.fsm_states or label in self.fsm_branches:
+        path = self.fsm_program.path_of(label)
+        if label in self.fsm_program.states or label in self.fsm_program.branches:
             raise InvalidStateError(f"State '{path}' is already there: a label names one state")
         if not isinstance(state, State):
             raise InvalidStateError(
@@ -404,10 +351,11 @@ class Container(State):
     def check_state_spec(self, label: str, state: State, transitions: Iterable[str]) -> None:
         """Raise `InvalidTransitionError` when `transitions` binds an outcome the state lacks."""
         outcomes = state.get_registered_outcomes()
+        path = self.fsm_program.path_of(label)
         for outcome in transitions:
             if outcome not in outcomes:
                 raise InvalidTransitionError(
-                    f"State '{self.fsm_path_of(label)}' has no outcome '{outcome}' to bind: its "
+                    f"State '{path}' has no outcome '{outcome}' to bind: its "
                     f'outcomes are {sorted(outcomes)}'
                 )
 
@@ -432,87 +380,15 @@ class Container(State):
         """
         for name in limits.keys() - LimitOptions.__annotations__.keys():
             known = {*self.fsm_arguments, *LimitOptions.__annotations__}
-            raise TypeError(f"State '{self.fsm_path_of(label)}': argument {unknown(name, known)}")
+            raise TypeError(
+                f"State '{self.fsm_program.path_of(label)}': argument {unknown(name, known)}"
+            )
         self._check_new(label, state)
-        checked = make_limits(self.fsm_path_of(label), state, bound, **limits)
+        checked = make_limits(self.fsm_program.path_of(label), state, bound, **limits)
         self.check_state_spec(
             label, state, [name for name in bound if checked is None or name != TIMEOUT]
         )
-        self.fsm_states[label] = state
-        if checked is not None:
-            self.fsm_limits[label] = checked
-        if remapping:
-            self.fsm_remappings[label] = dict(remapping)
-        if constants:
-            self.fsm_constants[label] = dict(constants)
-        structure_version.changed()
-
-    def fsm_path_of(self, label: str) -> str:
-        """Return the path of the state with a label; without one, the container's own."""
-        return f'{self.fsm_path}/{label}' if label else self.fsm_path
-
-    # Nodes.
-
-    def fsm_node(self, label: str, state: State, priority: float = LOWEST) -> Node:
-        """Make the node of one state; its targets are left to the container's kind."""
-        path = self.fsm_path_of(label)
-        view = Remapper(
-            self.userdata,
-            state.get_registered_input_keys(),
-            state.get_registered_output_keys(),
-            self.fsm_remappings.get(label, ()),
-            self.fsm_constants.get(label),
-            path,
-        )
-        node = Node(self.fsm_path, label, path, state, view, priority)
-        clock = self.fsm_clock
-        if state.fsm_clock is not clock:
-            state.fsm_clock = clock
-        if state.fsm_left is not None:
-            block_reentry(node, state.fsm_left)
-        limits = node.limits = self.fsm_limits.get(label)
-        if limits is not None:
-            node.execute = limited(node, limits)
-        return node
-
-    def fsm_update_table(self, path: str, clock: Clock) -> None:
-        """Make the nodes of states and interrupts anew if anything has changed.
-
-        Args:
-            path: The path at which the container is executed.
-            clock: What waits go by.
-
-        Raises:
-            InvalidTransitionError: The container cannot run.
-        """
-        data = raw(self.userdata)
-        # A registration that comes meanwhile must not be taken for one that came before.
-        made_for = (structure_version.number, id(data), id(clock), path)
-        if made_for != self._table_made_for:
-            self.check_consistency()
-            self.fsm_path, self.fsm_clock, self.fsm_data = path, clock, data
-            self.fsm_table = self._with_branches(self.fsm_make_table())
-            self._table_made_for = made_for
-
-    def _with_branches(self, table: dict[str, Node]) -> dict[str, Node]:
-        """Add the nodes of interrupts to those of states."""
-        states = dict(table) if self.fsm_branches else table
-        for branch in self.fsm_branches.values():
-            node = table[branch.label] = self.fsm_node(branch.label, branch.state, branch.priority)
-            for outcome in branch.state.get_registered_outcomes():
-                name = branch.transitions.get(outcome, RESUME)
-                if name == RESUME:
-                    node.targets[outcome] = RESUMPTION
-                else:
-                    node.targets[outcome] = states.get(name) or Exit(name)
-        return table
-
-    def fsm_has_limits(self) -> bool:
-        """Tell whether a state inside has limits that somebody must watch."""
-        return bool(self.fsm_limits) or any(
-            isinstance(state, Container) and state.fsm_has_limits()
-            for state in self.fsm_children().values()
-        )
+        self.fsm_program.put(label, state, remapping, constants, checked)
 
     # Running.
 
@@ -534,80 +410,64 @@ class Container(State):
         """
         here = this_thread
         thread: ExecutionThread | None = here.thread
-        current = here.stack[-1].current if here.stack else None
-        if thread is not None and isinstance(current, Node) and current.state is self:
-            # It is the engine that executes it, not the code of a state.
-            return self._enter(thread, here.stack, parent_ud)
+        if thread is not None and here.stack:
+            current = here.stack[-1].current
+            if isinstance(current, Node) and current.state is self:
+                # It is the engine that executes it, not the code of a state.
+                return execute_root(here.stack, thread, self.fsm_program, parent_ud)
         return self._execute_as_root(parent_ud)
 
     def _execute_as_root(self, parent_ud: Any) -> Any:
-        """Begin a run of its own, and watch it to its end."""
-        control, wakeup = self.control, Interrupt()
-
-        def body() -> Any:
-            return self._enter(thread, this_thread.stack, parent_ud)
-
+        """Begin a run of its own, and watch it to its end where somebody asked for that."""
+        program, control = self.fsm_program, self.control
         control.fsm_begin(self.fsm_clock, self._preempt_timeout)
         try:
-            thread = ExecutionThread(control, self.fsm_path, wakeup)
-            if self._preempt_timeout is None and not self.fsm_has_limits():
-                return thread.run_here(body)
-            thread.start(body)
-            try:
-                while not thread.done:
-                    supervise(control, [thread], wakeup)
-            except BaseException:
-                # An interrupt from the keyboard, as a rule: stop what runs before passing it on.
-                self.request_preempt()
-                while not thread.done:
-                    supervise(control, [thread], wakeup)
-                raise
+            if self._preempt_timeout is None and not program.has_limits():
+                thread = ExecutionThread(control, program.path, None)
+                return thread.run_here(
+                    lambda stack: execute_root(stack, thread, program, parent_ud)
+                )
+            return self._execute_watched(parent_ud)
         finally:
-            self.fsm_frame = None
+            program.frame = None
             control.fsm_end()
+
+    def _execute_watched(self, parent_ud: Any) -> Any:
+        """Run on another thread, which is left behind if a state hangs."""
+        program, control, wakeup = self.fsm_program, self.control, Interrupt()
+        thread = ExecutionThread(control, program.path, wakeup)
+        thread.start(lambda: execute_root(this_thread.stack, thread, program, parent_ud))
+        try:
+            while not thread.done:
+                supervise(control, [thread], wakeup)
+        except BaseException:
+            # An interrupt from the keyboard, as a rule: stop what runs before passing it on.
+            self.request_preempt()
+            while not thread.done:
+                supervise(control, [thread], wakeup)
+            raise
         if thread.error is not None:
             raise thread.error
         return thread.outcome
 
-    def _enter(self, thread: ExecutionThread, stack: list[Frame], parent_ud: Any) -> Any:
-        """Run as part of a thread of execution."""
-        if stack:
-            path = stack[-1].current.path  # type: ignore[union-attr]
-        else:
-            path = thread.path
-        before = self.fsm_frame
-        if before is not None and not before.ended:
-            raise InvalidStateError(f"'{self.fsm_path}' is running already")
-        self.fsm_update_table(path, thread.control.clock)
-        frame = self.fsm_frame_type(self, thread, path, self.fsm_first(), parent_ud)
-        with _entry_lock:
-            if self.fsm_frame is not before:
-                raise InvalidStateError(f"'{self.fsm_path}' is running already")
-            self.fsm_frame = frame
-        if stack and stack[-1].cut is stack[-1].current:
-            # It was asked to make way before it was visible that it had begun.
-            frame.suspending = True
-        # Whoever takes the thread over gives it another stack, and afterwards looks at this one.
-        stack.append(frame)
-
-        def run() -> Any:
-            if stack is not thread.stack:
-                raise LeftBehindError
-            history, self.fsm_history = self.fsm_history, None
-            return frame.execute(history)
-
-        return frame.to_its_end(run)
-
     def request_preempt(self) -> None:
         """Ask the container to stop: the request reaches what runs inside at once."""
         super().request_preempt()
-        frame = self.fsm_frame
+        frame = self.fsm_program.frame
         if frame is None:
             return
-        with frame.control.condition:
-            frame = self.fsm_frame
+        with frame.condition:
+            frame = self.fsm_program.frame
             if frame is not None:
                 frame.preempt()
+
+    def fsm_passes_on(self, method: str) -> bool:
+        """Tell whether a method is the engine's, and neither a subclass nor the object has one."""
+        return method not in vars(self) and getattr(type(self), method) is vars(Container)[method]
+
+    def fsm_is_entered(self) -> bool:
+        """Tell whether the loop goes into it: always, unless a subclass executes it otherwise."""
+        return self.fsm_passes_on('execute')
 
     # Interrupts.
 
@@ -644,9 +504,10 @@ class Container(State):
         for outcome in state.get_registered_outcomes():
             ends = outcome == 'preempted' and outcome in self._outcomes
             bound.setdefault(outcome, outcome if ends else RESUME)
-        self.fsm_branches[label] = Branch(label, state, priority, bound)
+        program = self.fsm_program
+        program.branches[label] = Branch(label, state, priority, bound)
         if remapping:
-            self.fsm_remappings[label] = dict(remapping)
+            program.remappings[label] = dict(remapping)
         structure_version.changed()
         return state
 
@@ -659,73 +520,54 @@ class Container(State):
         Raises:
             InvalidStateError: There is no such interrupt.
         """
-        branch = self.fsm_branches.get(label)
+        program = self.fsm_program
+        branch = program.branches.get(label)
         if branch is None:
             raise InvalidStateError(
-                f"'{self.fsm_path}' has no interrupt '{label}': its interrupts are "
-                f'{sorted(self.fsm_branches)}'
+                f"'{program.path}' has no interrupt '{label}': its interrupts are "
+                f'{sorted(program.branches)}'
             )
-        with _raise_lock:
-            if branch not in self.fsm_raised:
-                self.fsm_raised = (*self.fsm_raised, branch)
+        program.raise_branch(branch)
         # A run that begins from here on finds it by itself.
-        frame = self.fsm_frame
+        frame = program.frame
         if frame is not None:
-            with frame.control.condition:
-                frame = self.fsm_frame
+            with frame.condition:
+                frame = program.frame
                 if frame is not None:
                     frame.interrupted()
 
     def withdraw_interrupt(self, label: str) -> bool:
         """Take back an interrupt that has not begun; tells whether there was one."""
-        with _raise_lock:
-            left = tuple(branch for branch in self.fsm_raised if branch.label != label)
-            there, self.fsm_raised = len(left) < len(self.fsm_raised), left
-        return there
-
-    def fsm_take_raised(self, above: float = LOWEST) -> Branch | None:
-        """Take the most urgent raised interrupt, if it is more urgent than `above`."""
-        with _raise_lock:
-            if not self.fsm_raised:
-                return None
-            urgent = max(self.fsm_raised, key=lambda branch: branch.priority)
-            if urgent.priority <= above:
-                return None
-            self.fsm_raised = tuple(each for each in self.fsm_raised if each is not urgent)
-            return urgent
-
-    def fsm_children(self) -> dict[str, State]:
-        """Return the states and interrupts inside by label."""
-        return self.fsm_states | {
-            label: branch.state for label, branch in self.fsm_branches.items()
-        }
+        return self.fsm_program.withdraw_branch(label)
 
     def fsm_suspend(self) -> None:
         """Have the container put aside with its history; under the machine's condition."""
-        frame = self.fsm_frame
+        frame = self.fsm_program.frame
         if frame is not None:
             frame.suspend()
 
     def fsm_forget(self) -> None:
         """Drop the history of the container and of all inside: it will not be resumed."""
-        super().fsm_forget()
-        self.fsm_history = None
-        for child in self.fsm_children().values():
-            child.fsm_forget()
+        self.fsm_progress = self.fsm_program.history = None
+        for _, state in self.fsm_program.walk():
+            state.fsm_progress = None
+            if state.fsm_program is not None:
+                state.fsm_program.history = None
 
     def check_consistency(self) -> None:
         """Raise `InvalidTransitionError` naming all that keeps the container from running."""
-        states = () if self.together else self.fsm_states
+        program = self.fsm_program
+        states = () if self.together else program.states
         names = {*states, *self.get_registered_outcomes(), RESUME}
         faults = self.fsm_faults() + [
             f"outcome '{outcome}' of interrupt '{branch.label}' leads to '{target}', which is "
             f"neither a state, nor an outcome, nor '{RESUME}'"
-            for branch in self.fsm_branches.values()
+            for branch in program.branches.values()
             for outcome, target in branch.transitions.items()
             if target not in names
         ]
         if faults:
             raise InvalidTransitionError(
-                f"{type(self).__name__} '{self.fsm_path}' cannot run: {'; '.join(faults)} (states: "
-                f'{sorted(self.fsm_states)}, outcomes: {sorted(self._outcomes)})'
+                f"{type(self).__name__} '{program.path}' cannot run: {'; '.join(faults)} (states: "
+                f'{sorted(program.states)}, outcomes: {sorted(self._outcomes)})'
             )

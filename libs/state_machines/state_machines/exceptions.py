@@ -49,11 +49,8 @@ class MissingKeyError(InvalidUserCodeError, KeyError):
     """A declared userdata key was read before anything wrote it (a ``KeyError``, as in SMACH)."""
 
 
-class MachineFileError(SmachError):
-    """A machine, a record or a checkpoint cannot be read from data or written as data.
-
-    Also: it does not fit the machine. The message names the place.
-    """
+class CheckpointError(SmachError):
+    """A checkpoint cannot be read or written, or does not fit the machine; the place is named."""
 
 
 class CallError(Exception):

@@ -2,11 +2,12 @@
 
 Each root has a `Control`, which all its executions share. An execution consists of logical threads,
 `ExecutionThread`: one for the root, and one for each child of a concurrence. A logical thread keeps
-a stack of frames, one for each container that it is in. It runs on one thread of the interpreter
-after another: when a state hangs, that thread is left behind and another one goes on (`timeouts`).
+a stack of frames, one for each container that it is in.
 
-Threads of the interpreter are kept for the next execution, because starting one costs more than
-most machines need for all their states.
+A root that asks for nothing else runs on the thread that calls it. Where a time limit or a bound on
+preempts is to be kept, it runs on another thread, and the caller watches: when a state hangs, that
+thread is left behind and a further one goes on (`timeouts`). Such threads are kept for the next
+execution, because starting one costs more than most machines need for all their states.
 
 The shutdown check belongs to all machines: each asks it between two states, and ends with None when
 it is true.
@@ -21,19 +22,13 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from queue import Empty, SimpleQueue
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 from state_machines import log
 from state_machines.clock import WALL_CLOCK, Clock, Interrupt, elapsed_of
 from state_machines.exceptions import InvalidStateError, InvalidTransitionError, describe
-from state_machines.nodes import Node, Noted, RawTransition, Trace
+from state_machines.program import Entry, Exit, Limits, Node, Noted, RawTransition, Trace
 from state_machines.state import this_thread
-
-if TYPE_CHECKING:
-    from state_machines.frame import Frame
-
-DEFAULT_PREEMPT_TIMEOUT = 60.0
-"""Seconds (steady time) that a state may ignore a preempt before the machine goes on."""
 
 IDLE_SECONDS = 10.0
 """How long a thread waits for the next execution before it ends."""
@@ -64,6 +59,38 @@ class LeftBehindError(BaseException):
     """Unwinds a thread that the machine went on without."""
 
 
+STOPPED = ('preempted', 'aborted')
+"""Outcomes that a state may be taken to have ended with that was left behind."""
+
+
+def stopped_outcome(node: Node) -> str | None:
+    """Return the outcome that a state is taken to have ended with, if it has one for that."""
+    return next((outcome for outcome in STOPPED if outcome in node.targets), None)
+
+
+class Place(Protocol):
+    """What a thread and the control know of a frame: where the thread is in one container.
+
+    Attributes:
+        path: The container's path.
+        thread: The logical thread.
+        current: The node that executes, or the exit that was taken.
+        attention: Something beside the next state wants to be looked at.
+        forced: A node, and the outcome to take in place of the one that its state returns.
+        left: The node whose state was left behind.
+    """
+
+    thread: ExecutionThread
+    current: Node | Exit
+    attention: bool
+    forced: tuple[Node, str] | None
+    left: Node | None
+
+    @property
+    def path(self) -> str:
+        """The container's path."""
+
+
 # The machine from outside.
 
 
@@ -74,7 +101,8 @@ class Control:
         name: Tells the root's name.
 
     Attributes:
-        condition: The one condition of the machine.
+        lock: The one lock of the machine.
+        condition: A condition with that lock; holding one is holding the other.
         paused: No further state is entered; see `pause`.
         steps: States that may be entered although paused.
         trace: Where transitions are reported, if anywhere.
@@ -82,7 +110,9 @@ class Control:
     """
 
     def __init__(self, name: Callable[[], str]) -> None:
-        self.condition = threading.Condition()
+        # Taking the lock itself costs a third of taking it as a condition.
+        self.lock = threading.RLock()
+        self.condition = threading.Condition(self.lock)
         self.paused = False
         self.steps = 0
         self.trace: Trace | None = None
@@ -96,7 +126,7 @@ class Control:
 
         Attributes:
             clock: The machine's clock.
-            preempt_timeout: See `DEFAULT_PREEMPT_TIMEOUT`; None waits for ever.
+            preempt_timeout: See `Container.preempt_timeout`; None waits for ever.
             now: The time of reports and limits.
             chatty: Transitions are worth a line in the log.
             sleeps_on_clock: A thread watches time limits and waits on the machine's clock.
@@ -218,9 +248,9 @@ class Control:
         with self.condition:
             return list(self._active())
 
-    def _active(self) -> dict[str, tuple[Frame, Node]]:
+    def _active(self) -> dict[str, tuple[Place, Node]]:
         """Return the active states by path: the frames they run in, and their nodes."""
-        active: dict[str, tuple[Frame, Node]] = {}
+        active: dict[str, tuple[Place, Node]] = {}
         for thread in self.threads:
             for frame in tuple(thread.stack):
                 node = frame.current
@@ -252,6 +282,7 @@ class Control:
         with self.condition:
             # The next one may go by another clock.
             now, self.running = self.now, False
+            self.threads.clear()
             self.condition.notify_all()
         # Others may end their reports in this moment.
         trace = self.trace
@@ -262,7 +293,7 @@ class Control:
 # Threads.
 
 
-@dataclass
+@dataclass(eq=False)
 class Watch:
     """Limits at work on a state that executes.
 
@@ -292,17 +323,17 @@ class ExecutionThread:
         done: It has ended.
         outcome: What it ended with.
         error: What it was ended by.
-        wakeup: Raised when it has ended, or its limits have changed.
+        wakeup: Raised when it has ended, or its limits have changed; None where nobody watches.
         watches: Limits at work, outermost first.
         asked_at: When the state that executes was asked to stop, steady time; None: it was not.
         work: What its present thread does.
     """
 
-    def __init__(self, control: Control, path: str, wakeup: Interrupt) -> None:
+    def __init__(self, control: Control, path: str, wakeup: Interrupt | None) -> None:
         self.control = control
         self.path = path
         self.wakeup = wakeup
-        self.stack: list[Frame] = []
+        self.stack: list[Any] = []
         self.watches: list[Watch] = []
         self.done = False
         self.outcome: Any = None
@@ -326,16 +357,15 @@ class ExecutionThread:
         self.work = Work(self, self.stack, body)
         self.work.begin()
 
-    def run_here(self, body: Callable[[], Any]) -> Any:
-        """Run `body` on the calling thread, unwatched."""
-        here = this_thread
-        outer = here.thread, here.stack
-        here.thread, here.stack = self, self.stack
+    def run_here(self, body: Callable[[list[Any]], Any]) -> Any:
+        """Run `body`, which is given the frames, on the calling thread, unwatched."""
+        here = vars(this_thread)
+        outer = here.get('thread'), here.get('stack')
+        here['thread'], here['stack'] = self, self.stack
         try:
-            return body()
+            return body(self.stack)
         finally:
-            here.thread, here.stack = outer
-            self.retire()
+            here['thread'], here['stack'] = outer
 
     def end(self, outcome: Any, error: BaseException | None) -> None:
         """Note what it ended with; under the condition. `wakeup` is to be raised after."""
@@ -355,6 +385,11 @@ class ExecutionThread:
         if this_thread.thread is self and this_thread.stack is not self.stack:
             raise LeftBehindError
 
+    def wake_watcher(self) -> None:
+        """Have whoever watches look."""
+        if self.wakeup is not None:
+            self.wakeup.set()
+
     # The side of whoever asks it to stop.
 
     def asked(self) -> None:
@@ -366,7 +401,7 @@ class ExecutionThread:
         if self.asked_at is None:
             self.asked_at = time.monotonic()
             if self.control.sleeps_on_clock:
-                self.wakeup.set()
+                self.wake_watcher()
 
     def asked_anew(self) -> None:
         """Begin to count again, if it was asked: something else is to stop now."""
@@ -380,12 +415,42 @@ class ExecutionThread:
             if self.asked_at is not None:
                 node.state.request_preempt()
 
-    def still_gone(self, node: Node) -> None:
+    def still_running(self, node: Node) -> None:
         """Note that a state could not be entered: an earlier execution of it has not ended."""
         with self.control.condition:
             self.check()
             frame = self.stack[-1]
-            frame.gone, frame.attention = node, True
+            frame.left, frame.attention = node, True
+
+    # Limits at work.
+
+    def begin_watch(self, node: Node, limits: Limits) -> Watch:
+        """Put limits to work on the state that the innermost frame is about to execute."""
+        now = self.control.now()
+        with self.control.condition:
+            self.check()
+            watch = Watch(
+                node,
+                len(self.stack) - 1,
+                None if limits.timeout is None else now + limits.timeout,
+                None if limits.deadline is None else now + limits.deadline,
+            )
+            self.watches.append(watch)
+        self.wake_watcher()
+        return watch
+
+    def end_watch(self, watch: Watch) -> None:
+        """End the limits of a state that has returned."""
+        with self.control.condition:
+            self.check()
+            if watch in self.watches:
+                self.watches.remove(watch)
+
+    def end_watches(self, depth: int) -> None:
+        """End the limits of all states from a depth on, an error having ended them."""
+        with self.control.condition:
+            if this_thread.stack is self.stack:
+                self.watches = [watch for watch in self.watches if watch.depth < depth]
 
 
 class Work:
@@ -395,9 +460,7 @@ class Work:
         stack: The logical thread's list of frames when it began.
     """
 
-    def __init__(
-        self, thread: ExecutionThread, stack: list[Frame], body: Callable[[], Any]
-    ) -> None:
+    def __init__(self, thread: ExecutionThread, stack: list[Any], body: Callable[[], Any]) -> None:
         self.stack = stack
         self._thread = thread
         self._body = body
@@ -421,6 +484,31 @@ class Work:
     def is_going_on(self) -> bool:
         """Tell whether it has not ended."""
         return self._going_on.locked()
+
+    def block_reentry(self, node: Node) -> None:
+        """Enter a state again only when this work, which was left behind in it, has ended."""
+        entry, state = node.entry, node.state
+        state.fsm_left = self
+
+        def wait_and_execute(view: Any) -> Any:
+            thread: ExecutionThread | None = this_thread.thread
+            if not self.await_end(thread.control.preempt_timeout if thread is not None else None):
+                log.logerr(f"State '{node.label}' is still running from an earlier execution")
+                if thread is not None:
+                    thread.still_running(node)
+                return stopped_outcome(node)
+            state.fsm_left = None
+            node.execute, node.entry = state.execute, entry
+            if thread is None:
+                state.recall_preempt()
+            else:
+                thread.renew_request(node)
+            return node.execute(view)
+
+        node.execute = wait_and_execute
+        if entry is not None:
+            # It is called, and not gone into; its limits hold as before.
+            node.entry = Entry(None, node.view, entry.limits, draws=entry.draws)
 
     def await_end(self, seconds: float | None) -> bool:
         """Wait for the end, in seconds of steady time; whether it came."""
@@ -451,7 +539,7 @@ class Work:
                 return
             thread.end(outcome, error)
         # Who wakes takes the condition at once.
-        thread.wakeup.set()
+        thread.wake_watcher()
 
 
 _idle: list[_Worker] = []

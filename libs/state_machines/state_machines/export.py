@@ -1,61 +1,76 @@
 """A machine drawn: as Mermaid, Graphviz, and text for a log.
 
-`to_yaml`, which writes it as a file that can be loaded, comes from `machine_file`.
+What is drawn of a container is an iterator over lines, among which the iterators of the containers
+inside stand: so machines may be nested deeper than Python calls (`_lines`).
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from typing import Any
 
 from state_machines.container import Container
-from state_machines.machine_file import to_yaml
-from state_machines.nodes import RESUME
+from state_machines.program import RESUME
 from state_machines.structure import Edge, Structure
 
-__all__ = ['to_ascii', 'to_graphviz', 'to_mermaid', 'to_yaml']
+__all__ = ['to_ascii', 'to_graphviz', 'to_mermaid']
+
+Drawn = Iterator[Any]
+"""Lines, and iterators over what stands between them."""
+
+
+def _lines(drawn: Drawn) -> Iterator[str]:
+    """Yield all lines in order."""
+    stack = [drawn]
+    while stack:
+        for each in stack[-1]:
+            if not isinstance(each, str):
+                stack.append(each)
+                break
+            yield each
+        else:
+            stack.pop()
 
 
 def to_mermaid(container: Container) -> str:
     """Draw as a Mermaid ``stateDiagram-v2``; interrupts have dashed-looking notes of their own."""
-    structure = Structure(container)
-    lines = ['stateDiagram-v2']
-    _mermaid(structure, lines, '    ')
+    lines = ['stateDiagram-v2', *_lines(_mermaid(Structure(container), '    '))]
     return '\n'.join(lines) + '\n'
 
 
-def _mermaid(structure: Structure, lines: list[str], indent: str) -> None:
+def _mermaid(structure: Structure, indent: str) -> Drawn:
     for label in structure.members:
         name = _id(f'{structure.path}/{label}')
         inner = structure.inner.get(label)
         if inner is None:
-            lines.append(f'{indent}state "{_spelled(label)}" as {name}')
+            yield f'{indent}state "{_spelled(label)}" as {name}'
         else:
-            lines.append(f'{indent}state "{_spelled(label)}" as {name} {{')
-            _mermaid(inner, lines, indent + '    ')
-            lines.append(f'{indent}}}')
+            yield f'{indent}state "{_spelled(label)}" as {name} {{'
+            yield _mermaid(inner, indent + '    ')
+            yield f'{indent}}}'
     if structure.together:
         # Mermaid separates what runs side by side; only the ends of each state are known.
         for number, label in enumerate(structure.states):
             if number:
-                lines.append(f'{indent}--')
+                yield f'{indent}--'
             name = _id(f'{structure.path}/{label}')
-            lines.append(f'{indent}[*] --> {name}')
+            yield f'{indent}[*] --> {name}'
             for outcome in sorted(structure.states[label].get_registered_outcomes()):
-                lines.append(f'{indent}{name} --> [*] : {outcome}')
+                yield f'{indent}{name} --> [*] : {outcome}'
         return
     for label in structure.initial:
-        lines.append(f'{indent}[*] --> {_id(f"{structure.path}/{label}")}')
+        yield f'{indent}[*] --> {_id(f"{structure.path}/{label}")}'
     for source, target, leaving, outcomes in _bundles(structure.edges):
         name = _id(f'{structure.path}/{source}')
         text = ', '.join(outcomes)
         if target == RESUME and not leaving:
-            lines.append(f'{indent}{name} --> {name} : {text} (resume)')
+            yield f'{indent}{name} --> {name} : {text} (resume)'
         elif leaving:
             ending = text if outcomes == [target] else f'{text} → {target}'
-            lines.append(f'{indent}{name} --> [*] : {ending}')
+            yield f'{indent}{name} --> [*] : {ending}'
         else:
-            lines.append(f'{indent}{name} --> {_id(f"{structure.path}/{target}")} : {text}')
+            yield f'{indent}{name} --> {_id(f"{structure.path}/{target}")} : {text}'
 
 
 def to_graphviz(container: Container) -> str:
@@ -67,29 +82,28 @@ def to_graphviz(container: Container) -> str:
         '    node [shape=box, style=rounded, fontname="Helvetica"];',
         '    edge [fontname="Helvetica", fontsize=10];',
     ]
-    _graphviz(structure, lines, '    ')
-    lines.append('}')
+    lines += [*_lines(_graphviz(structure, '    ')), '}']
     return '\n'.join(lines) + '\n'
 
 
-def _graphviz(structure: Structure, lines: list[str], indent: str) -> None:
+def _graphviz(structure: Structure, indent: str) -> Drawn:
     inside = indent + '    '
-    lines.append(f'{indent}subgraph {_quoted(f"cluster_{structure.path}")} {{')
-    lines.append(f'{inside}label={_quoted(f"{structure.label} ({structure.kind})")};')
+    yield f'{indent}subgraph {_quoted(f"cluster_{structure.path}")} {{'
+    yield f'{inside}label={_quoted(f"{structure.label} ({structure.kind})")};'
     for outcome in structure.outcomes:
         name = _quoted(f'{structure.path}:{outcome}')
         look = 'shape=oval, style=filled, fillcolor=lightgrey'
-        lines.append(f'{inside}{name} [label={_quoted(outcome)}, {look}];')
+        yield f'{inside}{name} [label={_quoted(outcome)}, {look}];'
     for label in structure.members:
         inner = structure.inner.get(label)
         if inner is not None:
-            _graphviz(inner, lines, inside)
+            yield _graphviz(inner, inside)
             continue
         bold = ', penwidth=2' if label in structure.initial else ''
         dashed = ', style="rounded,dashed"' if label in structure.interrupts else ''
         name = _quoted(f'{structure.path}/{label}')
-        lines.append(f'{inside}{name} [label={_quoted(label)}{bold}{dashed}];')
-    lines.append(f'{indent}}}')
+        yield f'{inside}{name} [label={_quoted(label)}{bold}{dashed}];'
+    yield f'{indent}}}'
     for edge in structure.edges:
         if edge.target == RESUME and not edge.leaving:
             continue
@@ -101,17 +115,21 @@ def _graphviz(structure: Structure, lines: list[str], indent: str) -> None:
             head, head_box = _entry(structure, edge.target)
             lhead = f', lhead={_quoted(head_box)}' if head_box else ''
         ends = f'{_quoted(tail)} -> {_quoted(head)}'
-        lines.append(f'{indent}{ends} [label={_quoted(edge.outcome)}{ltail}{lhead}];')
+        yield f'{indent}{ends} [label={_quoted(edge.outcome)}{ltail}{lhead}];'
 
 
 def _entry(structure: Structure, label: str) -> tuple[str, str]:
     """Return the node that stands for a state in Graphviz, and its cluster if it is a container."""
     path = f'{structure.path}/{label}'
     inner = structure.inner.get(label)
-    if inner is None:
-        return path, ''
-    first = (inner.initial or sorted(inner.members) or [''])[0]
-    return (_entry(inner, first)[0] if first else path), f'cluster_{path}'
+    cluster = '' if inner is None else f'cluster_{path}'
+    while inner is not None:
+        first = (inner.initial or sorted(inner.members) or [''])[0]
+        if not first:
+            break
+        path = f'{inner.path}/{first}'
+        inner = inner.inner.get(first)
+    return path, cluster
 
 
 def to_ascii(container: Container) -> str:
@@ -123,11 +141,11 @@ def to_ascii(container: Container) -> str:
         for label in inner.container.get_active_states()
     }
     lines = [f'{structure.path} ({structure.kind}) ends with {", ".join(structure.outcomes)}']
-    _ascii(structure, marked, lines, '')
+    lines += _lines(_ascii(structure, marked, ''))
     return '\n'.join(lines) + '\n'
 
 
-def _ascii(structure: Structure, marked: set[str], lines: list[str], indent: str) -> None:
+def _ascii(structure: Structure, marked: set[str], indent: str) -> Drawn:
     labels = list(structure.members)
     for label in labels:
         path = f'{structure.path}/{label}'
@@ -142,9 +160,9 @@ def _ascii(structure: Structure, marked: set[str], lines: list[str], indent: str
             for _, target, leaving, outcomes in _bundles(edges)
         )
         branch = '`-' if last else '|-'
-        lines.append(f'{indent}{branch}{mark} {label}{kind}{flag}{f"  {leads}" if leads else ""}')
+        yield f'{indent}{branch}{mark} {label}{kind}{flag}{f"  {leads}" if leads else ""}'
         if inner is not None:
-            _ascii(inner, marked, lines, indent + ('     ' if last else '|    '))
+            yield _ascii(inner, marked, indent + ('     ' if last else '|    '))
 
 
 def _bundles(edges: Iterable[Edge]) -> list[tuple[str, str, bool, list[str]]]:

@@ -1,57 +1,326 @@
-"""The execution of a container: the loop over its states.
+"""The execution of containers: the loop over states, and what comes between two of them.
 
-Most transitions need only the loop, `Frame._run_from`. It looks at one flag after each state. When
-something beside the next state wants to be looked at (`attention`), `_attend` passes preempts on,
-lets interrupts cut in and resumes from them, forces outcomes, and stands still while the machine is
-paused.
+`run` is the loop. It executes states one after another, goes into a container by putting a `Frame`
+on the thread's stack, and comes back out of it by taking that frame off. So a machine in a machine
+costs no call of Python, and how deep machines are nested is bounded by memory.
+
+Most transitions need only the loop. It looks at one flag after each state. When something beside
+the next state wants to be looked at (`Frame.attention`), `Frame.attend` passes preempts on, lets
+interrupts in and resumes from them, forces outcomes, and stands still while the machine is paused.
 """
 
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, NamedTuple, Self
+import threading
+from collections.abc import Iterable
+from typing import Any, NamedTuple, Self
 
 from state_machines import execution, log
 from state_machines.exceptions import InvalidStateError, SmachError
-from state_machines.execution import ExecutionThread, LeftBehindError
-from state_machines.nodes import LOWEST, RESUMPTION, SUSPENDED, Exit, Node, Noted
-from state_machines.state import State, this_thread
-from state_machines.timeouts import settled
-from state_machines.userdata import raw
-
-if TYPE_CHECKING:
-    from state_machines.container import Container
+from state_machines.execution import Control, ExecutionThread, LeftBehindError, Watch
+from state_machines.program import (
+    LOWEST,
+    RESUMPTION,
+    SUSPENDED,
+    Exit,
+    History,
+    Node,
+    Noted,
+    Program,
+)
+from state_machines.state import State
+from state_machines.userdata import Remapper, raw
 
 SHUTDOWN = Exit('shutdown')
 """Where a run goes that the shutdown check ended."""
 ASIDE = Exit('aside')
 """Where a run goes that was put aside."""
+AGAIN: Any = object()
+"""What `Frame.after` returns for a state that is to be executed once more."""
 
 
-@dataclass
-class History:
-    """Where a container that was put aside goes on.
+# The loop.
 
-    Attributes:
-        current: Label of the state, or of the outcome when `leaving`; empty for all states of a
-            concurrence.
-        leaving: `current` is an outcome of the container.
-        saved: Of the interrupts under way, where each goes on: (label, leaving).
-        index: How many items an iterator had begun, the current one included.
-        repeat: The current item had not ended.
-        outcomes: Of a concurrence's children that had ended.
+_entry_lock = threading.Lock()
+
+
+def run(stack: list[Any], base: int) -> Any:
+    """Execute the containers on a thread's stack to the end of the one at `base`.
+
+    Args:
+        stack: The frames that the present thread began with, the innermost last. Whoever takes the
+            execution over gives the logical thread another list, and marks these frames.
+        base: Index of the frame whose end is waited for.
+
+    Returns:
+        Its outcome, or `SUSPENDED`.
     """
+    try:
+        return _run(stack, base)
+    except BaseException:
+        _unwind(stack, base)
+        raise
 
-    current: str = ''
-    leaving: bool = False
-    saved: list[tuple[str, bool]] = field(default_factory=list)
-    index: int = 0
-    repeat: bool = True
-    outcomes: dict[str, str] = field(default_factory=dict)
-    # An iterator suspended in this process goes on with its own generator.
-    items: Any = None
+
+def _unwind(stack: list[Any], base: int) -> None:
+    """Take the frames from `base` on off the stack: an error ended them."""
+    for frame in stack[base:]:
+        if frame.program.frame is frame:
+            frame.program.frame = None
+        frame.ended = True
+    thread = stack[base].thread if base < len(stack) else None
+    if thread is not None and thread.watches:
+        thread.end_watches(base)
+    del stack[base:]
+
+
+def _run(stack: list[Any], base: int) -> Any:
+    # This function is the engine's speed. What it needs of a frame is in local variables, which are
+    # set anew whenever it goes into a container or comes out of one.
+    frame: Frame = stack[-1]
+    thread, control = frame.thread, frame.thread.control
+    now, trace, chatty = control.now, control.trace, control.chatty
+    program = frame.program
+    data, callbacks = program.data, program.transition_cbs
+    target: Any = frame.current
+    told: Any = target
+    node: Any = None
+    entry: Any = None
+    while True:
+        if target.is_exit:
+            # The container ends.
+            if target is not told and program.termination_cbs:
+                frame.container.call_termination_cbs([node.label], target.label)
+            told = None
+            if target is ASIDE:
+                outcome = SUSPENDED
+            elif target is SHUTDOWN:
+                outcome = frame.shut_down()
+            else:
+                outcome = target.label
+            depth = len(stack) - 1
+            if depth == base:
+                if target is not ASIDE:
+                    copy_output_keys(frame.container, frame.parent_ud)
+                frame.ended = True
+                stack.pop()
+                return outcome
+            inner, inner_data = frame, data
+            frame = stack[depth - 1]
+            program, node = frame.program, frame.current
+            data, callbacks = program.data, program.transition_cbs
+            entry = node.entry
+            if target is not ASIDE:
+                if entry.plain_keys:
+                    for name, outside in entry.outputs:
+                        try:
+                            data[outside] = inner_data[name]
+                        except KeyError:
+                            warn_of_output(inner.container, name)
+                else:
+                    copy_output_keys(inner.container, inner.parent_ud)
+            inner.ended = True
+            stack.pop()
+            if entry.hooked:
+                outcome = frame.after(node, outcome)
+                if outcome is AGAIN:
+                    target = node
+                    entry.program.frame = None
+                    continue
+        else:
+            node = target
+            entry = node.entry
+            if entry is None:
+                try:
+                    outcome = node.execute(node.view)
+                except SmachError:
+                    raise
+                except Exception as error:
+                    raise node.user_fault(error) from error
+            else:
+                outcome = frame.before(node) if entry.hooked else None
+                if outcome is not None:
+                    # Nothing is left to be executed.
+                    pass
+                elif entry.program is None:
+                    outcome = call(node)
+                    if entry.hooked:
+                        outcome = frame.after(node, outcome)
+                        if outcome is AGAIN:
+                            continue
+                else:
+                    # Into a container.
+                    frame = enter(stack, thread, entry.program, node.path, node.view, frame)
+                    outer_data, program = data, frame.program
+                    data, callbacks = program.data, program.transition_cbs
+                    trace = control.trace
+                    if program.history is None:
+                        if entry.plain_keys:
+                            for name, outside in entry.inputs:
+                                try:
+                                    data[name] = outer_data[outside]
+                                except KeyError:
+                                    warn_of_input(frame.container, name)
+                        else:
+                            copy_input_keys(frame.container, node.view)
+                        if not (
+                            trace is not None
+                            or chatty
+                            or program.start_cbs
+                            or frame.attention
+                            or frame.container.fsm_interrupt is not None
+                            or program.raised
+                            or frame.suspending
+                            or control.paused
+                            or execution.shutdown_check is not None
+                        ):
+                            target = frame.current
+                            continue
+                    target = told = frame.begin()
+                    trace, chatty = control.trace, control.chatty
+                    continue
+        try:
+            target = node.targets[outcome]
+        except (KeyError, TypeError):
+            target = node.target(outcome)
+        frame.current = target
+        if entry is not None and entry.program is not None:
+            entry.program.frame = None
+        if frame.attention:
+            told = target = frame.attend(node, outcome, target)
+            trace, chatty = control.trace, control.chatty
+        elif trace is not None or callbacks or chatty or execution.shutdown_check is not None:
+            if execution.is_shutdown():
+                frame.stopped = target
+                frame.current = told = target = SHUTDOWN
+                continue
+            if trace is not None:
+                trace((node, outcome, now(), data.copy()))
+            if chatty:
+                frame.log_move(node, outcome, target)
+            if callbacks and not target.is_exit:
+                frame.container.call_transition_cbs()
+
+
+def call(node: Node) -> Any:
+    """Execute a state that is no container; its outcome.
+
+    Raises:
+        InvalidUserCodeError: Its code raised.
+    """
+    try:
+        return node.execute(node.view)
+    except SmachError:
+        raise
+    except Exception as error:
+        raise node.user_fault(error) from error
+
+
+def enter(
+    stack: list[Any],
+    thread: ExecutionThread,
+    program: Program,
+    path: str,
+    parent_ud: Any,
+    outer: Frame | None,
+) -> Frame:
+    """Put a frame for a container on the stack.
+
+    Args:
+        stack: The present thread's frames.
+        thread: The logical thread.
+        program: The container's program.
+        path: Where the container is.
+        parent_ud: The parent's userdata.
+        outer: The frame around it, if there is one.
+
+    Raises:
+        InvalidStateError: The container is running already.
+        InvalidTransitionError: It cannot run.
+        LeftBehindError: The machine went on without the present thread.
+    """
+    before = program.frame
+    if before is not None and not before.ended:
+        raise InvalidStateError(f"'{program.path}' is running already")
+    clock = thread.control.clock
+    if not program.is_current(path, clock):
+        program.make(path, clock)
+    frame: Frame = program.container.fsm_frame_type(program, thread, parent_ud)
+    with _entry_lock:
+        # Another thread may enter it, too, as another state of a concurrence.
+        if program.frame is not before:
+            raise InvalidStateError(f"'{program.path}' is running already")
+        program.frame = frame
+    if outer is not None and outer.making_way is outer.current:
+        # It was asked to make way before it could be seen that it had begun.
+        frame.suspending = True
+    stack.append(frame)
+    # Whoever takes the thread over gives it another stack first, and looks at this one after.
+    if stack is not thread.stack:
+        raise LeftBehindError
+    return frame
+
+
+def execute_root(stack: list[Any], thread: ExecutionThread, program: Program, ud: Any) -> Any:
+    """Execute a container with whatever userdata it is given; its outcome or `SUSPENDED`.
+
+    Args:
+        stack: The present thread's frames.
+        thread: The logical thread.
+        program: The container's program.
+        ud: Userdata that input keys come from and output keys go to.
+    """
+    base = len(stack)
+    outer = stack[-1] if stack else None
+    path = outer.current.path if outer is not None else thread.path
+    try:
+        frame = enter(stack, thread, program, path, ud, outer)
+        if program.history is None:
+            copy_input_keys(frame.container, ud)
+        frame.begin()
+    except BaseException:
+        _unwind(stack, base)
+        raise
+    return run(stack, base)
+
+
+# Userdata in and out.
+
+
+def copy_input_keys(container: Any, parent_ud: Any) -> None:
+    """Take a container's input keys over from its parent's userdata, whatever kind that is."""
+    keys = container.get_registered_input_keys()
+    if parent_ud is None or not keys:
+        return
+    if not isinstance(parent_ud, Remapper):
+        parent_ud = Remapper(parent_ud, keys)
+    for key in parent_ud.fsm_copy_to(container.fsm_program.data, keys):
+        warn_of_input(container, key)
+
+
+def copy_output_keys(container: Any, parent_ud: Any) -> None:
+    """Hand a container's output keys over to its parent's userdata, whatever kind that is."""
+    keys = container.get_registered_output_keys()
+    if parent_ud is None or not keys:
+        return
+    if not isinstance(parent_ud, Remapper):
+        parent_ud = Remapper(parent_ud, (), keys)
+    for key in parent_ud.fsm_take_from(container.fsm_program.data, keys):
+        warn_of_output(container, key)
+
+
+def warn_of_input(container: Any, key: str) -> None:
+    """Say that an input key is not there."""
+    log.logwarn(f"'{container.get_name()}' starts without its input key '{key}': nobody set it")
+
+
+def warn_of_output(container: Any, key: str) -> None:
+    """Say that an output key is not there."""
+    log.logwarn(f"'{container.get_name()}' ends without its output key '{key}': nobody set it")
+
+
+# What is between two states.
 
 
 class Move(NamedTuple):
@@ -75,7 +344,9 @@ class Answer(NamedTuple):
     served: bool
 
 
-def answer_of(state: State, outcome: Any, *, preempted: bool, cut: bool, gone: bool) -> Answer:
+def answer_of(
+    state: State, outcome: Any, *, preempted: bool, making_way: bool, left: bool
+) -> Answer:
     """Tell what a state's end answers, and take back what it did not acknowledge.
 
     One flag stands for both requests. So a state that was asked for both, and acknowledged once,
@@ -85,20 +356,20 @@ def answer_of(state: State, outcome: Any, *, preempted: bool, cut: bool, gone: b
         state: The state, which has ended.
         outcome: What it ended with.
         preempted: It was asked to stop for good.
-        cut: It was asked to make way for an interrupt.
-        gone: It was left behind: it keeps the request, so that it ends some time.
+        making_way: It was asked to make way for an interrupt.
+        left: It was left behind: it keeps the request, so that it ends some time.
     """
-    pending = state.preempt_requested() and not gone
-    if pending and (preempted or (cut and outcome is not SUSPENDED)):
+    pending = state.preempt_requested() and not left
+    if pending and (preempted or (making_way and outcome is not SUSPENDED)):
         state.recall_preempt()
     # A container that makes way is suspended; any other outcome is its own.
-    cut = cut and not state.fsm_suspends
+    making_way = making_way and not state.fsm_suspends
     if outcome is SUSPENDED:
         made_way = True
     elif pending:
-        made_way = cut and outcome == 'preempted'
+        made_way = making_way and outcome == 'preempted'
     else:
-        made_way = cut and not preempted
+        made_way = making_way and not preempted
     return Answer(made_way, served=preempted and not pending)
 
 
@@ -111,124 +382,133 @@ class Frame:
     condition only.
 
     Args:
-        container: Whose execution it is.
+        program: The container's program.
         thread: The logical thread it belongs to.
-        path: The container's path.
-        current: The node it begins with.
         parent_ud: The parent's userdata.
 
     Attributes:
-        control: The control of the machine it belongs to.
+        container: The container.
         current: The node that executes, or the exit that was taken.
         attention: Something beside the next state wants to be looked at.
-        stale: The machine went on without the thread that runs this frame.
+        abandoned: The machine went on without the thread that runs this frame.
         preempted: The node whose state was last asked to stop because of a preempt.
-        cut: The node whose state was asked to stop because of an interrupt.
+        making_way: The node whose state was asked to make way for an interrupt.
         suspending: The parent wants the container put aside.
-        gone: The node whose state was left behind.
+        left: The node whose state was left behind.
         forced: A node, and the outcome to take in place of the one that its state returns.
         ended: The execution is over. The container keeps the frame until its parent has taken note,
             so that a checkpoint taken in between does not take it for one that has not begun.
         saved: Where to go on after each of the interrupts under way.
         stopped: Where the shutdown check ended the run.
+        watch: The limits at work on the state that executes.
+        attempt: How often that was executed before, because of its limits.
         watches_threads: It watches threads of its own, which have bounds of their own.
     """
 
     # Class attributes: most executions of a container need none of them.
     attention = False
-    stale = False
+    abandoned = False
     preempted: Node | None = None
-    cut: Node | None = None
+    making_way: Node | None = None
     suspending = False
-    gone: Node | None = None
+    left: Node | None = None
     forced: tuple[Node, str] | None = None
     ended = False
     saved: tuple[Node | Exit, ...] = ()
     stopped: Node | Exit = SHUTDOWN
+    watch: Watch | None = None
+    attempt = 0
     watches_threads = False
 
-    def __init__(
-        self,
-        container: Container,
-        thread: ExecutionThread,
-        path: str,
-        current: Node | Exit,
-        parent_ud: Any,
-    ) -> None:
-        self.container = container
+    def __init__(self, program: Program, thread: ExecutionThread, parent_ud: Any) -> None:
+        self.program = program
+        self.container: Any = program.container
         self.thread = thread
-        self.control = thread.control
-        self.path = path
-        self.current = current
+        self.current: Node | Exit = program.first
         self.parent_ud = parent_ud
+
+    @property
+    def path(self) -> str:
+        """The container's path."""
+        return self.program.path
+
+    @property
+    def control(self) -> Control:
+        """The control of the machine it belongs to."""
+        return self.thread.control
+
+    @property
+    def condition(self) -> threading.Condition:
+        """The machine's condition."""
+        return self.thread.control.condition
 
     # From the beginning to the end.
 
-    def execute(self, history: History | None) -> Any:
-        """Run the container to its outcome, or to `SUSPENDED`."""
-        container, control = self.container, self.control
-        if history is None:
-            container.fsm_copy_input_keys(self.parent_ud)
-        else:
+    def begin(self) -> Node | Exit:
+        """Go to the first state, or to the one that the history names; return it."""
+        container, program, control = self.container, self.program, self.control
+        history, program.history = program.history, None
+        if history is not None:
             self.go_on_from(history)
         if control.chatty:
             verb = 'starts in' if history is None else 'goes on in'
             place = ', '.join(map(repr, self.active_labels())) or repr(self.current.label)
             keys = sorted(container.userdata.keys())
             log.loginfo(f"'{self.path}' {verb} {place} with userdata {keys}")
-        if history is None and container.fsm_start_cbs:
+        if history is None and program.start_cbs:
             container.call_start_cbs()
         target = self.current
         if (
             container.preempt_requested()
-            or container.fsm_raised
+            or program.raised
             or self.attention
             or self.suspending
             or control.paused
             or history is not None
             or execution.shutdown_check is not None
         ):
-            target = self._attend(None, None, target)
+            target = self.attend(None, None, target)
         elif control.trace is not None:
             self.tell(Move(None, None, target, 'start'))
-        return self._run_from(target)
+        return target
 
-    def to_its_end(self, run: Callable[[], Any]) -> Any:
-        """Call what runs the container to its end; the frame leaves this thread's stack then."""
-        stack = this_thread.stack
-        try:
-            return run()
-        except BaseException:
-            if self.container.fsm_frame is self:
-                self.container.fsm_frame = None
-            raise
-        finally:
-            self.ended = True
-            if stack and stack[-1] is self:
-                stack.pop()
-
-    def run_on(self, outcome: Any) -> Any:
-        """Go on as if the current state had just returned `outcome`, and run to the end."""
+    def go_on_after(self, outcome: Any) -> None:
+        """Go on as if the current state had just returned `outcome`."""
         node = self.current
         assert isinstance(node, Node)
-        outcome = settled(self, outcome)
         self.current = target = node.target(outcome)
         node.release()
-        return self._run_from(self._attend(node, outcome, target))
+        self.attend(node, outcome, target)
+
+    def go_on(self, stack: list[Any], outcome: Any) -> Any:
+        """As the outermost frame, go on after a state that was left behind, to the end.
+
+        Args:
+            stack: The frames for the thread that takes the execution over.
+            outcome: What the innermost one's state is taken to have returned.
+        """
+        try:
+            stack[-1].go_on_after(outcome)
+        except BaseException:
+            _unwind(stack, 0)
+            raise
+        return run(stack, 0)
 
     def successor(self) -> Self:
         """Return a copy for the thread that takes this execution over."""
         frame = copy.copy(self)
-        frame.attention, frame.gone = False, None
+        # What was asked of the state inside is to be settled when that ends.
+        frame.attention, frame.left = True, None
         return frame
 
     def last_outcomes(self) -> Iterable[str]:
         """Return what the logical thread may end with whose outermost frame this is."""
-        return self.container.get_registered_outcomes()
+        outcomes: Iterable[str] = self.container.get_registered_outcomes()
+        return outcomes
 
     def hold(self) -> None:
         """Be the execution of the container."""
-        self.container.fsm_frame = self
+        self.program.frame = self
 
     def go_on_from(self, history: History) -> None:
         """Begin where the container was put aside.
@@ -236,79 +516,75 @@ class Frame:
         Raises:
             InvalidStateError: It has no such state any more.
         """
-        table = self.container.fsm_table
+        self.saved = tuple(self.program.place(*saved) for saved in history.saved)
+        self.current = self.program.place(history.current, history.leaving)
 
-        def place(label: str, leaving: bool) -> Node | Exit:
-            if leaving:
-                return Exit(label)
-            if label not in table:
-                raise InvalidStateError(
-                    f"'{self.path}' cannot go on in '{label}': its states are {sorted(table)}"
-                )
-            return table[label]
-
-        self.saved = tuple(place(*saved) for saved in history.saved)
-        self.current = place(history.current, history.leaving)
-
-    def _run_from(self, target: Any) -> Any:
-        """Execute states from `target` on until one leads out of the container; the outcome."""
-        container, control = self.container, self.control
-        data, now = container.fsm_data, control.now
-        trace, callbacks, chatty = control.trace, container.fsm_transition_cbs, control.chatty
-        told: Node | Exit = target
-        node: Any = None
-        while not target.is_exit:
-            node = target
-            try:
-                outcome = node.execute(node.view)
-            except SmachError:
-                raise
-            except Exception as error:
-                raise node.user_fault(error) from error
-            try:
-                target = node.targets[outcome]
-            except (KeyError, TypeError):
-                target = node.target(outcome)
-            self.current = target
-            if node.is_container:
-                node.state.fsm_frame = None
-            if self.attention:
-                told = target = self._attend(node, outcome, target)
-                trace, chatty = control.trace, control.chatty
-            elif trace is not None or callbacks or chatty or execution.shutdown_check is not None:
-                if execution.is_shutdown():
-                    self.stopped = target
-                    self.current = told = target = SHUTDOWN
-                    break
-                if trace is not None:
-                    trace((node, outcome, now(), data.copy()))
-                if chatty:
-                    self._log(node, outcome, target)
-                if callbacks and not target.is_exit:
-                    container.call_transition_cbs()
-        if target is not told and container.fsm_termination_cbs:
-            container.call_termination_cbs([node.label], target.label)
-        if target is ASIDE:
-            return SUSPENDED
-        container.fsm_copy_output_keys(self.parent_ud)
-        if target is SHUTDOWN:
-            return self._shut_down()
-        return target.label
-
-    def _shut_down(self) -> Any:
+    def shut_down(self) -> Any:
         """End with None; below the root, leave that to the parent, which sees the check, too."""
-        container = self.container
+        program = self.program
         if self.thread.stack[0] is not self:
             # What runs beside it may save a checkpoint yet.
-            container.fsm_history = self.where()
+            program.history = self.where()
             return SUSPENDED
-        for child in container.fsm_children().values():
-            child.fsm_forget()
+        self.container.fsm_forget()
         return None
+
+    # Around a state with limits.
+
+    def before(self, node: Node) -> Any:
+        """Put the limits of the state to work that is about to be executed.
+
+        Returns:
+            The state's outcome, if there is nothing to execute; else None.
+        """
+        limits = node.limits
+        if limits is not None and (limits.timeout is not None or limits.deadline is not None):
+            self.watch = self.thread.begin_watch(node, limits)
+        return None
+
+    def after(self, node: Node, outcome: Any) -> Any:
+        """End the limits of a state that returned; its outcome, or `AGAIN` for another attempt."""
+        limits = node.limits
+        self.thread.check()
+        outcome = self._end_watch(node, outcome)
+        if (
+            limits is None
+            or not isinstance(outcome, str)
+            or outcome not in limits.failures
+            or self.attempt == limits.retry
+            or node.state.preempt_requested()
+            or self.must_end
+        ):
+            self.attempt = 0
+            return outcome
+        self.attempt += 1
+        log.logwarn(
+            f"State '{node.path}' ended with '{outcome}': attempt {self.attempt + 1} of "
+            f'{limits.retry + 1}'
+        )
+        return AGAIN
+
+    def _end_watch(self, node: Node, outcome: Any) -> Any:
+        """Turn what a state returned after running out of time into the outcome for that."""
+        watch, limits = self.watch, node.limits
+        if watch is None or limits is None:
+            return outcome
+        self.watch = None
+        self.thread.end_watch(watch)
+        if not watch.asked or outcome is SUSPENDED or self.must_end:
+            # Whoever else wants it to end sorts the request out.
+            return outcome
+        if node.state.preempt_requested():
+            # It ended by itself; the request came too late or for nothing.
+            node.state.recall_preempt()
+            if outcome != 'preempted':
+                return outcome
+        log.logwarn(f"State '{node.path}' was stopped after its timeout of {limits.timeout:g} s")
+        return limits.late_outcome
 
     # Between two states.
 
-    def _attend(self, left: Node | None, outcome: Any, target: Node | Exit) -> Node | Exit:
+    def attend(self, left: Node | None, outcome: Any, target: Node | Exit) -> Node | Exit:
         """Do what comes between two states beside the transition itself.
 
         Args:
@@ -319,13 +595,16 @@ class Frame:
         Returns:
             Where to go.
         """
-        control, stood, still = self.control, False, False
+        control, stood, still = self.thread.control, False, False
+        if left is not None and target.is_exit and self._leave_preempted(left, outcome, target):
+            self.tell(Move(left, outcome, target, ''))
+            return target
         while True:
-            with control.condition:
+            with control.lock:
                 paused = control.paused and not control.steps
-                if still and paused and not (self.attention or self.stale):
+                if still and paused and not (self.attention or self.abandoned):
                     control.condition.wait()
-                if self.stale:
+                if self.abandoned:
                     raise LeftBehindError
                 self.thread.asked_at = None  # The state that was asked has returned.
                 self.attention = False
@@ -344,6 +623,36 @@ class Frame:
             stood, outcome = True, ''
             left = target  # type: ignore[assignment]
 
+    def _leave_preempted(self, node: Node, outcome: Any, target: Node | Exit) -> bool:
+        """Leave the container because of a preempt, if nothing else is to be looked at.
+
+        It is what `attend` does in general, for the way on which a preempt ends nested machines.
+        """
+        container = self.container
+        with self.thread.control.lock:
+            if (
+                self.preempted is not node
+                or self.making_way is not None
+                or self.left is not None
+                or self.forced is not None
+                or self.abandoned
+                or self.suspending
+                or self.saved
+                or self.program.raised
+                or outcome is SUSPENDED
+                or node.priority > LOWEST
+                or execution.shutdown_check is not None
+            ):
+                return False
+            self.thread.asked_at = self.preempted = node.state.fsm_progress = None
+            if node.state.preempt_requested():
+                # It ended by itself: whoever comes next is asked.
+                node.state.recall_preempt()
+            elif container.preempt_requested():
+                container.service_preempt()
+            self.current = target
+        return True
+
     def _decide(
         self, left: Node | None, outcome: Any, target: Node | Exit, *, stood: bool
     ) -> tuple[Node | Exit, list[Move]]:
@@ -355,11 +664,11 @@ class Frame:
             target: Where that leads by the table.
             stood: The machine stood here in a pause: nothing has ended since.
         """
-        container, moves = self.container, []
+        container, program, moves = self.container, self.program, []
         ended = None if stood else left
         move = None if stood else Move(left, outcome, target, '')
         while True:
-            self._settle_cut(ended)
+            self._settle_making_way(ended)
             if ended is not None:
                 move = self._leave(ended, outcome, target)
                 target = ended if move is None else move.target
@@ -374,30 +683,30 @@ class Frame:
         preempted = container.preempt_requested()
         if preempted and isinstance(target, Node):
             self._preempt_next(target)
-        elif self.suspending and (isinstance(target, Node) or container.fsm_raised):
+        elif self.suspending and (isinstance(target, Node) or program.raised):
             # At its end, too, while interrupts are to run before that: they wait with it.
-            container.fsm_history = self.history_before(target)
+            program.history = self.history_before(target)
             return ASIDE, moves if move is None or left is None else [*moves, move]
-        elif container.fsm_raised and not preempted:
-            urgent = container.fsm_take_raised(target.priority)
+        elif program.raised and not preempted:
+            urgent = program.take_raised(target.priority)
             if urgent is not None:
                 self.saved = (*self.saved, target)
-                target = container.fsm_table[urgent.label]
+                target = program.table[urgent.label]
                 move = Move(left, outcome, target, 'interrupt')
         if execution.is_shutdown():
             self.stopped = target
             return SHUTDOWN, moves
         return target, moves if move is None else [*moves, move]
 
-    def _settle_cut(self, ended: Node | None) -> None:
+    def _settle_making_way(self, ended: Node | None) -> None:
         """Take the request to make way back from a state that had not begun when it came."""
-        cut = self.cut
-        if cut is not None and cut is not ended:
-            if not cut.state.fsm_suspends:
-                cut.state.recall_preempt()
-            if self.preempted is cut:
+        node = self.making_way
+        if node is not None and node is not ended:
+            if not node.state.fsm_suspends:
+                node.state.recall_preempt()
+            if self.preempted is node:
                 self.preempted = None  # It is asked again.
-            self.cut = None
+            self.making_way = None
 
     def _leave(self, node: Node, outcome: Any, target: Node | Exit) -> Move | None:
         """Settle what was asked of the state that ended, and leave it.
@@ -410,7 +719,7 @@ class Frame:
             target = node.target(outcome)
             node.state.recall_preempt()
             node.state.fsm_forget()
-            self.forced = self.preempted = self.cut = None
+            self.forced = self.preempted = self.making_way = None
         else:
             answer = self._answer_of(node, outcome)
             preempted = self.container.preempt_requested()
@@ -429,11 +738,12 @@ class Frame:
 
     def _answer_of(self, node: Node, outcome: Any) -> Answer:
         """Tell what a state's end answers; nothing is asked of it any more."""
-        asked, cut, gone = self.preempted is node, self.cut is node, self.gone is node
-        self.cut = self.gone = None
-        if asked:
+        preempted, making_way = self.preempted is node, self.making_way is node
+        left = self.left is node
+        self.making_way = self.left = None
+        if preempted:
             self.preempted = None
-        return answer_of(node.state, outcome, preempted=asked, cut=cut, gone=gone)
+        return answer_of(node.state, outcome, preempted=preempted, making_way=making_way, left=left)
 
     def _leave_branch(self, move: Move) -> Move:
         """Go back to where the interrupt came, or forget that place."""
@@ -465,7 +775,7 @@ class Frame:
         steering = self.control
         if not steering.paused or self.suspending:
             return False
-        if not isinstance(target, Node) or target.is_container:
+        if not isinstance(target, Node) or target.state.fsm_program is not None:
             return False
         if any(other.container.preempt_requested() for other in self.thread.stack):
             return False
@@ -475,13 +785,12 @@ class Frame:
         return True
 
     def _wants_attention(self, target: Node | Exit) -> bool:
-        container = self.container
         return bool(
-            container.preempt_requested()
-            or container.fsm_raised
+            self.container.preempt_requested()
+            or self.program.raised
             or self.saved
             or self.suspending
-            or self.cut
+            or self.making_way
             or self.forced
             or self.control.paused
             or (isinstance(target, Node) and target.state.fsm_progress)
@@ -491,21 +800,22 @@ class Frame:
 
     def tell(self, move: Move) -> None:
         """Tell trace, log and callbacks of a transition."""
-        container, control = self.container, self.control
+        container, control = self.container, self.thread.control
         left, outcome, target, kind = move
         if left is None:
             self.note('', '', target.label, kind or 'start')
             return
         kind = target.kind if target.is_exit else kind or 'transition'
-        self.note(left.label, outcome, target.label, kind)
+        if control.trace is not None:
+            self.note(left.label, outcome, target.label, kind)
         if control.chatty:
-            self._log(left, outcome, target)
-        if target.is_exit:
-            container.call_termination_cbs([left.label], target.label)
-        else:
+            self.log_move(left, outcome, target)
+        if not target.is_exit:
             container.call_transition_cbs()
+        elif self.program.termination_cbs:
+            container.call_termination_cbs([left.label], target.label)
 
-    def _log(self, left: Node, outcome: Any, target: Node | Exit) -> None:
+    def log_move(self, left: Node, outcome: Any, target: Node | Exit) -> None:
         verb = 'ends' if target.is_exit else 'goes on'
         log.loginfo(f"'{self.path}' {verb}: '{left.label}' : '{outcome}' --> '{target.label}'")
 
@@ -519,51 +829,75 @@ class Frame:
     # What others want; under the machine's condition.
 
     @property
-    def wanted(self) -> bool:
+    def must_end(self) -> bool:
         """Whether somebody wants the current state to end."""
         return bool(
             self.container.preempt_requested()
-            or self.cut is not None
+            or self.making_way is not None
             or self.suspending
             or self.forced is not None
         )
 
     def preempt(self) -> None:
-        """Ask the state that runs to stop."""
-        self.attention = True
-        current = self.current
-        if isinstance(current, Node) and self.preempted is not current:
-            self.preempted = current
-            self.thread.asked()
-            current.state.request_preempt()
+        """Ask what runs to stop: the containers inside, and the state in the innermost one.
+
+        The request goes down level by level, not by calls: the state that waits is woken last, when
+        nothing else is left to be done.
+        """
+        frame: Frame | None = self
+        while frame is not None:
+            frame.attention = True
+            current = frame.current
+            if not isinstance(current, Node) or frame.preempted is current:
+                break
+            frame.preempted = current
+            frame.thread.asked()
+            entry = current.entry
+            if entry is None or entry.program is None or not entry.relays:
+                current.state.request_preempt()
+                break
+            State.request_preempt(entry.program.container)
+            frame = entry.program.frame
         if self.control.paused:
-            self.control.condition.notify_all()
+            self.condition.notify_all()
 
     def interrupted(self) -> None:
         """Make way for the container's raised interrupts."""
         self.attention = True
         priority = self.current.priority
-        if any(branch.priority > priority for branch in self.container.fsm_raised):
-            self.cut_short()
+        if any(branch.priority > priority for branch in self.program.raised):
+            self.make_way()
         if self.control.paused:
-            self.control.condition.notify_all()
+            self.condition.notify_all()
 
     def suspend(self) -> None:
-        """Have the container put aside with its history."""
-        self.suspending = self.attention = True
-        self.cut_short()
+        """Have the container put aside with its history, and all containers inside."""
+        frame: Frame | None = self
+        while frame is not None:
+            frame.suspending = frame.attention = True
+            current = frame.current
+            if not isinstance(current, Node) or frame.making_way is current:
+                return
+            frame.making_way = current
+            program = current.program
+            if program is None:
+                frame.thread.asked()
+                current.state.fsm_suspend()
+                return
+            frame = program.frame
 
-    def cut_short(self) -> None:
+    def make_way(self) -> None:
+        """Ask the state that runs to make way for an interrupt."""
         current = self.current
-        if isinstance(current, Node) and self.cut is not current:
-            self.cut = current
+        if isinstance(current, Node) and self.making_way is not current:
+            self.making_way = current
             self.thread.asked()
             current.state.fsm_suspend()
 
     def where(self) -> History | None:
         """Return where the container would go on if its process ended now."""
         if self.current is ASIDE:
-            return self.container.fsm_history
+            return self.program.history
         return self.history_before(self.stopped if self.current is SHUTDOWN else self.current)
 
     def history_before(self, target: Node | Exit) -> History:
@@ -579,13 +913,13 @@ class Frame:
         current = self.current
         return [] if current.is_exit else [current.label]
 
-    def abandoned(self, *, for_good: bool) -> None:
+    def abandon(self, *, for_good: bool) -> None:
         """Note that the machine went on without the thread that runs this frame.
 
         Args:
             for_good: No other thread takes the execution over.
         """
-        self.stale = self.attention = True
-        self.container.fsm_frame = None
+        self.abandoned = self.attention = True
+        self.program.frame = None
         if for_good:
             self.container.recall_preempt()

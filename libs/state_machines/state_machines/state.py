@@ -152,6 +152,8 @@ class State:
     fsm_source: Mapping[str, Any] | None = None
     # Whether it makes way for an interrupt with its history kept, as containers do.
     fsm_suspends = False
+    # What a container is compiled into.
+    fsm_program: Any = None
     fsm_of_execution: ClassVar[frozenset[str]] = frozenset(
         {
             'fsm_clock',
@@ -324,9 +326,9 @@ class State:
 
     # What a container overrides.
 
-    def fsm_children(self) -> dict[str, State]:
-        """Return the states and interrupts inside by label; none but in a container."""
-        return {}
+    def fsm_is_entered(self) -> bool:
+        """Tell whether the loop goes into it, as into a container, and does not call it."""
+        return False
 
     def fsm_suspend(self) -> None:
         """Ask the state to make way for an interrupt; under the machine's condition."""

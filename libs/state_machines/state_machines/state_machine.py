@@ -15,9 +15,9 @@ from state_machines.exceptions import (
     InvalidUserCodeError,
     describe,
 )
-from state_machines.frame import Frame, History, Move
+from state_machines.frame import AGAIN, Frame, Move
 from state_machines.log import logwarn
-from state_machines.nodes import SUSPENDED, Exit, LimitOptions, Node
+from state_machines.program import SUSPENDED, Exit, History, LimitOptions, Node
 from state_machines.state import State, structure_version
 from state_machines.userdata import UserData, raw
 
@@ -103,8 +103,9 @@ class StateMachine(Container):
         connectors = list(connector_outcomes)
         unknown = [name for name in connectors if name not in state.get_registered_outcomes()]
         if unknown:
+            path = machine.fsm_program.path_of(label)
             raise InvalidStateError(
-                f"State '{machine.fsm_path_of(label)}' cannot be connected by {unknown}: its "
+                f"State '{path}' cannot be connected by {unknown}: its "
                 f'outcomes are {sorted(state.get_registered_outcomes())}'
             )
         StateMachine.add_state(machine, label, state, transitions, remapping, **limits)
@@ -148,7 +149,7 @@ class StateMachine(Container):
         outcomes = self.get_registered_outcomes()
         if self._initial_state_label is None:
             faults.append('it has no states')
-        elif self._initial_state_label not in self.fsm_states:
+        elif self._initial_state_label not in self.fsm_program.states:
             faults.append(f"its initial state '{self._initial_state_label}' does not exist")
         for label, transitions in self._transitions.items():
             for outcome, target in transitions.items():
@@ -158,7 +159,7 @@ class StateMachine(Container):
                             f"outcome '{outcome}' of state '{label}' is bound to nothing and is "
                             'not an outcome of the machine'
                         )
-                elif target not in self.fsm_states and target not in outcomes:
+                elif target not in self.fsm_program.states and target not in outcomes:
                     faults.append(
                         f"outcome '{outcome}' of state '{label}' leads to '{target}', which is "
                         'neither a state nor an outcome of the machine'
@@ -169,7 +170,8 @@ class StateMachine(Container):
 
     def fsm_make_table(self) -> dict[str, Node]:
         """Make the nodes of all states and interrupts."""
-        table = {label: self.fsm_node(label, state) for label, state in self.fsm_states.items()}
+        program = self.fsm_program
+        table = {label: program.node(label, state) for label, state in program.states.items()}
         exits = {outcome: Exit(outcome) for outcome in self.get_registered_outcomes()}
         for label, transitions in self._transitions.items():
             targets = table[label].targets
@@ -180,9 +182,9 @@ class StateMachine(Container):
                 ]
         return table
 
-    def fsm_first(self) -> Node | Exit:
+    def fsm_first_of(self, table: Mapping[str, Node]) -> Node | Exit:
         """Return the node of the initial state."""
-        return self.fsm_table[self._initial_state_label]  # type: ignore[index]
+        return table[self._initial_state_label]  # type: ignore[index]
 
     # The container's interface.
 
@@ -200,14 +202,14 @@ class StateMachine(Container):
         """
         if len(initial_states) > 1:
             raise InvalidStateError(
-                f"State machine '{self.fsm_path}' begins with one state, not {initial_states}"
+                f"State machine '{self.get_name()}' begins with one state, not {initial_states}"
             )
         for label in initial_states:
             # While it has no states, as in SMACH, they may be added later.
-            if self.fsm_states and label not in self.fsm_states:
+            if self.fsm_program.states and label not in self.fsm_program.states:
                 raise InvalidStateError(
-                    f"State machine '{self.fsm_path}' cannot begin with '{label}': its states are "
-                    f'{sorted(self.fsm_states)}'
+                    f"State machine '{self.get_name()}' cannot begin with '{label}': its states "
+                    f'are {sorted(self.fsm_program.states)}'
                 )
             self._initial_state_label = label
         super().set_initial_state((), userdata)
@@ -286,7 +288,6 @@ class IteratorFrame(Frame):
         repeat: The current item has not ended: it is not followed by the next one.
     """
 
-    container: Iterator
     items: Any = None
     index = 0
     repeat = False
@@ -339,10 +340,26 @@ class IteratorFrame(Frame):
             data[iterator.items_label] = item
         return True
 
-    def run_on(self, outcome: Any) -> Any:
-        """Take `outcome` for that of the current item, and run to the end."""
+    def before(self, node: Node) -> Any:
+        """Draw an item, but for another attempt; the outcome for having none."""
+        if node.entry is None or not node.entry.draws:
+            # An interrupt's.
+            return super().before(node)
+        if self.attempt == 0 and not self.draw():
+            return self.container.fsm_exhausted
+        return super().before(node)
+
+    def after(self, node: Node, outcome: Any) -> Any:
+        """As of any container; an item whose state made way has not ended."""
+        outcome = super().after(node, outcome)
+        if outcome is not AGAIN and node.entry is not None and node.entry.draws:
+            self.repeat = outcome is SUSPENDED
+        return outcome
+
+    def go_on_after(self, outcome: Any) -> None:
+        """Take `outcome` for that of the current item, and go on."""
         self.repeat = outcome is SUSPENDED
-        return super().run_on(outcome)
+        super().go_on_after(outcome)
 
     def _leave(self, node: Node, outcome: Any, target: Node | Exit) -> Move | None:
         """As of any container; an item whose state made way has not ended."""
@@ -444,15 +461,15 @@ class Iterator(Container):
         **limits: Unpack[LimitOptions],
     ) -> State:
         """Set the state of an iterator at hand, open or not; see `set_contained_state`."""
-        if self.fsm_states:
+        if self.fsm_program.states:
             raise InvalidStateError(
-                f"Iterator '{self.fsm_path}' has the state '{self._state_label}' already"
+                f"Iterator '{self.get_name()}' has the state '{self._state_label}' already"
             )
         loop, breaking = list(loop_outcomes), list(break_outcomes)
         bound = [*loop, *breaking]
         self._register(label, state, bound, None, None, **limits)
         if loop and breaking:
-            logwarn(f"Iterator '{self.fsm_path}' has loop and break outcomes: the latter count")
+            logwarn(f"Iterator '{self.get_name()}' has loop and break outcomes: the latter count")
         # With ``timeout`` among them where it is bound without being declared.
         outcomes = dict.fromkeys([*state.get_registered_outcomes(), *bound])
         if breaking:
@@ -466,40 +483,30 @@ class Iterator(Container):
 
     def fsm_faults(self) -> list[str]:
         """Return what keeps the iterator from running."""
-        return [] if self.fsm_states else ['it has no state']
+        return [] if self.fsm_program.states else ['it has no state']
 
     # Running: the state leads back to itself until something breaks the loop.
 
     def fsm_make_table(self) -> dict[str, Node]:
         """Make the nodes of the state and of all interrupts."""
-        node = self.fsm_node(self._state_label, self.fsm_states[self._state_label])
+        program = self.fsm_program
+        label = self._state_label
+        node = program.node(label, program.states[label], draws=True)
         for outcome in self.loop_outcomes:
             node.targets[outcome] = node
         for outcome in self._break_outcomes:
             node.targets[outcome] = Exit(self.fsm_ending(outcome))
-        exhausted = _Exhausted(self.exhausted_outcome)
-        node.targets[exhausted] = Exit(self.fsm_ending(self.exhausted_outcome))
-        within_limits = node.execute if node.limits is not None else None
-
-        def execute_for_item(view: Any) -> Any:
-            frame = self.fsm_frame
-            assert isinstance(frame, IteratorFrame)
-            if not frame.draw():
-                return exhausted
-            outcome = within_limits(view) if within_limits is not None else node.enter(view)
-            frame.repeat = outcome is SUSPENDED
-            return outcome
-
-        node.execute = execute_for_item
-        return {self._state_label: node}
+        self.fsm_exhausted = _Exhausted(self.exhausted_outcome)
+        node.targets[self.fsm_exhausted] = Exit(self.fsm_ending(self.exhausted_outcome))
+        return {label: node}
 
     def fsm_ending(self, outcome: str) -> str:
         """Return the iterator's outcome when its state's `outcome` ends the loop."""
         return self.final_outcome_map.get(outcome, outcome)
 
-    def fsm_first(self) -> Node | Exit:
+    def fsm_first_of(self, table: Mapping[str, Node]) -> Node | Exit:
         """Return the node of the state."""
-        return self.fsm_table[self._state_label]
+        return table[self._state_label]
 
     # The container's interface.
 

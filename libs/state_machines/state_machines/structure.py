@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from state_machines.container import Container
-from state_machines.nodes import RESUME
+from state_machines.program import RESUME
 from state_machines.state import State
 from state_machines.state_machine import Iterator as IteratorContainer
 
@@ -51,12 +51,26 @@ class Structure:
     """
 
     def __init__(self, container: Container, path: str | None = None) -> None:
-        self.path = container.get_name() if path is None else path
-        self.label = self.path.rpartition('/')[2]
+        pending = [self]
+        self._read(container, container.get_name() if path is None else path)
+        while pending:
+            # Not by recursion: machines may be nested deeper than Python calls.
+            outer = pending.pop()
+            for label, state in outer.members.items():
+                if isinstance(state, Container):
+                    inner = outer.inner[label] = object.__new__(Structure)
+                    inner._read(state, f'{outer.path}/{label}')
+                    pending.append(inner)
+
+    def _read(self, container: Container, path: str) -> None:
+        """Take over what one container says of itself."""
+        program = container.fsm_program
+        self.path = path
+        self.label = path.rpartition('/')[2]
         self.kind = type(container).__name__
         self.together = container.together
         self.container = container
-        branches = sorted(container.fsm_branches.values(), key=lambda branch: -branch.priority)
+        branches = sorted(program.branches.values(), key=lambda branch: -branch.priority)
         self.states = container.get_children()
         self.interrupts = {branch.label: branch.state for branch in branches}
         self.members = self.states | self.interrupts
@@ -74,17 +88,15 @@ class Structure:
             for outcome, name in sorted(branch.transitions.items()):
                 leaving = name not in self.states and name != RESUME
                 self.edges.append(Edge(branch.label, outcome, name, leaving))
-        self.inner = {
-            label: Structure(state, f'{self.path}/{label}')
-            for label, state in self.members.items()
-            if isinstance(state, Container)
-        }
+        self.inner: dict[str, Structure] = {}
 
     def walk(self) -> Iterator[Structure]:
         """Return this container and all inside, outermost first."""
-        yield self
-        for inner in self.inner.values():
-            yield from inner.walk()
+        pending = [self]
+        while pending:
+            structure = pending.pop()
+            yield structure
+            pending += reversed(structure.inner.values())
 
 
 def state_at(container: Container, path: str) -> State:
@@ -100,7 +112,7 @@ def state_at(container: Container, path: str) -> State:
     walked = root
     labels = path[len(root) + 1 :].split('/') if path != root else []
     for label in labels:
-        children = state.fsm_children()
+        children = {} if state.fsm_program is None else state.fsm_program.children()
         if label not in children:
             raise KeyError(f"'{walked}' has no state '{label}': its states are {sorted(children)}")
         state = children[label]

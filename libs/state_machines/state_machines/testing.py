@@ -21,7 +21,7 @@ from typing import Any
 from state_machines.clock import Interrupt
 from state_machines.container import Container
 from state_machines.exceptions import InvalidStateError, InvalidTransitionError
-from state_machines.nodes import RawTransition, unfold
+from state_machines.program import RawTransition, unfold
 from state_machines.state import State
 from state_machines.structure import Structure, state_at
 

@@ -1,115 +1,23 @@
-"""Time limits, retries, and states that hang: stopped in time, executed again, left behind.
+"""States that hang: asked to stop in time, and left behind when they do not.
 
-Whoever executes a machine watches its threads (`supervise`). When a state neither returns within
-its deadline nor heeds a preempt within its bound, the watcher leaves its thread behind, has another
-one go on where the state would have ended (`_abandon`), and names the state in the log.
+Whoever executes a machine with time limits or a bound on preempts watches its threads
+(`supervise`). When a state neither returns within its deadline nor heeds a preempt within its
+bound, the watcher leaves its thread behind, has another one go on where the state would have ended
+(`_abandon`), and names the state in the log.
 """
 
 from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable, Sequence
-from functools import partial
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
 
 from state_machines.clock import Interrupt
 from state_machines.exceptions import InvalidTransitionError
-from state_machines.execution import Control, ExecutionThread, Watch, Work
-from state_machines.log import logerr, logwarn
-from state_machines.nodes import SUSPENDED, Limits, Node
-from state_machines.state import this_thread
-
-if TYPE_CHECKING:
-    from state_machines.frame import Frame
-
-
-def limited(node: Node, limits: Limits) -> Callable[[Any], Any]:
-    """Wrap what executes a state so that its limits are at work meanwhile."""
-    timed = limits.timeout is not None or limits.deadline is not None
-
-    def run(view: Any) -> Any:
-        for attempt in range(limits.retry + 1):
-            thread: ExecutionThread | None = this_thread.thread
-            watch = _begin_watch(thread, node, limits) if thread is not None and timed else None
-            try:
-                outcome = node.enter(view)
-            finally:
-                if watch is not None and thread is not None:
-                    _end_watch(thread, watch)
-            frame = thread.stack[-1] if thread is not None else None
-            outcome = _settle(node, frame, watch, outcome)
-            if outcome not in limits.failures or attempt == limits.retry:
-                return outcome
-            if node.state.preempt_requested() or (frame is not None and frame.wanted):
-                return outcome
-            logwarn(
-                f"State '{node.path}' ended with '{outcome}': attempt {attempt + 2} of "
-                f'{limits.retry + 1}'
-            )
-        return None
-
-    return run
-
-
-def _settle(node: Node, frame: Frame | None, watch: Watch | None, outcome: Any) -> Any:
-    """Turn what a state returned after running out of time into the outcome for that.
-
-    Args:
-        node: The state's node.
-        frame: The frame that it ran in.
-        watch: Its limits at work.
-        outcome: What it returned.
-    """
-    limits = node.limits
-    if watch is None or not watch.asked or limits is None or outcome is SUSPENDED:
-        return outcome
-    if frame is not None and frame.wanted:
-        return outcome  # Whoever wants it to end too sorts the request out.
-    ignored = node.state.preempt_requested()
-    if ignored:
-        # It ended by itself; the request came too late or for nothing.
-        node.state.recall_preempt()
-        if outcome != 'preempted':
-            return outcome
-    logwarn(f"State '{node.path}' was stopped after its timeout of {limits.timeout:g} s")
-    return limits.late_outcome
-
-
-# Limits at work.
-
-
-def _begin_watch(thread: ExecutionThread, node: Node, limits: Limits) -> Watch:
-    """Put limits to work on the state that the innermost frame is about to execute."""
-    now = thread.control.now()
-    with thread.control.condition:
-        thread.check()
-        watch = Watch(
-            node,
-            len(thread.stack) - 1,
-            None if limits.timeout is None else now + limits.timeout,
-            None if limits.deadline is None else now + limits.deadline,
-        )
-        thread.watches.append(watch)
-    thread.wakeup.set()
-    return watch
-
-
-def _end_watch(thread: ExecutionThread, watch: Watch) -> None:
-    """End the limits of a state that has returned."""
-    with thread.control.condition:
-        thread.check()
-        thread.watches.remove(watch)
-
-
-def settled(frame: Frame, outcome: Any) -> Any:
-    """Return the outcome of the state that `frame` executed, its limits having been ended."""
-    for watch in frame.thread.watches:
-        if frame.thread.stack[watch.depth] is frame:
-            _end_watch(frame.thread, watch)
-            return _settle(watch.node, frame, watch, outcome)
-    return outcome
-
+from state_machines.execution import STOPPED, Control, ExecutionThread, stopped_outcome
+from state_machines.frame import Frame
+from state_machines.log import logerr
+from state_machines.program import Node
 
 # Watching.
 
@@ -180,6 +88,9 @@ def _enforce(thread: ExecutionThread) -> None:
         for watch in tuple(thread.watches):
             limits = watch.node.limits
             if watch.hard is not None and now >= watch.hard and limits is not None:
+                _hold(thread)
+                if thread.stack[watch.depth].current is not watch.node:
+                    return  # It has just returned.
                 reason = f'did not return within its deadline of {limits.deadline:g} s'
                 _abandon(thread, watch.depth, limits.late_outcome, reason)
                 return
@@ -193,13 +104,15 @@ def _enforce(thread: ExecutionThread) -> None:
 
 # Going on without a state.
 
-STOPPED = ('preempted', 'aborted')
-"""Outcomes that a state may be taken to have ended with that was left behind."""
 
+def _hold(thread: ExecutionThread) -> None:
+    """Have the thread wait for the condition before its next state; under the condition.
 
-def stopped_outcome(node: Node) -> str | None:
-    """Return the outcome that a state is taken to have ended with, if it has one for that."""
-    return next((outcome for outcome in STOPPED if outcome in node.targets), None)
+    What its frames' `current` say from here on is what it executes, until the condition is given
+    back: it writes that before it looks at `attention`.
+    """
+    for frame in tuple(thread.stack):
+        frame.attention = True
 
 
 def _abandon_unpreemptible(thread: ExecutionThread) -> None:
@@ -208,6 +121,7 @@ def _abandon_unpreemptible(thread: ExecutionThread) -> None:
     Under the machine's condition.
     """
     reason = f'ignored a preempt for {thread.control.preempt_timeout:g} s'
+    _hold(thread)
     for depth, frame in reversed(list(enumerate(thread.stack))):
         if not isinstance(frame.current, Node):
             return  # It is ending by itself.
@@ -239,91 +153,49 @@ def _abandon(
     """
     ended = f"with '{outcome}'" if isinstance(outcome, str) else 'with an error'
     logerr(f"State '{thread.path_inside()}' {reason}: the machine goes on without it, {ended}")
-    frames = leave_behind(thread, depth)
-    if frames:
-        thread.start(lambda: _go_on(thread, frames, outcome))
+    leave_behind(thread, depth)
+    stack = thread.stack
+    if stack:
+        thread.start(lambda: stack[0].go_on(stack, outcome))
         return
     error = None if isinstance(outcome, str) else outcome
     thread.end(outcome if error is None else None, error)
-    thread.wakeup.set()
+    thread.wake_watcher()
 
 
-def leave_behind(thread: ExecutionThread, depth: int = -1) -> list[Frame]:
+def leave_behind(thread: ExecutionThread, depth: int = -1) -> None:
     """Leave the present thread behind, and take its containers and userdata away from it.
 
     Under the machine's condition.
 
     Args:
-        thread: The logical thread.
+        thread: The logical thread. Its stack has copies of the frames up to `depth` afterwards, for
+            the thread that takes the execution over.
         depth: Index of the last frame that is gone on in, without its state; -1 for none.
-
-    Returns:
-        The frames up to `depth` for the thread that takes the execution over.
     """
-    old, work = thread.stack, thread.work
+    old: list[Frame] = thread.stack
+    work, where = thread.work, thread.path_inside()
     frames = [frame.successor() for frame in old[: depth + 1]]
+    # First of all: what the old thread puts on its stack from here on ends at once.
+    thread.stack = frames
     inside = old[-1].current if old else None
     for index, frame in enumerate(old):
-        frame.abandoned(for_good=index > depth)
+        frame.abandon(for_good=index > depth)
     for frame in frames:
         frame.hold()
     if work is not None:
-        thread.control.hanging.append((thread.path_inside(), work))
+        thread.control.hanging.append((where, work))
     if isinstance(inside, Node) and work is not None:
         # The request stays with the state, so that the thread left behind ends some time.
         inside.state.request_preempt()
         inside.revoke()
-        block_reentry(inside, work)
+        work.block_reentry(inside)
     if frames and isinstance(frames[-1].current, Node):
-        frames[-1].gone = frames[-1].current
+        frames[-1].left, frames[-1].watch = frames[-1].current, None
         if frames[-1].current is not inside:
             frames[-1].current.revoke()
-    thread.stack = list(frames)
     thread.watches = [watch for watch in thread.watches if watch.depth < depth]
     thread.asked_at = None
     if not frames:
         thread.retire()
     thread.control.condition.notify_all()
-    return frames
-
-
-def _go_on(thread: ExecutionThread, frames: list[Frame], outcome: Any) -> Any:
-    """Finish nested containers from inside out, the innermost one's state having ended."""
-    frame = frames[-1]
-    try:
-        for frame in reversed(frames):
-            outcome = frame.to_its_end(partial(frame.run_on, outcome))
-    finally:
-        with thread.control.condition:
-            for rest in frames[: frames.index(frame) + 1]:
-                if rest.container.fsm_frame is rest:
-                    rest.container.fsm_frame = None
-    return outcome
-
-
-def block_reentry(node: Node, left: Work) -> None:
-    """Enter a state again only when the thread that was left behind in it has ended."""
-    enter = node.state.execute
-    unlimited = node.execute is node.enter
-
-    def wait_and_enter(view: Any) -> Any:
-        thread: ExecutionThread | None = this_thread.thread
-        if not left.await_end(thread.control.preempt_timeout if thread is not None else None):
-            logerr(f"State '{node.label}' is still running from an earlier execution")
-            if thread is not None:
-                thread.still_gone(node)
-            return stopped_outcome(node)
-        node.state.fsm_left = None
-        node.enter = enter
-        if unlimited:
-            node.execute = enter
-        if thread is None:
-            node.state.recall_preempt()
-        else:
-            thread.renew_request(node)
-        return enter(view)
-
-    node.state.fsm_left = left
-    node.enter = wait_and_enter
-    if unlimited:
-        node.execute = wait_and_enter

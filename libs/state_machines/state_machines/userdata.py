@@ -172,6 +172,15 @@ class Remapper:
                 raise self._undeclared('write', key)
         return missing
 
+    def fsm_names(self) -> tuple[tuple[tuple[str, str], ...], tuple[tuple[str, str], ...], bool]:
+        """Return inputs and outputs as (the state's name, the name outside).
+
+        Also whether copying by these names is all: there are no constants, and a dictionary is
+        behind the view.
+        """
+        plain = not self._constants and type(self._data) is dict
+        return tuple(self._input.items()), tuple(self._output.items()), plain
+
     def __contains__(self, key: object) -> bool:
         if key in self._constants:
             return key in self._input

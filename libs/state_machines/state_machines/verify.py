@@ -14,7 +14,7 @@ from __future__ import annotations
 import ast
 import inspect
 import textwrap
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import lru_cache, reduce
 from typing import Any
@@ -59,9 +59,9 @@ def verify(machine: Container, userdata_keys: Iterable[str] = ()) -> list[Findin
     Returns:
         What is wrong; errors first, outermost containers first.
     """
-    root = _View(Structure(machine))
+    views = _views(Structure(machine))
     findings: list[Finding] = []
-    for view in root.walk():
+    for view in views:
         for check in (
             _unbound,
             _unreachable,
@@ -73,7 +73,7 @@ def verify(machine: Container, userdata_keys: Iterable[str] = ()) -> list[Findin
         ):
             findings += check(view)
     keys = frozenset(userdata_keys)
-    findings += _unset_reads(root, keys, keys)
+    findings += _unset_reads(views[0], keys, keys)
     return sorted(findings, key=lambda finding: finding.severity != 'error')
 
 
@@ -93,9 +93,9 @@ class _View:
         written: Keys that have been written inside when it ends, likewise.
     """
 
-    def __init__(self, structure: Structure) -> None:
+    def __init__(self, structure: Structure, inner: dict[str, _View]) -> None:
         self.structure = structure
-        self.inner = {label: _View(inner) for label, inner in structure.inner.items()}
+        self.inner = inner
         self.edges: dict[str, list[Edge]] = {label: [] for label in structure.members}
         for edge in structure.edges:
             within = self.inner.get(edge.source)
@@ -109,12 +109,6 @@ class _View:
         self.written = _Keys()
         _follow_keys(self)
 
-    def walk(self) -> Iterator[_View]:
-        """Return this container and all inside, outermost first."""
-        yield self
-        for inner in self.inner.values():
-            yield from inner.walk()
-
     def bits(self, keys: Iterable[str]) -> int:
         """Return userdata keys as a set of bits, see `_Keys`."""
         numbers, bits = self._numbers, 0
@@ -124,7 +118,7 @@ class _View:
 
     def remapping(self, label: str) -> Mapping[str, str]:
         """Return the remapping of a state or an interrupt."""
-        return self.structure.container.fsm_remappings.get(label, {})
+        return self.structure.container.fsm_program.remappings.get(label, {})
 
     def error(self, check: str, message: str, label: str = '') -> Finding:
         """Return an error of the container, or of the state with a label."""
@@ -136,6 +130,17 @@ class _View:
 
     def _path(self, label: str) -> str:
         return f'{self.structure.path}/{label}' if label else self.structure.path
+
+
+def _views(root: Structure) -> list[_View]:
+    """Return the containers of a machine as the checks need them, outermost first."""
+    structures = list(root.walk())
+    views: dict[str, _View] = {}
+    # What an inner container can end with, and writes, is known before the outer one is looked at.
+    for structure in reversed(structures):
+        inner = {label: views[each.path] for label, each in structure.inner.items()}
+        views[structure.path] = _View(structure, inner)
+    return [views[structure.path] for structure in structures]
 
 
 def _reachable(view: _View) -> set[str]:
@@ -251,7 +256,7 @@ def _wrong_remappings(view: _View) -> list[Finding]:
             view.error(
                 'remapping', f"its constant '{key}' is not among its input keys {inputs}", label
             )
-            for key in view.structure.container.fsm_constants.get(label, ())
+            for key in view.structure.container.fsm_program.constants.get(label, ())
             if key not in inputs
         ]
     return findings
@@ -438,37 +443,50 @@ def _added(view: _View, label: str) -> _Keys:
     return _Keys(always, sometimes)
 
 
-def _unset_reads(view: _View, always: Iterable[str], sometimes: Iterable[str]) -> list[Finding]:
+def _unset_reads(root: _View, always: Iterable[str], sometimes: Iterable[str]) -> list[Finding]:
     """Return reads that find nothing, or may find nothing.
 
     Args:
-        view: A container.
+        root: The root.
         always: Keys that it is always entered with, in its own names.
         sometimes: Keys that it is sometimes entered with.
     """
-    findings = []
-    given = _Keys(view.bits(always), view.bits(sometimes))
-    for label, local in view.before.items():
-        before = local.plus(given)
-        renamed = view.remapping(label)
-        constants = view.structure.container.fsm_constants.get(label, {})
-        there: list[str] = []
-        at_times: list[str] = []
-        for key in sorted(view.structure.members[label].get_registered_input_keys()):
-            bit = view.bits([renamed.get(key, key)])
-            if key in constants or before.always & bit:
-                there.append(key)
-            elif before.sometimes & bit:
-                at_times.append(key)
-            if label in view.inner or key in there:
+    findings: list[Finding] = []
+    pending: list[tuple[_View, Iterable[str], Iterable[str]]] = [(root, always, sometimes)]
+    while pending:
+        view, always, sometimes = pending.pop()
+        given = _Keys(view.bits(always), view.bits(sometimes))
+        inside: list[tuple[_View, Iterable[str], Iterable[str]]] = []
+        for label, local in view.before.items():
+            there, at_times, missing = _reads(view, label, local.plus(given))
+            if label in view.inner:
+                inside.append((view.inner[label], there, [*there, *at_times]))
                 continue
-            message = f"reads userdata key '{key}', which %s written"
-            if key in at_times:
-                message %= 'on some ways to it nobody has'
-                findings.append(view.warning('unset-key', message, label))
-            else:
-                message %= 'nobody has ever'
-                findings.append(view.error('unset-key', message, label))
-        if label in view.inner:
-            findings += _unset_reads(view.inner[label], there, [*there, *at_times])
+            for key in sorted([*at_times, *missing]):
+                message = f"reads userdata key '{key}', which %s written"
+                if key in at_times:
+                    message %= 'on some ways to it nobody has'
+                    findings.append(view.warning('unset-key', message, label))
+                else:
+                    message %= 'nobody has ever'
+                    findings.append(view.error('unset-key', message, label))
+        pending += reversed(inside)
     return findings
+
+
+def _reads(view: _View, label: str, before: _Keys) -> tuple[list[str], list[str], list[str]]:
+    """Return the keys that a state reads: those always written before, at times, and never."""
+    renamed = view.remapping(label)
+    constants = view.structure.container.fsm_program.constants.get(label, {})
+    there: list[str] = []
+    at_times: list[str] = []
+    missing: list[str] = []
+    for key in sorted(view.structure.members[label].get_registered_input_keys()):
+        bit = view.bits([renamed.get(key, key)])
+        if key in constants or before.always & bit:
+            there.append(key)
+        elif before.sometimes & bit:
+            at_times.append(key)
+        else:
+            missing.append(key)
+    return there, at_times, missing

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable
 from typing import Any
 
 import state_machines as fsm
-from state_machines import history
+from state_machines import checkpoint
 from state_machines.testing import FakeClock
 
 
@@ -136,4 +136,4 @@ class CheckpointedWorld:
 
 
 def through_json(machine):
-    return json.loads(json.dumps(history.capture(machine)))
+    return json.loads(json.dumps(checkpoint.capture(machine)))

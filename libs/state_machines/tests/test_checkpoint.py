@@ -6,7 +6,7 @@ import json
 import threading
 
 import state_machines as fsm
-from state_machines import history as checkpoint
+from state_machines import checkpoint
 from state_machines.testing import FakeClock
 
 from .states import Answer, Background, CheckpointedWorld, Waiter, began, through_json

@@ -12,15 +12,14 @@ import threading
 import pytest
 
 import state_machines as fsm
-from state_machines import history as checkpoint
-from state_machines.machine_file import load_machine
+from state_machines import checkpoint
 
 from .states import Answer, CheckpointedWorld, through_json
 
 CHILD = """
 import os, sys
 import state_machines as fsm
-from state_machines import history as checkpoint
+from state_machines import checkpoint
 path, mode = sys.argv[1:]
 def step(name, die=False):
     def work(ud):
@@ -61,20 +60,20 @@ def test_a_process_that_was_killed_is_gone_on_from_by_the_next(tmp_path):
 def test_a_checkpoint_of_another_machine_is_refused_and_changes_nothing():
     first = CheckpointedWorld()
     saved = through_json(first.root)
-    saved['machine']['states'] = {
-        'INNER': {
-            'at': {'current': 'GONE', 'leaving': False, 'saved': [], 'index': 0, 'outcomes': {}}
-        }
-    }
-    saved['machine']['userdata'] = {'a': 1}
-    with pytest.raises(checkpoint.MachineFileError, match=r"'StateMachine/INNER'.*'GONE'"):
+    gone = {'current': 'GONE', 'leaving': False, 'saved': [], 'index': 0, 'outcomes': {}}
+    saved['states'] = [{'userdata': {'a': 1}}, {'label': 'INNER', 'in': 0, 'at': gone}]
+    with pytest.raises(checkpoint.CheckpointError, match=r"'StateMachine/INNER'.*'GONE'"):
         checkpoint.restore(first.root, saved)
     assert 'a' not in first.root.userdata
-    saved['machine']['states'] = {'OTHER': {}}
-    with pytest.raises(checkpoint.MachineFileError, match="no state 'OTHER'"):
+    saved['states'] = [{}, {'label': 'OTHER', 'in': 0}]
+    with pytest.raises(checkpoint.CheckpointError, match="no state 'OTHER'"):
         checkpoint.restore(first.root, saved)
-    saved['machine'] = {'raised': ['NIX']}
-    with pytest.raises(checkpoint.MachineFileError, match="no interrupt 'NIX'"):
+    for within in (1, -1, None, 'INNER'):
+        saved['states'] = [{}, {'label': 'INNER', 'in': within}]
+        with pytest.raises(checkpoint.CheckpointError, match='expected the number of a container'):
+            checkpoint.restore(first.root, saved)
+    saved['states'] = [{'raised': ['NIX']}]
+    with pytest.raises(checkpoint.CheckpointError, match="no interrupt 'NIX'"):
         checkpoint.restore(first.root, saved)
 
 
@@ -82,9 +81,9 @@ def test_a_checkpoint_of_another_machine_is_refused_and_changes_nothing():
 def test_a_file_that_is_no_checkpoint_is_named(tmp_path, text):
     path = tmp_path / 'broken.json'
     path.write_text(text)
-    with pytest.raises(checkpoint.MachineFileError, match=r'broken\.json'):
+    with pytest.raises(checkpoint.CheckpointError, match=r'broken\.json'):
         checkpoint.load(CheckpointedWorld().root, path)
-    with pytest.raises(checkpoint.MachineFileError, match=r'absent\.json'):
+    with pytest.raises(checkpoint.CheckpointError, match=r'absent\.json'):
         checkpoint.load(CheckpointedWorld().root, tmp_path / 'absent.json')
 
 
@@ -173,7 +172,7 @@ class Number(int):
 @pytest.mark.parametrize('value', [object(), [object()], Number(3), circle(), {'a': print}])
 def test_what_cannot_be_kept_is_refused_with_its_key_when_it_is_written(value, tmp_path, caplog):
     machine = machine_with(fine=1, robot=value)
-    with pytest.raises(checkpoint.MachineFileError, match="userdata key 'robot' of 'StateMachine'"):
+    with pytest.raises(checkpoint.CheckpointError, match="userdata key 'robot' of 'StateMachine'"):
         checkpoint.save(machine, tmp_path / 'at')
     assert list(tmp_path.iterdir()) == []
     checkpoint.save(machine, tmp_path / 'at', leave_out=['robot'])
@@ -205,14 +204,14 @@ DEEP = '[' * 5000 + ']' * 5000
         ('"userdata": {"key": 1}', '"userdata": {"key": {"!": "bytes", "is": 1}}'),
         ('"userdata": {"key": 1}', '"userdata": {"key": {"!": []}}'),
         ('"userdata": {"key": 1}', f'"userdata": {{"key": {DEEP}}}'),
-        ('"userdata": {"key": 1}', '"states": []'),
+        ('"userdata": {"key": 1}', '"userdata": {}}, 7, {"label": "A"'),
         ('"userdata": {"key": 1}', '"at": []'),
         ('"userdata": {"key": 1}', '"at": {"current": 3}'),
         ('"userdata": {"key": 1}', '"at": {"current": "A", "saved": [1]}'),
         ('"userdata": {"key": 1}', '"at": {"current": "A", "index": -1}'),
         ('"userdata": {"key": 1}', '"raised": [[]]'),
         ('"userdata": {"key": 1}', '"progress": [1]'),
-        ('"userdata": {"key": 1}', '"states": {"A": {"userdata": {}}}'),
+        ('"userdata": {"key": 1}', '"at": null}, {"label": "A", "in": 0, "userdata": {}'),
     ],
 )
 def test_a_damaged_checkpoint_is_an_error_of_one_line_that_changes_nothing(old, new, tmp_path):
@@ -222,7 +221,7 @@ def test_a_damaged_checkpoint_is_an_error_of_one_line_that_changes_nothing(old, 
     assert old in text
     path.write_text(text.replace(old, new))
     machine = machine_with()
-    with pytest.raises(checkpoint.MachineFileError) as caught:
+    with pytest.raises(checkpoint.CheckpointError) as caught:
         checkpoint.load(machine, path)
     assert '\n' not in str(caught.value)
     assert str(path) in str(caught.value)
@@ -247,13 +246,8 @@ def test_what_is_no_file_is_neither_read_nor_replaced(tmp_path, kind):
     else:
         path.symlink_to('/dev/zero')
     machine = CheckpointedWorld().root
-    for read in (
-        lambda: checkpoint.load(machine, path),
-        lambda: checkpoint.read_record(path),
-        lambda: load_machine(path),
-    ):
-        with pytest.raises(fsm.MachineFileError, match=f'^{path}: expected a file, got {kind}$'):
-            read()
+    with pytest.raises(fsm.CheckpointError, match=f'^{path}: expected a file, got {kind}$'):
+        checkpoint.load(machine, path)
     with pytest.raises(OSError, match=f'expected a file, got {kind}'):
         checkpoint.save(machine, path)
     assert not path.is_file()

@@ -10,7 +10,7 @@ import weakref
 import pytest
 
 import state_machines as fsm
-from state_machines import history
+from state_machines import checkpoint
 from state_machines.testing import FakeClock
 
 from .states import Answer, Background, Deaf, Waiter, began, chain, through_json
@@ -126,7 +126,7 @@ def test_a_checkpoint_in_a_shutdown_says_where_a_nested_machine_stopped():
 
     def later(ud):
         down.wait(60.0)
-        while inner.fsm_frame is not None:
+        while inner.fsm_program.frame is not None:
             pass
         return 'done'
 
@@ -142,8 +142,9 @@ def test_a_checkpoint_in_a_shutdown_says_where_a_nested_machine_stopped():
         assert root.execute() is None
     finally:
         fsm.set_shutdown_check(None)
-    assert saved[-1]['machine']['at']['outcomes'] == {'LATER': 'done'}
-    assert saved[-1]['machine']['states']['INNER']['at']['current'] == 'S1'
+    assert saved[-1]['states'][0]['at']['outcomes'] == {'LATER': 'done'}
+    (place,) = (each['at'] for each in saved[-1]['states'] if each.get('label') == 'INNER')
+    assert place['current'] == 'S1'
     # Another execution begins anew.
     assert root.execute() == 'done'
     assert len(turns) == 2
@@ -160,7 +161,7 @@ def test_a_checkpoint_after_a_concurrence_was_left_behind_has_no_place_in_it():
     root = fsm.StateMachine(['late', 'done', 'preempted'])
     root.add_state('TOGETHER', concurrence, {'timeout': 'late'}, deadline=0.5)
     assert root.execute() == 'late'
-    assert 'states' not in through_json(root)['machine']
+    assert not any('at' in each for each in through_json(root)['states'])
     hold.set()
 
 
@@ -451,7 +452,7 @@ def test_a_checkpoint_taken_in_an_interrupt_goes_on_in_it():
     concurrence.request_preempt()
     assert run.result() == 'preempted'
     concurrence, states, stop, clock = waiting_with_an_interrupt(**ALL_DONE)
-    history.restore(concurrence, in_interrupt)
+    checkpoint.restore(concurrence, in_interrupt)
     run = Background(concurrence)
     began(stop)
     assert [state.runs for state in states] == [0, 0]
@@ -465,10 +466,10 @@ def test_a_checkpoint_taken_in_an_interrupt_goes_on_in_it():
 
 def test_a_checkpoint_that_is_in_one_of_the_states_is_damaged():
     concurrence, _, _, _ = waiting_with_an_interrupt()
-    checkpoint = through_json(concurrence)
-    checkpoint['machine']['at'] = {'current': 'S0'}
-    with pytest.raises(fsm.MachineFileError, match="no state 'S0' to resume in"):
-        history.restore(concurrence, checkpoint)
+    saved = through_json(concurrence)
+    saved['states'][0]['at'] = {'current': 'S0'}
+    with pytest.raises(fsm.CheckpointError, match="no state 'S0' to resume in"):
+        checkpoint.restore(concurrence, saved)
 
 
 def test_a_paused_machine_starts_no_state_of_a_concurrence():
@@ -557,7 +558,7 @@ def test_what_an_end_was_to_stop_is_stopped_after_a_checkpoint_too():
     concurrence.register_transition_cb(ended)
     concurrence.execute()
     again, slow = build()
-    history.restore(again, checkpoints[0])
+    checkpoint.restore(again, checkpoints[0])
     assert Background(again).result(60.0) == 'preempted'
     assert slow.runs == 1
 

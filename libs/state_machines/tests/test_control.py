@@ -8,8 +8,8 @@ import pytest
 
 import state_machines as fsm
 from state_machines.execution import Control
-from state_machines.history import TransitionFeed
 from state_machines.testing import FakeClock, watching
+from state_machines.transitions import TransitionFeed
 
 from .states import Answer, Background, Waiter, began
 

@@ -223,6 +223,7 @@ def test_an_interrupt_of_the_calling_thread_preempts_before_it_is_passed_on(monk
 
     waiter = Waiter()
     root, _ = chain(waiter)
+    root.preempt_timeout = 60.0
     supervise, calls = container.supervise, []
 
     def interrupted(*arguments):

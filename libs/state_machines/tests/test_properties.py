@@ -9,10 +9,12 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import state_machines as fsm
-from state_machines import history as checkpoint
-from state_machines.history import Transition, replay
+from state_machines import checkpoint
 from state_machines.testing import watching
+from state_machines.transitions import Transition
 from state_machines.verify import verify
+
+from .replaying import replay
 
 OUTCOMES = ('a', 'b', 'c')
 SETTINGS = settings(

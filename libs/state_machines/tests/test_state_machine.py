@@ -6,10 +6,10 @@ import pytest
 
 import state_machines as fsm
 from state_machines.export import to_ascii
-from state_machines.history import replay
 from state_machines.structure import Structure
 from state_machines.testing import watching
 
+from .replaying import replay
 from .states import Answer, Background, Deaf, Waiter, began
 
 # Labels and outcomes.

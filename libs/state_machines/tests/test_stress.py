@@ -11,7 +11,7 @@ import time
 import pytest
 
 import state_machines as fsm
-from state_machines import history as checkpoint
+from state_machines import checkpoint
 
 SECONDS = float(os.environ.get('FSM_STRESS_SECONDS', '1.5'))
 

@@ -1,25 +1,19 @@
-"""Records of transitions, their replay, and the test kit's view of them."""
+"""Transitions as they are told, and the test kit's view of them."""
 
 from __future__ import annotations
 
-import json
 import sys
 import threading
 
 import pytest
 
 import state_machines as fsm
-from state_machines import history as record
-from state_machines.exceptions import MachineFileError
-from state_machines.history import (
-    Recorder,
-    TransitionFeed,
-    read_record,
-    replay,
-    unfold,
-)
+from state_machines import transitions as feeds
+from state_machines.program import unfold
 from state_machines.testing import FakeClock, script, watching
+from state_machines.transitions import TransitionFeed
 
+from .replaying import recording, replay
 from .states import Answer, Background, Waiter, began, chain
 
 
@@ -36,13 +30,12 @@ def patrol():
     return root
 
 
-def test_a_record_is_written_read_and_replayed(tmp_path):
-    path, machine = tmp_path / 'record.jsonl', patrol()
+def test_transitions_are_numbered_and_fit_the_machine():
+    machine = patrol()
     machine.userdata.battery = 80
     machine.userdata.handle = object()
-    with Recorder(machine, path):
+    with recording(machine) as transitions:
         assert machine.execute() == 'done'
-    transitions = read_record(path)
     assert [t.sequence for t in transitions] == list(range(1, 10))
     assert transitions[0].userdata == {'battery': 80}
     assert [(t.path, t.from_state, t.outcome, t.to_state, t.kind) for t in transitions[:4]] == [
@@ -58,21 +51,7 @@ def test_a_record_is_written_read_and_replayed(tmp_path):
     assert steps[-1].active == ()
 
 
-def test_a_replay_stops_where_the_machine_is_another(tmp_path):
-    path, machine = tmp_path / 'record.jsonl', patrol()
-    with Recorder(machine, path):
-        machine.execute()
-    other = fsm.StateMachine(['done', 'preempted'])
-    other.set_name('PATROL')
-    with other:
-        fsm.StateMachine.add('CHOOSE', Answer('go', 'done'), {'go': 'done'})
-    with pytest.raises(
-        MachineFileError, match="Transition 1 in 'PATROL': 'CHOOSE' does not lead to"
-    ):
-        list(replay(other, read_record(path)))
-
-
-def test_interrupts_and_concurrences_are_replayed(tmp_path):
+def test_transitions_of_interrupts_and_concurrences_fit_the_machine():
     def build():
         waiter, quick = Waiter(100.0), Answer('done')
         both = fsm.Concurrence(['done', 'preempted'], 'preempted')
@@ -86,15 +65,14 @@ def test_interrupts_and_concurrences_are_replayed(tmp_path):
         return root, waiter
 
     root, waiter = build()
-    path = tmp_path / 'record.jsonl'
-    with Recorder(root, path):
+    with recording(root) as transitions:
         run = Background(root)
         began(waiter)
         root.raise_interrupt('STOP')
         began(waiter)
         root.request_preempt()
         run.result()
-    steps = list(replay(build()[0], read_record(path)))
+    steps = list(replay(build()[0], transitions))
     assert [step.transition.kind for step in steps if step.transition.path == 'StateMachine'] == [
         'interrupt',
         'resume',
@@ -102,7 +80,7 @@ def test_interrupts_and_concurrences_are_replayed(tmp_path):
     ]
 
 
-def test_interrupts_of_a_concurrence_are_recorded_and_replayed(tmp_path):
+def test_interrupts_of_a_concurrence_are_told_in_order():
     def build():
         root, slow = fsm.Concurrence(['done', 'preempted'], 'done'), Waiter(100.0)
         with root:
@@ -113,12 +91,11 @@ def test_interrupts_of_a_concurrence_are_recorded_and_replayed(tmp_path):
         return root, slow
 
     root, slow = build()
-    path = tmp_path / 'record.jsonl'
     quick_ended = threading.Event()
     root.register_transition_cb(
         lambda ud, active: quick_ended.set() if active == ['SLOW'] else None
     )
-    with Recorder(root, path):
+    with recording(root) as transitions:
         root.raise_interrupt('STOP')
         run = Background(root)
         began(slow)
@@ -127,7 +104,7 @@ def test_interrupts_of_a_concurrence_are_recorded_and_replayed(tmp_path):
         began(slow)
         root.request_preempt()
         run.result()
-    steps = list(replay(build()[0], read_record(path)))
+    steps = list(replay(build()[0], transitions))
     assert [
         (each.transition.from_state, each.transition.to_state, each.transition.kind, each.active)
         for each in steps
@@ -141,47 +118,23 @@ def test_interrupts_of_a_concurrence_are_recorded_and_replayed(tmp_path):
     ]
 
 
-def test_a_replay_goes_back_to_where_a_nested_machine_was_before_an_interrupt(tmp_path):
+def test_a_replay_goes_back_to_where_a_nested_machine_was_before_an_interrupt():
     def build():
         root, _ = chain(Answer('done'), waiter := Waiter(100.0))
         root.add_interrupt('STOP', Answer('done'))
         return root, waiter
 
     root, waiter = build()
-    with Recorder(root, tmp_path / 'record'):
+    with recording(root) as transitions:
         run = Background(root)
         began(waiter)
         root.raise_interrupt('STOP')
         began(waiter)
         root.request_preempt()
         run.result()
-    steps = list(replay(build()[0], read_record(tmp_path / 'record')))
+    steps = list(replay(build()[0], transitions))
     resumed = next(step for step in steps if step.transition.kind == 'resume')
     assert resumed.active[-1] == 'StateMachine/INNER/INNER/S1'
-
-
-def test_a_record_that_was_cut_off_is_read_as_far_as_it_goes(tmp_path):
-    path, machine = tmp_path / 'record.jsonl', patrol()
-    with Recorder(machine, path):
-        machine.execute()
-    whole = path.read_text()
-    path.write_text(whole[: len(whole) - 40])
-    assert len(read_record(path)) == 8
-    lines = whole.splitlines(keepends=True)
-    path.write_text(''.join([lines[0], '{broken\n', *lines[2:]]))
-    with pytest.raises(MachineFileError, match=r'record\.jsonl:2: '):
-        read_record(path)
-    path.write_text(lines[0] + '[' * 200_000 + '\n' + lines[2])
-    with pytest.raises(MachineFileError, match=r'record\.jsonl:2: .*nested too deep'):
-        read_record(path)
-    path.write_text('[' * 200_000)
-    with pytest.raises(MachineFileError, match=r'record\.jsonl:1: not a surveillance-fsm-record'):
-        read_record(path)
-    path.write_text('something else\n')
-    with pytest.raises(MachineFileError, match=r'record\.jsonl:1: not a surveillance-fsm-record'):
-        read_record(path)
-    with pytest.raises(MachineFileError, match=r'absent\.jsonl'):
-        read_record(tmp_path / 'absent.jsonl')
 
 
 def test_a_feed_survives_its_consumer_and_reports_all_that_ran(caplog):
@@ -267,7 +220,7 @@ def test_transitions_of_several_threads_are_numbered_in_the_order_they_come_in()
 
 
 def test_transitions_that_nobody_could_take_in_leave_a_gap_in_the_numbers(monkeypatch):
-    monkeypatch.setattr(record, 'QUEUE_LENGTH', 10)
+    monkeypatch.setattr(feeds, 'QUEUE_LENGTH', 10)
     seen, busy, go_on = [], threading.Event(), threading.Event()
     wait = fsm.CBState(lambda ud: 'done' if busy.wait(5.0) else None, outcomes=['done'])
     machine = fsm.StateMachine(['done'])
@@ -290,15 +243,15 @@ def test_transitions_that_nobody_could_take_in_leave_a_gap_in_the_numbers(monkey
     assert seen == [1, *range(94, 103)]
 
 
-def test_several_may_watch_a_machine_at_once(tmp_path):
+def test_several_may_watch_a_machine_at_once():
     machine, seen = patrol(), []
     script(machine, {'PATROL/CHOOSE': ['done', 'done']})
     feed = TransitionFeed(machine, lambda transition: seen.append(transition.from_state))
-    with Recorder(machine, tmp_path / 'record'), watching(machine) as watched:
+    with recording(machine) as transitions, watching(machine) as watched:
         machine.execute()
     feed.flush(5.0)
     assert seen == watched.path() == ['CHOOSE']
-    assert [t.from_state for t in read_record(tmp_path / 'record')] == ['CHOOSE']
+    assert [t.from_state for t in transitions] == ['CHOOSE']
     machine.set_initial_state(['CHOOSE'])
     machine.execute()
     feed.close()
@@ -383,33 +336,12 @@ def test_a_fake_clock_wakes_whom_it_should():
         clock.until_sleeping(1, timeout=0.01)
 
 
-def test_the_record_is_json_that_others_can_read(tmp_path):
-    path, machine = tmp_path / 'record.jsonl', patrol()
-    with Recorder(machine, path):
-        machine.execute()
-    header, *rest = map(json.loads, path.read_text().splitlines())
-    assert header == {'format': 'surveillance-fsm-record', 'version': 1, 'root': 'PATROL'}
-    assert set(rest[0]) == {
-        'sequence',
-        'time',
-        'path',
-        'from_state',
-        'outcome',
-        'to_state',
-        'kind',
-        'duration',
-        'visits',
-        'userdata',
-    }
-
-
-def test_a_record_says_how_long_each_state_took_by_the_machines_clock(tmp_path):
+def test_a_transition_says_how_long_each_state_took_by_the_machines_clock():
     clock, machine = FakeClock(leaps=True), patrol()
     machine.set_clock(clock)
     plan = [lambda ud: clock.sleep(4.0, fsm.Interrupt()) and 'done']
     outcomes = {'CHOOSE': ['go', 'done'], 'MOVE/PLAN': plan, 'MOVE/FOLLOW': ['done']}
     script(machine, {f'PATROL/{path}': turns for path, turns in outcomes.items()})
-    with Recorder(machine, tmp_path / 'record.jsonl'):
+    with recording(machine) as transitions:
         machine.execute()
-    transitions = read_record(tmp_path / 'record.jsonl')
     assert [t.duration for t in transitions] == [0.0, 4.0, 0.0, 4.0, 0.0]
