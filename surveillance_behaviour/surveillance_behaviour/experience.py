@@ -6,20 +6,34 @@ driven takes the mean of its own drives, drawn towards that prediction while the
 direction of a leg is learned for itself; while one was not driven, the other stands for it. The
 spread is the standard deviation of what drives took over what was predicted for them just before,
 pooled over all legs.
+
+All of these are Huber's estimates (Huber 1964, *Robust Estimation of a Location Parameter*): what
+lies within 1.345 deviations counts as in a mean, which wastes nothing of usual drives, and what
+lies further off pulls only as hard as that. One absurd drive changes next to nothing; of two that
+agree the second is believed. A median would do the latter as well, but needs more drives for the
+same certainty, and the draw of the battery must be a mean: what a way costs is the sum of its
+parts. Values that no robot can have (`FASTEST`, `SLOWEST`, `FASTEST_FALL`) never enter, and are
+left out of what is read back.
 """
 
 from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field
+from operator import mul
 from pathlib import Path
-from statistics import fmean
+from statistics import fmean, median
 from typing import Any
 
 from patrol_policy.battery_reserve import LEARNED_FALL, Draw
-from surveillance_behaviour.mission.mission_log import account_of, on_present_clock, read
+from surveillance_behaviour.mission.mission_log import (
+    account_of,
+    is_other_simulation,
+    on_present_clock,
+    read,
+)
 from surveillance_runtime.files import FileError, KeptFile
 
 SIMULTANEOUS = 1.0
@@ -33,6 +47,16 @@ PRIOR_SPREAD = 0.15
 """Spread before anything was learned."""
 PRIOR_WEIGHT = 5.0
 """How many ratios the prior of the spread weighs as much as."""
+HUBER = 1.345
+"""Deviations within which an estimate is a mean: 95 % as good as that for normal errors."""
+ROUNDS = 30
+"""Steps of an estimate; each moves less than the one before."""
+FASTEST = 10.0
+"""No robot drives faster from place to place, m/s."""
+SLOWEST = 86_400.0
+"""A drive that takes longer is none, seconds."""
+FASTEST_FALL = 5.0
+"""No battery falls faster, percent per second: it would last 20 s."""
 CHANGE = 0.03
 """Expected times of the map follow what was learned once they differ by more than this part."""
 
@@ -42,10 +66,36 @@ Leg = tuple[str, str]
 def spread_of(ratios: Collection[float]) -> float:
     """Return the standard deviation from 1 of ratios of what was seen to what was expected.
 
-    `PRIOR_SPREAD` stands for it while they are few; none counts as further off than 2.
+    `PRIOR_SPREAD` stands for it while they are few; none counts as further off than 2, and one in
+    twenty, or one alone, as no further off than the next.
     """
-    squares = sum(min(abs(ratio - 1.0), 2.0) ** 2 for ratio in ratios)
+    away = sorted(min(abs(ratio - 1.0), 2.0) for ratio in ratios)
+    # The furthest ones count as the next, until there are more of their kind.
+    odd = 1 + len(away) // 20
+    most = max(PRIOR_SPREAD, away[-1 - odd]) if len(away) > odd else PRIOR_SPREAD
+    squares = sum(min(each, most) ** 2 for each in away)
     return math.sqrt((PRIOR_WEIGHT * PRIOR_SPREAD**2 + squares) / (PRIOR_WEIGHT + len(ratios)))
+
+
+def robust_mean(values: Collection[float], start: float, *, prior: float = 0.0) -> float:
+    """Return Huber's estimate of where values lie, all of them positive.
+
+    Args:
+        values: At least one.
+        start: Where it is expected; the estimate begins there.
+        prior: How many values `start` itself counts as.
+    """
+    estimate = start
+    for _ in range(ROUNDS):
+        within = HUBER * PRIOR_SPREAD * estimate
+        weights = [within / max(within, abs(value - estimate)) for value in values]
+        own = prior * within / max(within, abs(start - estimate))
+        total = sum(weights) + own
+        step = float((sum(map(mul, weights, values)) + own * start) / total)
+        if abs(step - estimate) < 1e-4 * estimate:
+            return step
+        estimate = step
+    return estimate
 
 
 @dataclass
@@ -78,7 +128,7 @@ class LegTimes:
             straight: Metres between the two places in a straight line.
             metres: Length of the planned path; None: not known.
         """
-        if start == goal or not 0.0 < seconds < math.inf:
+        if start == goal or not is_drive(seconds, straight):
             return
         expected = self.expected(start, goal, straight)
         if expected > 0.0:
@@ -102,7 +152,7 @@ class LegTimes:
         own = self.drives.get(leg)
         if not own:
             return prediction
-        return (prediction + sum(own)) / (1.0 + len(own))
+        return robust_mean(own, prediction, prior=1.0)
 
     @property
     def spread(self) -> float:
@@ -119,17 +169,28 @@ class LegTimes:
         if self._fit is None:
             # The prior: no overhead, the configured speed; as sure as one drive of a usual leg.
             usual, weight = 5.0, 1.0
-            n, sx, sxx = weight, weight * usual, 1.25 * weight * usual**2
-            sy, sxy = sx / self.speed, sxx / self.speed
-            for leg, seconds in self.drives.items():
-                x, count, total = self.metres[leg], len(seconds), sum(seconds)
-                n, sx, sxx = n + count, sx + count * x, sxx + count * x * x
-                sy, sxy = sy + total, sxy + total * x
-            determinant = n * sxx - sx * sx
-            pace = (n * sxy - sx * sy) / determinant
-            overhead = (sy - pace * sx) / n
-            if pace <= 0.0 or overhead < 0.0:
-                overhead, pace = 0.0, sxy / sxx
+            legs = [
+                (self.metres[leg], float(len(seconds)), median(seconds))
+                for leg, seconds in self.drives.items()
+            ]
+            overhead, pace = 0.0, 1.0 / self.speed
+            for _ in range(ROUNDS):
+                n, sx, sxx = weight, weight * usual, 1.25 * weight * usual**2
+                sy, sxy = sx / self.speed, sxx / self.speed
+                for x, count, seconds in legs:
+                    expected = overhead + pace * x
+                    # Of a leg that was driven once, another one of its length tells more.
+                    within = HUBER * PRIOR_SPREAD * expected * count
+                    w = count * within / max(within, abs(seconds - expected))
+                    n, sx, sxx = n + w, sx + w * x, sxx + w * x * x
+                    sy, sxy = sy + w * seconds, sxy + w * seconds * x
+                before = overhead, pace
+                pace = (n * sxy - sx * sy) / (n * sxx - sx * sx)
+                overhead = (sy - pace * sx) / n
+                if pace <= 0.0 or overhead < 0.0:
+                    overhead, pace = 0.0, sxy / sxx
+                if abs(pace - before[1]) + abs(overhead - before[0]) / usual < 1e-4 * pace:
+                    break
             self._fit = overhead, pace
         return self._fit
 
@@ -151,21 +212,35 @@ class LegTimes:
         legs = [[*leg, self.metres[leg], list(drives)] for leg, drives in self.drives.items()]
         return {'legs': legs, 'errors': list(self.errors)}
 
-    def restore(self, kept: Mapping[str, Any]) -> None:
-        """Take what `to_json` gave.
+    def restore(self, kept: Mapping[str, Any]) -> int:
+        """Take what `to_json` gave; return how many values no robot can have, which are left out.
 
         Raises:
             ValueError, KeyError, TypeError: It is something else.
         """
+        left_out = 0
         for start, goal, metres, drives in kept['legs']:
             leg = str(start), str(goal)
             seconds = [float(value) for value in drives]
             if not all(0.0 < value < math.inf for value in (*seconds, float(metres))):
                 raise ValueError(f'times of {start} to {goal}: expected finite and positive')
-            self.metres[leg] = float(metres)
-            self.drives[leg] = deque(seconds, maxlen=DRIVES_REMEMBERED)
-        self.errors.extend(float(value) for value in kept['errors'])
+            # A path is longer than the straight line that new drives are compared with.
+            likely = [value for value in seconds if is_drive(value, 0.0)]
+            left_out += len(seconds) - len(likely)
+            if likely:
+                self.metres[leg] = float(metres)
+                self.drives[leg] = deque(likely, maxlen=DRIVES_REMEMBERED)
+        errors = [float(value) for value in kept['errors']]
+        if not all(0.0 < value < math.inf for value in errors):
+            raise ValueError('errors: expected finite and positive numbers')
+        self.errors.extend(errors)
         self._fit = None
+        return left_out
+
+
+def is_drive(seconds: float, metres: float) -> bool:
+    """Tell whether a robot can drive some metres in some seconds."""
+    return 0.0 < seconds <= SLOWEST and metres <= FASTEST * seconds
 
 
 @dataclass
@@ -173,8 +248,7 @@ class DrawEstimate:
     """How fast the battery falls, learned from its level whenever that is heard.
 
     The level is known in whole percents. Between two moments at which it changes the fall is
-    exact. One that is more than twice as fast as the next fastest is not counted until it is seen
-    again: it was a jump of the level, not a draw.
+    exact. One that no battery can have is a jump of the level.
     """
 
     _rates: deque[float] = field(default_factory=lambda: deque(maxlen=FALLS_REMEMBERED))
@@ -187,27 +261,38 @@ class DrawEstimate:
             return
         fallen = self._mark[1] - level
         if fallen >= LEARNED_FALL:
-            self._rates.append(fallen / (time - self._mark[0]))
+            rate = fallen / (time - self._mark[0])
+            if rate <= FASTEST_FALL:
+                self._rates.append(rate)
             self._mark = (time, level)
 
     @property
     def draw(self) -> Draw:
         """The mean and the spread of the last rates; the mean is 0 while nothing is known."""
-        rates = sorted(self._rates)
-        if len(rates) >= 5 and rates[-1] > 2.0 * rates[-2]:
-            rates.pop()
+        rates = list(self._rates)
         if not rates:
             return Draw()
-        rate = fmean(rates)
+        middle = median(rates)
+        # Standing and driving differ: what lies within that is averaged.
+        spread = max(PRIOR_SPREAD * middle, 1.4826 * median(abs(each - middle) for each in rates))
+        within = 2.0 * HUBER * spread
+        rate = fmean(min(max(each, middle - within), middle + within) for each in rates)
         return Draw(rate, spread_of([each / rate for each in rates]))
 
     def to_json(self) -> list[float]:
         """Return the rates, to be kept in a file."""
         return list(self._rates)
 
-    def restore(self, rates: Iterable[float]) -> None:
-        """Take rates that `to_json` gave."""
-        self._rates.extend(float(rate) for rate in rates)
+    def restore(self, rates: Iterable[float]) -> int:
+        """Take rates that `to_json` gave; return how many no battery can have.
+
+        Raises:
+            ValueError, TypeError: It is something else.
+        """
+        given = [float(rate) for rate in rates]
+        likely = [rate for rate in given if 0.0 < rate <= FASTEST_FALL]
+        self._rates.extend(likely)
+        return len(given) - len(likely)
 
 
 @dataclass
@@ -228,6 +313,9 @@ class Experience:
         sent_to_charge: Why the robot was sent to charge and has not been charged since.
         requested: Where an operator wants the robot, and it has not been since; empty: nowhere.
         now: The last time that was told, seconds on the clock of the visits.
+        problem: What is wrong with the file; empty: nothing.
+        left_out: What of it was not taken.
+        elapsed: Tells seconds as they pass, which shows when the clock is set; None: nobody does.
     """
 
     file: KeptFile = field(default_factory=KeptFile)
@@ -238,6 +326,9 @@ class Experience:
     requested: str = ''
     now: float = 0.0
     problem: str = ''
+    left_out: str = ''
+    elapsed: Callable[[], float] | None = None
+    _passed: float | None = None
 
     @classmethod
     def of_record(cls, record: str) -> Experience:
@@ -247,7 +338,7 @@ class Experience:
         be read counts as none; `problem` says what is wrong with it.
         """
         experience = cls(KeptFile.of_record(record, '.experience.json'))
-        experience.problem = experience.file.read(experience._take)
+        experience.problem = experience.file.read(experience._take) or experience.left_out
         if record and Path(record).is_file():
             try:
                 account = account_of(read(record))
@@ -261,11 +352,14 @@ class Experience:
     def _take(self, kept: dict[str, Any]) -> None:
         leg_times, draw = LegTimes(), DrawEstimate()
         visits = {str(place): float(at) for place, at in kept['visits'].items()}
-        leg_times.restore(kept['leg_times'])
-        draw.restore(kept['draw'])
+        if not all(math.isfinite(at) for at in visits.values()):
+            raise ValueError('visits: expected finite times')
+        left_out = leg_times.restore(kept['leg_times']) + draw.restore(kept['draw'])
         sent_to_charge = str(kept['sent_to_charge'])
         self.visits, self.leg_times, self.draw = visits, leg_times, draw
         self.sent_to_charge, self.requested = sent_to_charge, str(kept.get('requested', ''))
+        if left_out:
+            self.left_out = f'{left_out} learned values that no robot can have are left out'
 
     def save(self) -> None:
         """Write the file, if anything has changed."""
@@ -284,9 +378,23 @@ class Experience:
         self.tell_time(now)
         self.visits[place] = now
 
-    def tell_time(self, now: float) -> None:
-        """Take the visits with a clock that was set back, forget those of another simulation."""
+    def tell_time(self, now: float) -> float:
+        """Take the visits with a clock that was set, forget those of another simulation.
+
+        Returns:
+            By how much the clock was set since the last time, seconds; 0: not at all, or not
+            noticed.
+        """
+        passed = None if self.elapsed is None else self.elapsed()
+        jump = 0.0
+        if passed is not None and self._passed is not None:
+            jump = now - self.now - (passed - self._passed)
         latest = max((self.now, *self.visits.values()))
-        if now < latest - SIMULTANEOUS:
+        if is_other_simulation(latest, now):
             self.visits = on_present_clock(self.visits, latest, now)
-        self.now = now
+        elif abs(jump) > SIMULTANEOUS:
+            self.visits = {place: at + jump for place, at in self.visits.items()}
+        elif now < latest - SIMULTANEOUS:
+            self.visits = on_present_clock(self.visits, latest, now)
+        self.now, self._passed = now, passed
+        return jump if abs(jump) > SIMULTANEOUS else 0.0

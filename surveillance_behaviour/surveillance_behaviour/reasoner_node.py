@@ -61,7 +61,7 @@ class Reasoner(PatrolNode):
             ros_ontology(self, deadlines),
             RosPlaces(self, deadlines),
             battery,
-            self._wait.now,
+            self._wait.elapsed,
         )
         self._avoided: frozenset[str] = frozenset()
         self._place = ''

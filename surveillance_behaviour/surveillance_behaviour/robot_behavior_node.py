@@ -113,7 +113,9 @@ class RobotBehavior(PatrolNode):
             reasoner = ReasonClient(self, deadlines, ontology, battery)
             routine = RosRoutine(self, deadlines, battery, clock)
             return Ports(ontology, places, self._announcer, reasoner, routine=routine)
-        world_model = world_model_of(self, settings, memory, ontology, places, battery, clock.now)
+        world_model = world_model_of(
+            self, settings, memory, ontology, places, battery, clock.elapsed
+        )
         offer_decision_services(
             self, world_model, clock.now, lambda: self.mission.recovery.avoided(self.mission.now())
         )

@@ -55,6 +55,8 @@ class WorldModel:
         warn: Told once when no robot can keep to the threshold on this map, and when the rules
             name a class that the ontology does not have.
         announce: Told each decision.
+        elapsed: Seconds as they pass, whatever the date is set to: drives are measured by them;
+            None: by the times that are told.
 
     Attributes:
         settings: Those.
@@ -75,6 +77,7 @@ class WorldModel:
         generator: random.Random | None = None,
         warn: Callable[[str], None] = lambda sentence: None,
         announce: Callable[[Decision], None] = lambda decision: None,
+        elapsed: Callable[[], float] | None = None,
     ) -> None:
         self.settings = settings
         self.experience = experience or Experience()
@@ -89,6 +92,8 @@ class WorldModel:
         self._memory = PolicyMemory(generator or random.Random())
         self._target: str | None = None
         self._leg: Decision | None = None
+        self._elapsed = self.experience.elapsed = elapsed
+        self._leg_began = 0.0
         self._graph_key: object = None
         self._since: float | None = None
         self._looking = threading.Lock()
@@ -116,11 +121,15 @@ class WorldModel:
             return replace(battery, sent_to_charge='')
         return battery
 
+    def _passed(self, now: float) -> float:
+        """Return the time that durations are measured by: the date may be set."""
+        return now if self._elapsed is None else self._elapsed()
+
     def learn_draw(self, now: Callable[[], float]) -> None:
         """Learn from now on, whenever the battery is heard, how fast it falls.
 
         Args:
-            now: Seconds on the mission's clock.
+            now: Seconds as they pass; no setting of a clock counts.
         """
 
         def learn() -> None:
@@ -155,8 +164,8 @@ class WorldModel:
         anew has them from here.
         """
         experience, settings = self.experience, self.settings
-        experience.tell_time(now)
-        self._since = now if self._since is None else min(self._since, now)
+        jump = experience.tell_time(now)
+        self._since = now if self._since is None else min(self._since + jump, now)
         threshold, classes = settings.urgency_threshold, settings.rules.classes
         visits = experience.visits
         found = self._ontology.snapshot(now, classes, visits, interrupt, threshold)
@@ -307,7 +316,7 @@ class WorldModel:
             self.experience.sent_to_charge = why_charge(world, battery, self.settings)
         if world.contradiction:
             decision = replace(decision, reason=f'{decision.reason}; {world.contradiction}')
-        self._leg = decision
+        self._leg, self._leg_began = decision, self._passed(decision.time)
         self._save()
         self._announce(decision)
         return decision
@@ -344,7 +353,8 @@ class WorldModel:
             start = leg.from_place
             if place in self.graph.leg_seconds.get(start, ()):
                 straight = self._metres(start, place)
-                self.experience.leg_times.observe(start, place, now - leg.time, straight, metres)
+                seconds = self._passed(now) - self._leg_began
+                self.experience.leg_times.observe(start, place, seconds, straight, metres)
         self.saw(place, now)
 
     def disturbed(self) -> None:

@@ -54,3 +54,12 @@ def test_one_jump_of_the_level_is_no_draw() -> None:
     jump.observe(60.0, 100.0)
     jump.observe(70.0, 99.0)
     assert jump.draw.rate == pytest.approx(0.3, rel=0.1), 'charging is no fall'
+
+
+def test_what_no_battery_can_draw_is_not_learned_and_not_read_back() -> None:
+    estimate = DrawEstimate()
+    estimate.observe(0.0, 90.0)
+    estimate.observe(0.1, 0.0)
+    assert estimate.draw.rate == 0.0
+    assert estimate.restore([0.1, 754.0, float('nan'), -1.0]) == 3
+    assert estimate.draw.rate == pytest.approx(0.1)

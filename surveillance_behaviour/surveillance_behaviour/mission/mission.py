@@ -9,6 +9,7 @@ from patrol_policy.battery_reserve import Battery
 from patrol_policy.decision import DecisionSettings
 from patrol_policy.world import Decision
 from state_machines import Clock, Interrupt
+from state_machines.clock import elapsed_of
 from state_machines.exceptions import CallError
 from surveillance_behaviour.charging import BatteryMonitor, charge
 from surveillance_behaviour.mission.mission_log import MissionRecord, is_other_simulation
@@ -237,7 +238,8 @@ class Mission:
         self, interrupt: Interrupt, recharge: Callable[[Interrupt], None] | None = None
     ) -> None:
         """Charge at the station where the robot is, and note it; see `charging.charge`."""
-        began = self.now()
+        elapsed = elapsed_of(self.clock)
+        began = elapsed()
         charge(
             self.battery,
             self.charged_enough,
@@ -247,7 +249,7 @@ class Mission:
             settle_seconds=self.settings.settle_seconds,
             recharge=recharge,
         )
-        seconds = self.now() - began
+        seconds = elapsed() - began
         self.ports.reasoner.charged()
         self.recovery.charged(self.place)
         self.failure = None

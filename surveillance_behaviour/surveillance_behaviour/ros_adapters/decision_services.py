@@ -46,7 +46,7 @@ def world_model_of(
     ontology: Ontology,
     places: Places,
     battery: BatteryMonitor,
-    now: Callable[[], float],
+    elapsed: Callable[[], float],
 ) -> WorldModel:
     """Return what a robot knows when it decides, with what it learned before.
 
@@ -60,7 +60,7 @@ def world_model_of(
         ontology: The ontology.
         places: Where the places are.
         battery: The battery.
-        now: Seconds on the mission's clock.
+        elapsed: Seconds as they pass on the mission's clock, which no setting of the date changes.
     """
     log = node.get_logger()
     experience = Experience.of_record(memory.record)
@@ -81,9 +81,17 @@ def world_model_of(
         )
 
     world_model = WorldModel(
-        settings, ontology, places, battery, experience, generator, lambda w: log.warn(w), announce
+        settings,
+        ontology,
+        places,
+        battery,
+        experience,
+        generator,
+        lambda w: log.warn(w),
+        announce,
+        elapsed,
     )
-    world_model.learn_draw(now)
+    world_model.learn_draw(elapsed)
     return world_model
 
 
