@@ -21,6 +21,10 @@ COMMANDS = {
         'surveillance_operator.watch_command:console',
         'one prompt for a running mission: answers, doors, rooms, why, go',
     ),
+    'doctor': (
+        'surveillance_operator.doctor_command',
+        'say what a mission awaits of a robot, what comes, and what is missing',
+    ),
     'replay': ('surveillance_operator.replay', 'show a recorded mission in a browser'),
     'report': ('surveillance_operator.report', 'write what a mission did into one HTML file'),
     'map': ('surveillance_operator.map_command', 'check a place and draw it as a picture'),

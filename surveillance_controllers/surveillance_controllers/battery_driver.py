@@ -63,7 +63,8 @@ def level_from(percentage: float, voltage: float, settings: DriverSettings) -> f
                 else ''
             )
             raise ValueError(f'percentage {percentage:g}: expected 0 to {settings.full:g}{hint}')
-        return min(100.0, 100.0 * share)
+        # Six percent are less than 0.06 as the message's 32 bits have it.
+        return round(min(100.0, 100.0 * share), 3)
     if not settings.voltages:
         raise ValueError(
             'percentage is not a number: expected one, or battery.voltages in the profile'

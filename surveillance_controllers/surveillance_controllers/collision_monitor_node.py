@@ -33,9 +33,11 @@ from surveillance_controllers.motion.path_following import (
     speed_to_stop,
 )
 from surveillance_controllers.motion.transforms import ScanReader
+from surveillance_runtime.graph_check import endpoints_of
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.parameters import parameter
 from surveillance_runtime.process import run_node
+from surveillance_runtime.profile.check_up import Awaited, findings
 from surveillance_runtime.profile.parameters import declared_frames
 from surveillance_runtime.robot_base import robot_deceleration, robot_radius
 from surveillance_runtime.state_file import StateFile
@@ -44,7 +46,8 @@ from surveillance_runtime.state_topics import OwnedTopic
 STOP_CAUSE = ('person', 'stop')
 MONITORED = 'cmd_vel_monitored'
 """Topic that the base listens to."""
-UNGUARDED_AFTER = 5.0
+BASE_CAUSE = ('robot', 'base')
+UNGUARDED_AFTER = 4.0
 """A base that does not listen is told of after this time, seconds."""
 LATENCY = 0.15
 """Time between seeing and braking, seconds: a period of the lidar and a half."""
@@ -129,7 +132,7 @@ class CollisionMonitor(PatrolNode):
         self._lidar.subscribe(self._on_scan)
         self.create_service(SetBool, 'stop', self._on_stop)
         self._tell_stop()
-        self._unguarded = self.create_timer(UNGUARDED_AFTER, self._look_for_base)
+        self.create_timer(UNGUARDED_AFTER, self._look_for_base)
 
     def _on_command(self, message: Twist) -> None:
         speed, turn = message.linear.x, message.angular.z
@@ -205,12 +208,23 @@ class CollisionMonitor(PatrolNode):
             self.get_logger().warn(f'nothing on the topic {topic}: the robot stands')
 
     def _look_for_base(self) -> None:
-        if self._wanted != Velocity() and not self.count_subscribers(MONITORED):
-            self._unguarded.cancel()
-            self.get_logger().warn(
-                f'the base is not protected: nobody subscribes to {MONITORED}; let the base '
-                'take its commands from there instead of from cmd_vel'
+        """Tell when the base does not listen, or expects another type."""
+        kind = self._base.type_name
+        types = {
+            info.topic_type.replace('/msg/', '/')
+            for info in self.get_subscriptions_info_by_topic(self._base.topic)
+        }
+        if types == {kind} or (not types and self._wanted == Velocity()):
+            self.incidents.end(BASE_CAUSE, 'the base listens')
+            return
+        command = Awaited('topics.command', self._base.topic, kind, False, 'the base drives by it')
+        lines = '; '.join(findings(command, endpoints_of(self), UNGUARDED_AFTER))
+        if not types:
+            lines += (
+                f'; the base is not protected: let it take its commands from {self._base.topic}, '
+                'instead of from those that are not looked at'
             )
+        self.incidents.begin(BASE_CAUSE, lines)
 
 
 def _nearest(scan: Scan) -> float:

@@ -15,7 +15,7 @@ from surveillance_runtime.command_line import CommandParser
 from surveillance_runtime.discovery import LAST_DOMAIN
 
 
-def _mission_parser(name: str, description: str) -> CommandParser:
+def mission_parser(name: str, description: str) -> CommandParser:
     """Return the parser of a command about a running mission."""
     parser = CommandParser(prog=f'launch.py {name}', description=description)
     parser.add_argument('--namespace', default='', metavar='NAME', help="the robot's namespace")
@@ -28,7 +28,7 @@ def _mission_parser(name: str, description: str) -> CommandParser:
     return parser
 
 
-def _ros_arguments(parser: CommandParser, options: argparse.Namespace) -> list[str]:
+def ros_arguments(parser: CommandParser, options: argparse.Namespace) -> list[str]:
     """Return the ROS arguments of a node that looks at a mission, and set its domain."""
     if options.domain is not None and not 0 <= options.domain <= LAST_DOMAIN:
         parser.error(f'--domain {options.domain}: expected a number from 0 to {LAST_DOMAIN}')
@@ -46,7 +46,7 @@ def _ros_arguments(parser: CommandParser, options: argparse.Namespace) -> list[s
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Watch until Ctrl-C; with --once the exit code is 1 when there was no mission to be seen."""
-    parser = _mission_parser(
+    parser = mission_parser(
         'watch',
         'Shows a running mission, simulated or real, until q or Ctrl-C: the map with robot, doors '
         'and obstacles, what the robot does and why. Keys: s stops the robot, r releases it, '
@@ -64,19 +64,19 @@ def main(argv: Sequence[str] | None = None) -> int:
     options = parser.parse_args(argv)
     if not 0.1 <= options.timeout < 1e9:
         parser.error(f'--timeout {options.timeout:g}: expected 0.1 seconds or more')
-    arguments = _ros_arguments(parser, options)
+    arguments = ros_arguments(parser, options)
     arguments += ['-p', f'once:={str(options.once).lower()}', '-p', f'timeout:={options.timeout}']
     return mission_view_node.main(arguments)
 
 
 def console(argv: Sequence[str] | None = None) -> int:
     """Read commands until `exit` or the end of the input."""
-    parser = _mission_parser(
+    parser = mission_parser(
         'console',
         'One prompt for a running mission: answers in mode MANUAL, doors, rooms, obstacles, '
         'policy, why, go, stop, pause. `help` lists the commands.',
     )
-    return console_node.main(_ros_arguments(parser, parser.parse_args(argv)))
+    return console_node.main(ros_arguments(parser, parser.parse_args(argv)))
 
 
 if __name__ == '__main__':

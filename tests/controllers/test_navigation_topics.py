@@ -40,6 +40,7 @@ class Steersman:
         self.pose = self.odometry = self.place = self.missing = None
         self.lost, self.jumps, self.obstacles_changed = False, 0, False
         self.ambiguous = False
+        self.awaits = ()
 
     def see(self, scan: Scan, now: float, _lidar: str = '') -> Velocity:
         self.seen.append(scan)

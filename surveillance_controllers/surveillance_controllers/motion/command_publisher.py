@@ -106,6 +106,8 @@ class CommandPublisher:
 
     Attributes:
         wanted: The last command, before it was limited by the age of what was heard.
+        topic: The full name of the topic.
+        type_name: The type of the commands, `package/Name`.
     """
 
     def __init__(
@@ -127,6 +129,8 @@ class CommandPublisher:
         self._lock = threading.Lock()
         self._publisher = node.create_publisher(TwistStamped if stamped else Twist, topic, 1)
         self._is_stamped = stamped
+        self.type_name = f'geometry_msgs/{"TwistStamped" if stamped else "Twist"}'
+        self.topic = str(node.resolve_topic_name(topic))
         self._timer = node.create_timer(WATCH_PERIOD, self._limit_again, autostart=False)
         self._silent = ''
         self.wanted = Velocity()

@@ -10,6 +10,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import replace
 from typing import Any
 
 from builtin_interfaces.msg import Time
@@ -48,8 +49,11 @@ from surveillance_runtime.conversions import (
     seconds_of,
     stamp_of_serialized,
 )
+from surveillance_runtime.graph_check import InputWatch
 from surveillance_runtime.node import PatrolNode
+from surveillance_runtime.profile.check_up import awaited
 from surveillance_runtime.profile.parameters import declared_frames
+from surveillance_runtime.profile.record import RobotProfile, Topics
 from surveillance_runtime.qos import SENSOR_QOS
 from surveillance_runtime.state_topics import OwnedTopic, StateSubscription
 
@@ -119,6 +123,29 @@ class NavigationMotion:
         node.create_subscription(Odometry, 'odom', self._on_odometry, SENSOR_QOS, raw=True)
         self._lidar.subscribe(self._on_scan)
         node.create_subscription(PoseWithCovarianceStamped, 'initialpose', self._on_initial_pose, 1)
+
+        self._watch_inputs()
+
+    def _watch_inputs(self) -> None:
+        """Have what never comes told by its name."""
+        node, scans = self._node, self._lidar.settings.scans
+        named = {name: str(node.resolve_topic_name(name)) for name in ('map', 'odom', *scans)}
+        topics = replace(
+            Topics(),
+            map=named['map'],
+            odom=named['odom'],
+            scans=tuple(named[scan] for scan in scans),
+        )
+        profile = replace(RobotProfile(), topics=topics, frames=self._frames)
+        wanted = [each for each in awaited(profile) if each.key != 'topics.command']
+
+        def missing() -> list[str]:
+            awaits = self._navigator.awaits
+            keys = ['odom' if 'odom' in awaits else '', 'map' if 'map' in awaits else '']
+            keys += scans if 'scan' in awaits else ()
+            return [named[key] for key in keys if key]
+
+        self._inputs = InputWatch(node, wanted, missing)
 
     def follow(self, path: Points, run: GoalRun, report: Callable[[Points], None]) -> Points:
         """Drive along a path of shape (n, 3).

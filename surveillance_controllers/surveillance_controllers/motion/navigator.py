@@ -85,6 +85,13 @@ class Navigator:
         self.place: str | None = None
 
     @property
+    def awaits(self) -> tuple[str, ...]:
+        """All that has not come yet of map, odom and scan."""
+        has_scan = self._localiser is not None or bool(self._others)
+        parts = (self._grid, 'map'), (self._odometry, 'odom'), (has_scan or None, 'scan')
+        return tuple(name for part, name in parts if part is None)
+
+    @property
     def missing(self) -> str | None:
         """What has not come yet of what the navigator needs; None when it is ready."""
         if self._grid is None:
@@ -196,6 +203,7 @@ class Navigator:
             The velocity to command; None when there is no task, or something is missing yet.
         """
         if self._grid is None or self._odometry is None:
+            self._others[lidar] = scan, stamp
             return None
         before, now = self._now, self._passed(stamp)
         if self.stands:

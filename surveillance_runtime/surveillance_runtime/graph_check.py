@@ -1,0 +1,136 @@
+"""Looks at the ROS graph for what a robot's drivers say: endpoints, rates, frames, stamps."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable, Sequence
+from functools import partial
+from importlib import import_module
+from typing import Any
+
+from rclpy.clock import Clock, ClockType
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.subscription import Subscription
+
+from surveillance_runtime.conversions import seconds_of
+from surveillance_runtime.node import PatrolNode
+from surveillance_runtime.profile.check_up import Awaited, Endpoint, Heard, Seen, findings
+from surveillance_runtime.qos import SENSOR_QOS
+
+
+def endpoints_of(node: Node) -> Seen:
+    """Return who publishes and who subscribes what, without what the node itself does."""
+    publishers: dict[str, list[Endpoint]] = {}
+    subscribers: dict[str, list[Endpoint]] = {}
+    for topic, _ in node.get_topic_names_and_types():
+        for found, infos in (
+            (publishers, node.get_publishers_info_by_topic(topic)),
+            (subscribers, node.get_subscriptions_info_by_topic(topic)),
+        ):
+            ends = [_endpoint(info) for info in infos if info.node_name != node.get_name()]
+            if ends:
+                found[topic] = ends
+    return Seen(publishers, subscribers)
+
+
+def _endpoint(info: Any) -> Endpoint:
+    quality = info.qos_profile
+    return Endpoint(
+        f'{info.node_namespace.rstrip("/")}/{info.node_name}',
+        info.topic_type.replace('/msg/', '/'),
+        quality.reliability == ReliabilityPolicy.RELIABLE,
+        quality.durability == DurabilityPolicy.TRANSIENT_LOCAL,
+    )
+
+
+class Listener:
+    """Listens to what is awaited, as its publishers offer it.
+
+    Args:
+        node: The node that listens; spun by somebody.
+        wanted: The topics.
+    """
+
+    def __init__(self, node: Node, wanted: Iterable[Awaited]) -> None:
+        self._node = node
+        self._wanted = [each for each in wanted if each.heard]
+        self._subscriptions: dict[str, Subscription] = {}
+        self._times: dict[str, list[float]] = {}
+        self._last: dict[str, tuple[str, float | None]] = {}
+
+    def look(self) -> Seen:
+        """Subscribe what is published by now; return what is there and what came so far."""
+        seen = endpoints_of(self._node)
+        for each in self._wanted:
+            ends = seen.publishers.get(each.topic, ())
+            right = [end for end in ends if end.type == each.type]
+            if right and each.topic not in self._subscriptions:
+                package, _, name = each.type.partition('/')
+                kind = getattr(import_module(f'{package}.msg'), name)
+                quality = SENSOR_QOS
+                if each.is_latched and all(end.latched for end in right):
+                    quality = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+                self._subscriptions[each.topic] = self._node.create_subscription(
+                    kind, each.topic, partial(self._hear, each.topic), quality
+                )
+        return Seen(seen.publishers, seen.subscribers, self._heard())
+
+    def _hear(self, topic: str, message: Any) -> None:
+        self._times.setdefault(topic, []).append(time.monotonic())
+        header = getattr(message, 'header', None)
+        if header is not None:
+            stamp = seconds_of(header.stamp)
+            now = self._node.get_clock().now().nanoseconds / 1e9
+            self._last[topic] = header.frame_id, now - stamp if stamp else None
+
+    def _heard(self) -> dict[str, Heard]:
+        found = {}
+        for topic, times in self._times.items():
+            passed = times[-1] - times[0]
+            frame, age = self._last.get(topic, ('', None))
+            rate = (len(times) - 1) / passed if passed > 0 else 0.0
+            found[topic] = Heard(len(times), rate, frame, age)
+        return found
+
+
+LOOK_PERIOD = 2.0
+"""Seconds of real time between two looks for what is missing."""
+PATIENCE = 3.9
+"""What has not come after this is missing, seconds: it is told with the second look."""
+
+
+class InputWatch:
+    """Tells what a node waits for, in the words of `doctor`, as incidents that end when it comes.
+
+    Args:
+        node: The node.
+        wanted: What it may wait for.
+        missing: Returns which of their topics it waits for now.
+    """
+
+    def __init__(
+        self,
+        node: PatrolNode,
+        wanted: Sequence[Awaited],
+        missing: Callable[[], Iterable[str]],
+    ) -> None:
+        self._node = node
+        self._wanted = {each.topic: each for each in wanted}
+        self._missing = missing
+        self._since = {each.topic: time.monotonic() for each in wanted}
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        node.create_timer(LOOK_PERIOD, self._look, clock=steady)
+
+    def _look(self) -> None:
+        now, missing = time.monotonic(), set(self._missing())
+        for topic in self._wanted.keys() - missing:
+            self._since[topic] = now
+            self._node.incidents.end(('robot', topic), f'{topic}: it is as awaited')
+        late = [topic for topic in missing if now - self._since[topic] >= PATIENCE]
+        if not late:
+            return
+        seen = endpoints_of(self._node)
+        for topic in late:
+            if lines := list(findings(self._wanted[topic], seen, now - self._since[topic])):
+                self._node.incidents.begin(('robot', topic), '; '.join(lines))
