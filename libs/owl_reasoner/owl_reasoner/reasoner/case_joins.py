@@ -31,6 +31,8 @@ from owl_reasoner.reasoner.case_model import (
     still_open,
 )
 from owl_reasoner.reasoner.case_rules import (
+    ANYBODY,
+    Asked,
     FactAtom,
     NamedAtom,
     NamedRule,
@@ -227,18 +229,25 @@ class CaseJoins:
             return self._model.individual(str(term.value))
         return (match.given[term], 0) if term in match.given else None
 
-    def _holders(self, match: _Match, term: Term) -> list[int]:
-        """Return named individuals among whom are all that may have the value of a term."""
-        model = self._model
+    def _holders(self, match: _Match, atom: OfProp) -> list[int]:
+        """Return named individuals among whom are all that may have the value of an atom."""
+        model, term = self._model, atom.terms[1]
         is_constant = isinstance(term, Constant)
         if not is_constant and term not in match.given:
-            return self._everybody()
+            return self._having(atom.prop)
         only = term.value if isinstance(term, Constant) else self._set(match.given[term])[0].only
         if only is None:
-            return self._everybody()
+            return self._having(atom.prop)
         values = (*model.holding.get(only, ()), *model.holding[None])
         owners = dict.fromkeys(model.owner[v] for v in values if not model.is_gone(v))
         return [x for x in owners if not model.is_gone(x) and model.names[x]]
+
+    def _having(self, what: Asked) -> list[int]:
+        """Return named individuals among whom are all that have something."""
+        model = self._model
+        if what == ANYBODY:
+            return self._everybody()
+        return [x for x in model.having[what] if model.names[x] and not model.is_gone(x)]
 
     def _everybody(self) -> list[int]:
         return [x for x in self._model.alive() if self._model.names[x]]
@@ -253,7 +262,7 @@ class CaseJoins:
             yield from self._compared_individuals(atom, match)
         elif isinstance(atom, OfConcept):
             known = self._node(match, atom.terms[0])
-            for x in self._everybody() if known is None else (known[0],):
+            for x in self._having(atom.concept) if known is None else (known[0],):
                 choices = self._model.labels[x].get(atom.concept)
                 if choices is not None:
                     more = match._replace(choices=match.choices | choices)
@@ -266,7 +275,9 @@ class CaseJoins:
             elif end is not None and isinstance(atom, OfRole):
                 starts = self._model.out[end[0]]
             elif isinstance(atom, OfProp):
-                starts = self._holders(match, atom.terms[1])
+                starts = self._holders(match, atom)
+            elif isinstance(atom, OfRole):
+                starts = self._having(('role', atom.role))
             else:
                 starts = self._everybody()
             for x in starts:

@@ -9,10 +9,11 @@ here: new facts wait in `queue`, individuals whose relations or values are to be
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from itertools import count
 from typing import Any, NamedTuple, TypeAlias
 
-from owl_reasoner.reasoner.case_rules import ANYBODY, FRESH, CaseRules
+from owl_reasoner.reasoner.case_rules import ANYBODY, FRESH, Asked, CaseRules
 from owl_reasoner.reasoner.clauses import StoppedError
 from owl_reasoner.reasoner.datatypes import Value
 from owl_reasoner.reasoner.value_sets import ValueSet
@@ -45,6 +46,8 @@ class CaseModel:
         props, sets, owner: Each value's properties, the set it is in, and whose it is.
         holding: The values that are known, by what they are; those that are not, by None.
         roots: Unnamed individuals that a named one counts, by what they are counted as.
+        having: Whoever has a concept, a value by a data property or somebody by a role, for those
+            that rules about named individuals ask for; some are gone, or have it no more.
     """
 
     def __init__(self, rules: CaseRules, most_steps: int) -> None:
@@ -63,6 +66,7 @@ class CaseModel:
         self.roots: dict[Any, int] = {}
         self._groups: dict[int, dict[int, Choices]] = {}
         self._gone: dict[int, tuple[int | None, Choices]] = {}
+        self.having: dict[Asked, dict[int, None]] = {one: {} for one in rules.asked}
         self._individuals: dict[str, int] = {}
         self._numbers = count(1)
         self._trail: list[tuple[dict[Any, Any], Any, Any]] = []
@@ -98,6 +102,16 @@ class CaseModel:
         self.queue.clear()
         self.recount.clear()
         self.revalue.clear()
+
+    @contextmanager
+    def at_most(self, steps: int) -> Iterator[None]:
+        """Take no more than so many steps until the context is left."""
+        most = self._most_steps
+        self._most_steps = min(most, self.steps + steps)
+        try:
+            yield
+        finally:
+            self._most_steps = most
 
     def step(self) -> None:
         """Count one step of the search.
@@ -146,6 +160,7 @@ class CaseModel:
         v = next(self._numbers)
         self.put(self.values[x], v, None)
         self.put(self.props, v, dict.fromkeys(self.rules.data_above(prop), choices))
+        self._note_holder(x, v)
         self.put(self.sets, v, (values, choices))
         self.put(self._groups, v, {})
         self.put(self.owner, v, x)
@@ -153,6 +168,12 @@ class CaseModel:
         self._learn(v, values)
         self.revalue[x] = None
         return v
+
+    def _note_holder(self, x: int, v: int) -> None:
+        """Note that an individual has a value by each of its properties."""
+        for prop in self.props[v]:
+            if prop in self.having:
+                self.put(self.having[prop], x, None)
 
     def _learn(self, v: int, values: ValueSet) -> None:
         """Note which value it is, where one alone is left."""
@@ -168,6 +189,7 @@ class CaseModel:
         for above in self.rules.data_above(prop):
             if above not in self.props[v]:
                 self.put(self.props[v], above, choices)
+        self._note_holder(self.owner[v], v)
         self.revalue[self.owner[v]] = None
 
     def find(self, node: int) -> tuple[int | None, Choices]:
@@ -200,6 +222,8 @@ class CaseModel:
             self.step()
             self.put(labels, concept, choices)
             self.queue.append((x, concept))
+            if concept in self.having:
+                self.put(self.having[concept], x, None)
 
     def relate(self, x: int, role: int, y: int, choices: Choices) -> None:
         """State that an individual is related to another one."""
@@ -209,12 +233,15 @@ class CaseModel:
             self.put(self.out[x], y, there)
             if x != y:
                 self.put(self.out[y], x, {})
-        back = self.out[y][x]
+        back, having = self.out[y][x], self.having
         for one in self.rules.roles_above(role):
             if one not in there:
                 self.put(there, one, choices)
                 self.put(back, -one, choices)
                 self.queue.append((x, one, y))
+                for role, source in ((one, x), (-one, y)):
+                    if ('role', role) in having:
+                        self.put(having['role', role], source, None)
 
     def narrow(self, v: int, values: ValueSet, choices: Choices) -> None:
         """State that a value is in a set."""
@@ -305,6 +332,7 @@ class CaseModel:
         for prop, more in self.props[gone].items():
             if prop not in self.props[kept]:
                 self.put(self.props[kept], prop, more | choices)
+        self._note_holder(self.owner[kept], kept)
         values, more = self.sets[gone]
         self.narrow(kept, values, choices | more)
 
@@ -325,6 +353,7 @@ class CaseModel:
         for v in self.values[gone]:
             self.put(self.values[kept], v, None)
             self.put(self.owner, v, kept)
+            self._note_holder(kept, v)
             for prop, more in tuple(self.props[v].items()):
                 self.put(self.props[v], prop, more | choices)
             values, more = self.sets[v]

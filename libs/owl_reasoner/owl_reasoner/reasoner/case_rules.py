@@ -147,6 +147,8 @@ class OfRange(NamedTuple):
 
 
 FactAtom: TypeAlias = OfConcept | OfRole | OfChain | OfProp
+Asked: TypeAlias = 'int | str | tuple[str, int]'
+"""A concept, a data property, or with 'role' before it a role."""
 NamedAtom: TypeAlias = FactAtom | OfRange | SameAtom | DifferentAtom | ComputedAtom
 
 
@@ -180,6 +182,7 @@ class CaseRules:
         above: Every role that a role implies, itself included; `props_above` the same for data.
         disjoint, disjoint_props: Roles (data properties) that exclude each other.
         named: Rules about named individuals: those of SWRL, and keys.
+        asked: The concepts, data properties and roles that stand in their bodies.
         gaps: One sentence for each axiom that is not fully covered.
         tested: One for each with a range that single values alone can be tested for.
         has_inverse: Whether any role is used backwards.
@@ -244,6 +247,15 @@ class CaseRules:
             self._attempt(axiom, self._check_chains)
             self._attempt(axiom, self._axiom)
         self._origin = None
+        self.asked: dict[Asked, None] = {}
+        for rule in self.named:
+            for atom in rule.body:
+                if isinstance(atom, OfConcept) and atom.concept != ANYBODY:
+                    self.asked[atom.concept] = None
+                elif isinstance(atom, OfProp):
+                    self.asked[atom.prop] = None
+                elif isinstance(atom, OfRole):
+                    self.asked['role', atom.role] = None
 
     def _attempt(self, axiom: Axiom, take: Callable[[Axiom], None]) -> None:
         self._origin = axiom

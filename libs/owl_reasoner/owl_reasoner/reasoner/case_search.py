@@ -101,6 +101,8 @@ class CaseSearch:
         self._stated: dict[tuple[tuple[type, Alternative], ...], bool] = {}
         self._signs: dict[int, frozenset[int]] = {}
         self._known_conditions: dict[tuple[frozenset[int], tuple[int, ...]], _Conditions] = {}
+        # What earlier models chose, which `differ_from_models` has this one choose last.
+        self._avoided: set[tuple[type, Alternative]] = set()
         self._functional: dict[int, Count] = {limit.role: limit for limit in rules.functional}
 
     # --- asking for a model ---
@@ -123,6 +125,25 @@ class CaseSearch:
     def _back_to(self, mark: int) -> None:
         self.model.undo(mark)
         self._signs.clear()
+
+    def differ_from_model(self) -> None:
+        """Have later models choose what the present one does not, where they can.
+
+        What named individuals are in both does not depend on the choices that differ.
+        """
+        for choice in self._stack:
+            chosen = choice.alternatives[choice.place]
+            self._avoided.add((type(chosen), chosen))
+        model = self.model
+        for x in model.alive():
+            if model.names[x]:
+                for concept, choices in model.labels[x].items():
+                    if choices:
+                        self._avoided.add((Has, Has(x, concept)))
+
+    def forget_models(self) -> None:
+        """Choose in the order of what failed least again."""
+        self._avoided.clear()
 
     def attempt(self, state: Callable[[], None]) -> bool:
         """State something; False where that is a contradiction at once."""
@@ -262,13 +283,17 @@ class CaseSearch:
         self.model.step()
         if len(left) > 1:
             # What failed often is tried late, as HermiT does.
-            left.sort(key=self._failures_of)
+            left.sort(key=self._order)
             if x is not None:
                 self.model.put(self._chosen, x, None)
             self._stack.append(_Choice(self.mark(), left, choices))
             choices |= 1 << len(self._stack) - 1
         left[0].apply(self.model, choices)
         return True
+
+    def _order(self, alternative: Alternative) -> tuple[bool, int]:
+        is_avoided = (type(alternative), alternative) in self._avoided
+        return is_avoided, self._failures_of(alternative)
 
     def _failures_of(self, alternative: Alternative) -> int:
         return self._failures.get(alternative.concept, 0) if isinstance(alternative, Has) else 0
@@ -562,9 +587,15 @@ class CaseSearch:
         if self._is_its_own(x):
             return None
         unwanted, conditions = self._conditions(self._sign(parent), tuple(model.out[parent][x]))
+        # Many are alike: what is not found in one of them is not looked for in the others.
+        unlike: set[frozenset[int]] = set()
         for y in cores if known is None else (known, *cores):
             if y in blocked or y in put_off or y >= x or model.is_gone(y):
                 continue
+            sign = self._sign(y)
+            if sign in unlike:
+                continue
+            unlike.add(sign)
             other = model.labels[y].keys()
             # Nobody is like a named individual: it would be that individual.
             if not own <= other or not nominals.isdisjoint(other):

@@ -33,6 +33,8 @@ MOST_STEPS = 1_000_000
 """Facts that may be added in all searches for one answer; some ten seconds."""
 _QUESTION_STEPS = 200_000
 """The same for one axiom."""
+_OTHER_MODELS = 4
+"""Models that are asked for what they choose otherwise, before facts are asked for one by one."""
 _UNSURE = ~0
 """All choices: those of a fact that a model only hints at, so that it is asked for."""
 _MOST_KEPT = 200
@@ -85,6 +87,8 @@ class CaseReasoner:
         self._search = CaseSearch(self._rules, most_steps)
         self._base = self._search.mark()
         self._consistent: bool | None = None
+        # Whether the search has the model that `consistent` found, and the steps it took.
+        self._has_model, self._cost = False, 0
         # The steps from each state of what accepts a property's chains.
         self._automata: dict[str, dict[int, list[tuple[int | None, int]]]] = {}
 
@@ -144,8 +148,9 @@ class CaseReasoner:
                 self.stopped = self._consistent = True
                 return True
             self._base = self._search.mark()
-            self._consistent = found and self._is_possible(lambda: None)
-            self._search.undo(self._base)
+            before = self._search.model.steps
+            self._consistent = self._has_model = found and self._is_possible(lambda: None)
+            self._cost = self._search.model.steps - before
         return self._consistent
 
     def _is_possible(self, state: Callable[[], None], search: CaseSearch | None = None) -> bool:
@@ -168,7 +173,10 @@ class CaseReasoner:
         search = self._search
         if not self.consistent():
             return
-        if not self._is_possible(lambda: None) or self.stopped:
+        if not self._has_model and not self._is_possible(lambda: None):
+            return
+        self._has_model = False
+        if self.stopped:
             return
         candidates: dict[Axiom, None] = {}
         for fact, choices in self._held():
@@ -178,6 +186,7 @@ class CaseReasoner:
                 candidates[fact] = None
             else:
                 yield fact
+        candidates = self._held_by_others(candidates, 1000 + 3 * self._cost)
         search.undo(self._base)
         while candidates and not self.stopped:
             fact = next(iter(candidates))
@@ -192,6 +201,38 @@ class CaseReasoner:
                 yield fact
                 search.undo(self._base)
                 self._keep(fact)
+
+    def _held_by_others(self, candidates: dict[Axiom, None], most: int) -> dict[Axiom, None]:
+        """Return those facts of the present model that models with other choices have as well.
+
+        One such model often decides all that each fact would take a model for. It may be hard to
+        find: then it is not looked for any longer.
+
+        Args:
+            candidates: Facts of the model.
+            most: Steps for one model.
+        """
+        search = self._search
+        try:
+            for _ in range(_OTHER_MODELS):
+                if not candidates:
+                    break
+                search.differ_from_model()
+                search.undo(self._base)
+                with search.model.at_most(most):
+                    if not search.solve():
+                        break
+                self.gaps.update(search.gaps)
+                held = {other for other, _ in self._held()}
+                left = {other: None for other in candidates if other in held}
+                is_of_use = len(left) < len(candidates)
+                candidates = left
+                if not is_of_use:
+                    break
+        except StoppedError:
+            pass
+        search.forget_models()
+        return candidates
 
     def _keep(self, fact: Axiom) -> None:
         """Let further searches begin with a fact that follows."""
@@ -306,6 +347,9 @@ class CaseReasoner:
         """
         if not self.consistent():
             return
+        if self._has_model:
+            self._has_model = False
+            self._search.undo(self._base)
         named = self.names_individuals
         left = self._most_steps - self._search.model.steps
         search = self._search if named else CaseSearch(self._rules, left)
