@@ -14,6 +14,9 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from marker_detection.annotation import annotated as annotated
+    from marker_detection.boards import BoardPose as BoardPose
+    from marker_detection.boards import aprilgrid as aprilgrid
+    from marker_detection.boards import board_pose as board_pose
     from marker_detection.camera_model import CameraModel as CameraModel
     from marker_detection.detector import Detection as Detection
     from marker_detection.detector import DetectorSettings as DetectorSettings
@@ -30,6 +33,7 @@ if TYPE_CHECKING:
     from marker_detection.pose import pose_of as pose_of
 
 _HOME = {
+    'BoardPose': 'boards',
     'CameraModel': 'camera_model',
     'Confirmation': 'marker_stream',
     'DICTIONARY_NAMES': 'dictionaries',
@@ -43,6 +47,8 @@ _HOME = {
     'Sighting': 'marker_stream',
     'StreamSettings': 'marker_stream',
     'annotated': 'annotation',
+    'aprilgrid': 'boards',
+    'board_pose': 'boards',
     'dictionary_named': 'dictionaries',
     'pose_of': 'pose',
 }

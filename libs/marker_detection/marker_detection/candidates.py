@@ -42,6 +42,8 @@ _QUAD_DEVIATION, _MOST_SCATTER = 0.35, 8.0
 _INSET = 0.5
 # sine between sides below which a corner is not moved further: it would leave the image
 _LEAST_SINE = 0.3
+# pixels that are taken from blobs that touch at their corners, to part them
+_ERODED = (1, 2)
 # neighbourhood in pixels from which the halved image does
 _WIDE_WINDOW = 21
 # blobs with one box to so many pixels, and quadrilaterals with one size to this share, are the same
@@ -62,10 +64,29 @@ _PLACES, _STEPS, _REACH = 10, 13, 1.2
 _STRAIGHTNESS, _STEEPEST = 0.15, 0.5
 
 
+class Mask(NamedTuple):
+    """What is dark in an image.
+
+    Attributes:
+        pixels: (height, width) not 0 where it is dark.
+        scale: Factor by which it is smaller than the image.
+        eroded: Pixels that were taken from the edge of every blob.
+    """
+
+    pixels: Grey
+    scale: int = 1
+    eroded: int = 0
+
+
 def dark_masks(
-    image: Grey, windows: Sequence[int], contrast: float, bridges: Sequence[int]
-) -> Iterator[tuple[Grey, int]]:
-    """Masks of what is dark, the most telling first, and the factor by which each is smaller.
+    image: Grey,
+    windows: Sequence[int],
+    contrast: float,
+    bridges: Sequence[int],
+    *,
+    touching: bool = False,
+) -> Iterator[Mask]:
+    """Masks of what is dark, the most telling first.
 
     Args:
         image: (height, width) grey levels.
@@ -77,6 +98,8 @@ def dark_masks(
             and along rows, each in a mask of its own: a marker seen at a flat angle has a border
             thinner than a pixel, which breaks at white rows of its code. A wider window would not
             part it from the wall beyond its margin.
+        touching: Whether markers may touch at their corners, as in Kalibr's AprilGrids, where small
+            black squares lie between them: each mask is eroded as well, which parts them.
 
     Yields:
         A mask for each window; one of what is darker than a quarter of white, and one split where
@@ -86,22 +109,28 @@ def dark_masks(
     half = (max(1, image.shape[1] // 2), max(1, image.shape[0] // 2))
     halved = _bytes(cv2.resize(image, half, interpolation=cv2.INTER_AREA))
     white = float(np.percentile(halved[::4, ::4], 98.0))
-    yield _bytes(cv2.threshold(image, white / 4.0, 255, cv2.THRESH_BINARY_INV)[1]), 1
+    yield Mask(_bytes(cv2.threshold(image, white / 4.0, 255, cv2.THRESH_BINARY_INV)[1]))
     full_size: list[Grey] = []
     for window in windows:
         wide = window >= _WIDE_WINDOW and window > min(windows)
         if wide:
-            yield _darker_than_around(halved, max(3, window // 4 * 2 + 1), contrast), 2
+            yield Mask(_darker_than_around(halved, max(3, window // 4 * 2 + 1), contrast), 2)
         else:
             full_size.append(_darker_than_around(image, window, contrast))
-            yield full_size[-1], 1
+            yield Mask(full_size[-1])
     split, _ = cv2.threshold(halved, 0, 255, cv2.THRESH_BINARY_INV + cv2.THRESH_OTSU)
-    yield _bytes(cv2.threshold(halved, split, 255, cv2.THRESH_BINARY_INV)[1]), 2
+    yield Mask(_bytes(cv2.threshold(halved, split, 255, cv2.THRESH_BINARY_INV)[1]), 2)
+    if touching:
+        whole = _bytes(cv2.threshold(image, split, 255, cv2.THRESH_BINARY_INV)[1])
+        for dark in (*full_size, whole):
+            for width in _ERODED:
+                kernel = np.ones((2 * width + 1, 2 * width + 1), np.uint8)
+                yield Mask(_bytes(cv2.erode(dark, kernel)), 1, width)
     for length in bridges:
         for dark in full_size:
             for shape in ((length, 1), (1, length)):
                 closed = cv2.morphologyEx(dark, cv2.MORPH_CLOSE, np.ones(shape, np.uint8))
-                yield _bytes(closed), 1
+                yield Mask(_bytes(closed))
 
 
 def _bytes(image: npt.NDArray[Any]) -> Grey:
@@ -124,7 +153,7 @@ def _darker_than_around(image: Grey, window: int, contrast: float) -> Grey:
 
 
 def quads_around(
-    masks: Iterable[tuple[Grey, int]],
+    masks: Iterable[Mask],
     *,
     min_length: float = 8.0,
     limit: float = math.inf,
@@ -132,8 +161,7 @@ def quads_around(
     """Quadrilaterals around the blobs of masks.
 
     Args:
-        masks: Images (height, width), blobs are not 0, and by how much each is smaller than the
-            image itself. A blob with the same upright box as one before is left out.
+        masks: What is dark. A blob with the same upright box as one before is left out.
         min_length: Longer side in pixels of the smallest blob's upright box.
         limit: Once so many blobs were looked at, in the first mask or in all others, only those
             with a parallelogram's moments are; after the others, no further mask.
@@ -143,7 +171,7 @@ def quads_around(
     """
     found: list[Quads] = []
     seen: set[bytes] = set()
-    for order, (mask, scale) in enumerate(masks):
+    for order, (mask, scale, eroded) in enumerate(masks):
         if order == 1:
             seen.clear()
         if len(seen) > limit:
@@ -169,7 +197,7 @@ def quads_around(
                 quads.append(quad)
         if quads:
             # a pixel's middle has whole coordinates, in a halved image as well
-            grown = _grown(_clockwise(np.array(quads, dtype=float)), _INSET)
+            grown = _grown(_clockwise(np.array(quads, dtype=float)), _INSET + eroded)
             found.append((grown + 0.5) * scale - 0.5)
     return np.concatenate(found) if found else np.zeros((0, 4, 2))
 

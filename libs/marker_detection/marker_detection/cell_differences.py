@@ -85,7 +85,8 @@ class CellDifferences:
         self._flips = _differences(np.eye(cells, dtype=np.float32).reshape(cells, codes.side, -1))
         # the border is black in all codes: what is white inside makes all of their differences
         inside = np.zeros((codes.side, codes.side), bool)
-        inside[1:-1, 1:-1] = True
+        self._own = slice(codes.border, codes.side - codes.border)
+        inside[self._own, self._own] = True
         self._inside = self._flips[inside.ravel()]
         squares = np.square(self._codes)
         # a code without differences has no correlation with any
@@ -124,7 +125,7 @@ class CellDifferences:
         seen = _normalised(differences, _step(differences))
         before, flipped = self._flipped(seen, np.ones_like(seen), entries)
         better = (flipped > before).reshape(cells.shape)
-        inner = better[:, 1:-1, 1:-1].sum(axis=(1, 2))
+        inner = better[:, self._own, self._own].sum(axis=(1, 2))
         return inner, better.sum(axis=(1, 2)) - inner
 
     def _flipped(self, seen: Patches, room: Patches, entries: Indices) -> tuple[Reals, Reals]:

@@ -87,6 +87,8 @@ class DetectorSettings:
             differences, or of the whole marker.
         known_lead: How many times less than the second best code the best one must leave
             unexplained, when its id is known.
+        border: Black cells around a marker's code. With two or more, outlines that touch each other
+            at their corners are parted, too.
     """
 
     dictionary: str = parameter(
@@ -124,6 +126,9 @@ class DetectorSettings:
     )
     known_lead: float = parameter(2.6, 'Lead over the second best code, known ids.', 1.0, 100.0)
     unknown_lead: float = parameter(3.0, 'Lead over the second best code, other ids.', 1.0, 100.0)
+    border: int = parameter(
+        1, "Black cells around a code; Kalibr's AprilGrids have 2.", 1, 4, name='marker_border'
+    )
 
     def __post_init__(self) -> None:
         if not self.windows or any(each < 3 or each % 2 == 0 for each in self.windows):
@@ -166,7 +171,7 @@ class MarkerDetector:
         dictionary = dictionary_named(self.settings.dictionary)
         if self.settings.known_ids is not None:
             MarkerCodes.of(dictionary, self.settings.known_ids)
-        codes = MarkerCodes.of(dictionary)
+        codes = MarkerCodes.of(dictionary, border=self.settings.border)
         self._reader = MarkerReader(codes, self.settings.blur)
         self._border = BorderCheck(self._reader.codes.side)
         self._edges = EdgeFit(self._reader.codes.side)
@@ -242,7 +247,13 @@ class MarkerDetector:
         """Return quadrilaterals (m, 4, 2) that look like a marker's border, the likeliest first."""
         settings = self.settings
         contrast = max(settings.contrast, 3.0 * prepared.noise)
-        masks = dark_masks(prepared.smooth, settings.windows, contrast, settings.bridges)
+        masks = dark_masks(
+            prepared.smooth,
+            settings.windows,
+            contrast,
+            settings.bridges,
+            touching=settings.border > 1,
+        )
         limit = settings.max_outlines * max(1.0, _FULL_WORK / prepared.grey.size)
         quads = quads_around(masks, min_length=settings.min_length, limit=limit)
         correlation = self._border.correlation(pyramid, homographies_of(quads), contrast)
@@ -270,7 +281,7 @@ class MarkerDetector:
             (readings.correlation > settings.least_correlation)
             & (np.minimum(readings.lead, readings.inner_lead) > lead)
             & (readings.wrong <= _CONTRADICTED * codes.bits**2)
-            & (readings.wrong_border <= _CONTRADICTED * 4 * (codes.side - 1))
+            & (readings.wrong_border <= _CONTRADICTED * (codes.side**2 - codes.bits**2))
         )
         accepted = (matched | (readings.error < _LARGEST_ERROR)) & (
             readings.inner > settings.least_inner_correlation

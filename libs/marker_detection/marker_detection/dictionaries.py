@@ -1,8 +1,9 @@
 """ArUco dictionaries by name, and their codes as cells for matching.
 
-A marker of `bits` x `bits` is drawn with one black cell around it. `MarkerCodes` adds the white
-margin every printed marker needs, so that a code is a square of `bits + 4` cells, +1 for white
-and -1 for black, once for each id and quarter turn.
+A marker of `bits` x `bits` is drawn with a border of black cells around it: one, or two in Kalibr's
+AprilGrids. `MarkerCodes` adds the white margin every printed marker needs, so that a code is a
+square of `bits + 2 border + 2` cells, +1 for white and -1 for black, once for each id and quarter
+turn.
 """
 
 from __future__ import annotations
@@ -122,22 +123,27 @@ class MarkerCodes:
         bits: Cells along a side of the code, without border.
         ids: (k,) marker id of each entry.
         turns: (k,) quarter turns clockwise by which the entry's image is turned.
-        cells: (k, bits + 4, bits + 4) +1 white, -1 black, with border and margin.
+        cells: (k, n, n) +1 white, -1 black, with border and margin: n is `side + 2`.
+        border: Black cells around the code.
     """
 
     bits: int
     ids: npt.NDArray[np.int64]
     turns: npt.NDArray[np.int64]
     cells: Cells
+    border: int = 1
 
     @property
     def side(self) -> int:
         """Cells along the marker's black square."""
-        return self.bits + 2
+        return self.bits + 2 * self.border
 
     @classmethod
     def of(
-        cls, dictionary: cv2.aruco.Dictionary, known_ids: Iterable[int] | None = None
+        cls,
+        dictionary: cv2.aruco.Dictionary,
+        known_ids: Iterable[int] | None = None,
+        border: int = 1,
     ) -> MarkerCodes:
         """Codes of a dictionary, all of them or those of `known_ids`.
 
@@ -152,14 +158,17 @@ class MarkerCodes:
                 f'known id {beyond[0]} is not in the dictionary, expected 0 to {count - 1}'
             )
         bits = int(dictionary.markerSize)
-        cells = np.ones((len(chosen) * 4, bits + 4, bits + 4), np.float32)
+        side = bits + 2 * border
+        cells = np.ones((len(chosen) * 4, side + 2, side + 2), np.float32)
         cells[:, 1:-1, 1:-1] = -1.0
         code = np.where(_bits_of(dictionary)[list(chosen)], np.float32(1.0), np.float32(-1.0))
         for turn in range(4):
-            cells[turn::4, 2:-2, 2:-2] = np.rot90(code, -turn, axes=(1, 2))
+            cells[turn::4, border + 1 : -border - 1, border + 1 : -border - 1] = np.rot90(
+                code, -turn, axes=(1, 2)
+            )
         ids = np.repeat(np.array(list(chosen), np.int64), 4)
         turns = np.tile(np.arange(4), len(chosen))
-        return cls(bits, ids, turns, cells)
+        return cls(bits, ids, turns, cells, border)
 
 
 def _bits_of(dictionary: cv2.aruco.Dictionary) -> npt.NDArray[np.bool_]:

@@ -75,7 +75,7 @@ class TemplateFit:
         positions: Array = (np.arange(self.count, dtype=float) - (self.count - 1) / 2.0) * step
         x, y = (each.ravel() for each in np.meshgrid(positions, positions))
         self._grid = np.stack([x, y, np.ones_like(x)]).astype(np.float32)
-        within = np.abs(positions) < 1.0 - 2.0 / codes.side
+        within = np.abs(positions) < 1.0 - 2.0 * codes.border / codes.side
         self._inside = np.outer(within, within).ravel()
         zero, one = np.zeros_like(x), np.ones_like(x)
         # derivative of the warped position by the eight parameters of a homography near identity

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from marker_detection.camera_model import CameraModel
-from marker_detection.candidates import distinct, quads_around
+from marker_detection.candidates import Mask, distinct, quads_around
 from marker_detection.detector import DetectorSettings, MarkerDetector
 from marker_detection.dictionaries import DICTIONARY_NAMES, dictionary_named
 from marker_detection.testing.marker_scene import (
@@ -352,7 +352,7 @@ def test_square_with_two_covered_corners_is_an_outline_in_crowds_too():
     mask[10:50, 100:140] = mask[60:100, 100:140] = mask[100:140, 10:50] = 255
     cv2.fillPoly(mask, [np.array([[10, 100], [36, 100], [10, 126]])], 0)
     mask[120:140, 35:50] = 0
-    middles = quads_around([(mask, 1)], limit=1).mean(axis=1)
+    middles = quads_around([Mask(mask)], limit=1).mean(axis=1)
     assert (np.linalg.norm(middles - (30.0, 120.0), axis=1) < 5.0).any()
 
 
