@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from owl_reasoner.knowledge_base import Changes as Changes
     from owl_reasoner.knowledge_base import KnowledgeBase as KnowledgeBase
     from owl_reasoner.reasoner.answers import Unknown as Unknown
+    from owl_reasoner.owlready.reasoning import sync_reasoner_native as sync_reasoner_native
     from owl_reasoner.reasoner.budget import Progress as Progress
     from owl_reasoner.reasoner.budget import ReasoningBudgetError as ReasoningBudgetError
     from owl_reasoner.reasoner.explanation import Explanation as Explanation
@@ -40,6 +41,7 @@ _HOME = {
     'Unknown': 'reasoner.answers',
     'ontology_bytes': 'documents.writing',
     'read_ontology': 'documents.reading',
+    'sync_reasoner_native': 'owlready.reasoning',
     'write_ontology': 'documents.writing',
 }
 __all__ = list(_HOME)

@@ -10,7 +10,7 @@ axioms of ontologies, whoever made them.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Container, Iterable, Iterator
 from typing import Any, TypeAlias
 
 from owl_reasoner.documents.mapping import Mapping
@@ -188,11 +188,16 @@ class OntologyWriter:
 
 
 class Names:
-    """What the numbers of a World stand for; asked of it once for each."""
+    """What the numbers of a World stand for; asked of it once for each.
 
-    def __init__(self, world: Any) -> None:
+    Args:
+        world: The World.
+        known: What is known already, also of entities that are no more; it is added to.
+    """
+
+    def __init__(self, world: Any, known: dict[int, str] | None = None) -> None:
         self._world = world
-        self._known: dict[int, str] = {}
+        self._known = {} if known is None else known
 
     def __getitem__(self, number: int) -> str:
         if number < 0:
@@ -204,7 +209,7 @@ class Names:
 
     def all(self) -> Names:
         """Ask for all names at once."""
-        self._known = dict(self._world.graph.execute('SELECT storid, iri FROM resources'))
+        self._known.update(self._world.graph.execute('SELECT storid, iri FROM resources'))
         return self
 
     def literal(self, value: object, datatype: int | str) -> Literal:
@@ -220,29 +225,40 @@ class Names:
         return self[quad[0]], self[quad[1]], value
 
 
-def quads_of(world: Any, contexts: Iterable[int] | None = None) -> Iterator[Quad]:
-    """Yield the quads of a World, or of the ontologies with these numbers, in storage order."""
-    chosen = '' if contexts is None else f' WHERE c IN ({",".join(map(str, contexts))})'
+def quads_of(world: Any, contexts: Iterable[int]) -> Iterator[Quad]:
+    """Yield the quads of the ontologies with these numbers, in storage order."""
+    chosen = ','.join(map(str, contexts))
     execute = world.graph.execute
-    yield from execute(f'SELECT s, p, o FROM objs{chosen} ORDER BY rowid').fetchall()
-    yield from execute(f'SELECT s, p, o, d FROM datas{chosen} ORDER BY rowid').fetchall()
+    yield from execute(f'SELECT s, p, o FROM objs WHERE c IN ({chosen}) ORDER BY rowid').fetchall()
+    yield from execute(
+        f'SELECT s, p, o, d FROM datas WHERE c IN ({chosen}) ORDER BY rowid'
+    ).fetchall()
+
+
+def contexts_of(world: Any) -> list[int]:
+    """Return the numbers of all ontologies of a World."""
+    return [number for (number,) in world.graph.execute('SELECT c FROM ontologies')]
 
 
 def read_axioms(
-    world: Any, contexts: Iterable[int] | None = None, without: frozenset[Quad] = frozenset()
+    world: Any,
+    contexts: Iterable[int],
+    without: Container[Quad] = (),
+    known: dict[int, str] | None = None,
 ) -> Mapping:
     """Read the axioms of ontologies.
 
     Args:
         world: The World.
-        contexts: The numbers of the ontologies in it; None: all.
+        contexts: The numbers of the ontologies in it.
         without: Quads that are left out.
+        known: Filled with what the numbers stand for.
 
     Returns:
-        What was read: its ``axioms``, and in ``unsupported`` one sentence for each statement that
-        was not understood.
+        What was read: its ``axioms``, what it ``declared``, and in ``unsupported`` one sentence for
+        each statement that was not understood.
     """
-    names = Names(world).all()
+    names = Names(world, known).all()
     triples = [names.triple(quad) for quad in quads_of(world, contexts) if quad not in without]
     mapping = Mapping(Graph(triples))
     mapping.read()

@@ -28,6 +28,8 @@ from owl_reasoner.reasoner.datatypes import (
     single,
 )
 
+DIGITS = 30
+"""Digits behind the point of a quotient; XPath asks for 18 in all at least."""
 _Number = int | Fraction | float
 _Solve = Callable[..., Iterable[Value]]
 
@@ -95,7 +97,16 @@ def _arithmetic(compute: Callable[..., _Number]) -> _Solve:
 def _divide(first: _Number, second: _Number) -> _Number:
     if isinstance(first, float) or isinstance(second, float):
         return first / second
-    return Fraction(first) / Fraction(second)
+    return _decimal(Fraction(first) / Fraction(second))
+
+
+def _decimal(number: Fraction) -> Fraction:
+    """Round what no decimal is equal to: a quotient of decimals is a decimal (XPath, op 6.2.4)."""
+    rest = number.denominator
+    for factor in (2, 5):
+        while rest % factor == 0:
+            rest //= factor
+    return number if rest == 1 else round(number, DIGITS)
 
 
 def _modulo(first: _Number, second: _Number) -> _Number:
@@ -109,7 +120,7 @@ def _power(base: _Number, exponent: _Number) -> _Number:
         return math.pow(base, exponent)
     if not isinstance(exponent, int) or abs(exponent) > 1024:
         raise ValueError
-    return Fraction(base) ** exponent
+    return _decimal(Fraction(base) ** exponent)
 
 
 def _rounding(compute: Callable[[Fraction], int]) -> _Solve:

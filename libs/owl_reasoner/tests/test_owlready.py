@@ -1,0 +1,240 @@
+"""What an owlready2 program has from the native reasoner, and from the quads of a World."""
+
+# ruff: noqa: N801, RUF012 - classes as users of owlready2 write them
+from __future__ import annotations
+
+import gc
+import os
+import threading
+import weakref
+from pathlib import Path
+from typing import Any
+
+import owlready2
+import pytest
+from owlready2 import AllDisjoint, FunctionalProperty, Imp, Not, SymmetricProperty, Thing
+
+from owl_reasoner import KnowledgeBase, sync_reasoner_native
+from owl_reasoner.owl.axioms import Axiom, Declaration
+from owl_reasoner.owlready import reasoning
+from owl_reasoner.owlready.quads import OntologyWriter, contexts_of, read_axioms
+from owl_reasoner.reasoner.budget import ReasoningBudgetError
+
+from .random_ontologies import RandomOntology
+
+IRI = 'http://example.org/o#'
+DATA = Path(__file__).parent / 'data'
+
+
+class Shop:
+    """A World with classes, properties and a rule, made as owlready2's users do."""
+
+    def __init__(self) -> None:
+        self.world: Any = owlready2.World()
+        self.onto: Any = self.world.get_ontology(IRI)
+        with self.onto:
+
+            class Drug(Thing):
+                pass
+
+            class price(Drug >> float, FunctionalProperty):
+                pass
+
+            class tablets(Drug >> int, FunctionalProperty):
+                pass
+
+            class each(Drug >> float, FunctionalProperty):
+                pass
+
+            class beside(Thing >> Thing, SymmetricProperty):
+                pass
+
+            class Cheap(Drug):
+                equivalent_to = [Drug & (each <= 1.0)]
+
+            class Contained(Thing):
+                equivalent_to = [beside.some(Drug)]
+
+            class Impossible(Drug):
+                is_a = [Not(Drug)]
+
+            rule = Imp()
+            rule.set_as_rule(
+                'Drug(?d), price(?d, ?p), tablets(?d, ?n), divide(?r, ?p, ?n) -> each(?d, ?r)'
+            )
+            self.aspirin: Any = Drug('aspirin', price=5.0, tablets=10)
+            self.box: Any = Thing('box', namespace=self.onto)
+            self.box.beside = [self.aspirin]
+
+
+@pytest.fixture
+def shop() -> Shop:
+    """Provide the World."""
+    return Shop()
+
+
+def test_classes_values_and_rules_show_in_the_objects(shop: Shop) -> None:
+    onto = shop.onto
+    sync_reasoner_native(shop.world)
+    assert shop.aspirin.is_a == [onto.Cheap]
+    assert shop.aspirin.each == 0.5
+    assert shop.aspirin.beside == [shop.box]
+    assert shop.box.is_a == [onto.Contained]
+    assert owlready2.Nothing in onto.Impossible.equivalent_to
+    assert onto.Impossible in list(shop.world.inconsistent_classes())
+
+
+def test_a_further_call_follows_the_changes_and_takes_back_what_follows_no_more(
+    shop: Shop, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    onto = shop.onto
+    sync_reasoner_native(shop.world)
+    read = 0
+
+    def counted(*args: Any) -> Any:
+        nonlocal read
+        read += 1
+        return read_axioms(*args)
+
+    monkeypatch.setattr(reasoning, 'read_axioms', counted)
+    shop.aspirin.price = 50.0
+    with onto:
+        other = onto.Drug('other', price=1.0, tablets=4)
+    sync_reasoner_native(shop.world)
+    assert (shop.aspirin.is_a, shop.aspirin.each) == ([onto.Drug], 5.0)
+    assert (other.is_a, other.each) == ([onto.Cheap], 0.25)
+    shop.box.beside = []
+    owlready2.destroy_entity(other)
+    sync_reasoner_native(shop.world)
+    assert shop.aspirin.beside == []
+    assert shop.box.is_a == [Thing]
+    assert read == 0, 'facts are not read again'
+    with onto:
+
+        class Sold(Thing):
+            equivalent_to = [onto.Drug & onto.price.some(float)]
+
+    sync_reasoner_native(shop.world)
+    assert read == 1
+    assert set(shop.aspirin.is_a) == {Sold}
+    before = shop.world.graph.db.total_changes
+    sync_reasoner_native(shop.world)
+    assert shop.world.graph.db.total_changes == before, 'nothing changed, nothing is written'
+
+
+def test_a_contradiction_is_an_error_that_says_why_and_can_be_mended(shop: Shop) -> None:
+    with shop.onto:
+
+        class Food(Thing):
+            pass
+
+        AllDisjoint([Food, shop.onto.Drug])
+        shop.aspirin.is_a.append(Food)
+    with pytest.raises(owlready2.OwlReadyInconsistentOntologyError, match='aspirin is Food'):
+        sync_reasoner_native(shop.world)
+    shop.aspirin.is_a.remove(Food)
+    sync_reasoner_native(shop.world)
+    assert shop.aspirin.is_a == [shop.onto.Cheap]
+
+
+def test_what_follows_goes_into_the_ontology_that_is_named(shop: Shop) -> None:
+    sync_reasoner_native(shop.onto)
+    inferred = shop.world.get_ontology(reasoning.INFERRED)
+    assert not list(inferred.get_triples(shop.aspirin.storid, None, None))
+    assert shop.aspirin.is_a == [shop.onto.Cheap]
+    shop.aspirin.price = 50.0
+    sync_reasoner_native(shop.onto)
+    assert shop.aspirin.is_a == [shop.onto.Drug]
+    shop = Shop()
+    found = shop.world.get_ontology('http://example.org/found#')
+    with found:
+        sync_reasoner_native([shop.onto])
+    assert list(found.get_triples(shop.aspirin.storid, None, None))
+
+
+def test_values_are_left_out_on_request(shop: Shop) -> None:
+    sync_reasoner_native(shop.world, infer_property_values=False, infer_data_property_values=False)
+    assert shop.aspirin.is_a == [shop.onto.Cheap]
+    assert shop.aspirin.each is None
+
+
+def test_it_ends_at_its_time_and_when_it_is_cancelled(shop: Shop) -> None:
+    cancel = threading.Event()
+    cancel.set()
+    with pytest.raises(ReasoningBudgetError, match='cancelled'):
+        sync_reasoner_native(shop.world, cancel=cancel)
+    with pytest.raises(ReasoningBudgetError, match='more than 0 s'):
+        sync_reasoner_native(shop.world, timeout=0.0)
+    assert shop.aspirin.is_a == [shop.onto.Drug]
+    sync_reasoner_native(shop.world)
+    assert shop.aspirin.is_a == [shop.onto.Cheap]
+
+
+def test_what_is_not_used_is_told(shop: Shop) -> None:
+    with shop.onto:
+        rule = Imp()
+        rule.set_as_rule('Drug(?d), price(?d, ?p) -> Cheap(?d)')
+    shop.world.graph.execute(
+        'UPDATE resources SET iri=? WHERE iri=?',
+        ('http://www.w3.org/2003/11/swrlb#unheardOf', 'http://www.w3.org/2003/11/swrlb#divide'),
+    )
+    with pytest.warns(reasoning.IncompleteReasoningWarning, match='unheardOf'):
+        sync_reasoner_native(shop.world)
+
+
+def test_a_world_that_nobody_needs_goes_with_its_reasoner() -> None:
+    shop = Shop()
+    sync_reasoner_native(shop.world)
+    session = weakref.ref(next(iter(reasoning._SESSIONS[shop.world].values())))
+    del shop
+    for _ in range(3):
+        gc.collect()
+    assert session() is None or session().world is not None
+
+
+def written(axioms: list[Axiom]) -> Any:
+    world: Any = owlready2.World()
+    OntologyWriter(world.get_ontology(IRI)).replace_all(axioms)
+    return world
+
+
+@pytest.mark.parametrize('seed', range(12))
+def test_axioms_come_back_from_a_world_as_they_were(seed: int) -> None:
+    axioms = list(dict.fromkeys(RandomOntology(seed).ontology(12, 12)))
+    found = list(read_axioms(world := written(axioms), contexts_of(world)).axioms)
+    kept = {axiom for axiom in found if not isinstance(axiom, Declaration)}
+    lost = [a for a in axioms if a not in kept and not isinstance(a, Declaration)]
+    assert KnowledgeBase(IRI, found).reason() == KnowledgeBase(IRI, axioms).reason()
+    assert not lost
+
+
+def differences(world: Any) -> dict[str, set[Any]]:
+    """Return what a reasoner left of each entity."""
+    return {
+        entity.name: {*map(str, entity.is_a), *map(str, entity.equivalent_to)}
+        for entity in (*world.classes(), *world.individuals())
+    }
+
+
+FOREIGN = sorted(Path(os.environ.get('OWLREADY2_TESTS', '/nowhere')).glob('*.owl'))
+
+
+@pytest.mark.java
+@pytest.mark.parametrize('path', FOREIGN, ids=lambda path: path.name)
+def test_owlready2s_own_ontologies_come_out_as_with_pellet(path: Path) -> None:
+    """Set OWLREADY2_TESTS to the folder ``test`` of owlready2's source package."""
+    results: list[object] = []
+    for sync in (sync_reasoner_native, owlready2.sync_reasoner_pellet):
+        world = owlready2.World()
+        try:
+            world.get_ontology(path.as_uri()).load(only_local=True)
+            sync(world, infer_property_values=True, infer_data_property_values=True, debug=0)
+            results.append(differences(world))
+        except owlready2.OwlReadyInconsistentOntologyError:
+            results.append('inconsistent')
+        except owlready2.OwlReadyOntologyParsingError:
+            pytest.skip('owlready2 does not read it')
+        except owlready2.OwlReadyJavaError as error:
+            pytest.skip(f'Pellet does not run: {str(error)[-80:]}')
+        world.close()
+    assert results[0] == results[1]
