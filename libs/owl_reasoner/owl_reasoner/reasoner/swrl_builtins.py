@@ -1,5 +1,5 @@
 """SWRL built-ins over values (https://www.w3.org/Submission/SWRL/, section 8): comparisons,
-arithmetic, booleans and strings. Those that compute with dates, URIs and lists are not supported
+arithmetic, booleans, strings and URIs. Those that compute with dates and lists are not supported
 and reported as such; values of XML Schema's dates, times and durations are compared.
 
 Each built-in is known by two functions of the values of its arguments: whether they satisfy it,
@@ -17,6 +17,7 @@ import re
 from collections.abc import Callable, Iterable
 from fractions import Fraction
 from typing import Any
+from urllib.parse import urljoin, urlsplit
 
 from owl_reasoner.reasoner.datatypes import (
     Value,
@@ -217,7 +218,9 @@ def _translate(text: str, old: str, new: str) -> str | None:
 
 
 def _before(text: str, mark: str) -> str | None:
-    return text.partition(mark)[0] if _text(text, mark) and mark and mark in text else ''
+    if not _text(text, mark):
+        return None
+    return text.partition(mark)[0] if mark and mark in text else ''
 
 
 def _after(text: str, mark: str) -> str | None:
@@ -236,9 +239,31 @@ def _tokens(text: Value, pattern: Value) -> Iterable[Value]:
     if not isinstance(text, str) or not isinstance(pattern, str):
         return ()
     try:
-        return tuple(dict.fromkeys(_pattern(pattern).split(text)))
+        found = _pattern(pattern)
+        if found.search('') or not text:
+            # A separator of no characters is an error, and an empty text has no parts.
+            return ()
+        ends = [0, *(end for match in found.finditer(text) for end in match.span()), len(text)]
     except ValueError:
         return ()
+    # Not `split`, which hands out what groups of the pattern matched as well.
+    parts = (text[start:end] for start, end in zip(ends[::2], ends[1::2], strict=True))
+    return tuple(dict.fromkeys(parts))
+
+
+def _resolved(reference: Value, base: Value) -> Value | None:
+    """Resolve a reference against an absolute base (RFC 3986, section 5); texts stand for URIs."""
+    written, stem = _uri(reference), _uri(base)
+    if written is None or stem is None or not urlsplit(stem).scheme:
+        return None
+    found = urljoin(stem, written)
+    return found if isinstance(reference, str) else ('anyURI', found)
+
+
+def _uri(value: Value) -> str | None:
+    if isinstance(value, tuple) and value[0] == 'anyURI':
+        return str(value[1])
+    return value if isinstance(value, str) else None
 
 
 def _negation(value: Value) -> Value | None:
@@ -305,6 +330,7 @@ _COMPUTATIONS: dict[str, tuple[int, int, _Solve]] = {
     'substringAfter': (3, 3, _strings(_after)),
     'replace': (4, 4, _strings(_replace)),
     'tokenize': (3, 3, _tokens),
+    'resolveURI': (3, 3, _strings(_resolved)),
 }
 
 
