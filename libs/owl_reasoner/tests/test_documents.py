@@ -344,3 +344,63 @@ def test_names_in_owl_xml_are_those_that_the_owl_api_shortened(
         f'<SubClassOf><Class IRI="{reference}"/><Class IRI="http://x/B"/></SubClassOf></Ontology>'
     )
     assert read_ontology(text.encode(), IRI).axioms == [ax.SubClassOf(iri, 'http://x/B')]
+
+
+ENTITY = """<?xml version="1.0"?>
+<!DOCTYPE rdf:RDF [ <!ENTITY q "http://ex.org/o#a&amp;b/" > ]>
+<rdf:RDF xmlns:rdf="http://www.w3.org/1999/02/22-rdf-syntax-ns#"
+  xmlns:owl="http://www.w3.org/2002/07/owl#"><owl:Class rdf:about="&q;X"/></rdf:RDF>"""
+
+
+def test_an_entity_may_hold_an_escaped_ampersand_and_no_other_entity() -> None:
+    found = read_ontology(ENTITY.encode(), 'urn:o').axioms
+    assert list(found) == [ax.Declaration('class', 'http://ex.org/o#a&b/X')]
+    for value in ('&r;', '&amp;&r;', '&#x26;r;', '&lt;&r;'):
+        bomb = ENTITY.replace('http://ex.org/o#a&amp;b/', value)
+        with pytest.raises(OntologyFileError, match='entity'):
+            read_ontology(bomb.replace('[ ', '[ <!ENTITY r "x"> ').encode(), 'urn:o')
+
+
+def test_a_datatype_of_owl_1_is_declared() -> None:
+    text = ENTITY.replace(
+        '<owl:Class rdf:about="&q;X"/>',
+        '<owl:Datatype rdf:about="http://www.w3.org/2001/XMLSchema#double"/>'
+        '<owl:Datatype rdf:about="http://ex.org/o#level"/>',
+    )
+    document = read_ontology(text.encode(), 'urn:o')
+    assert document.unsupported == []
+    assert ax.Declaration('datatype', 'http://ex.org/o#level') in document.axioms
+
+
+CATALOG_TEXT = """<?xml version="1.0" encoding="UTF-8" standalone="no"?>
+<catalog prefer="public" xmlns="urn:oasis:names:tc:entity:xmlns:xml:catalog">
+  <uri id="User Entered" name="http://ex.org/away" uri="elsewhere/near%20by.ofn"/>
+  <group id="Folder Repository" prefer="public" xml:base="elsewhere">
+    <uri id="x" name="http://ex.org/grouped" uri="grouped.ofn"/>
+    <uri id="y" name="http://ex.org/web" uri="http://ex.org/web.owl"/>
+  </group>
+</catalog>"""
+
+
+def test_imports_are_found_in_a_catalog_and_in_packages(tmp_path: Path) -> None:
+    folder = tmp_path / 'maps' / 'owl'
+    (folder / 'elsewhere').mkdir(parents=True)
+    (tmp_path / 'upper' / 'owl').mkdir(parents=True)
+    (folder / 'catalog-v001.xml').write_text(CATALOG_TEXT)
+    imported = {
+        'http://ex.org/away': folder / 'elsewhere' / 'near by.ofn',
+        'http://ex.org/grouped': folder / 'elsewhere' / 'grouped.ofn',
+        'package://maps/owl/own.ofn': folder / 'own.ofn',
+        'package://upper/owl/top.ofn': tmp_path / 'upper' / 'owl' / 'top.ofn',
+    }
+    for number, path in enumerate(imported.values()):
+        path.write_text(f'Ontology(Declaration(Class(<urn:c{number}>)))')
+    imports = ' '.join(f'Import(<{iri}>)' for iri in (*imported, 'http://ex.org/web'))
+    (folder / 'map.ofn').write_text(f'Ontology(<urn:map> {imports})')
+    document = read_ontology(folder / 'map.ofn', 'urn:map')
+    declared = {axiom.iri for axiom in document.axioms if isinstance(axiom, ax.Declaration)}
+    assert declared == {f'urn:c{number}' for number in range(len(imported))}
+    (note,) = document.unsupported
+    assert note.startswith('owl:imports <http://ex.org/web> is not followed')
+    (folder / 'catalog-v001.xml').write_text('no XML')
+    assert len(read_ontology(folder / 'map.ofn', 'urn:map').unsupported) == 3

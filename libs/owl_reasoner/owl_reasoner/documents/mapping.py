@@ -41,6 +41,7 @@ DECLARATIONS = {
     OWL + 'NamedIndividual': 'individual',
     RDFS + 'Datatype': 'datatype',
     OWL + 'DataRange': 'datatype',
+    OWL + 'Datatype': 'datatype',
 }
 CHARACTERISTICS: dict[str, Callable[[ex.PropertyExpression], Axiom]] = {
     OWL + 'InverseFunctionalProperty': ax.InverseFunctionalObjectProperty,

@@ -9,10 +9,12 @@ from __future__ import annotations
 import codecs
 import re
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
+from owl_reasoner.documents.catalogs import CATALOG, catalog_entries
 from owl_reasoner.documents.functional_syntax import is_functional, parse_functional
 from owl_reasoner.documents.mapping import Mapping
 from owl_reasoner.documents.owl_xml import is_owl_xml, parse_owl_xml
@@ -46,6 +48,8 @@ _MANCHESTER = re.compile(rb'(?:Prefix|Namespace|Ontology|Import|Class|Individual
 _PARSER_PLACE = re.compile(r'Parser error (?:at|between) line [\w ]*: ')
 _NAMES = {'turtle': 'Turtle', 'ntriples': 'N-Triples', 'jsonld': 'JSON-LD'}
 FORMATS = 'RDF/XML, OWL/XML, Turtle, N-Triples, JSON-LD or OWL functional syntax'
+PACKAGE_DEPTH = 6
+"""Folders above a document in which a package is looked for."""
 _ENDINGS = ('.owl', '.rdf', '.ttl', '.ofn', '.owx', '.xml', '.nt', '.jsonld')
 DEFAULT_SIZE_LIMIT = 256 * 1024 * 1024
 
@@ -81,7 +85,8 @@ def read_ontology(
 
     Its format is told by how it begins: RDF/XML, OWL/XML, Turtle, N-Triples, JSON-LD, or OWL
     functional syntax. An import is followed where a file of its name (with any ending) lies in the
-    folder of the document, or where it is a file IRI; its axioms then take the place of the import.
+    folder of the document, where a catalog says where it is (`catalogs`), or where it is a file
+    IRI; its axioms then take the place of the import.
     Any other import is reported.
 
     Args:
@@ -102,7 +107,7 @@ def read_ontology(
     for _, document, place in documents:
         for name in document.imports:
             with collected():
-                path = _imported(name, place)
+                path = _imported(name, place, may_read)
                 if path is None:
                     missing[name] = 'no such file beside the document'
                 elif not may_read(path):
@@ -140,17 +145,42 @@ def _apart(axioms: Iterable[Axiom], taken: set[str], prefix: str) -> Iterator[Ax
     taken |= own
 
 
-def _imported(iri: str, folder: Path | None) -> Path | None:
-    """Return the local file that an import names."""
+def _imported(iri: str, folder: Path | None, may_read: Callable[[Path], bool]) -> Path | None:
+    """Return the local file that an import names: itself, in a catalog, or beside the document."""
     if iri.startswith('file:'):
         path = Path(unquote(urlsplit(iri).path))
         return path if path.is_file() else None
+    if folder is None:
+        return None
+    for catalog in (folder / CATALOG, folder.parent / CATALOG):
+        if catalog.is_file() and may_read(catalog):
+            with suppress(OntologyFileError, OSError):
+                found = catalog_entries(catalog).get(iri)
+                if found is not None and found.is_file():
+                    return found
+    if iri.startswith('package://') and (found := _in_package(iri, folder)) is not None:
+        return found
     name = local_name(iri.rstrip('/#')).rpartition('/')[2]
-    if folder is None or not name or name.startswith('.'):
+    if not name or name.startswith('.'):
         return None
     for candidate in (folder / name, *(folder / (name + ending) for ending in _ENDINGS)):
         if candidate.is_file():
             return candidate
+    return None
+
+
+def _in_package(iri: str, folder: Path) -> Path | None:
+    """Return the file of a ROS package that lies around a document or beside its package."""
+    parts = [unquote(part) for part in iri.removeprefix('package://').split('/') if part]
+    if '..' in parts:
+        return None
+    for above in (folder, *folder.parents[:PACKAGE_DEPTH]):
+        candidates = [above.joinpath(*parts)]
+        if parts and above.name == parts[0]:
+            candidates.append(above.joinpath(*parts[1:]))
+        for candidate in candidates:
+            if candidate.is_file():
+                return candidate
     return None
 
 

@@ -16,6 +16,7 @@ _ABSOLUTE = re.compile(r'[A-Za-z][A-Za-z0-9+.\-]*:')
 _EMPTY_END = re.compile(r'(?:\?#|[?#])\Z')
 FORBIDDEN = re.compile(r'[\x00-\x20<>"{}|\\^`]')
 _REFERENCE = re.compile(rb'&([A-Za-z_][\w.-]*);')
+_ESCAPED = re.compile(r'&(?:amp|lt|gt|quot|apos|#\d{1,7}|#x[0-9A-Fa-f]{1,6});')
 _MAX_ENTITY = 512
 _MAX_DEPTH = 20_000
 DEEPEST = 100
@@ -206,8 +207,9 @@ class XmlReader:
     def _entity(self, name: str, is_parameter: bool, value: str | None, *_: object) -> None:
         if is_parameter or value is None:
             raise self.fail(f'entity {name!r} is refused: only plain text may stand in an entity')
-        if '&' in value or '<' in value or len(value) > _MAX_ENTITY:
-            expected = f'plain text of at most {_MAX_ENTITY} characters'
+        # A character that is escaped makes the text shorter; another entity could make it longer.
+        if '&' in _ESCAPED.sub('', value) or '<' in value or len(value) > _MAX_ENTITY:
+            expected = f'plain text of at most {_MAX_ENTITY} characters, no other entity'
             raise self.fail(f'entity {name!r} is refused: expected {expected}')
         self._entities.add(name.encode())
 
