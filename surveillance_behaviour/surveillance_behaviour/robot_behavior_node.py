@@ -64,6 +64,14 @@ class RobotBehavior(PatrolNode):
             choices=tuple(MACHINES),
             read_only=True,
         )
+        autonomy: str = self.parameter(
+            'autonomy',
+            'full',
+            'How much the robot does without asking: below high a person is asked before it leaves '
+            'for a place.',
+            choices=tuple(level.name.lower() for level in fsm.Autonomy),
+            read_only=True,
+        )
         choice = self.declare_live(DecisionSettings())
         settings = self.declare_fields(MissionSettings(choice))
         deadlines = self.declare_fields(Deadlines(), prefix='deadline.')
@@ -77,6 +85,7 @@ class RobotBehavior(PatrolNode):
         self.mission = Mission(self._behaviour, settings, ports, battery, clock, self._record)
         self.machine = MACHINES[self._behaviour](self.mission)
         self.machine.preempt_timeout = HUNG_STATE_SECONDS
+        self.machine.control.set_autonomy(fsm.Autonomy[autonomy.upper()])
         self._announcer.attach(self.mission, self.machine)
         # A pause lets no further state begin; what moves the robot has it stand at once.
         self._paused = OwnedTopic(self, Bool, 'paused')

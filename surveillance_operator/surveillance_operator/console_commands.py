@@ -180,6 +180,19 @@ _COMMANDS = (
     _command('pause', 'Stand, and enter no further state.', lambda a: a.machine('pause')),
     _command('step', 'Enter one state, then pause.', lambda a: a.machine('step')),
     _command('resume', 'Go on.', lambda a: a.machine('resume')),
+    _command('approve', 'Let the transition be made that waits for you.', lambda a: a.approve()),
+    _command(
+        'choose',
+        'Go on with another outcome in its place.',
+        lambda a, outcome: a.approve(outcome),
+        _word('OUTCOME', 'an outcome of the state'),
+    ),
+    _command(
+        'autonomy',
+        'Set what the robot does without asking.',
+        lambda a, level: a.set_autonomy(level),
+        _word('LEVEL', 'off, low, high or full', lambda: ('off', 'low', 'high', 'full')),
+    ),
     _command('why not', 'Say why the robot does not go there now.', _why_not, _PLACE),
     _command('param list', "Show a node's parameters; * can be set now.", _list_parameters, _NODE),
     _command(

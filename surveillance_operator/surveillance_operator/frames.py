@@ -197,7 +197,10 @@ PARTS: Mapping[str, tuple[tuple[str, ...], Callable[[Snapshot], Any]]] = {
     'obstacles': (('obstacles',), lambda s: _points(s.obstacles)),
     'machine': (('containers',), lambda s: [asdict(each) for each in s.containers]),
     'stopped': (('stopped',), lambda s: s.stopped),
-    'active': (('active', 'paused'), lambda s: {'paths': list(s.active), 'paused': s.paused}),
+    'active': (
+        ('active', 'paused', 'waiting'),
+        lambda s: {'paths': list(s.active), 'paused': s.paused, 'waiting': list(s.waiting)},
+    ),
     'transitions': (('transitions',), _transitions),
     'markers': (
         ('detections', 'scan_progress', 'markers'),

@@ -23,12 +23,14 @@ from surveillance_interfaces.srv import (
     AddRoom,
     ConsoleCommand,
     DrainBattery,
+    ForceOutcome,
     GoTo,
     MarkerRoutine,
     PlaceObstacle,
     ReferenceName,
     RemoveObstacle,
     RemoveRoom,
+    SetAutonomy,
     SetDoor,
     WhyNot,
 )
@@ -72,6 +74,8 @@ _KINDS: Mapping[str, Any] = {
     'go_to': GoTo,
     'why_not': WhyNot,
     f'{BEHAVIOUR}/set_parameters': SetParameters,
+    f'{BEHAVIOUR}/fsm/approve': ForceOutcome,
+    f'{BEHAVIOUR}/fsm/set_autonomy': SetAutonomy,
     **dict.fromkeys((f'{BEHAVIOUR}/fsm/{word}' for word in ('pause', 'step', 'resume')), Trigger),
     **dict.fromkeys((f'{name}/command' for name in CONTROLLERS), ConsoleCommand),
 }
@@ -81,6 +85,8 @@ _PARAMETER_KINDS: Mapping[str, Any] = {
     'list_parameters': ListParameters,
     'set_parameters': SetParameters,
 }
+AUTONOMY = ('off', 'low', 'high', 'full')
+"""The levels of autonomy, in the order of their numbers."""
 ARM_SECONDS = 60.0
 """Deadline of a movement of the arm, whose answer comes when it has arrived."""
 
@@ -147,14 +153,28 @@ class MissionActions:
         return answer.message, list(answer.premises)
 
     def machine(self, word: str) -> str:
-        """Pause, step or resume the state machine."""
+        """Pause, step or resume the state machine, or approve the transition that waits."""
+        if word == 'approve':
+            return self.approve()
         if word not in ('pause', 'step', 'resume'):
-            raise ValueError(f'{word!r}: expected pause, step or resume')
+            raise ValueError(f'{word!r}: expected pause, step, resume or approve')
         answer = self._call(f'{BEHAVIOUR}/fsm/{word}')
         if not answer.success:
             raise ValueError(answer.message or f'{word} was refused')
         done = {'pause': 'paused', 'step': 'one step made', 'resume': 'going on'}
         return str(answer.message) or f'state machine: {done[word]}'
+
+    def approve(self, outcome: str = '') -> str:
+        """Have the transition be made that waits for a person, or that of another outcome."""
+        self._told(f'{BEHAVIOUR}/fsm/approve', outcome=str(outcome))
+        return f'going on with {outcome}' if outcome else 'approved'
+
+    def set_autonomy(self, level: str) -> str:
+        """Set how much the machine does by itself: off, low, high or full."""
+        if level not in AUTONOMY:
+            raise ValueError(f'{level!r}: expected {nearest(level, AUTONOMY)}')
+        self._told(f'{BEHAVIOUR}/fsm/set_autonomy', level=AUTONOMY.index(level))
+        return f'autonomy: {level}'
 
     def stop(self, on: bool) -> str:
         """Have the robot stand, whoever commands it, or release it."""

@@ -177,6 +177,7 @@ class Snapshot:
         containers: The state machine, outermost container first.
         active: Paths of the states that are active, outermost first.
         paused: Whether the machine enters no further state.
+        waiting: The transitions of the machine that wait for a person's approval.
         stopped: Whether a person has stopped the robot.
         transitions: The latest transitions.
         detections: The markers of the latest image: id, whether the list of markers has it, whether
@@ -226,6 +227,7 @@ class Snapshot:
     containers: tuple[Container, ...] = ()
     active: tuple[str, ...] = ()
     paused: bool = False
+    waiting: tuple[str, ...] = ()
     stopped: bool = False
     transitions: tuple[Transition, ...] = ()
     detections: tuple[tuple[int, bool, bool, float], ...] = ()
@@ -304,6 +306,9 @@ def changes(old: Snapshot, new: Snapshot) -> Iterator[Change]:
         yield Change(STOPPED if new.stopped else 'the robot is released')
     if old.paused != new.paused:
         yield Change('the state machine is paused' if new.paused else 'the state machine continues')
+    for each in new.waiting:
+        if each not in old.waiting:
+            yield Change(f'approval is waited for: {each}')
     yield from _node_changes(old, new)
 
 

@@ -437,6 +437,11 @@ def _feedback(action: str, kind: Any, read: Callable[[Any, Snapshot], Fields]) -
     return Topic(name, message, lambda m, old: read(m.feedback, old), _NEWEST)
 
 
+def _on_machine(message: FsmStatus, _: Snapshot) -> dict[str, Any]:
+    waiting = tuple(f'{each.path}: {each.outcome} -> {each.to_state}' for each in message.questions)
+    return {'active': tuple(message.active), 'paused': message.paused, 'waiting': waiting}
+
+
 TOPICS: tuple[Topic, ...] = (
     Topic('mission_status', MissionStatus, _sets('status', status_from)),
     Topic('decision', Decision, lambda m, _: {'decision': decision_from(m), 'number': m.sequence}),
@@ -458,7 +463,7 @@ TOPICS: tuple[Topic, ...] = (
     Topic(DETECTIONS_TOPIC, MarkerDetectionArray, _on_detections, _NEWEST),
     Topic('joint_states', JointState, _on_joints, _STREAM, beside=DETECTIONS_TOPIC),
     Topic(f'{FSM}/structure', FsmStructure, _sets('containers', containers_from)),
-    Topic(f'{FSM}/status', FsmStatus, lambda m, _: {'active': tuple(m.active), 'paused': m.paused}),
+    Topic(f'{FSM}/status', FsmStatus, _on_machine),
     Topic(f'{FSM}/transition', FsmTransition, _on_transition, _QUEUE),
     *(Topic(f'{name}/announcement', String, _on_request(name)) for name in CONTROLLERS),
     Topic('/diagnostics', DiagnosticArray, _on_diagnostics, _MANY, period=1.0),

@@ -27,7 +27,7 @@ from surveillance_interfaces.msg import (
     SmachContainerStatus,
     SmachContainerStructure,
 )
-from surveillance_interfaces.srv import ForceOutcome, SetInitialState
+from surveillance_interfaces.srv import ForceOutcome, SetAutonomy, SetInitialState
 from surveillance_runtime.machine_messages import (
     smach_status_messages,
     smach_structure_messages,
@@ -63,7 +63,9 @@ class IntrospectionServer:
 
     Below `server_name`: the topics ``fsm/transition`` (every transition, numbered), ``fsm/status``
     and ``fsm/structure``, all latched, and the services ``fsm/pause``, ``fsm/step``,
-    ``fsm/resume``, ``fsm/force_outcome`` and ``fsm/set_initial_state``.
+    ``fsm/resume``, ``fsm/force_outcome``, ``fsm/set_initial_state``, ``fsm/set_autonomy`` and
+    ``fsm/approve`` (a transition that waits for a person; empty fields stand for the only one, and
+    for the outcome that the state ended with).
 
     Beside them, SMACH's own topics with the fields of its messages: ``smach/container_structure``,
     ``smach/container_status`` (both a message for each container) and ``smach/container_init``,
@@ -125,6 +127,8 @@ class IntrospectionServer:
             (Trigger, 'resume', pausing(control.resume, False)),
             (Trigger, 'step', pausing(control.step, False)),
             (ForceOutcome, 'force_outcome', lambda r: control.force_outcome(r.path, r.outcome)),
+            (ForceOutcome, 'approve', lambda r: control.approve(r.path, r.outcome)),
+            (SetAutonomy, 'set_autonomy', lambda r: control.set_autonomy(r.level)),
             (
                 SetInitialState,
                 'set_initial_state',

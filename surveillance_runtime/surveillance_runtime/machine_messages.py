@@ -18,6 +18,7 @@ from state_machines.userdata import UserData, raw
 from surveillance_interfaces.msg import (
     FsmContainer,
     FsmEdge,
+    FsmQuestion,
     FsmStatus,
     FsmStructure,
     FsmTransition,
@@ -56,6 +57,19 @@ def status_message(root: Container, sequence: int, stamp: Any) -> FsmStatus:
         paused=root.control.paused,
         active=root.control.active_paths(),
         left_behind=root.control.left_behind(),
+        autonomy=int(root.control.autonomy),
+        questions=[
+            FsmQuestion(
+                path=question.path,
+                outcome=question.outcome,
+                to_state=question.target,
+                level=int(question.approval.level),
+                outcomes=list(question.outcomes),
+                timeout=float(question.approval.timeout or 0.0),
+                otherwise=question.approval.otherwise,
+            )
+            for question in root.control.questions()
+        ],
     )
 
 

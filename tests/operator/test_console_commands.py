@@ -55,6 +55,9 @@ def said(line: str, actions: Any = None) -> list[Answer]:
         ('go R3', ('go_to', 'R3')),
         ('home', ('go_to', '')),
         ('pause', ('machine', 'pause')),
+        ('approve', ('approve',)),
+        ('choose failed', ('approve', 'failed')),
+        ('autonomy low', ('set_autonomy', 'low')),
         ('why not R3', ('why_not', 'R3')),
     ],
 )

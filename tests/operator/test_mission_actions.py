@@ -15,7 +15,15 @@ from std_srvs.srv import Trigger
 from patrol_policy.decision import DecisionSettings
 from state_machines.exceptions import CallError
 from surveillance_behaviour.reasoner_node import Reasoner
-from surveillance_interfaces.srv import GoTo, MarkerRoutine, PlaceObstacle, SetDoor, WhyNot
+from surveillance_interfaces.srv import (
+    ForceOutcome,
+    GoTo,
+    MarkerRoutine,
+    PlaceObstacle,
+    SetAutonomy,
+    SetDoor,
+    WhyNot,
+)
 from surveillance_ontology.armor_server_node import ArmorServer
 from surveillance_ontology.ontology_map_builder_node import OntologyMapBuilder
 from surveillance_operator.console_commands import answer
@@ -126,6 +134,18 @@ def test_a_refusal_is_said_in_the_words_of_the_node(graph: Any, actions: Mission
     assert actions.machine('pause') == 'state machine: paused'
 
 
+def test_a_person_approves_and_sets_the_autonomy(graph: Any, actions: MissionActions) -> None:
+    approved = serve(graph, ForceOutcome, 'robot_behavior/fsm/approve', success=True)
+    levels = serve(graph, SetAutonomy, 'robot_behavior/fsm/set_autonomy', success=True)
+    assert actions.machine('approve') == 'approved'
+    assert actions.approve('failed') == 'going on with failed'
+    assert [request.outcome for request in approved] == ['', 'failed']
+    assert actions.set_autonomy('low') == 'autonomy: low'
+    assert levels[0].level == 1
+    with pytest.raises(ValueError, match=r"'hihg': expected .*high"):
+        actions.set_autonomy('hihg')
+
+
 def test_a_parameter_is_set_or_the_reason_told(graph: Any, actions: MissionActions) -> None:
     results = [SetParametersResult(successful=True)]
     asked = serve(graph, SetParameters, 'robot_behavior/set_parameters', results=results)
@@ -205,7 +225,7 @@ def test_what_a_person_sets_reaches_the_node_that_decides(
         ),
         (lambda a: a.set_threshold('-5'), 'got -5, expected an integer from 0 to 1000000000'),
         (lambda a: a.set_policy('fast'), "got 'fast', expected one of 'tour'"),
-        (lambda a: a.machine('stop'), 'expected pause, step or resume'),
+        (lambda a: a.machine('stop'), 'expected pause, step, resume or approve'),
         (lambda a: a.move_arm('up'), 'expected left, home, right, back or stop'),
         (lambda a: a.command('simulator', 'x'), 'expected one of battery_controller'),
         (lambda a: a.explain('URGENT'), 'expected CLASS'),

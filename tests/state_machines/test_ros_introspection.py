@@ -9,7 +9,7 @@ from builtin_interfaces.msg import Time
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_srvs.srv import Trigger
 
-from libs.state_machines.tests.states import Background, began
+from libs.state_machines.tests.states import Answer, Background, began
 from state_machines.ros import ServiceCaller
 from state_machines.transitions import Transition
 from surveillance_interfaces.msg import (
@@ -18,7 +18,7 @@ from surveillance_interfaces.msg import (
     FsmTransition,
     SmachContainerStatus,
 )
-from surveillance_interfaces.srv import ForceOutcome, SetInitialState
+from surveillance_interfaces.srv import ForceOutcome, SetAutonomy, SetInitialState
 from surveillance_runtime.machine_messages import transition_message
 
 from .ros_servers import introspected
@@ -95,6 +95,32 @@ def test_a_machine_is_paused_stepped_and_resumed(graph, watched):
     assert waiter.runs == 0
     assert call(graph, Trigger, 'resume').success
     began(waiter)
+    root.request_preempt()
+    assert run.result() == 'preempted'
+
+
+def test_a_transition_above_the_level_waits_until_a_person_approves(graph, watched):
+    root, waiter = watched
+    root.add_state(
+        'ASKS',
+        Answer('go', outcomes=['go', 'no']),
+        {'go': 'INNER', 'no': 'done'},
+        autonomy={'go': 2},
+    )
+    root.set_initial_state(['ASKS'])
+    statuses = graph.listen(FsmStatus, 'robot/fsm/status', LATCHED)
+    answer = call(graph, SetAutonomy, 'set_autonomy', level=9)
+    assert not answer.success
+    assert 'expected one of 0 (OFF)' in answer.message
+    assert call(graph, SetAutonomy, 'set_autonomy', level=1).success
+    run = Background(root)
+    (question,) = graph.until(lambda: statuses and statuses[-1].questions)
+    assert (question.path, question.outcome, question.to_state) == ('PATROL/ASKS', 'go', 'INNER')
+    assert statuses[-1].autonomy == 1
+    assert not call(graph, ForceOutcome, 'approve', outcome='nix').success
+    assert call(graph, ForceOutcome, 'approve').success
+    began(waiter)
+    graph.until(lambda: not statuses[-1].questions)
     root.request_preempt()
     assert run.result() == 'preempted'
 

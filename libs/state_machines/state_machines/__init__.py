@@ -7,6 +7,7 @@ ROS 2.
 
 from __future__ import annotations
 
+from state_machines.autonomy import Approval, Autonomy, Question
 from state_machines.clock import Clock, Interrupt, WallClock
 from state_machines.concurrence import Concurrence
 from state_machines.container import Container
@@ -41,6 +42,8 @@ from state_machines.userdata import Remapper, UserData
 
 __all__ = [
     'RESUME',
+    'Approval',
+    'Autonomy',
     'CBInterface',
     'CBState',
     'CheckpointError',
@@ -55,6 +58,7 @@ __all__ = [
     'Iterator',
     'LimitOptions',
     'MissingKeyError',
+    'Question',
     'Remapper',
     'Sequence',
     'SmachError',

@@ -75,7 +75,12 @@ class Container(State):
     """Whether all states run at the same time."""
     fsm_suspends = True
     fsm_frame_type: ClassVar[type[Frame]] = Frame
-    fsm_arguments: ClassVar[tuple[str, ...]] = ('transitions', 'remapping', 'constants')
+    fsm_arguments: ClassVar[tuple[str, ...]] = (
+        'transitions',
+        'remapping',
+        'constants',
+        'autonomy',
+    )
 
     fsm_program: Program
     _control: Control | None = None

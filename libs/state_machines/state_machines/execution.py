@@ -25,6 +25,7 @@ from queue import Empty, SimpleQueue
 from typing import Any, Protocol
 
 from state_machines import log
+from state_machines.autonomy import Autonomy, Question, level_of
 from state_machines.clock import WALL_CLOCK, Clock, Interrupt, elapsed_of
 from state_machines.exceptions import InvalidStateError, InvalidTransitionError, describe
 from state_machines.program import Entry, Exit, Limits, Node, Noted, RawTransition, Trace
@@ -78,6 +79,7 @@ class Place(Protocol):
         attention: Something beside the next state wants to be looked at.
         forced: A node, and the outcome to take in place of the one that its state returns.
         left: The node whose state was left behind.
+        question: The transition that waits for a person.
     """
 
     thread: ExecutionThread
@@ -85,6 +87,7 @@ class Place(Protocol):
     attention: bool
     forced: tuple[Node, str] | None
     left: Node | None
+    question: Question | None
 
     @property
     def path(self) -> str:
@@ -107,6 +110,7 @@ class Control:
         steps: States that may be entered although paused.
         trace: Where transitions are reported, if anywhere.
         running: An execution has not ended.
+        autonomy: Transitions that need a higher level wait for a person.
     """
 
     def __init__(self, name: Callable[[], str]) -> None:
@@ -117,6 +121,8 @@ class Control:
         self.steps = 0
         self.trace: Trace | None = None
         self.running = False
+        self.autonomy = Autonomy.FULL
+        self._questions: list[Question] = []
         self._name = name
         self._traces: list[Trace] = []
         self._set_up(WALL_CLOCK, None)
@@ -242,6 +248,64 @@ class Control:
             frame.forced = (node, outcome)
             frame.thread.asked()
             node.state.request_preempt()
+            if frame.question is not None:
+                frame.question.wake.set()
+
+    # Transitions that wait for a person.
+
+    def set_autonomy(self, level: int) -> None:
+        """Set how much the machine does by itself; questions that are answered by that go on.
+
+        Raises:
+            InvalidTransitionError: There is no such level.
+        """
+        with self.condition:
+            self.autonomy = level_of(level, f"The autonomy of '{self._name()}'")
+            for question in self._questions:
+                if question.approval.level <= self.autonomy:
+                    question.wake.set()
+
+    def questions(self) -> list[Question]:
+        """Return the transitions that wait for a person."""
+        with self.condition:
+            return list(self._questions)
+
+    def approve(self, path: str = '', outcome: str = '') -> None:
+        """Have a transition that waits be made, or another one in its place.
+
+        Args:
+            path: Of the state that has ended; empty for the only one that waits.
+            outcome: The outcome to go on with; empty for the one that it ended with.
+
+        Raises:
+            InvalidStateError: No such transition waits.
+            InvalidTransitionError: The state has no such outcome.
+        """
+        with self.condition:
+            waiting = {each.path: each for each in self._questions if each.answer is None}
+            if not path and len(waiting) == 1:
+                (path,) = waiting
+            question = waiting.get(path)
+            if question is None:
+                raise InvalidStateError(
+                    f"No transition of '{path}' waits for a person; those that do are of "
+                    f'{sorted(waiting)}'
+                )
+            if outcome and outcome not in question.outcomes:
+                raise InvalidTransitionError(
+                    f"State '{path}' has no outcome '{outcome}' to go on with: its outcomes are "
+                    f'{sorted(question.outcomes)}'
+                )
+            question.answer = outcome or question.outcome
+            question.wake.set()
+
+    def fsm_ask(self, question: Question) -> None:
+        """Have a question be one of those that wait; under the condition."""
+        self._questions.append(question)
+
+    def fsm_settle(self, question: Question) -> None:
+        """Take a question away; under the condition."""
+        self._questions.remove(question)
 
     def active_paths(self) -> list[str]:
         """Paths of all states that are active, containers included, outermost first."""
@@ -508,7 +572,7 @@ class Work:
         node.execute = wait_and_execute
         if entry is not None:
             # It is called, and not gone into; its limits hold as before.
-            node.entry = Entry(None, node.view, entry.limits, draws=entry.draws)
+            node.entry = Entry(None, node.view, entry.limits, entry.approvals, draws=entry.draws)
 
     def await_end(self, seconds: float | None) -> bool:
         """Wait for the end, in seconds of steady time; whether it came."""

@@ -17,6 +17,7 @@ from collections.abc import Iterable
 from typing import Any, NamedTuple, Self
 
 from state_machines import execution, log
+from state_machines.autonomy import Question
 from state_machines.exceptions import InvalidStateError, SmachError
 from state_machines.execution import Control, ExecutionThread, LeftBehindError, Watch
 from state_machines.program import (
@@ -402,6 +403,8 @@ class Frame:
         stopped: Where the shutdown check ended the run.
         watch: The limits at work on the state that executes.
         attempt: How often that was executed before, because of its limits.
+        question: The transition that waits for a person.
+        held: A state that has ended and its outcome, whose question an interrupt put off.
         watches_threads: It watches threads of its own, which have bounds of their own.
     """
 
@@ -418,6 +421,8 @@ class Frame:
     stopped: Node | Exit = SHUTDOWN
     watch: Watch | None = None
     attempt = 0
+    question: Question | None = None
+    held: tuple[Node, str] | None = None
     watches_threads = False
 
     def __init__(self, program: Program, thread: ExecutionThread, parent_ud: Any) -> None:
@@ -537,6 +542,10 @@ class Frame:
         Returns:
             The state's outcome, if there is nothing to execute; else None.
         """
+        held, self.held = self.held, None
+        if held is not None and held[0] is node:
+            # It ended before the interrupt: what is left is the question.
+            return self._ask(node, held[1])
         limits = node.limits
         if limits is not None and (limits.timeout is not None or limits.deadline is not None):
             self.watch = self.thread.begin_watch(node, limits)
@@ -556,7 +565,7 @@ class Frame:
             or self.must_end
         ):
             self.attempt = 0
-            return outcome
+            return self._ask(node, outcome)
         self.attempt += 1
         log.logwarn(
             f"State '{node.path}' ended with '{outcome}': attempt {self.attempt + 1} of "
@@ -581,6 +590,70 @@ class Frame:
                 return outcome
         log.logwarn(f"State '{node.path}' was stopped after its timeout of {limits.timeout:g} s")
         return limits.late_outcome
+
+    # Waiting for a person.
+
+    def _ask(self, node: Node, outcome: Any) -> Any:
+        """Return the outcome to go on with, after a question where the transition needs one."""
+        entry, control = node.entry, self.thread.control
+        approvals = entry.approvals if entry is not None else None
+        approval = approvals.get(outcome) if approvals and isinstance(outcome, str) else None
+        if approval is None or approval.level <= control.autonomy:
+            return outcome
+        with control.lock:
+            self.thread.check()
+            self.attention = True
+            if self.must_end or approval.level <= control.autonomy:
+                return self._settle_question(node, outcome, None)
+            question = Question(
+                node.path,
+                outcome,
+                node.target(outcome).label,
+                approval,
+                tuple(each for each in node.targets if isinstance(each, str)),
+            )
+            self.question = question
+            control.fsm_ask(question)
+        log.logwarn(f"State '{node.path}': outcome '{outcome}' waits for a person's approval")
+        self.note(node.label, outcome, question.target, 'question')
+        try:
+            if approval.timeout is None:
+                question.wake.wait()
+            elif control.clock.sleep(approval.timeout, question.wake):
+                log.logwarn(
+                    f"State '{node.path}': nobody answered for {approval.timeout:g} s, it goes on "
+                    f"with '{approval.otherwise}'"
+                )
+                question.answer = question.answer or approval.otherwise
+        finally:
+            with control.lock:
+                self.question = None
+                control.fsm_settle(question)
+            self.note(node.label, outcome, question.target, 'question')
+        with control.lock:
+            self.thread.check()
+            return self._settle_question(node, outcome, question.answer)
+
+    def _settle_question(self, node: Node, outcome: str, answer: str | None) -> Any:
+        """Return the outcome to go on with, the wait being over; under the machine's condition.
+
+        Args:
+            node: The state that ended.
+            outcome: What it ended with.
+            answer: What was chosen, if anything was.
+        """
+        if answer is not None or self.forced is not None:
+            return answer or outcome
+        if self.container.preempt_requested():
+            if 'preempted' in node.targets:
+                node.state.service_preempt()
+                return 'preempted'
+            return outcome  # The next state is asked to stop.
+        if self.making_way is not None or self.suspending:
+            node.state.recall_preempt()
+            self.held = node, outcome
+            return SUSPENDED
+        return outcome
 
     # Between two states.
 
@@ -852,6 +925,8 @@ class Frame:
                 break
             frame.preempted = current
             frame.thread.asked()
+            if frame.question is not None:
+                frame.question.wake.set()
             entry = current.entry
             if entry is None or entry.program is None or not entry.relays:
                 current.state.request_preempt()
@@ -879,6 +954,8 @@ class Frame:
             if not isinstance(current, Node) or frame.making_way is current:
                 return
             frame.making_way = current
+            if frame.question is not None:
+                frame.question.wake.set()
             program = current.program
             if program is None:
                 frame.thread.asked()
@@ -893,6 +970,8 @@ class Frame:
             self.making_way = current
             self.thread.asked()
             current.state.fsm_suspend()
+            if self.question is not None:
+                self.question.wake.set()
 
     def where(self) -> History | None:
         """Return where the container would go on if its process ended now."""
@@ -920,6 +999,8 @@ class Frame:
             for_good: No other thread takes the execution over.
         """
         self.abandoned = self.attention = True
+        if self.question is not None:
+            self.question.wake.set()
         self.program.frame = None
         if for_good:
             self.container.recall_preempt()

@@ -14,6 +14,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple, TypedDict
 
+from state_machines.autonomy import Approval
 from state_machines.clock import WALL_CLOCK, Clock
 from state_machines.exceptions import (
     InvalidStateError,
@@ -169,10 +170,12 @@ class Entry:
             keys.
         relays: The container hands a preempt on as the engine does it, not in a way of its own.
         limits: Time limits and retries, if it has any.
+        approvals: The autonomy that its outcomes need.
         draws: It is executed for one item of an iterator after another.
     """
 
     __slots__ = (
+        'approvals',
         'draws',
         'hooked',
         'inputs',
@@ -184,14 +187,21 @@ class Entry:
     )
 
     def __init__(
-        self, program: Program | None, view: Remapper, limits: Limits | None, *, draws: bool
+        self,
+        program: Program | None,
+        view: Remapper,
+        limits: Limits | None,
+        approvals: Mapping[str, Approval] | None,
+        *,
+        draws: bool,
     ) -> None:
         self.program = program
         self.inputs, self.outputs, self.plain_keys = view.fsm_names()
         self.relays = program is not None and program.container.fsm_passes_on('request_preempt')
         self.limits = limits
+        self.approvals = approvals
         self.draws = draws
-        self.hooked = draws or limits is not None
+        self.hooked = draws or limits is not None or approvals is not None
         """Whether the frame is asked before and after the state (`Frame.before`)."""
 
 
@@ -343,6 +353,7 @@ class Program:
         remappings: From the userdata keys of states and interrupts to the container's, by label.
         constants: Values of the states' input keys that come from no userdata, by label.
         limits: The states' time limits and retries, by label.
+        approvals: The autonomy that outcomes of the states need, by label.
         start_cbs: The registered callbacks, and likewise the others.
         table: The nodes of states and interrupts by label, as they were last made.
         first: The node that an execution begins with.
@@ -376,6 +387,7 @@ class Program:
         self.remappings: dict[str, Mapping[str, str]] = {}
         self.constants: dict[str, Mapping[str, Any]] = {}
         self.limits: dict[str, Limits] = {}
+        self.approvals: dict[str, Mapping[str, Approval]] = {}
         self.start_cbs: list[Callback] = []
         self.transition_cbs: list[Callback] = []
         self.termination_cbs: list[Callback] = []
@@ -468,8 +480,9 @@ class Program:
             state.fsm_clock = self._clock
         limits = self.limits.get(label)
         program = state.fsm_program if state.fsm_is_entered() else None
-        if program is not None or limits is not None or draws:
-            node.entry = Entry(program, view, limits, draws=draws)
+        approvals = self.approvals.get(label)
+        if program is not None or limits is not None or approvals is not None or draws:
+            node.entry = Entry(program, view, limits, approvals, draws=draws)
         if state.fsm_left is not None:
             state.fsm_left.block_reentry(node)
         return node
@@ -561,8 +574,9 @@ class Noted(NamedTuple):
         target: Label of the state entered, or the container's outcome.
         time: Seconds on the machine's clock.
         userdata: Shallow copy of the container's userdata.
-        kind: See `history.Transition`; also ``start``, when a container begins or goes on,
-            ``entered``, when a pause before `target` is over, and ``end``, when a root has ended.
+        kind: See `transitions.Transition`; also ``start``, when a container begins or goes on,
+            ``entered``, when a pause before `target` is over, ``question``, when a transition waits
+            for a person or does so no more, and ``end``, when a root has ended.
     """
 
     path: str
@@ -576,7 +590,7 @@ class Noted(NamedTuple):
     @property
     def is_transition(self) -> bool:
         """Whether a state was left, or a child of a concurrence ended."""
-        return self.kind not in ('start', 'entered', 'end')
+        return self.kind not in ('start', 'entered', 'question', 'end')
 
 
 RawTransition = Noted | tuple[Node, Any, float, dict[str, Any]]

@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterable, Mapping
 from collections.abc import Sequence as Labels
 from typing import Any, Unpack
 
+from state_machines.autonomy import Approval, make_approvals
 from state_machines.container import Container
 from state_machines.exceptions import (
     InvalidStateError,
@@ -22,6 +23,8 @@ from state_machines.state import State, structure_version
 from state_machines.userdata import UserData, raw
 
 Items = Iterable[Any] | Callable[[], Iterable[Any]]
+Needs = Mapping[str, int | Approval]
+"""From outcomes to the level of autonomy that their transitions need."""
 
 
 class StateMachine(Container):
@@ -61,6 +64,7 @@ class StateMachine(Container):
         transitions: Mapping[str, str | None] | None = None,
         remapping: Mapping[str, str] | None = None,
         constants: Mapping[str, Any] | None = None,
+        autonomy: Needs | None = None,
         **limits: Unpack[LimitOptions],
     ) -> State:
         """Add a state to the open machine.
@@ -71,6 +75,9 @@ class StateMachine(Container):
             transitions: From the state's outcomes to labels or to outcomes of the machine.
             remapping: From the state's userdata keys to the machine's.
             constants: Values for input keys of the state that come from no userdata.
+            autonomy: From outcomes to the level that their transitions need: at a lower level of
+                the machine (`Control.set_autonomy`) they wait for a person. An `Approval` says how
+                long.
             **limits: See `LimitOptions`.
 
         Returns:
@@ -83,7 +90,7 @@ class StateMachine(Container):
         """
         machine = StateMachine._currently_opened_container()
         return StateMachine.add_state(
-            machine, label, state, transitions, remapping, constants, **limits
+            machine, label, state, transitions, remapping, constants, autonomy, **limits
         )
 
     @staticmethod
@@ -119,15 +126,22 @@ class StateMachine(Container):
         transitions: Mapping[str, str | None] | None = None,
         remapping: Mapping[str, str] | None = None,
         constants: Mapping[str, Any] | None = None,
+        autonomy: Needs | None = None,
         **limits: Unpack[LimitOptions],
     ) -> State:
         """Add a state to a machine at hand, open or not; for the arguments see `add`."""
         bound = dict(transitions or {})
+        needs = {}
+        if autonomy and isinstance(state, State):
+            known = {*state.get_registered_outcomes(), *bound}
+            needs = make_approvals(self.fsm_program.path_of(label), known, autonomy)
         self._register(label, state, tuple(bound), remapping, constants, **limits)
         group = self._group_transitions() if self.is_opened() else {}
         for outcome in sorted(state.get_registered_outcomes()):
             bound.setdefault(outcome, group.get(outcome))
         self._transitions[label] = bound
+        if needs:
+            self.fsm_program.approvals[label] = needs
         if self._initial_state_label is None:
             self._initial_state_label = label
         if self._to_connect is not None:
@@ -180,6 +194,10 @@ class StateMachine(Container):
                 targets[outcome] = (table.get(target) if target else None) or exits[
                     target or outcome
                 ]
+        for label in program.approvals:
+            # What a preempt ends that comes while a person is asked.
+            if 'preempted' in exits:
+                table[label].targets.setdefault('preempted', exits['preempted'])
         return table
 
     def fsm_first_of(self, table: Mapping[str, Node]) -> Node | Exit:
@@ -251,6 +269,7 @@ class Sequence(StateMachine):
         transitions: Mapping[str, str | None] | None = None,
         remapping: Mapping[str, str] | None = None,
         constants: Mapping[str, Any] | None = None,
+        autonomy: Needs | None = None,
         **limits: Unpack[LimitOptions],
     ) -> State:
         """Add a state after the last one; for the arguments see `StateMachine.add`.
@@ -258,7 +277,9 @@ class Sequence(StateMachine):
         The last state's connector outcome leads here, unless its own transitions bind it.
         """
         sequence = Sequence._currently_opened_container()
-        return sequence.add_state(label, state, transitions, remapping, constants, **limits)
+        return sequence.add_state(
+            label, state, transitions, remapping, constants, autonomy, **limits
+        )
 
     def add_state(self, label: str, state: State, *args: Any, **kwargs: Any) -> State:
         """Add a state to a sequence at hand, open or not; for the arguments see `add`."""

@@ -75,8 +75,8 @@ class TransitionFeed:
     Args:
         machine: The root.
         consume: Takes each `Transition`, in order, on the feed's thread.
-        changed: Told the path of each container that begins or goes on, and of the root when that
-            has ended; in order with the transitions.
+        changed: Told the path of each container that begins or goes on, that asks a person or has
+            an answer, and of the root when that has ended; in order with the transitions.
     """
 
     def __init__(
@@ -144,7 +144,7 @@ class TransitionFeed:
         if noted.kind == 'entered':
             self._entered[noted.path] = noted.time
             return
-        if noted.kind == 'end':
+        if noted.kind in ('end', 'question'):
             self._changed(noted.path)
             return
         place = (noted.path, noted.target)

@@ -21,6 +21,7 @@ from surveillance_behaviour.machines.shared_states import (
     Recover,
     WaitForHelp,
     add,
+    add_asking,
     check_path,
     follow,
 )
@@ -229,9 +230,11 @@ def patrol_machine(mission: Mission) -> fsm.StateMachine:
     with machine:
         add('Initial', Initial(mission), start='Reasoning', failed='WaitForStart')
         add('WaitForStart', WaitForHelp(mission), try_again='Initial')
-        add(
+        add_asking(
             'Reasoning',
             Reasoning(mission),
+            'reasoned',
+            mission,
             reasoned='Moving',
             battery_low='RechargeRoutine',
             failed='Recover',

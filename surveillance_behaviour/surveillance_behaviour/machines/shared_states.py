@@ -173,6 +173,19 @@ def add(label: str, state: fsm.State, **transitions: str) -> None:
     fsm.StateMachine.add(label, state, {PREEMPTED: PREEMPTED, **transitions})
 
 
+def add_asking(
+    label: str, state: fsm.State, outcome: str, mission: Mission, **transitions: str
+) -> None:
+    """Add a state as `add` does; below the autonomy ``high`` a person is asked after `outcome`.
+
+    A robot that nobody answers goes on, so that it is back before its battery is empty.
+    """
+    seconds = mission.settings.approval_seconds
+    approval = fsm.Approval(fsm.Autonomy.HIGH, timeout=seconds, otherwise=outcome)
+    bound = {PREEMPTED: PREEMPTED, **transitions}
+    fsm.StateMachine.add(label, state, bound, autonomy={outcome: approval})
+
+
 def check_path(path: list[Point], goal: Point | None, tolerance: float, peer: str) -> None:
     """Refuse a path that leads nowhere, or elsewhere.
 

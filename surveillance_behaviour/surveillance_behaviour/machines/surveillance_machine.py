@@ -18,6 +18,7 @@ from surveillance_behaviour.machines.shared_states import (
     Recover,
     WaitForHelp,
     add,
+    add_asking,
     check_path,
     follow,
 )
@@ -203,9 +204,11 @@ def surveillance_machine(mission: Mission) -> fsm.StateMachine:
             failed='RE_DOCK',
         )
         add('RE_DOCK', ReDock(mission), again='MOVE_TO_NEXT_ROOM', give_up='WAIT_FOR_HELP')
-        add(
+        add_asking(
             'CHOOSE_NEXT_ROOM',
             ChooseNextRoom(mission),
+            'chosen',
+            mission,
             chosen='MOVE_TO_NEXT_ROOM',
             failed='RECOVER',
         )

@@ -48,6 +48,14 @@ class MissionSettings:
         0.0,
         86_400.0,
     )
+    approval_seconds: float = parameter(
+        120.0,
+        'How long a person is asked before the robot leaves for a place, when its autonomy is low '
+        'or off, s; then it goes.',
+        1.0,
+        86_400.0,
+        read_only=True,
+    )
     settle_seconds: float = 2.0
 
 

@@ -79,6 +79,9 @@ const SHOW = {
   lit: [['machine', 'active', 'transitions'], () => {
     lightMachine($('machine'), state.active?.paths ?? [], state.transitions ?? []);
     $('paused').hidden = !state.active?.paused;
+    const waiting = state.active?.waiting ?? [];
+    $('waiting').hidden = !waiting.length;
+    $('waiting').textContent = `waits for approval: ${waiting.join(', ')}`;
   }],
   stopped: [['stopped'], () => {
     $('stopped').hidden = !state.stopped;
