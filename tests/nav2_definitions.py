@@ -167,7 +167,7 @@ def _sources(folder: Path) -> Path:
     for name, text in ACTIONS.items():
         (folder / 'action' / f'{name}.action').write_text(text)
     files = ''.join(f'  action/{name}.action\n' for name in ACTIONS)
-    for name in ('CMakeLists.txt', 'package.xml', 'pyproject.toml'):
+    for name in ('CMakeLists.txt', 'package.xml', 'pyproject.toml', 'wheels.cmake'):
         text = (CHECKOUT / 'surveillance_interfaces' / name).read_text()
         text = re.sub(r'surveillance([_-])interfaces', r'nav2\1msgs', text)
         text = re.sub(r'(  action/.*\n|  msg/.*\n|  srv/.*\n)+', files, text)

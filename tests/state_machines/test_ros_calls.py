@@ -171,6 +171,17 @@ def test_service_call_notices_that_its_server_went_away(graph, server):
         end()
 
 
+def test_who_is_interrupted_in_the_moment_the_server_is_lost_was_interrupted():
+    interrupt = Interrupt()
+
+    def look():
+        interrupt.set()
+        raise UnavailableError('service ask: another server took the place')
+
+    with pytest.raises(CallInterruptedError, match='service ask: interrupted'):
+        calls.block_on(Future(), time.monotonic() + 60.0, interrupt, 'service ask', look)
+
+
 def test_service_call_notices_that_another_server_took_the_place_of_one_that_was_killed(
     graph, server, monkeypatch
 ):

@@ -323,7 +323,13 @@ def block_on(
         while not woken.wait(max(0.0, min(SERVER_PERIOD, deadline - time.monotonic()))):
             if time.monotonic() >= deadline:
                 break
-            look()
+            try:
+                look()
+            except UnavailableError:
+                # Who was asked to stop in this moment was interrupted; the loss is no reason.
+                if interrupt is not None and interrupt.is_set():
+                    break
+                raise
     finally:
         if remove is not None:
             remove()
