@@ -418,6 +418,139 @@ def print_poses(count: int) -> None:
     )
 
 
+FAMILIES = (
+    'DICT_4X4_1000',
+    'DICT_6X6_1000',
+    'DICT_7X7_1000',
+    'DICT_ARUCO_ORIGINAL',
+    'DICT_APRILTAG_16h5',
+    'DICT_APRILTAG_25h9',
+    'DICT_APRILTAG_36h10',
+    'DICT_APRILTAG_36h11',
+    'DICT_ARUCO_MIP_36h12',
+)
+
+
+def print_foreign(every: int) -> None:
+    """Ids of DICT_5X5_100 that are seen in markers of other dictionaries, each shown once.
+
+    Args:
+        every: Only each so many-th marker.
+    """
+    detectors = {'OpenCV': opencv_defaults(), 'ladder': opencv_ladder(), 'here': this_project(None)}
+    rows = []
+    for order, name in enumerate(FAMILIES):
+        dictionary = dictionary_named(name)
+        ids = list(range(0, len(dictionary.bytesList), every))
+        wrong = dict.fromkeys(detectors, 0)
+        for start in range(0, len(ids), 3):
+            generator = np.random.default_rng([13, order, start])
+            shown = [
+                Panel(
+                    marker_id,
+                    float(generator.uniform(1, 7)),
+                    math.radians(generator.uniform(-65, 65)),
+                    offset=(190.0 * (place - 1), float(generator.uniform(-100, 100))),
+                )
+                for place, marker_id in enumerate(ids[start : start + 3])
+            ]
+            image = scene(shown, indoors(generator), SHARP, generator, dictionary)
+            for detector, detect in detectors.items():
+                wrong[detector] += len(detect(image))
+        rows.append([name, str(len(ids)), *(str(wrong[each]) for each in detectors)])
+    sums = [str(sum(int(row[column]) for row in rows)) for column in range(1, 5)]
+    print_table(['wrong ids in other markers', 'views', *detectors], [*rows, ['all', *sums]])
+
+
+def kalibrs_grid(view: int, scale: float) -> ImageArray:
+    """Return an image of 1280x960 of Kalibr's AprilGrid of 12x6 tags, so large a part of it."""
+    dictionary = dictionary_named('DICT_APRILTAG_36h11')
+    tag, gap, columns, rows = 100, 30, 12, 6
+    height, width = rows * (tag + gap) + gap, columns * (tag + gap) + gap
+    sheet = np.full((height, width), 255, np.uint8)
+    for row in range(rows + 1):
+        for column in range(columns + 1):
+            left, low = column * (tag + gap), height - row * (tag + gap)
+            sheet[low - gap : low, left : left + gap] = 0
+            if row < rows and column < columns:
+                drawn = cv2.aruco.generateImageMarker(
+                    dictionary, row * columns + column, tag, borderBits=2
+                )
+                top, left = low - gap - tag, left + gap
+                sheet[top : top + tag, left : left + tag] = drawn
+    generator = np.random.default_rng([14, view])
+    half = np.array([width, height]) * scale / 2
+    corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * half + (640, 480)
+    corners += generator.uniform(-0.18, 0.18, (4, 2)) * half[1]
+    flat = np.array([[0, 0], [width, 0], [width, height], [0, height]], np.float32)
+    matrix = cv2.getPerspectiveTransform(flat, corners.astype(np.float32))
+    image = cv2.warpPerspective(sheet, matrix, (1280, 960), flags=cv2.INTER_AREA, borderValue=160)
+    blurred = cv2.GaussianBlur(image, (0, 0), 0.8).astype(float) * 0.85 + 15.0
+    noisy = blurred + generator.normal(0.0, 2.0, blurred.shape)
+    return np.asarray(np.clip(noisy, 0, 255), np.uint8)
+
+
+def print_kalibr(views: int) -> None:
+    """Tags of Kalibr's AprilGrid (two black cells around each) that are found."""
+    dictionary = dictionary_named('DICT_APRILTAG_36h11')
+    parameters = cv2.aruco.DetectorParameters()
+    parameters.markerBorderBits = 2
+    opencv = cv2.aruco.ArucoDetector(dictionary, parameters)
+    ours = MarkerDetector(DetectorSettings('DICT_APRILTAG_36h11', border=2))
+    detectors: dict[str, Detect] = {
+        'OpenCV, border bits 2': lambda image: _found(opencv.detectMarkers(image)),
+        'here, border 2': lambda image: [(d.marker_id, d.corners) for d in ours.detect(image)],
+    }
+    peer = apriltag3()
+    if peer is not None:
+        detectors['AprilTag 3'] = peer
+    rows = []
+    for scale in (0.75, 0.5, 0.35, 0.25, 0.18):
+        row = [f'{100 * scale:.0f} pixels a tag']
+        for detect in detectors.values():
+            counts = [
+                len({each for each, _ in detect(kalibrs_grid(v, scale))}) for v in range(views)
+            ]
+            row.append(f'{np.mean(counts):.0f}')
+        rows.append(row)
+    print_table(["tags of Kalibr's grid, of 72", *detectors], rows)
+
+
+def print_corners(folder: Path | None) -> None:
+    """Distance in pixels to the corners that AprilTag 3 finds in the photographs of its tags."""
+    peer = apriltag3()
+    if folder is None or peer is None or not (folder / 'markers.json').exists():
+        print('no comparison of corners: it needs photographs and pupil-apriltags\n')
+        return
+    kind = 'DICT_APRILTAG_36h11'
+    errors: defaultdict[str, list[float]] = defaultdict(list)
+    for photograph in photographs_in(folder):
+        if photograph.dictionary != kind:
+            continue
+        # AprilTag's pixels have their middles at halves
+        theirs = [(marker_id, corners - 0.5) for marker_id, corners in peer(photograph.image)]
+        for name in ('OpenCV', 'ladder', 'here'):
+            detect = _photo_detector(name, kind)
+            assert detect is not None
+            for marker_id, corners in detect(photograph.image):
+                for other_id, truth in theirs:
+                    if (
+                        other_id != marker_id
+                        or math.dist(*(c.mean(0) for c in (corners, truth))) > 15
+                    ):
+                        continue
+                    turned = [np.roll(c, k, 0) for c in (truth, truth[::-1]) for k in range(4)]
+                    apart = [np.linalg.norm(each - corners, axis=1) for each in turned]
+                    errors[name] += min(apart, key=lambda each: float(each.mean())).tolist()
+    print_table(
+        ["corners to AprilTag 3's", 'markers', 'median px', '95 %'],
+        [
+            [n, f'{len(e) // 4}', f'{np.median(e):.2f}', f'{np.quantile(e, 0.95):.2f}']
+            for n, e in errors.items()
+        ],
+    )
+
+
 def natural_images(count: int) -> Iterator[ImageArray]:
     """Photographs of scikit-image and, where it is installed, scikit-learn: parts, rescaled."""
     import skimage.data
@@ -690,6 +823,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     print_lights(3 if options.quick else 60)
     print_photos(options.photos, 12 if options.quick else 1)
     print_poses(300 if options.quick else 6000)
+    print_foreign(40 if options.quick else 1)
+    print_kalibr(1 if options.quick else 5)
+    print_corners(None if options.photos is None else Path(options.photos))
     print_natural(40 if options.quick else 1500)
     cells = grid(detectors, samples)
     for name in detectors:

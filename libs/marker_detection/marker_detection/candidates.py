@@ -7,7 +7,7 @@ few tenths of a pixel wrong, which `template_fit` repairs, but they are there. `
 sides of those that are wrong by up to a cell.
 
 Of the hundreds of dark outlines in a textured image only a few pass `BorderCheck`, and every marker
-that can be read does. A candidate costs 97 samples there and some thousands in `template_fit`.
+that can be read does. A candidate costs 121 samples there and some thousands in `template_fit`.
 """
 
 from __future__ import annotations
@@ -50,6 +50,8 @@ _WIDE_WINDOW = 21
 _SAME_BOX, _SAME_SIZE = 3, 0.06
 # places that `BorderCheck` looks at along each side, and along each side of the code
 _PER_SIDE, _INNER = 6, 5
+# cells beyond the border at which its white margin is looked for: a pixel of a large marker too
+_MARGINS = (0.07, 0.2, 0.5)
 # image pixels a cell has at most where borders are looked at
 _CELL_PIXELS = 6.0
 # what passes: correlation of border and margin, contrast of the two worst sides as shares of all,
@@ -172,6 +174,7 @@ def quads_around(
     found: list[Quads] = []
     seen: set[bytes] = set()
     for order, (mask, scale, eroded) in enumerate(masks):
+        # the first mask is of black alone: what it shows is no reason to look at less elsewhere
         if order == 1:
             seen.clear()
         if len(seen) > limit:
@@ -180,6 +183,7 @@ def quads_around(
         if blobs is None:
             continue
         outlines, boxes, scatter = blobs
+        # the likeliest blobs first, so that the limit costs what is least like a marker
         unlike = np.abs(scatter - 1.0)
         kept = np.argsort(unlike)
         kept = kept[scatter[kept] < _MOST_SCATTER]
@@ -235,6 +239,7 @@ def _blobs_in(mask: Grey, length: float, width: float) -> _Blobs | None:
     top, bottom = np.minimum.reduceat(y, starts), np.maximum.reduceat(y, starts)
     wide, high = right - left + 1, bottom - top + 1
     large = (np.maximum(wide, high) >= length) & (np.minimum(wide, high) >= width)
+    # a square has as many outline points as its box has pixels around it; foliage has far more
     large &= (counts >= 4) & (counts <= 3 * (wide + high))
     if not large.any():
         return None
@@ -294,6 +299,8 @@ def distinct(quads: Quads, distance: float) -> npt.NDArray[np.int64]:
 
 def _quad_around(outline: Outline) -> npt.NDArray[np.float32] | None:
     """Return the smallest quadrilateral (4, 2) around an outline; None where it is none."""
+    # of the hull, not of the outline: a border that touches something or lacks a corner has no
+    # polygon of four corners, but its hull is cut down to one
     hull = cv2.convexHull(outline)
     if len(hull) < 4:
         return None
@@ -327,7 +334,7 @@ class BorderCheck:
         along = np.linspace(-0.85, 0.85, _PER_SIDE)
         inner = np.linspace(-1.0, 1.0, _INNER) * (1.0 - 3.0 / side)
         cell = 2.0 / side
-        points = [_border(along, 1.0 + cell * part) for part in (0.2, 0.5)]
+        points = [_border(along, 1.0 + cell * part) for part in _MARGINS]
         points.append(_border(along, 1.0 - cell * 0.5))
         points.append(np.stack([each.ravel() for each in np.meshgrid(inner, inner)]))
         flat = np.concatenate(points, axis=1)
@@ -350,14 +357,18 @@ class BorderCheck:
         levels = levels_for(homographies, self._side, _CELL_PIXELS)
         values = pyramid.sample(homographies, self._grid, levels)
         count = 4 * _PER_SIDE
-        near, far, border = (values[:, k * count : (k + 1) * count] for k in range(3))
-        deviation = values[:, 3 * count :].std(axis=1)
-        # a white margin may be thinner than half a cell
-        thin = near.mean(axis=1) > far.mean(axis=1)
-        margin = np.where(thin[:, None], near, far)
+        rings = len(_MARGINS)
+        margins = values[:, : rings * count].reshape(len(values), rings, count)
+        border = values[:, rings * count : (rings + 1) * count]
+        deviation = values[:, (rings + 1) * count :].std(axis=1)
+        # a white margin may be thinner than half a cell: the brightest ring is it
+        brightest = margins.mean(axis=2).argmax(axis=1)
+        margin = margins[np.arange(len(margins)), brightest]
         contrast = margin.mean(axis=1) - border.mean(axis=1)
+        # of a step of two levels with that spread around them
         variance = (margin.var(axis=1) + border.var(axis=1)) / 2.0
         correlation = contrast / np.sqrt(contrast**2 + 4.0 * variance + 1e-6)
+        # a shadow, a thumb or the image's edge may spoil one side: the two worst are judged apart
         by_side = np.sort((margin - border).reshape(-1, 4, _PER_SIDE).mean(axis=2), axis=1)
         passed = (
             (contrast > least_contrast)
@@ -402,6 +413,8 @@ class EdgeFit:
         levels = levels_for(homographies, self._side, _CELL_PIXELS)
         values = pyramid.sample(homographies, self._grid, levels)
         values = values.reshape(len(quads), 4, _PLACES, _STEPS)
+        # from dark to light on the way out: the code's own edges in the border's other direction
+        # do not attract it
         rise = np.maximum(values[..., 2:] - values[..., :-2], 0.0)
         steepest = rise.max(axis=3)
         near = np.square(rise * (rise > 0.5 * steepest[..., None])) + 1e-9

@@ -101,6 +101,7 @@ class CellDifferences:
         levels, logarithms = _differences(cells), _differences(_logarithms(cells))
         step = _step(levels)
         room = _room(cells, step)
+        # which of the two is right depends on the light: a reflection adds, a shadow multiplies
         level = self._best(_normalised(levels, step), room)
         ratio = self._best(_normalised(logarithms, _step(logarithms)), np.ones_like(room))
         better = ratio.error < level.error
@@ -130,6 +131,8 @@ class CellDifferences:
 
     def _flipped(self, seen: Patches, room: Patches, entries: Indices) -> tuple[Reals, Reals]:
         """Return correlations (m, 1) with codes, and (m, cells) with one cell of them flipped."""
+        # flipping one cell changes its few differences only: agreement and energy are updated
+        # instead of made anew for each cell
         expected, white = room * self._codes[entries], self._white[entries]
         sign = 1.0 - 2.0 * white.reshape(len(white), -1)
         agreement = (seen * expected).sum(axis=1, keepdims=True)
@@ -152,10 +155,13 @@ class CellDifferences:
         highest = correlation[rows, entries]
         correlation[rows, entries] = -1.0
         best, second = _unexplained(highest), _unexplained(correlation.max(axis=1))
+        # saturated pairs say nothing, and count for no degree of freedom
         freedom = self._freedom * room.mean(axis=1, dtype=float)
+        # P(r^2 >= best) of unrelated differences; half, as a negative correlation does not count
         by_chance = betainc((freedom - 1.0) / 2.0, 0.5, np.minimum(best, 1.0)) / 2.0
         # each code is tried with levels and with logarithms
         error = 2.0 * len(self._codes) * by_chance + (second / best) ** (-freedom / 2.0)
+        # the look at other cells is the dearest step: only for what would be accepted
         likely = np.flatnonzero(error < _LIKELY)
         if len(likely):
             other_code = self._other_code(seen[likely], room[likely], entries[likely], best[likely])
@@ -209,6 +215,7 @@ def _normalised(differences: Patches, step: Patches) -> Patches:
 
 def _step(differences: Patches) -> Patches:
     """Return the difference (m, 1) between black and white."""
+    # half of the pairs of a code differ: a high quantile of all is the step between black and white
     index = round(_STEP_QUANTILE * (differences.shape[1] - 1))
     large = np.partition(np.abs(differences), index, axis=1)[:, index : index + 1]
     return np.asarray(np.maximum(large, np.float32(1e-3)))

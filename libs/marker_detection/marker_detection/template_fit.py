@@ -134,11 +134,15 @@ class TemplateFit:
         Returns:
             (m, j) entries and (m, j) correlations, j at most `_SHORTLIST`.
         """
+        # the blur is separable, so the image is blurred by it once and compared with sharp codes:
+        # the same sums as with each code blurred, for all codes in one product
         down, across = self._profile[footprint.down], self._profile[footprint.across]
         centred = patches - patches.mean(axis=1, keepdims=True)
         square = centred.reshape(-1, self.count, self.count)
         agreement = (down.transpose(0, 2, 1) @ square @ across).reshape(len(patches), -1)
         if listed is None:
+            # the codes differ in their own cells only; by the codes' energies, which are nearly
+            # equal, the few best are divided below
             everything = agreement[:, self._own] @ self._own_cells.T
             count = min(_SHORTLIST, everything.shape[1])
             listed = np.argpartition(everything, -count, axis=1)[:, -count:]
@@ -178,14 +182,18 @@ class TemplateFit:
         """Homographies (m, 3, 3) aligned so that the codes lie on the image."""
         levels = self.levels(homographies)
         footprint = self.footprint(homographies, levels, blur)
+        # inverse compositional: the template is moved instead of the image, so that its slopes
+        # and the Hessian are made once for all iterations
         template = self._render(entries, footprint)
         flat = template - template.mean(axis=1, keepdims=True)
         energy = np.maximum(np.einsum('mn,mn->m', flat, flat), 1e-6)
         steepest = self._steepest(entries, footprint)
         steepest -= steepest.mean(axis=2, keepdims=True)
+        # brightness and contrast are no movement: what of a slope looks like them is taken away
         along = (steepest @ flat[:, :, None]) / energy[:, None, None]
         steepest -= along * flat[:, None]
         hessian = (steepest @ steepest.transpose(0, 2, 1)).astype(np.float64)
+        # a code with few edges in one direction says little of some parameters
         damping = _DAMPING * np.trace(hessian, axis1=1, axis2=2) / 8.0 + 1e-9
         hessian += damping[:, None, None] * np.eye(8)
         solve = np.linalg.inv(hessian).astype(np.float32)
@@ -196,6 +204,7 @@ class TemplateFit:
             contrast = np.where(np.abs(contrast) < 1.0, 1.0, contrast)
             change = np.asarray((solve @ (steepest @ patches))[:, :, 0], dtype=float)
             change /= contrast[:, None]
+            # the slopes hold within about a cell
             largest = np.abs(change).max(axis=1, keepdims=True)
             change *= np.minimum(1.0, _LARGEST_STEP / np.maximum(largest, 1e-9))
             result = np.asarray(result @ np.linalg.inv(_warps(change)))

@@ -369,3 +369,13 @@ def test_outlines_of_one_marker_are_one_in_crowds_too():
     tracemalloc.stop()
     assert kept.tolist() == [*range(len(quads)), *range(2 * len(quads), 3 * len(quads))]
     assert peak < 20e6
+
+
+@pytest.mark.parametrize('margin', [0.09, 0.13, 0.2])
+def test_white_margin_of_a_pixel_or_two_on_a_black_wall_is_enough(margin):
+    # cells of eleven pixels
+    panel = Panel(14, 1.45, margin=margin, roll=0.1)
+    wall = np.full((480, 640), 10.0, np.float32)
+    generator = np.random.default_rng(1)
+    image = image_of([panel], CAMERA, DICTIONARY, wall, Degradation(blur=0.5), generator)
+    assert set(found(DETECTOR.detect(image))) == {14}
