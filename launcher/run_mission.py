@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import os
 import shlex
-import subprocess
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 from launcher import run_folder
+from launcher.alarm import Alarm, caller
 from launcher.instance_lock import claim
 from launcher.log_merge import MergedLog
 from launcher.run import NOT_RECORDED, Run
@@ -23,7 +23,6 @@ from launcher.run_processes import COMPOSED, node_environ, programs_of, ros_doma
 from launcher.service import is_service
 from launcher.supervisor import Supervisor
 from surveillance_behaviour.mission import mission_log
-from surveillance_behaviour.mission.recovery import WAITING_FOR_HELP
 from surveillance_runtime import node_table
 from surveillance_runtime.files import PLACE, RECORD, TIMELINE, FileError
 from surveillance_runtime.place.writing import copy_place
@@ -73,14 +72,11 @@ def run_mission(run: Run, config: Path, runs: Path, resume: Path | None = None) 
     if run.network:
         log.say('nodes of other machines are heard: see docs/security.md')
     log.say(f'watch it in a second terminal: {watch_command(run)}')
-    call = alarm_caller(run.alarm, log)
-    log.listen(
-        lambda name, text: (
-            call(text) if name == BEHAVIOUR_NODE and f'{WAITING_FOR_HELP}: ' in text else None
-        )
-    )
-    supervisor = Supervisor(programs, log, on_trouble=call)
+    alarm = Alarm(caller(run.alarm, log), folder)
+    log.listen(alarm.hear)
+    supervisor = Supervisor(programs, log, on_trouble=alarm.trouble, on_restart=alarm.restarted)
     code = _supervised(run, nodes, supervisor, folder, log)
+    alarm.close()
     for line in what_to_look_at(folder):
         log.plain(line)
     log.close()
@@ -104,26 +100,6 @@ def chosen_folder(run: Run, runs: Path, resume: Path | None) -> tuple[Path, str]
         left = f'{_short(found.folder)} was started with other options and is not finished'
         return run_folder.make_folder(runs), f'{left}; --resume continues it'
     return run_folder.make_folder(runs), ''
-
-
-def alarm_caller(alarm: str, log: MergedLog) -> Callable[[str], None]:
-    """Return what calls somebody: it runs the user's command with one line as its argument."""
-
-    def call(text: str) -> None:
-        if not alarm:
-            return
-        try:
-            subprocess.Popen(
-                [*shlex.split(alarm), text],
-                stdin=subprocess.DEVNULL,
-                stdout=subprocess.DEVNULL,
-                stderr=subprocess.DEVNULL,
-                start_new_session=True,
-            )
-        except (OSError, ValueError) as error:
-            log.error(f'--alarm {alarm}: {error}')
-
-    return call
 
 
 def _supervised(

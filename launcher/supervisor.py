@@ -116,6 +116,7 @@ class Supervisor:
         at_once: how many may come up at the same time; default: one more than there are
             processors, for each waits at times.
         on_trouble: called with one line when a program dies again and again.
+        on_restart: called with the name of a program that is started again.
 
     Attributes:
         time_is_over: whether it stopped because the time that was asked for was over.
@@ -128,12 +129,14 @@ class Supervisor:
         pauses: Sequence[float] = PAUSES,
         at_once: int | None = None,
         on_trouble: Callable[[str], None] = lambda _text: None,
+        on_restart: Callable[[str], None] = lambda _name: None,
     ) -> None:
         self.children = {program.name: Child(program, Restarts(pauses)) for program in programs}
         self._to_start: list[Child] = []
         self._at_once = at_once or (os.cpu_count() or 1) + 1
         self._log = log
         self._on_trouble = on_trouble
+        self._on_restart = on_restart
         self._look_at = 0.0
         self._selector = selectors.DefaultSelector()
         self._stopping_since: float | None = None
@@ -237,6 +240,8 @@ class Supervisor:
             process.stdout.fileno(), partial(self._log.line, child.program.name)
         )
         self._log.say(f'started {child.program.name} (process {process.pid})')
+        if child.starts > 1:
+            self._on_restart(child.program.name)
 
     @contextlib.contextmanager
     def _pipe(self, on_read: Callable[[bytes], None]) -> Iterator[int]:

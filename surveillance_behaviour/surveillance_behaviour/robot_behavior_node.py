@@ -37,6 +37,7 @@ from surveillance_behaviour.ros_adapters.peers import (
     hear_battery,
     ros_ontology,
 )
+from surveillance_behaviour.ros_adapters.purpose_feed import PurposeFeed
 from surveillance_behaviour.ros_adapters.reason_client import ReasonClient
 from surveillance_runtime.conversions import charging_from, seconds_of
 from surveillance_runtime.files import FileError
@@ -95,6 +96,7 @@ class RobotBehavior(PatrolNode):
         )
         self._introspection.start()
         hear_battery(self, battery)
+        PurposeFeed(self, self.mission, self.machine, self._announcer, deadlines, clock.elapsed)
         StateSubscription(
             self,
             BatteryState,

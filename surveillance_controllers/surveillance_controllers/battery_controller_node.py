@@ -38,6 +38,7 @@ from surveillance_runtime.conversions import (
     stamp_of_serialized,
     trajectory_from,
 )
+from surveillance_runtime.incidents import Severity
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.process import run_node
 from surveillance_runtime.qos import SENSOR_QOS
@@ -45,6 +46,7 @@ from surveillance_runtime.state_file import StateFile
 from surveillance_runtime.state_topics import OwnedTopic, StateSubscription
 from surveillance_runtime.waiting import AwaitedEvent
 
+STATION = ('station', 'station')
 RECHARGE_STEPS = 50
 """Steps in which `recharge` fills an empty battery in MANUAL and RANDOM."""
 
@@ -202,6 +204,7 @@ class RobotBattery:
         if since is not None:
             # From then on no setting of the clock counts.
             since += self._wait.elapsed() - self._wait.now()
+        self._station, self._low_below = settings.station, settings.require_recharge
         self._use = BatteryInUse(battery, settings.station, settings.dock_reach, since)
         self._driver: DrivenBattery | None = None
         self._states: OwnedTopic[BatteryState] | None = None
@@ -277,12 +280,26 @@ class RobotBattery:
         percent = max(0.0, float(message.data)) if math.isfinite(message.data) else 0.0
         self._change(lambda: self._battery.set_level(self._battery.level - percent))
 
+    def _look_for_station(self) -> None:
+        """Tell of a low battery that no station can charge, because none was given."""
+        if self._use.docked or self._node.was_given('station'):
+            self._node.incidents.end(STATION)
+        elif self._battery.level < self._low_below:
+            x, y, _ = self._station
+            self._node.incidents.begin(
+                STATION,
+                f'no `station` in the place file: it is taken for ({x:g}, {y:g}), and the battery '
+                'is low',
+                Severity.ALARM,
+            )
+
     def _update(self) -> None:
         now = self._wait.elapsed()
         if self._driver is not None and self._take_driver(self._driver, now):
             self._use.skip(now)
             return
         self._change(partial(self._use.advance, now))
+        self._look_for_station()
         if self._states is None:
             return
         state = conversions.battery_state(self._battery, charging=self._use.docked)

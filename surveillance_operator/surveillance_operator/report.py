@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import json
 import math
 import sys
 import time
@@ -17,7 +18,7 @@ from surveillance_operator.map_command import facts, graph_over_doors, in_words,
 from surveillance_operator.recording import bag
 from surveillance_operator.recording.runs import find_run, run_parser
 from surveillance_runtime.command_line import EXIT_BAD_INPUT
-from surveillance_runtime.files import PLACE, RECORD, RECORDING, FileError, replace_text
+from surveillance_runtime.files import INCIDENTS, PLACE, RECORD, RECORDING, FileError, replace_text
 from surveillance_runtime.place import read_place_file
 from surveillance_runtime.place.drawing import Run, draw_place
 from surveillance_runtime.place.floor_plan import FloorPlan
@@ -180,6 +181,7 @@ def _page(folder: Path, events: Sequence[Event], drawn: str, bound: float | None
         opened = ' open' if is_open else ''
         head = f'<summary>{title} ({number})</summary>'
         body.append(f'<details{opened}>{head}{table}</details>')
+    body.append(_incidents(folder))
     made = time.strftime('%Y-%m-%d %H:%M')
     return (
         '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">'
@@ -187,6 +189,38 @@ def _page(folder: Path, events: Sequence[Event], drawn: str, bound: float | None
         f'<title>Mission {escape(folder.name)}</title><style>{_STYLE}</style></head>'
         f'<body><main>{"".join(body)}<p>Written {made}.</p></main></body></html>\n'
     )
+
+
+def _incidents(folder: Path) -> str:
+    """Return what the nodes told of what went wrong, from the run's `incidents.jsonl`."""
+    rows: list[list[str]] = []
+    begun: dict[tuple[str, str, str], int] = {}
+    for line in _lines_of(folder / INCIDENTS):
+        try:
+            told = json.loads(line)
+            key = told['node'], told['kind'], told['name']
+            lasted, at = told['seconds'], time.localtime(float(told['at']))
+            cause = f'{told["kind"]} {told["name"]}'
+            text, severity = str(told['text']), str(told['severity'])
+        except (ValueError, KeyError, TypeError):
+            continue  # a line that was cut off
+        if lasted is None:
+            begun[key] = len(rows)
+            when = time.strftime('%H:%M:%S', at)
+            rows.append([when, cause, severity, 'goes on', text])
+        elif key in begun:
+            rows[begun.pop(key)][3] = f'{lasted:.0f} s'
+    if not rows:
+        return '<h2>Incidents (0)</h2>'
+    table = _table(['at', 'cause', 'severity', 'lasted', 'what'], rows[-MOST_LINES:])
+    return f'<details open><summary>Incidents ({len(rows)})</summary>{table}</details>'
+
+
+def _lines_of(path: Path) -> list[str]:
+    try:
+        return path.read_text(encoding='utf-8', errors='replace').splitlines()
+    except OSError:
+        return []
 
 
 def _overview(

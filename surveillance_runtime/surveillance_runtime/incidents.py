@@ -224,7 +224,7 @@ class IncidentBook:
         for key, each in list(self._open.items()):
             if each.ends_at is not None and now >= each.ends_at:
                 del self._open[key]
-                self._finish(each, each.ends_at)
+                self._finish(each, each.ends_at - SETTLED)
         due = [each.ends_at for each in self._open.values() if each.ends_at is not None]
         for each in self._calling():
             if now >= each.next_call:

@@ -209,6 +209,10 @@ class PatrolNode(Node):
             self._live.append(_LiveRecord(record, prefix, values.keys(), on_change))
         return record
 
+    def was_given(self, name: str) -> bool:
+        """Tell whether a parameter was given at the start, so that its value is no default."""
+        return name in self._parameter_overrides
+
     def declare_live(self, record: Record, without: Container[str] = ()) -> Record:
         """Declare fields as `declare_fields`; the record that is returned follows each change."""
         live = self.declare_fields(

@@ -13,6 +13,7 @@ from pathlib import Path
 import pytest
 import yaml
 
+from launcher.alarm import caller
 from launcher.cli import CONFIG
 from launcher.log_merge import MergedLog
 from launcher.run import (
@@ -26,7 +27,6 @@ from launcher.run import (
 from launcher.run_configuration import check_assignments, check_clocks, configuration, with_mode_of
 from launcher.run_folder import RunState, make_folder, options_of, resumed, run_from
 from launcher.run_mission import (
-    alarm_caller,
     chosen_folder,
     summary,
     watch_command,
@@ -271,7 +271,7 @@ def test_an_alarm_gets_one_line_as_its_last_argument(tmp_path):
     script = tmp_path / 'alarm.sh'
     script.write_text(f'printf "%s|" "$@" > {out}.new; mv {out}.new {out}\n')
     log = MergedLog(io.StringIO(), ['a'])
-    alarm_caller(f'sh {script} first', log)('waiting for help: a door is closed')
+    caller(f'sh {script} first', log)('waiting for help: a door is closed')
     for _ in range(1200):
         if out.exists():
             break

@@ -380,13 +380,18 @@ class RosAnnouncer:
 
     Args:
         node: The node that speaks.
+
+    Attributes:
+        text: What was said last.
+        waits: Why the robot waits for help; empty: it does not.
+        words: How many transitions and words there were.
     """
 
     def __init__(self, node: PatrolNode) -> None:
         self._node = node
         self._lock = threading.Lock()
-        self._text = ''
-        self._waiting = False
+        self.text = self.waits = ''
+        self.words = 0
         self._status: Callable[[], MissionStatus] = MissionStatus
         self._topic = OwnedTopic(node, MissionStatus, 'mission_status')
 
@@ -402,8 +407,8 @@ class RosAnnouncer:
                 place=mission.place,
                 heading_to=mission.heading_to,
                 battery_level=math.nan if level is None else float(level),
-                waiting_for_help=self._waiting,
-                text=self._text,
+                waiting_for_help=bool(self.waits),
+                text=self.text,
                 avoided=sorted(mission.recovery.avoided(mission.now())),
             )
 
@@ -419,13 +424,13 @@ class RosAnnouncer:
             log.warn(text)
         else:
             log.info(text)
-        self._text = text
+        self.text = text
         self._publish()
 
     def waiting_for_help(self, reason: str) -> None:
         """Say that the robot waits, or that it goes on."""
-        self._waiting = bool(reason)
-        self._text = reason or 'trying again'
+        self.waits = reason
+        self.text = reason or 'trying again'
         if reason:
             said = f'{WAITING_FOR_HELP}: {reason}'
             self._node.get_logger().error(said)
@@ -436,6 +441,7 @@ class RosAnnouncer:
 
     def _publish(self) -> None:
         with self._lock:
+            self.words += 1
             self._topic.publish(self._status())
 
 

@@ -8,6 +8,7 @@ have (`obstacles`). Asks `compute_path` for another path when a drive does not g
 from __future__ import annotations
 
 import threading
+import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
@@ -16,6 +17,7 @@ from typing import Any
 from builtin_interfaces.msg import Time
 from geometry_msgs.msg import PoseWithCovarianceStamped
 from nav_msgs.msg import OccupancyGrid, Odometry
+from rclpy.clock import Clock, ClockType
 from sensor_msgs.msg import LaserScan, PointCloud2
 
 from state_machines import Interrupt
@@ -36,6 +38,7 @@ from surveillance_controllers.motion.holding import Hold
 from surveillance_controllers.motion.navigator import Navigator
 from surveillance_controllers.motion.path_following import DriveParameters, Velocity
 from surveillance_controllers.motion.place_recording import PlaceRecorder
+from surveillance_controllers.motion.silence import SilenceWatch
 from surveillance_controllers.motion.transforms import MapFrame, ScanReader
 from surveillance_controllers.planning.grid_planning import NoPathError
 from surveillance_interfaces.action import ComputePath
@@ -123,6 +126,9 @@ class NavigationMotion:
         node.create_subscription(Odometry, 'odom', self._on_odometry, SENSOR_QOS, raw=True)
         self._lidar.subscribe(self._on_scan)
         node.create_subscription(PoseWithCovarianceStamped, 'initialpose', self._on_initial_pose, 1)
+        self._silence = SilenceWatch(node.incidents, time.monotonic())
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        node.create_timer(1.0, lambda: self._silence.look(time.monotonic()), clock=steady)
 
         self._watch_inputs()
 
@@ -293,6 +299,7 @@ class NavigationMotion:
     def _on_map(self, message: OccupancyGrid) -> None:
         with conversions.refusing(self._node, 'map'):
             grid = conversions.grid_from(message)
+            self._silence.hear('map', time.monotonic())
             with self._lock:
                 self._navigator.set_map(grid)
 
@@ -311,6 +318,7 @@ class NavigationMotion:
         with conversions.refusing(self._node, 'odom'):
             pose = pose_of_serialized(serialized, texts=1)
             stamp = stamp_of_serialized(serialized)
+            self._silence.hear('odom', time.monotonic())
             with self._lock:
                 self._base.hear('odom')
                 self._navigator.move(pose, stamp if stamp > 0.0 else self._now())
@@ -335,6 +343,7 @@ class NavigationMotion:
 
     def _see(self, scan: Scan, stamp: Any, topic: str = 'scan') -> None:
         measured = seconds_of(stamp)
+        self._silence.hear('scan', time.monotonic())
         with self._stepped:
             before = self._place
             self._base.hear(topic)
