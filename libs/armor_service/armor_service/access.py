@@ -64,6 +64,11 @@ class Settings:
     enforce_mount: bool = parameter(
         True, 'Refuse changes by others while a client is mounted; ARMOR 2.2 does not.'
     )
+    strict: bool = parameter(
+        False,
+        'Refuse facts with a class or property that the ontology does not know, and properties '
+        'used as another kind; else the answer names them.',
+    )
     narrow_doubles: bool = parameter(
         False, 'Store values of type DOUBLE as xsd:float, as ARMOR 2.2 does.'
     )

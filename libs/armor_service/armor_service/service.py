@@ -22,6 +22,7 @@ from armor_service.access import SafePaths, Settings
 from armor_service.changes import Change
 from armor_service.directive_log import DirectiveLog
 from armor_service.directives import Directive, Kind, look_up
+from armor_service.names import doubtful_names, unknown_names
 from armor_service.protocol import (
     DirectiveError,
     DirectiveRequest,
@@ -301,11 +302,12 @@ class ArmorService:
             remark: str = directive.run(ref, *self._values(directive, request, ref))
             return remark
         changes: list[Change] = directive.run(ref, *self._values(directive, request, ref))
+        doubts = self._doubts(request, ref, changes)
         told = Told(request.client_name, self._clock(), tuple(changes))
         if self.store and changes:
             self.store.changed(ref.name, told)
         ref.heavy |= directive.schema
-        remark = ref.missing(changes)
+        remark = '; '.join(filter(None, (ref.missing(changes), *doubts)))
         if not changes:
             waiting = f'; {len(ref.queue)} changes wait for APPLY' if ref.waiting else ''
             remark = f'{request.words}: nothing to change{waiting}'
@@ -316,6 +318,21 @@ class ArmorService:
         if problem:
             raise DirectiveError(f'{request.words}: taken back: {problem}')
         return '; '.join(filter(None, (remark, ref.too_hard)))
+
+    def _doubts(
+        self, request: DirectiveRequest, ref: Reference, changes: list[Change]
+    ) -> list[str]:
+        """Return what the client should know of the names in its changes.
+
+        Raises:
+            DirectiveError: 205, the service is strict about them.
+        """
+        doubts = list(doubtful_names(ref, changes))
+        if self.settings.strict:
+            refused = [*unknown_names(ref, changes), *(d for d in doubts if 'forbids' in d)]
+            if refused:
+                raise DirectiveError(f'{request.words}: {"; ".join(dict.fromkeys(refused))}')
+        return doubts
 
     def _values(self, directive: Directive, request: DirectiveRequest, ref: Reference) -> list[Any]:
         return directive.read(request.args, ref.kb.iri, narrow_doubles=self.settings.narrow_doubles)

@@ -42,6 +42,7 @@ from armor_service.rendering import (
 )
 from armor_service.rendering import render_literal as _literal
 from owl_reasoner.knowledge_base import Fact
+from owl_reasoner.open_world import open_definition
 from owl_reasoner.owl.axioms import (
     Axiom,
     ClassAssertion,
@@ -63,6 +64,7 @@ from owl_reasoner.owl.expressions import (
     PropertyExpression,
 )
 from owl_reasoner.owl.vocabulary import NOTHING, OWL, THING, local_name
+from owl_reasoner.reasoner.absence import Absence
 
 if TYPE_CHECKING:
     from armor_service.service import ArmorService
@@ -204,14 +206,15 @@ def _explain(_: ArmorService, ref: Reference, fact: str) -> DirectiveResponse:
     text('fact'),
     native=False,
     summary='What a fact that does not hold lacks, of the rule or definition nearest to it: first '
-    'an English sentence, then each missing condition; nothing where it holds.',
+    'an English sentence, then each missing condition; nothing where it holds. Where a definition '
+    'asks for what nothing says, the directive that states it is named.',
 )
 def _explain_absence(ref: Reference, fact: str) -> DirectiveResponse:
     asked = _full_fact('QUERY EXPLAIN ABSENCE', ref, fact)
     absence = ref.kb.explain_absence(asked)
     unknown = _unknown(ref, *entities_of(asked))
     if absence is not None:
-        found = [absence.sentence(), *absence.missing]
+        found = _closable(ref, asked, absence) or [absence.sentence(), *absence.missing]
         return DirectiveResponse(queried_objects=found, error_description=unknown)
     if ref.kb.holds(asked):
         return DirectiveResponse(error_description=f'{fact} holds in {ref.name}')
@@ -219,6 +222,23 @@ def _explain_absence(ref: Reference, fact: str) -> DirectiveResponse:
     if not ref.kb.consistent:
         problem = f'{ref.name} is inconsistent'
     return DirectiveResponse(success=False, error_description=problem)
+
+
+def _closable(ref: Reference, fact: Fact, absence: Absence) -> list[str]:
+    """Return what the open world withholds of a fact, with the directives that close it."""
+    found = open_definition(ref.kb, fact)
+    if found is None or (absence.because and not found.can_be_closed):
+        return []
+    lines = [found.sentence(absence.fact_text)]
+    who = local_name(found.individual)
+    for gap in found.gaps:
+        offer = ''
+        if gap.closing is not None:
+            kind, iri = gap.closing
+            word = 'OBJECTPROP' if kind == 'property' else 'CLASS'
+            offer = f' (CLOSE {word} IND {local_name(iri)} {who})'
+        lines.append(gap.text + offer)
+    return lines
 
 
 @query(
