@@ -262,10 +262,15 @@ class ActionServerWrapper:
         wrapped_container.register_transition_cb(
             lambda userdata, _: self.publish_feedback(userdata)
         )
+        # As SMACH does: the states inside find the action's own messages.
+        given = [goal_key, result_key, feedback_key]
+        if expand_goal_slots:
+            given += action_spec.Goal.get_fields_and_field_types()
+        wrapped_container.register_input_keys(given)
+        self._server = GoalServer(node, action_spec, server_name, self._execute)
 
     def run_server(self) -> None:
-        """Start to serve; does not block."""
-        self._server = GoalServer(self._node, self._action_spec, self._server_name, self._execute)
+        """Do nothing: it serves since it was made, as in ROS 2; SMACH of ROS 1 begins here."""
 
     def publish_feedback(self, userdata: fsm.UserData) -> None:
         """Publish the feedback that is in `userdata`."""
