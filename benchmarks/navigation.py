@@ -44,7 +44,7 @@ from whole_stack import ROOT, Stack, ros_arguments
 
 from launcher.run import Run
 from launcher.run_processes import command, node_environ
-from patrol_policy.battery_reserve import PERCENTILE_99
+from patrol_policy.battery import PERCENTILE_99
 from surveillance_behaviour.experience import LegTimes
 from surveillance_controllers import geometry
 from surveillance_controllers.geometry import Scan

@@ -36,6 +36,7 @@ ROOT = Path(__file__).resolve().parents[1]
 for package in ('behaviour', 'fsm', 'ontology', 'runtime'):
     sys.path.insert(0, str(ROOT / f'surveillance_{package}'))
 
+from literature_policies import LITERATURE
 from tables import table
 
 from patrol_policy.bounds import rule_bound
@@ -46,7 +47,7 @@ from patrol_policy.graph import (
     graph_of_places,
 )
 from patrol_policy.patrolling_sim import read_patrolling_sim
-from patrol_policy.policies import DEFAULT_POLICY
+from patrol_policy.policies import DEFAULT_POLICY, POLICIES
 from patrol_policy.simulation import (
     Patrol,
     PatrolRun,
@@ -66,7 +67,8 @@ RULED = ('tour', 'lookahead', 'oldest', 'seed')
 SIZES = (5, 8, 12, 20, 35, 60, 100, 150)
 """Places of the random maps, in turn."""
 TABLES = ('compare', 'battery', 'rules', 'choice', 'configured')
-FREE = ('random', 'CR', 'HCR', 'HPCC', 'cycle')
+FREE = tuple(LITERATURE)
+POLICIES.update(LITERATURE)
 
 
 @dataclass(frozen=True)

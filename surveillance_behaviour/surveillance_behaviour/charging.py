@@ -11,7 +11,7 @@ import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-from patrol_policy.battery_reserve import Battery
+from patrol_policy.battery import Battery
 from state_machines import Clock, Interrupt
 from state_machines.exceptions import CallError, CallInterruptedError
 

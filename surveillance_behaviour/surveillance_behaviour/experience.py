@@ -27,7 +27,8 @@ from pathlib import Path
 from statistics import fmean, median
 from typing import Any
 
-from patrol_policy.battery_reserve import LEARNED_FALL, Draw
+from patrol_policy.battery import LEARNED_FALL, Draw
+from surveillance_behaviour.charge_estimate import ChargeEstimate
 from surveillance_behaviour.mission.mission_log import (
     account_of,
     is_other_simulation,
@@ -310,6 +311,7 @@ class Experience:
         visits: When the robot was in each place last, seconds on the mission's clock.
         leg_times: How long the legs take.
         draw: How fast the battery falls.
+        charge: How fast the stations charge.
         sent_to_charge: Why the robot was sent to charge and has not been charged since.
         requested: Where an operator wants the robot, and it has not been since; empty: nowhere.
         now: The last time that was told, seconds on the clock of the visits.
@@ -322,6 +324,7 @@ class Experience:
     visits: dict[str, float] = field(default_factory=dict)
     leg_times: LegTimes = field(default_factory=LegTimes)
     draw: DrawEstimate = field(default_factory=DrawEstimate)
+    charge: ChargeEstimate = field(default_factory=ChargeEstimate)
     sent_to_charge: str = ''
     requested: str = ''
     now: float = 0.0
@@ -350,13 +353,15 @@ class Experience:
         return experience
 
     def _take(self, kept: dict[str, Any]) -> None:
-        leg_times, draw = LegTimes(), DrawEstimate()
+        leg_times, draw, charge = LegTimes(), DrawEstimate(), ChargeEstimate()
         visits = {str(place): float(at) for place, at in kept['visits'].items()}
         if not all(math.isfinite(at) for at in visits.values()):
             raise ValueError('visits: expected finite times')
         left_out = leg_times.restore(kept['leg_times']) + draw.restore(kept['draw'])
+        charge.restore(kept.get('charge', {}))
         sent_to_charge = str(kept['sent_to_charge'])
-        self.visits, self.leg_times, self.draw = visits, leg_times, draw
+        self.visits, self.leg_times = visits, leg_times
+        self.draw, self.charge = draw, charge
         self.sent_to_charge, self.requested = sent_to_charge, str(kept.get('requested', ''))
         if left_out:
             self.left_out = f'{left_out} learned values that no robot can have are left out'
@@ -368,6 +373,7 @@ class Experience:
                 'visits': {place: round(at, 3) for place, at in self.visits.copy().items()},
                 'leg_times': self.leg_times.to_json(),
                 'draw': self.draw.to_json(),
+                'charge': self.charge.to_json(),
                 'sent_to_charge': self.sent_to_charge,
                 'requested': self.requested,
             }

@@ -17,7 +17,7 @@ import threading
 from collections.abc import Callable
 from dataclasses import replace
 
-from patrol_policy.battery_reserve import Battery
+from patrol_policy.battery import Battery
 from patrol_policy.decision import (
     RECHARGE,
     DecisionSettings,
@@ -115,6 +115,7 @@ class WorldModel:
             monitor.low,
             experience.draw.draw,
             experience.sent_to_charge,
+            experience.charge.curves(),
         )
         if battery.sent_to_charge and battery.charged_enough(self.settings.battery):
             experience.sent_to_charge = ''
@@ -126,15 +127,17 @@ class WorldModel:
         return now if self._elapsed is None else self._elapsed()
 
     def learn_draw(self, now: Callable[[], float]) -> None:
-        """Learn from now on, whenever the battery is heard, how fast it falls.
+        """Learn from now on, whenever the battery is heard, how fast it falls and is charged.
 
         Args:
             now: Seconds as they pass; no setting of a clock counts.
         """
 
         def learn() -> None:
-            if self._battery.level is not None:
-                self.experience.draw.observe(now(), self._battery.level)
+            if (level := self._battery.level) is not None:
+                self.experience.draw.observe(now(), level)
+                if self.place in self.settings.recharge_rooms:
+                    self.experience.charge.observe(self.place, now(), level)
 
         self._battery.watch(learn)
 
@@ -313,7 +316,10 @@ class WorldModel:
             decision = decide(replace(world, requested=''), battery, self.settings)
         self._target = decision.target
         if decision.rule == RECHARGE and not self.experience.sent_to_charge:
-            self.experience.sent_to_charge = why_charge(world, battery, self.settings)
+            why = why_charge(world, battery, self.settings)
+            # A charge that was planned is a charge: it goes on until it is enough.
+            if why or not battery.charged_enough(self.settings.battery):
+                self.experience.sent_to_charge = why or decision.reason.partition(';')[0]
         if world.contradiction:
             decision = replace(decision, reason=f'{decision.reason}; {world.contradiction}')
         self._leg, self._leg_began = decision, self._passed(decision.time)

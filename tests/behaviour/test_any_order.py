@@ -149,7 +149,7 @@ class AnyOrder(RuleBasedStateMachine):
     def threshold_changes(self, threshold: float) -> None:
         self.mission.settings.choice.urgency_threshold = threshold
 
-    @rule(policy=st.sampled_from(['tour', 'oldest', 'lookahead', 'HPCC', 'cycle', 'seed']))
+    @rule(policy=st.sampled_from(['tour', 'oldest', 'lookahead', 'seed']))
     def policy_changes(self, policy: str) -> None:
         self.mission.settings.choice.policy = policy
 

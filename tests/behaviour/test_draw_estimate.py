@@ -7,7 +7,7 @@ import random
 
 import pytest
 
-from patrol_policy.battery_reserve import Draw
+from patrol_policy.battery import Draw
 from surveillance_behaviour.experience import DrawEstimate
 
 

@@ -3,12 +3,12 @@
 - `graph`: a map as places and legs in seconds; `tour`: its shortest tour;
 - `decision`: `decide(world, battery, settings)`, the one function that decides; `why_not`;
 - `policies`, `plan`, `rollout`, `rounds`: which of the allowed places;
-- `battery_reserve`: when to go charging; `simulation`: a patrol in simulated time.
+- `battery`: when to go charging; `simulation`: a patrol in simulated time.
 """
 
 from __future__ import annotations
 
-from patrol_policy.battery_reserve import Battery, BatteryLimits
+from patrol_policy.battery import Battery, BatteryLimits
 from patrol_policy.decision import (
     DecisionSettings,
     NowhereToGoError,

@@ -12,6 +12,13 @@ long ago each place was visited. A state is dead when the places that are due ca
 in time (see `Covers`), or when all that follow from it are dead; one that comes back to itself goes
 on for ever. The search begins anywhere, with any past: until a place was visited it may be URGENT
 or not. The limit is raised as long as that is proven impossible.
+
+`charge_bound` knows the charge, too. Beside legs there is the drive home from anywhere, with a
+charge to the full level, and a state has the charge that was used. On every map two facts hold. At
+any moment the place that waits longest was visited before all others, so its wait encloses a closed
+tour. And a part draw / (draw + rate) of all time is spent charging; a moment of it lies in the wait
+of all moments until every place was visited since. Averaged over time, such a wait therefore holds
+a closed tour and that part of the shortest way from a station through all places.
 """
 
 from __future__ import annotations
@@ -24,8 +31,10 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from patrol_policy.battery import WORTH_CHARGING
 from patrol_policy.graph import PatrolGraph
 from patrol_policy.rollout import RuleMap
+from patrol_policy.tour import EXACT_UP_TO, shortest_tour
 
 CORE_UP_TO = 20
 """The largest core of a map that is searched, in places: its table takes 84 MB and 4 s."""
@@ -112,10 +121,7 @@ class _Search:
 
     def __init__(self, rules: RuleMap, covers: Covers, states: int) -> None:
         self._rules, self._left = rules, states
-        self._legs = [
-            [(other, round(TICKS * seconds)) for other, seconds in ways.items()]
-            for ways in rules.leg_seconds
-        ]
+        self._legs = _legs_in_ticks(rules)
         self._threshold = round(TICKS * rules.threshold)
         self._covers = covers
 
@@ -151,17 +157,31 @@ class _Search:
 
     def _moves(self, state: State) -> list[tuple[int, int]]:
         """Return the legs that the rules may allow, the place that waited longest last."""
-        place, met, ages = state
-        ranks = self._rules.ranks
-        allowed, least = [], math.inf
-        for other, ticks in self._legs[place]:
-            urgent = ages[other] > self._threshold
-            known = urgent or met >> other & 1
-            worst = 0 if urgent else ranks[other]
-            allowed.append((worst if known else 0, other, ticks))
-            least = min(least, worst)
-        moves = [(other, ticks) for best, other, ticks in allowed if best <= least]
-        return sorted(moves, key=lambda move: ages[move[0]])
+        return _lawful_moves(self._rules.ranks, self._legs[state[0]], self._threshold, state)
+
+
+def _legs_in_ticks(rules: RuleMap) -> list[list[tuple[int, int]]]:
+    """Return for each place its neighbours and the ticks to them."""
+    return [
+        [(other, round(TICKS * seconds)) for other, seconds in ways.items()]
+        for ways in rules.leg_seconds[: rules.count]
+    ]
+
+
+def _lawful_moves(
+    ranks: Sequence[int], legs: Sequence[tuple[int, int]], threshold: int, state: State
+) -> list[tuple[int, int]]:
+    """Return the legs that the rules may allow, the place that waited longest last."""
+    _, met, ages = state
+    allowed, least = [], math.inf
+    for other, ticks in legs:
+        urgent = ages[other] > threshold
+        known = urgent or met >> other & 1
+        worst = 0 if urgent else ranks[other]
+        allowed.append((worst if known else 0, other, ticks))
+        least = min(least, worst)
+    moves = [(other, ticks) for best, other, ticks in allowed if best <= least]
+    return sorted(moves, key=lambda move: ages[move[0]])
 
 
 def _after(state: State, place: int, ticks: int) -> State:
@@ -262,3 +282,145 @@ def _shortest_covers(ticks: NDArray[np.int32]) -> NDArray[np.int32]:
                 way = rest + ticks[start, first]
                 cover[start, chosen] = np.minimum(cover[start, chosen], way)
     return cover
+
+
+def charge_bound(rules: RuleMap, precision: float = 0.01, states: int = STATES) -> RuleBound:
+    """Return bounds of the least longest wait of a robot whose charges end at the full level.
+
+    Args:
+        rules: The map; its energy is known, all its places are within range and have the same
+            threshold.
+        precision: The bounds that are looked for differ by this part at most.
+        states: How many states may be visited in all.
+    """
+    energy = rules.energy
+    assert energy is not None
+    away = _relaxed_ways(rules)
+    if rules.count > EXACT_UP_TO:
+        return RuleBound(max(rules.least_period, _tree_length(away)))
+    cover = _shortest_covers(np.maximum(np.floor(TICKS * away) - 1, 0).astype(np.int32))
+    through = min(int(cover[station, -1]) for station in energy.stations) / TICKS
+    charging = energy.draw / (energy.draw + energy.fastest)
+    low = max(rules.least_period, shortest_tour(away).length + through * charging)
+    high, step = math.inf, 0.9 * precision
+    search = _ChargeSearch(rules, cover, states)
+    while high > low * (1.0 + precision):
+        limit = min(low * (1.0 + step), (low + high) / 2.0)
+        endless = search.goes_on(limit)
+        if endless is None:
+            break
+        if endless:
+            high = limit
+        else:
+            low, step = limit, 2.0 * step
+    return RuleBound(low, high)
+
+
+def _relaxed_ways(rules: RuleMap) -> NDArray[np.float64]:
+    """Return seconds between places that no robot falls below, shape (n, n).
+
+    A station may be entered by driving only, as on the way to charge, and left for elsewhere.
+    """
+    energy = rules.energy
+    assert energy is not None
+    away = rules.graph.distances.copy()
+    for station, drive in zip(energy.stations, energy.drive, strict=True):
+        away[:, station] = np.minimum(away[:, station], drive)
+    for middle in range(len(away)):
+        np.minimum(away, away[:, middle, None] + away[middle], out=away)
+    return away
+
+
+def _tree_length(away: NDArray[np.float64]) -> float:
+    """Return the length of the shortest tree through all places, which no tour falls below."""
+    from scipy.sparse.csgraph import minimum_spanning_tree
+
+    return float(minimum_spanning_tree(np.minimum(away, away.T)).sum())
+
+
+ChargeState = tuple[int, int, tuple[int, ...], int]
+"""A `State`, and for how many ticks the robot was at work since its last charge."""
+
+
+class _ChargeSearch:
+    """Asks whether a robot with a battery can go on for ever with no wait above a limit.
+
+    Args:
+        rules: The map.
+        cover: The ticks from each place through each set, see `_shortest_covers`.
+        states: How many states may be visited, over all questions.
+    """
+
+    def __init__(self, rules: RuleMap, cover: NDArray[np.int32], states: int) -> None:
+        energy = rules.energy
+        assert energy is not None
+        self._rules, self._energy, self._left = rules, energy, states
+        self._cover: list[list[int]] = cover.tolist()
+        self._legs = _legs_in_ticks(rules)
+        self._threshold = round(TICKS * rules.threshold)
+        self._worth = math.floor(TICKS * WORTH_CHARGING / energy.draw) - 1
+        # How long it may be at work until it leaves each place, rather too long than too short.
+        self._usable = [
+            math.ceil(TICKS * (energy.full - least) / energy.draw) + rules.count
+            for least in energy.least
+        ]
+
+    def goes_on(self, limit: float) -> bool | None:
+        """Return whether it can; None: the states did not suffice to find out."""
+        longest = round(TICKS * limit) + self._rules.count
+        everywhere, dead = (1 << self._rules.count) - 1, set[ChargeState]()
+        # Whoever goes on for ever charges again and again.
+        for station in self._energy.stations:
+            begin: ChargeState = (station, 1 << station, (0,) * self._rules.count, 0)
+            path = [(begin, self._following(begin, longest))]
+            on_path = {begin}
+            while path:
+                state, todo = path[-1]
+                if not todo:
+                    dead.add(state)
+                    on_path.discard(state)
+                    path.pop()
+                    continue
+                following = todo.pop()
+                if following in on_path and following[1] == everywhere:
+                    return True
+                if following in dead or not self._is_in_time(following, longest):
+                    continue
+                self._left -= 1
+                if self._left < 0:
+                    return None
+                on_path.add(following)
+                path.append((following, self._following(following, longest)))
+        return False
+
+    def _following(self, state: ChargeState, longest: int) -> list[ChargeState]:
+        """Return the states that may come next, the place that waited longest last."""
+        place, met, ages, used = state
+        moves = _lawful_moves(
+            self._rules.ranks, self._legs[place], self._threshold, (place, met, ages)
+        )
+        found = []
+        for other, ticks in moves:
+            if used + ticks <= self._usable[other] and ages[other] + ticks <= longest:
+                found.append((*_after((place, met, ages), other, ticks), used + ticks))
+        charges = []
+        for number, station in enumerate(self._energy.stations):
+            drive = math.floor(TICKS * self._energy.drive[number][place])
+            if used + drive < self._worth:
+                continue
+            level = self._energy.full - self._energy.draw * (used + drive) / TICKS
+            charge = math.floor(TICKS * self._energy.charge_seconds(number, max(level, 0.0)))
+            ticks = drive + charge
+            if ages[station] + ticks <= longest:
+                charges.append((*_after((place, met, ages), station, ticks), 0))
+        return [*charges, *found]
+
+    def _is_in_time(self, state: ChargeState, longest: int) -> bool:
+        """Return whether the places that are due before any moment can be visited by then."""
+        place, _, ages, _ = state
+        cover, due = self._cover[place], 0
+        for age, other in sorted(zip(ages, range(len(ages)), strict=True), reverse=True):
+            due |= 1 << other
+            if cover[due] > longest - age:
+                return False
+        return True

@@ -1,11 +1,13 @@
-"""Where to go next: charging first, then an operator's request, then the rules, then the policy.
+"""Where to go next: charging first, then an operator's request, quiet hours, the rules, the policy.
 
 `decide` is the one function that decides, for both behaviours. It is pure: all that it knows
 comes in as a `World`, a `Battery` and `DecisionSettings`. `why_not` answers from the same steps
 why a place is not chosen.
 
 The rules are a list of classes of places in order of priority. The first class that has a
-reachable member decides: its members are the candidates, and the policy chooses among them.
+reachable member decides: its members are the candidates, and the policy chooses among them. Where
+the way to the chosen place and home from there takes more than the charge, the robot charges first.
+A policy that plans ahead may also choose to charge, where that costs least.
 """
 
 from __future__ import annotations
@@ -15,8 +17,15 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from patrol_policy.battery_reserve import Battery, BatteryLimits, reserve
-from patrol_policy.policies import DEFAULT_POLICY, POLICIES, Scores, make_policy
+from patrol_policy.battery import (
+    PERCENTILE_99,
+    Battery,
+    BatteryLimits,
+    ChargeCurve,
+    Energy,
+    Station,
+)
+from patrol_policy.policies import DEFAULT_POLICY, POLICIES, Charge, Scores, make_policy
 from patrol_policy.settings import converted, names_expected, parameter, parameters
 from patrol_policy.suggestions import closest_name
 from patrol_policy.world import Decision, World
@@ -25,6 +34,8 @@ RECHARGE = 'recharge'
 """The rule of a decision to go charging."""
 REQUEST = 'request'
 """The rule of a decision to go where an operator has sent the robot."""
+QUIET = 'quiet'
+"""The rule of a decision to stay at the station: quiet hours, or nothing is open."""
 ANY = 'any'
 """The rule of a decision for which no class had a reachable member."""
 URGENT = 'URGENT'
@@ -37,6 +48,14 @@ LONGEST_THRESHOLD = 10**9
 
 class NowhereToGoError(RuntimeError):
     """No place can be reached from where the robot is."""
+
+
+class NothingOpenError(NowhereToGoError):
+    """All that can be reached is closed now, or will be before the robot is out again."""
+
+
+class OutOfRangeError(NowhereToGoError):
+    """A full charge does not suffice for any place within reach."""
 
 
 class RequestError(NowhereToGoError):
@@ -74,9 +93,12 @@ class Rules:
         reachable = [place for place in world.reachable if place != world.place]
         if not reachable:
             raise NowhereToGoError(f'nothing can be reached from {world.place}')
+        reachable = [place for place in reachable if not is_closed(world, place)]
+        if not reachable:
+            raise NothingOpenError(f'nothing that can be reached from {world.place} is open')
         open_places = [place for place in reachable if place not in world.avoided] or reachable
         for name in self.classes:
-            members = [p for p in open_places if name in world.classes.get(p, frozenset())]
+            members = [p for p in open_places if name in classes_of(world, p)]
             if members:
                 return name, tuple(sorted(members))
         return ANY, tuple(sorted(open_places))
@@ -131,6 +153,60 @@ class DecisionSettings:
     )
 
 
+def classes_of(world: World, place: str) -> frozenset[str]:
+    """Return the classes of a place; one that only may be visited now is not URGENT."""
+    classes = world.classes.get(place, frozenset())
+    return classes - {URGENT} if place in world.openings.optional else classes
+
+
+def is_closed(world: World, place: str) -> bool:
+    """Return whether a place may not be entered now, or closes before the robot is out of it."""
+    return bool(why_closed(world, place))
+
+
+def why_closed(world: World, place: str) -> str:
+    """Return why a place may not be entered now; empty: it may."""
+    openings = world.openings
+    if place in openings.closed:
+        return openings.closed[place]
+    closes = openings.closes_in.get(place)
+    if closes is None or place not in world.graph.index or world.place not in world.graph.index:
+        return ''
+    # It must be able to leave again, too: as long as the longest leg out of it may take.
+    ways = world.graph.leg_seconds[place]
+    seconds = world.graph.move(world.place, place) + max(ways.values(), default=0.0)
+    seconds *= 1.0 + PERCENTILE_99 * world.time_spread
+    if seconds < closes:
+        return ''
+    return f'it closes in {closes:.0f} s, and a visit takes up to {seconds:.0f} s'
+
+
+def energy_of(world: World, battery: Battery, settings: DecisionSettings) -> Energy | None:
+    """Return what the charge comes to on this map; None: too little is known of the battery.
+
+    It is kept with the world's memory as long as nothing has changed.
+    """
+    if battery.level is None or battery.draw.rate <= 0.0:
+        return None
+    stations = [
+        Station(place, battery.curves.get(place, ChargeCurve()))
+        for place in sorted(settings.recharge_rooms)
+        if place in world.graph.index and place not in world.avoided
+    ]
+    if not stations:
+        return None
+    spread = round(world.time_spread, 2)
+    key = (world.graph, tuple(stations), battery.draw, spread, settings.battery)
+    kept = world.memory.energy
+    found = kept.get(key)
+    if found is None:
+        # One for the whole map and one for the part that is open.
+        if len(kept) > 1:
+            kept.pop(next(iter(kept)))
+        found = kept[key] = Energy(world.graph, stations, battery.draw, spread, settings.battery)
+    return found
+
+
 def decide(world: World, battery: Battery, settings: DecisionSettings) -> Decision:
     """Choose where to go next.
 
@@ -141,9 +217,81 @@ def decide(world: World, battery: Battery, settings: DecisionSettings) -> Decisi
         return _to_charge(world, settings.recharge_rooms, why)
     if world.requested and world.requested != world.place:
         return _as_requested(world)
-    rule, allowed = settings.rules.candidates(world)
-    scores = make_policy(settings.policy)(world, allowed)
-    return _best(world, rule, allowed, scores, settings.policy)
+    if world.openings.quiet_for > 0.0:
+        return _stay(world, settings, f'quiet hours for {world.openings.quiet_for:.0f} s more')
+    world = world_with_charge(world, battery)
+    energy = energy_of(world, battery, settings)
+    try:
+        rule, allowed = settings.rules.candidates(_within_range(world, energy))
+    except (NothingOpenError, OutOfRangeError) as error:
+        return _stay(world, settings, str(error))
+    scores = make_policy(settings.policy)(world, allowed, energy)
+    if isinstance(scores, Charge):
+        return _to_charge(world, (scores.place,), scores.words)
+    decision = _best(world, rule, allowed, scores, settings.policy)
+    if energy is not None and (why := _too_far(world, decision.place, energy)):
+        here = world.graph.index[world.place]
+        if not (here in energy.stations and world.level >= energy.full):
+            return _to_charge(world, settings.recharge_rooms, why)
+    return decision
+
+
+def world_with_charge(world: World, battery: Battery) -> World:
+    """Return a world that knows the charge, and the thresholds of places as the hours leave them.
+
+    Nobody waits for a place that only may be visited now.
+    """
+    level = 100.0 if battery.level is None else battery.level
+    optional = dict.fromkeys(world.openings.optional, math.inf)
+    own = {**world.own_thresholds, **optional}
+    gone = [place for place in world.openings.closed if place in world.graph.index]
+    graph = world.graph
+    if gone:
+        graph = world.memory.without(graph, frozenset(gone), world.place)
+    return replace(world, level=level, own_thresholds=own, graph=graph)
+
+
+def _within_range(world: World, energy: Energy | None) -> World:
+    """Return the world without places that a full charge does not suffice for.
+
+    Raises:
+        OutOfRangeError: There are no others.
+    """
+    if energy is None:
+        return world
+    index = energy.index
+    near = tuple(p for p in world.reachable if p not in index or energy.within_range[index[p]])
+    if world.reachable and not [place for place in near if place != world.place]:
+        raise OutOfRangeError(
+            f'a full charge of {energy.full:g} % suffices for no place within reach'
+        )
+    return replace(world, reachable=near)
+
+
+def _too_far(world: World, place: str, energy: Energy) -> str:
+    """Return why the charge does not suffice for a place and the way home; empty: it does."""
+    seconds = world.graph.move(world.place, place)
+    left, least = world.level - energy.draw * seconds, energy.least[energy.index[place]]
+    if left >= least:
+        return ''
+    home = energy.home_seconds[energy.index[place]]
+    return (
+        f'the battery is at {world.level:g} %; a visit of {place} would leave {left:.1f} %, and '
+        f'{least:.1f} % must be left there, {home:.1f} s of driving from a station'
+    )
+
+
+def _stay(world: World, settings: DecisionSettings, why: str) -> Decision:
+    """Stay at the station, or go to the nearest one to stay there."""
+    within = stations_within_reach(world, settings.recharge_rooms)
+    if not within:
+        raise NowhereToGoError(f'{why}, and no station can be reached from {world.place}')
+    if world.place in within:
+        reason = f'{why}: the robot stays at its station in {world.place}'
+        return _straight_to(world, world.place, QUIET, 'station', reason, {world.place: 0.0})
+    best = min(within, key=lambda station: (station in world.avoided, within[station]))
+    reason = f'{why}: it goes to its station in {best}, {within[best]:.1f} s away'
+    return _straight_to(world, best, QUIET, 'station', reason, within)
 
 
 def why_charge(world: World, battery: Battery, settings: DecisionSettings) -> str:
@@ -158,17 +306,16 @@ def why_charge(world: World, battery: Battery, settings: DecisionSettings) -> st
         return f'the battery is low ({battery.level_text()})'
     if battery.level is None:
         return ''
-    required, words = settings.battery.require_recharge, f'{world.place} is not on the map'
-    if world.place in world.graph.index:
-        required, words = reserve(
-            world.graph,
-            world.place,
-            world.reachable,
-            settings.recharge_rooms,
-            battery.draw,
-            world.time_spread,
-            settings.battery,
-        )
+    required, words = settings.battery.require_recharge, 'battery_require_recharge'
+    energy = energy_of(world, battery, settings)
+    if energy is not None and world.place in energy.index:
+        here = energy.index[world.place]
+        if energy.least[here] > required and math.isfinite(energy.least[here]):
+            required = min(energy.least[here], settings.battery.stop_recharge)
+            words = (
+                f'home takes {energy.home_seconds[here]:.1f} s at {energy.draw:.3g} %/s, in 99 of '
+                f'100 cases with a margin of {settings.battery.margin:g} %'
+            )
     if battery.level >= required:
         return ''
     return f'the battery is at {battery.level:g} %, below {required:.1f} % ({words})'
@@ -182,17 +329,18 @@ def _to_charge(world: World, stations: Sequence[str], why: str) -> Decision:
             f'no charging place ({", ".join(stations)}) can be reached from {world.place}'
         )
     best = min(within, key=lambda station: (station in world.avoided, within[station]))
-    reason = f'{why}; {best} is the nearest charging place, {within[best]:.1f} s away'
+    kind = 'the charging place' if len(within) == 1 else 'the nearest charging place'
+    reason = f'{why}; {best} is {kind}, {within[best]:.1f} s away'
     return _straight_to(world, best, RECHARGE, 'nearest', reason, within)
 
 
 def stations_within_reach(world: World, stations: Sequence[str]) -> dict[str, float]:
-    """Return the seconds to each charging place that can be reached, sorted by name."""
-    away = {
-        station: world.graph.seconds(world.place, station)
-        for station in sorted(stations)
-        if station in world.graph.index
-    }
+    """Return the seconds of driving to each charging place within reach, sorted by name."""
+    away = {}
+    for station in sorted(stations):
+        if station in world.graph.index:
+            seconds, _ = world.graph.drive_home([station])
+            away[station] = seconds[world.graph.index[world.place]]
     return {station: seconds for station, seconds in away.items() if math.isfinite(seconds)}
 
 
@@ -225,7 +373,7 @@ def _best(world: World, rule: str, allowed: Sequence[str], scores: Scores, polic
             -order.index(place),
         ),
     )
-    threshold = f', threshold {world.threshold:g} s' if rule == URGENT else ''
+    threshold = f', threshold {world.threshold_of(best):g} s' if rule == URGENT else ''
     name = f'{best} ({world.wait_in_words(best)}{threshold})'
     kind = 'place' if rule == ANY else f'{rule} place'
     if len(allowed) == 1:
@@ -303,11 +451,16 @@ def why_not(place: str, world: World, battery: Battery, settings: DecisionSettin
         decision = decide(asked, battery, settings)
     except NowhereToGoError as error:
         return WhyNot(str(error), _premises(place, world, ''))
-    if decision.place == place:
+    if decision.place == place and decision.rule != QUIET:
         return WhyNot(f'the robot would go to {place} now [{decision.rule}]: {decision.reason}')
     instead = f'the robot goes to {decision.place} [{decision.rule}]'
-    if decision.rule in (RECHARGE, REQUEST):
+    if decision.rule in (RECHARGE, REQUEST, QUIET):
         return WhyNot(f'{instead}: {decision.reason}')
+    if why := why_closed(world, place):
+        return WhyNot(f'{place} is not entered: {why}; {instead}')
+    energy = energy_of(world, battery, settings)
+    if energy is not None and not energy.within_range[energy.index[place]]:
+        return WhyNot(f'{place} is not entered: {energy.why_never(place)}; {instead}')
     premises = _premises(place, world, '' if decision.rule == ANY else decision.rule)
     if place not in world.reachable:
         way = ' - '.join((world.place, *world.graph.route(world.place, place)))
@@ -321,7 +474,7 @@ def why_not(place: str, world: World, battery: Battery, settings: DecisionSettin
             return WhyNot(f'{place} could not be reached lately and is avoided for now; {instead}')
         return WhyNot(
             f'{place} is not {decision.rule} ({world.wait_in_words(place)}, threshold '
-            f'{world.threshold:g} s), but {_listed(decision.scores)} '
+            f'{world.threshold_of(place):g} s), but {_listed(decision.scores)} '
             f'{"is" if len(decision.scores) == 1 else "are"}; {instead}',
             premises,
         )

@@ -6,11 +6,12 @@ All costs that leave this module are the sum of both, in seconds.
 
 from __future__ import annotations
 
+import heapq
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +28,11 @@ if TYPE_CHECKING:
 
 DENSE_UP_TO = 128
 """Up to so many places the shortest ways are computed without scipy, whose import takes longer."""
+ALL_PAIRS_UP_TO = 600
+"""Up to so many places the shortest ways between all pairs are kept. On larger maps they are found
+when they are asked for, so that memory grows with the ways and not with the pairs."""
+TREES_KEPT = 64
+"""How many trees of shortest ways a large map keeps."""
 
 
 class GraphError(ValueError):
@@ -41,6 +47,7 @@ class PatrolGraph:
         leg_seconds: For each place, its neighbours and the seconds it takes to drive there. Each
             leg has a way back, which may take another time.
         exploration_seconds: Seconds that the robot stays in each place it enters.
+        own_exploration: The same for places that differ from that.
 
     Raises:
         GraphError: A leg leads to an unknown place, is not positive, or has no way back.
@@ -48,16 +55,21 @@ class PatrolGraph:
 
     leg_seconds: Mapping[str, Mapping[str, float]]
     exploration_seconds: float = 0.0
+    own_exploration: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         for place, ways in self.leg_seconds.items():
             for other, seconds in ways.items():
                 if other not in self.leg_seconds:
                     raise GraphError(f'{place} leads to {other}, which is not a place of the map')
-                if not seconds + self.exploration_seconds > 0.0 or not math.isfinite(seconds):
+                if not seconds + self.exploring(other) > 0.0 or not math.isfinite(seconds):
                     raise GraphError(f'{place} to {other} takes {seconds} s, expected more than 0')
                 if place not in self.leg_seconds[other]:
                     raise GraphError(f'{place} leads to {other}, but {other} not back')
+
+    def exploring(self, place: str) -> float:
+        """Return the seconds that the robot stays in a place it enters."""
+        return self.own_exploration.get(place, self.exploration_seconds)
 
     @cached_property
     def places(self) -> tuple[str, ...]:
@@ -70,49 +82,117 @@ class PatrolGraph:
         return {place: position for position, place in enumerate(self.places)}
 
     @cached_property
-    def direct(self) -> NDArray[np.float64]:
-        """Seconds of each leg, exploring included, shape (n, n); inf: not neighbours."""
-        costs = np.full((len(self.places), len(self.places)), np.inf)
-        for place, ways in self.leg_seconds.items():
-            for other, seconds in ways.items():
-                costs[self.index[place], self.index[other]] = seconds + self.exploration_seconds
-        return costs
+    def ways(self) -> list[dict[int, float]]:
+        """For each place, the seconds to each neighbour, exploring there included, by index."""
+        index = self.index
+        return [
+            {
+                index[other]: seconds + self.exploring(other)
+                for other, seconds in sorted(self.leg_seconds[place].items())
+            }
+            for place in self.places
+        ]
+
+    def drive_home(self, stations: Iterable[str]) -> tuple[list[float], list[int]]:
+        """Return the seconds of driving from each place to the nearest of some places.
+
+        Nothing is explored on the way: so the robot drives when it goes to charge.
+
+        Args:
+            stations: Places of the map.
+
+        Returns:
+            The seconds, inf where there is no way, and the index of the place they lead to, -1
+            where there is none.
+        """
+        back: list[list[tuple[int, float]]] = [[] for _ in self.places]
+        for name, others in self.leg_seconds.items():
+            for other, leg in others.items():
+                back[self.index[other]].append((self.index[name], leg))
+        away, leads_to = [math.inf] * len(back), [-1] * len(back)
+        pending = [(0.0, self.index[station], self.index[station]) for station in stations]
+        heapq.heapify(pending)
+        while pending:
+            seconds, place, station = heapq.heappop(pending)
+            if seconds >= away[place]:
+                continue
+            away[place], leads_to[place] = seconds, station
+            for before, leg in back[place]:
+                if seconds + leg < away[before]:
+                    heapq.heappush(pending, (seconds + leg, before, station))
+        return away, leads_to
 
     @cached_property
     def adjacency(self) -> csr_array:
-        """:attr:`direct` as a sparse matrix without the infinite entries."""
+        """The seconds of the legs, exploring included, as a sparse matrix."""
         from scipy.sparse import csr_array
 
-        rows, columns = np.nonzero(np.isfinite(self.direct))
-        values = self.direct[rows, columns]
-        return csr_array((values, (rows, columns)), shape=self.direct.shape)
+        count = len(self.places)
+        rows = np.repeat(np.arange(count), [len(others) for others in self.ways])
+        columns = np.array([o for others in self.ways for o in others], dtype=np.intp)
+        values = np.array([s for others in self.ways for s in others.values()])
+        return csr_array((values, (rows, columns)), shape=(count, count))
 
     @cached_property
     def distances(self) -> NDArray[np.float64]:
-        """Seconds from each place to each other by the shortest way, shape (n, n); inf: no way."""
+        """Seconds from each place to each other by the shortest way, shape (n, n); inf: no way.
+
+        Ask a large map for `row` instead.
+        """
         if len(self.places) > DENSE_UP_TO:
             from scipy.sparse.csgraph import dijkstra
 
             found: NDArray[np.float64] = dijkstra(self.adjacency)
             return found
-        seconds = self.direct.copy()
+        count = len(self.places)
+        seconds = np.full((count, count), np.inf)
+        for place, others in enumerate(self.ways):
+            seconds[place, list(others)] = list(others.values())
         np.fill_diagonal(seconds, 0.0)
-        for middle in range(len(seconds)):
+        for middle in range(count):
             np.minimum(seconds, seconds[:, middle, None] + seconds[middle], out=seconds)
         return seconds
+
+    @cached_property
+    def has_all_pairs(self) -> bool:
+        """Whether the map is small enough for :attr:`distances`."""
+        return len(self.places) <= ALL_PAIRS_UP_TO
+
+    @cached_property
+    def _trees(self) -> dict[int, tuple[NDArray[np.float64], NDArray[np.int32]]]:
+        return {}
+
+    def _tree(self, start: int) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
+        """Return the seconds to each place of a large map, and the place before it on the way."""
+        trees = self._trees
+        if start not in trees:
+            from scipy.sparse.csgraph import dijkstra
+
+            while len(trees) >= TREES_KEPT:
+                trees.pop(next(iter(trees)))
+            seconds, before = dijkstra(self.adjacency, indices=[start], return_predecessors=True)
+            trees[start] = seconds[0], before[0]
+        return trees[start]
+
+    def row(self, start: int) -> NDArray[np.float64]:
+        """Return the seconds from one place to each other by the shortest way, shape (n,)."""
+        found: NDArray[np.float64] = (
+            self.distances[start] if self.has_all_pairs else self._tree(start)[0]
+        )
+        return found
 
     def seconds(self, start: str, goal: str) -> float:
         """Return the seconds from ``start`` to ``goal`` by the shortest way; inf when there is
         none.
         """
-        return float(self.distances[self.index[start], self.index[goal]])
+        return float(self.row(self.index[start])[self.index[goal]])
 
     def move(self, start: str, goal: str) -> float:
         """Return the seconds of a move: over the leg to a neighbour, even where a way round is
         shorter; by the shortest way to any other place.
         """
         leg = self.leg_seconds[start].get(goal)
-        return self.seconds(start, goal) if leg is None else leg + self.exploration_seconds
+        return self.seconds(start, goal) if leg is None else leg + self.exploring(goal)
 
     def route(self, start: str, goal: str) -> tuple[str, ...]:
         """Return the places on the shortest way, without ``start``, with ``goal``.
@@ -122,10 +202,19 @@ class PatrolGraph:
         """
         if not math.isfinite(self.seconds(start, goal)):
             raise GraphError(f'there is no way from {start} to {goal}')
+        if not self.has_all_pairs:
+            before, at = self._tree(self.index[start])[1], self.index[goal]
+            back = []
+            while at != self.index[start]:
+                back.append(self.places[at])
+                at = int(before[at])
+            return tuple(reversed(back))
         way, place = [], start
         while place != goal:
-            ways = self.leg_seconds[place]
-            place = min(sorted(ways), key=lambda other: ways[other] + self.seconds(other, goal))
+            place = min(
+                sorted(self.leg_seconds[place]),
+                key=lambda other: self.move(place, other) + self.seconds(other, goal),
+            )
             way.append(place)
         return tuple(way)
 
@@ -148,7 +237,7 @@ class PatrolGraph:
             for place, ways in self.leg_seconds.items()
             if place in names
         }
-        return PatrolGraph(legs, self.exploration_seconds)
+        return PatrolGraph(legs, self.exploration_seconds, self.own_exploration)
 
     def without_leg(self, start: str, goal: str) -> PatrolGraph:
         """Return the map without the direct way between two places."""
@@ -157,7 +246,7 @@ class PatrolGraph:
             place: {other: cost for other, cost in ways.items() if (place, other) not in gone}
             for place, ways in self.leg_seconds.items()
         }
-        return PatrolGraph(legs, self.exploration_seconds)
+        return PatrolGraph(legs, self.exploration_seconds, self.own_exploration)
 
     @cached_property
     def tour(self) -> Tour:
@@ -166,22 +255,18 @@ class PatrolGraph:
         Raises:
             GraphError: The map is not connected.
         """
-        if not np.isfinite(self.distances).all():
+        if self.places and not np.isfinite(self.row(0)).all():
             raise GraphError('no tour leads through all places: the map is not connected')
         if len(self.places) <= EXACT_UP_TO:
             return shortest_tour(self.distances)
         import networkx
 
-        network: networkx.Graph[str] = networkx.Graph()
-        network.add_nodes_from(self.places)
-        network.add_edges_from(
-            (place, other) for place in self.leg_seconds for other in self.leg_seconds[place]
-        )
-        blocks = [
-            sorted(self.index[place] for place in block)  # type: ignore[index]
-            for block in networkx.biconnected_components(network)
-        ]
-        return tour_over_blocks(self.distances, sorted(blocks))
+        network: networkx.Graph[int] = networkx.Graph()
+        network.add_nodes_from(range(len(self.places)))
+        network.add_edges_from((place, other) for place in network for other in self.ways[place])
+        found: Any = networkx.biconnected_components(network)
+        blocks: list[list[int]] = [sorted(block) for block in found]
+        return tour_over_blocks(self.ways, sorted(blocks))
 
     @cached_property
     def walk(self) -> tuple[str, ...]:

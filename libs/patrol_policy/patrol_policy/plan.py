@@ -1,20 +1,18 @@
-"""Plans a patrol ahead within the rules, and keeps the plan up to date at each choice.
+"""Plans a patrol ahead within the rules and the charge, and follows the plan at each choice.
 
-A plan follows a `Course`: targets on the way in, and a round that is walked again and again. The
-search has three steps.
+A plan follows a `Course`: targets on the way in, and a round that is walked again and again.
+Charges are targets like places, put where they cost least. There is one search: `rounds` looks for
+a round with short waits that the rules and the charge allow (simulated annealing). Where the robot
+would have to wait on it for places to be URGENT, also for one that is filled with further visits.
+Ways into the rounds that were found are then compared by simulating each from where the robot is
+until the patrol repeats itself (`rollout`), which gives the longest wait for ever. So are the walks
+of the simple policies `oldest` and `lookahead`: the plan is never worse than those.
 
-1. `rounds` looks for a short round that the rules allow (simulated annealing); where the robot
-   would have to wait on it, also for one that is filled with further visits.
-2. Ways into that round are compared by simulating each from where the robot is until the patrol
-   repeats itself (`rollout`), which gives the longest wait for ever. So are the walks of the
-   simple policies `oldest` and `lookahead`: the plan is never worse than those.
-3. Random changes of the best course are kept when they leave less waiting (hill climbing).
+All that is done at the first choice. Work is counted in steps and not in time, so that the same
+world gives the same mission on a slow machine, too; only `MOST_SECONDS` of the processor's time end
+it early, and the plan then says so.
 
-The first choice takes all three steps. Each later one goes on for a few milliseconds, from where
-the robot is then. Work is counted in steps and not in time, so that the same world gives the same
-mission on a slow machine, too.
-
-When times of legs, the threshold or the rules change, a new plan takes over the course as it
+When times of legs, thresholds, rules or the charge change, a new plan takes over the course as it
 stands, and changes it only for one that leaves less waiting from where the robot is.
 """
 
@@ -22,12 +20,12 @@ from __future__ import annotations
 
 import itertools
 import math
-import random
 import time
 from collections.abc import Iterator
 from copy import copy
 from dataclasses import dataclass, replace
 
+from patrol_policy.battery import WORTH_CHARGING, Energy
 from patrol_policy.rollout import (
     HALF_OPEN,
     URGENT,
@@ -40,18 +38,16 @@ from patrol_policy.rollout import (
     roll_out,
     rule_map,
 )
-from patrol_policy.rounds import Round, RoundChanges, RoundSearch
+from patrol_policy.rounds import RoundSearch, with_charges
 from patrol_policy.world import World
 
-FIRST_WORK, MORE_WORK, ALL_WORK = 360_000.0, 1_500.0, 20e6
-"""Work before the first choice of a plan, at each later one, in all: about microseconds."""
+FIRST_WORK = 360_000.0
+"""Work before the first choice of a plan: about microseconds."""
 FULL_UP_TO = 100.0
 """Larger maps, in places, have less work before the first choice: knowing them takes its time."""
-MOST_SECONDS = 2.0
-"""Time of the processor for one choice at most; only a machine that is very slow comes to it."""
-MOST_WORK = 12_000.0
-"""Work of simulations at one later choice at most; larger maps keep the first course."""
-WARM_WORK = 20_000.0
+MOST_SECONDS = 1.5
+"""Time of the processor for one choice; what is looked for then is ended, and the plan says so."""
+WARM_WORK = 60_000.0
 """Work before the first choice of a plan that takes the place of another."""
 SLICE_WORK = 500.0
 """Work between two looks at the clock."""
@@ -61,6 +57,8 @@ MOVE_WORK = 3.0
 """Work of a move that is simulated."""
 HORIZON = 12.0
 """How many periods a course is simulated at most."""
+FILLED_UP_TO = 6.0
+"""Rounds are filled with visits while places wait at most so many shortest rounds."""
 GOOD_ENOUGH = 1.004
 """A longest wait of so many bounds is not improved any further."""
 ACCEPTED = 1.03
@@ -97,6 +95,13 @@ class Course:
         Where the rules forbid that, the allowed place that is nearest to the target.
         """
         target = self._target(rules, state)
+        if target >= rules.count or target == state.place:
+            return target
+        if not rules.affords(state, target):
+            # Before it sets out, and not half-way.
+            charge = rules.charge_from(state.place)
+            if charge >= 0 and not _is_full(rules, state, charge):
+                return charge
         allowed = rules.allowed(state)
         if not allowed:
             return state.place
@@ -111,14 +116,26 @@ class Course:
         place = state.place
         for _ in self.targets:
             target = self.targets[state.position]
-            idle = state.now - state.seen[target]
-            if target != place and idle >= self.skip and target not in state.avoided:
-                gate = rules.gates[target]
-                if gate < 0 or rules.threshold - idle - rules.away[place][gate] <= self.patience:
+            if target >= rules.count:
+                if not _is_full(rules, state, target) and rules.places[target] not in state.avoided:
                     return target
+            elif target != place and target not in state.avoided:
+                idle = state.now - state.seen[target]
+                gate = rules.gates[target] if idle >= self.skip else -2
+                if gate == -1:
+                    return target
+                if gate >= 0:
+                    wait = rules.thresholds[target] - idle - rules.away[place][gate]
+                    if wait <= self.patience:
+                        return target
             state.position = self.after(state.position)
-        target = self.targets[state.position]
-        return target if target != place else self.targets[self.after(state.position)]
+        # None is due: on to the next place, whatever it is.
+        for _ in self.targets:
+            target = self.targets[state.position]
+            if target < rules.count and target != place:
+                return target
+            state.position = self.after(state.position)
+        return place
 
     def after(self, position: int) -> int:
         """Return the position that comes next."""
@@ -132,73 +149,96 @@ class Course:
         return replace(self, targets=around, back=0)
 
 
+def _is_full(rules: RuleMap, state: State, charge: int) -> bool:
+    """Return whether a charge would give too little to be worth its while."""
+    energy = rules.energy
+    assert energy is not None
+    away = energy.drive[charge - rules.count][state.place]
+    return state.level - energy.draw * away > energy.full - WORTH_CHARGING
+
+
 class Plan:
-    """The course of one robot on one map, and the search for a better one.
+    """The course of one robot on one map.
 
     Args:
         world: Where it begins.
+        energy: What the charge comes to; None: the battery does not matter.
         before: The plan that this one takes the place of, if there is one.
+
+    Attributes:
+        rules: The map with its rules.
+        cut: What the deadline has cut off, in words; empty: nothing.
     """
 
     _state: State
+    _began: State
 
-    def __init__(self, world: World, before: Plan | None = None) -> None:
-        self._key = world.threshold, world.rules
-        self._rules = rules = rule_map(world)
-        self._draw = random.Random(0)
-        self._work, self._spared, self._sent = 0.0, 0.0, -1
+    def __init__(
+        self, world: World, energy: Energy | None = None, before: Plan | None = None
+    ) -> None:
         self._deadline = time.thread_time() + MOST_SECONDS
+        self._key = world.threshold, world.own_thresholds, world.rules
+        self.rules = rules = rule_map(world, energy)
+        self._work = 0.0
+        self.cut = ''
         # Waits that began under the plan before count like all others: else each new plan might
         # turn on the round once, and the places behind would wait for two rounds.
         met = [before is not None] * rules.count
         self._state = State(world.graph.index[world.place], world.now, [], met)
-        self._observe(world)
+        self._observe(world, 100.0 if energy is None else world.level)
         work = FIRST_WORK * min(1.0, FULL_UP_TO / rules.count)
-        if before and before.places == self.places:
+        if before and before.places == self.places and before.stations == self.stations:
             self._begin([before.targets], min(work, WARM_WORK), before.course)
         else:
             tour = world.graph.tour.order
             self._begin([tour, tour[::-1]], work)
 
-    def fits(self, world: World) -> bool:
-        """Return whether the plan is for this map, threshold and rules.
+    def fits(self, world: World, energy: Energy | None) -> bool:
+        """Return whether the plan is for this map, these thresholds, rules and stations.
 
-        Times of legs that differ a little keep the plan.
+        Times and rates that differ a little keep the plan.
         """
-        planned, graph = self._rules.graph, world.graph
-        if self._key != (world.threshold, world.rules):
+        planned, graph = self.rules.graph, world.graph
+        if self._key != (world.threshold, world.own_thresholds, world.rules):
             return False
-        return graph is planned or (
-            graph.places == planned.places
+        mine = self.rules.energy
+        if energy is not mine and (energy is None or not energy.alike(mine)):
+            return False
+        if graph is planned:
+            return True
+        if graph.places != planned.places:
+            return False
+        return all(
+            now.keys() == then.keys()
             and all(
-                ways.keys() == graph.leg_seconds[place].keys()
-                and all(
-                    abs(graph.leg_seconds[place][other] - seconds) <= LEG_CHANGE * seconds
-                    for other, seconds in ways.items()
-                )
-                for place, ways in planned.leg_seconds.items()
+                abs(now[other] - seconds) <= LEG_CHANGE * seconds for other, seconds in then.items()
             )
+            for now, then in zip(graph.ways, planned.ways, strict=True)
         )
 
     def for_a_question(self) -> Plan:
-        """Return a copy that says where its course leads from now on, and thinks no further."""
+        """Return a copy that says where its course leads from now on, and changes nothing."""
         plan = copy(self)
-        plan._state, plan._work = replace(self._state, met=self._state.met.copy()), math.inf
+        plan._state = replace(self._state, met=self._state.met.copy())
         return plan
 
     def advance(self, world: World) -> tuple[int, int]:
-        """Think on, and return the place to go to and the target that it leads to, as indices."""
-        self._observe(world)
-        self._deadline = time.thread_time() + MOST_SECONDS
-        if self._work + self._search.work < ALL_WORK:
-            self._think()
-        self._sent = self._course.choose(self._rules, self._state)
-        return self._sent, self._course.targets[self._state.position]
+        """Return the stop to go to and the target that it leads to, as indices."""
+        self._observe(world, world.level)
+        choice = self._course.choose(self.rules, self._state)
+        target = self._course.targets[self._state.position]
+        stop = self.rules.guarded(self._state, choice)
+        return stop, target if stop < self.rules.count else stop
 
     @property
     def places(self) -> tuple[str, ...]:
         """The places of the map."""
-        return self._rules.graph.places
+        return self.rules.graph.places
+
+    @property
+    def stations(self) -> list[int]:
+        """The places of the stations, by index."""
+        return self.rules.energy.stations if self.rules.energy else []
 
     @property
     def targets(self) -> tuple[int, ...]:
@@ -212,73 +252,159 @@ class Plan:
 
     @property
     def longest(self) -> float:
-        """The longest wait from visit to visit that the course leaves, seconds."""
-        return self._outcome.settled
+        """The longest wait from visit to visit that the course leaves, seconds.
+
+        Where places have time of their own, the first waits count, too.
+        """
+        if self.rules.is_even:
+            return self._outcome.settled
+        return max((self._outcome.waits[place] for place in self.rules.wanted), default=0.0)
+
+    def settled_waits(self) -> list[float]:
+        """Return for each place the wait from visit to visit that the course leaves, seconds.
+
+        inf: the place is not visited.
+        """
+        rules, outcome, state = self.rules, self._outcome, self._began.fresh()
+        begin = outcome.repeated_from(rules)
+        waits = [math.inf] * rules.count
+        if begin is None:
+            for place in {rules.places[stop] for stop in outcome.walk}:
+                waits[place] = outcome.waits[place]
+            return waits
+        for stop in outcome.walk[:begin]:
+            rules.go(state, stop)
+        seen: dict[int, float] = {}
+        for stop in (*outcome.walk[begin:], *outcome.walk[begin:]):
+            rules.go(state, stop)
+            place = rules.places[stop]
+            if place in seen:
+                known = 0.0 if math.isinf(waits[place]) else waits[place]
+                waits[place] = max(known, state.now - seen[place])
+            seen[place] = state.now
+        return waits
 
     @property
     def _bound(self) -> float:
         """The longest wait that cannot be helped, as far as is known, seconds."""
-        return max(self._search.best.length, 1e-6)
+        return max(self._search.best.wait, 1e-6)
 
     @property
     def _accepted(self) -> float:
         """The longest wait from visit to visit that is accepted for shorter first waits."""
         return min(ACCEPTED * self._bound, self._simple)
 
-    def _observe(self, world: World) -> None:
+    def _observe(self, world: World, level: float) -> None:
         """Take where the patrol stands."""
         graph, met, seen = world.graph, self._state.met, []
-        for place in graph.places:
+        thresholds = self.rules.thresholds
+        for place, threshold in zip(graph.places, thresholds, strict=True):
             last = world.visited_at.get(place, world.since)
-            if world.now - last <= world.threshold and URGENT in world.classes.get(place, ()):
+            if world.now - last <= threshold and URGENT in world.classes.get(place, ()):
                 # The ontology knows better: it was never visited.
-                last = world.now - world.threshold - HALF_OPEN
+                last = world.now - min(threshold, world.threshold) - HALF_OPEN
             seen.append(last)
         here = graph.index[world.place]
         if here != self._state.place:
             met[here] = True
         avoided = frozenset(graph.index[name] for name in world.avoided if name in graph.index)
-        self._state = State(here, world.now, seen, met, avoided, self._state.position)
+        position = self._state.position
+        self._state = State(here, world.now, seen, met, avoided, position, level)
 
     def _begin(
         self, rounds: list[tuple[int, ...]], work: float, course: Course | None = None
     ) -> None:
-        """Find the first course.
+        """Find the course.
 
         Args:
             rounds: Where the search for a round begins.
             work: For rounds and for courses together.
             course: One that is followed already; None: the best round is begun.
         """
-        rules, length = self._rules, self._rules.length(rounds[0])
-        self._horizon = HORIZON * max(length, rules.threshold)
+        rules = self.rules
+        rounds = list(filter(None, (self._feasible(targets) for targets in rounds)))
+        if not rounds:
+            # Nothing can be visited but the place where the robot is.
+            rounds = [(rules.charge_from(self._state.place),) if rules.energy else (0,)]
+        length = rules.length(rounds[0])
+        self._horizon = HORIZON * max(length, rules.least_period)
+        if rules.energy:
+            # A course that has not come to its charge yet looks better than it is.
+            self._horizon += 2.0 * rules.energy.cycle_seconds
         simple = SIMPLE if rules.count <= SIMPLE_UP_TO else ()
-        walks = [roll_out(rules, choose, self._state, self._horizon) for choose in simple]
-        self._simple = min((walk.settled for walk in walks), default=math.inf)
-        filled = self._find_rounds(rounds, walks, work / 2.0)
+        walks = [self._simulated(choose) for choose in simple]
+        self._simple = min((walk.settled for walk in walks if not walk.cut), default=math.inf)
+        filled = self._find_rounds(rounds, walks, 0.7 * work)
+        # A charge on its round takes time that the length of the ways does not tell.
+        self._horizon = max(self._horizon, HORIZON * self._search.best.length)
         self._course = course or self._entered(self._phases()[0])
         self._outcome = self._followed(self._course, math.inf)
-        self._climb(self._first_courses(filled), work / 2.0)
+        self._began = self._state
+        end = self._work + 0.3 * work
+        for candidate in self._candidates(filled):
+            if self._work > end or self._is_finished() or self._late():
+                break
+            self._try(candidate)
         for walk in walks:
-            if (back := walk.repeated_from(rules.count)) is not None:
+            if (back := walk.repeated_from(rules)) is not None and not walk.cut:
                 self._try(Course(tuple(walk.walk), back, patience=math.inf))
+        self._explain_cut()
+
+    def _explain_cut(self) -> None:
+        """Note what was not looked at for want of time."""
+        if self._late():
+            self.cut = f'the search was ended after {MOST_SECONDS:g} s of the processor'
+        elif self._outcome.cut:
+            self.cut = f'it was looked ahead for {len(self._outcome.walk)} moves only'
+
+    def _simulated(self, choose: Choice, stop: float = math.inf) -> Outcome:
+        """Return what a way to choose comes to from here.
+
+        A level above that at which charges end is had once only.
+        """
+        state, energy = self._state, self.rules.energy
+        if energy is not None and state.level > energy.full:
+            state = replace(state, level=energy.full)
+        outcome = roll_out(self.rules, choose, state, self._horizon, stop, self._late)
+        self._work += MOVE_WORK * len(outcome.walk)
+        return outcome
+
+    def _feasible(self, targets: tuple[int, ...]) -> tuple[int, ...]:
+        """Return a round without what the charge does not allow, and with the charges it needs."""
+        rules = self.rules
+        if rules.energy is None:
+            return targets
+        wanted = set(rules.wanted)
+        kept = tuple(t for t in targets if t >= rules.count or t in wanted)
+        if any(target >= rules.count for target in kept):
+            return kept
+        return with_charges(rules, kept) if kept else ()
 
     def _find_rounds(
         self, rounds: list[tuple[int, ...]], walks: list[Outcome], work: float
     ) -> tuple[int, ...]:
         """Search a short round; return one that is filled with visits where the robot would wait on
         the short one, else nothing."""
-        rules = self._rules
-        waits = rules.length(rounds[0]) < rules.least_period
+        rules = self.rules
+        length = rules.length(rounds[0])
+        waits = length < rules.least_period
         starts = [rounds]
         if not waits:  # Else the simple policies wait by walking more.
-            starts += filter(None, ([*rules.laps(walk.walk)] for walk in walks))
+            laps = ([*rules.laps(walk.walk)] for walk in walks)
+            starts += [group for group in laps if group]
+            if rules.energy:
+                starts = [[*filter(None, map(self._feasible, group))] for group in starts]
         self._search = RoundSearch(rules, starts)
-        filled = self._filled(starts, work / 2.0) if waits else ()
+        filled: tuple[int, ...] = ()
+        if waits and rules.least_period < FILLED_UP_TO * length:
+            search = RoundSearch(rules, starts, fills=True)
+            self._search_on(search, work / 2.0)
+            if not search.best.breaches and not search.best.short:
+                filled = search.best.targets
         self._search_on(self._search, work / 2.0 if filled else work)
         return filled
 
-    def _first_courses(self, filled: tuple[int, ...]) -> Iterator[Course]:
+    def _candidates(self, filled: tuple[int, ...]) -> Iterator[Course]:
         """Yield ways into the round that was found and the filled one, the likeliest first."""
         phases = [*self._phases(), *range(len(self._search.best.targets))]
         likeliest = [self._entered(phase) for phase in phases[:2]]
@@ -291,30 +417,31 @@ class Plan:
             yield replace(likeliest[0], skip=skip * self._bound, patience=patience)
         for phase in phases[2:]:
             yield self._entered(phase)
+        if self.rules.least_period > self._search.best.length - 1e-6:
+            yield from self._with_one_more_visit()
 
-    def _think(self) -> None:
-        """Go on with the search from where the robot is."""
-        if self._state.place == self._sent and self._finished():
-            return
-        self._search_on(self._search, MORE_WORK / 2.0)
-        # The present course and two others are simulated, as soon as there was the work for that.
-        self._spared = min(self._spared + MORE_WORK / 2.0, MOST_WORK)
-        if 3.0 * MOVE_WORK * len(self._outcome.walk) > self._spared:
-            return
-        self._course, self._state.position = self.course, 0
-        self._outcome = self._followed(self._course, math.inf)
-        self._climb(map(self._entered, self._phases()), self._spared)
-        self._spared = 0.0
+    def _with_one_more_visit(self) -> Iterator[Course]:
+        """Yield the best course so far with one visit more or less: waiting in another way.
 
-    def _finished(self) -> bool:
+        That is gone on with as long as one of them is better.
+        """
+        course = None
+        while course is not self._course:
+            course = self._course
+            targets, patience = course.targets, {0.0, course.patience, math.inf}
+            for position in range(course.back, len(targets)):
+                changed = [
+                    (*targets[:position], place, *targets[position:])
+                    for place in self.rules.near(targets[position])
+                ]
+                if targets.count(targets[position]) > 1:
+                    changed.append((*targets[:position], *targets[position + 1 :]))
+                for other, wait in itertools.product(changed, sorted(patience)):
+                    yield replace(course, targets=other, patience=wait)
+
+    def _is_finished(self) -> bool:
         """Return whether no better course is looked for."""
         return self._search.finished and self._outcome.first <= GOOD_ENOUGH * self._bound
-
-    def _filled(self, starts: list[list[tuple[int, ...]]], work: float) -> tuple[int, ...]:
-        """Return a lawful round in which the robot need not wait; empty: none was found."""
-        search = RoundSearch(self._rules, starts, fills=True)
-        self._search_on(search, work)
-        return () if search.best.breaches else search.best.targets
 
     def _search_on(self, search: RoundSearch, work: float) -> None:
         """Go on looking for a better round."""
@@ -325,16 +452,6 @@ class Plan:
     def _late(self) -> bool:
         """Return whether the choice has taken all the time that there is."""
         return time.thread_time() > self._deadline
-
-    def _climb(self, courses: Iterator[Course], work: float) -> None:
-        """Try courses, and then random changes of the best one."""
-        end = self._work + work
-        while self._work < end and not self._finished() and not self._late():
-            course = next(courses, None) or self._neighbour()
-            if course is None:
-                self._work += MOVE_WORK
-                continue
-            self._try(course)
 
     def _try(self, course: Course) -> None:
         """Take a course if it is better from here."""
@@ -347,61 +464,39 @@ class Plan:
 
     def _followed(self, course: Course, stop: float) -> Outcome:
         """Return what a course comes to from here."""
-        outcome = roll_out(self._rules, course.choose, self._state, self._horizon, stop)
-        self._work += MOVE_WORK * len(outcome.walk)
-        return outcome
+        return self._simulated(course.choose, stop)
 
-    def _grade(self, outcome: Outcome) -> tuple[int, int, float]:
+    def _grade(self, outcome: Outcome) -> tuple[bool, int, int, float]:
         """Return what courses are compared by, less is better, in whole percents of the bound.
 
         Waits from visit to visit come again and again, so they count first, as far as they are
-        longer than what is accepted. Then the first waits do, which come once.
+        longer than what is accepted. Then the first waits do, which come once. Of a course that was
+        looked at in part only nothing good is known.
         """
         bound = self._bound
         lasting = max(0, math.ceil(100.0 * (outcome.settled - self._accepted) / bound - 1e-6))
-        return lasting, round(100.0 * outcome.first / bound), outcome.settled
+        return outcome.cut, lasting, round(100.0 * outcome.first / bound), outcome.settled
 
     def _entered(self, phase: int, targets: tuple[int, ...] = ()) -> Course:
         """Return the course that begins a round, the best one if none is given, with one of its
         targets."""
         targets = targets or self._search.best.targets
-        rules = self._rules
+        rules = self.rules
         wait = max(0.0, rules.least_period - rules.length(targets))
         patience = wait + 2.0 * rules.mean_leg
         return Course(targets[phase:] + targets[:phase], patience=patience)
 
     def _phases(self) -> list[int]:
         """Return where the best round is well begun: where it leads on, with the oldest place."""
-        targets, seen = self._search.best.targets, self._state.seen
-        phases = [k for k in range(len(targets)) if targets[k - 1] == self._state.place]
-        return [*phases, targets.index(min(range(len(seen)), key=seen.__getitem__))]
-
-    def _neighbour(self) -> Course | None:
-        """Return the course with one to three random changes; None: it would become too long."""
-        course: Course | None = self._course
-        for _ in range(self._draw.choice((1, 1, 2, 3))):
-            course = course and self._changed(course)
-        return course
-
-    def _changed(self, course: Course) -> Course | None:
-        """Return a course with one random change; None: it would become too long."""
-        draw = self._draw
-        choice = draw.random()
-        if choice < 0.1:
-            skip = max(0.0, course.skip + draw.uniform(-0.2, 0.2) * self._bound)
-            return replace(course, skip=skip)
-        if choice < 0.2:
-            return replace(course, patience=draw.random() ** 2 * self._bound)
-        way, targets = course.targets[: course.back], course.targets[course.back :]
-        limit = 1.1 * min(self._outcome.settled, 1.5 * self._bound)
-        changes = RoundChanges(self._rules, Round(targets, 0.0), draw)
-        changed = changes.doubled(limit) if choice < 0.4 else changes.one(limit)
-        return replace(course, targets=way + changed) if changed else None
+        targets, seen, places = self._search.best.targets, self._state.seen, self.rules.places
+        phases = [k for k in range(len(targets)) if places[targets[k - 1]] == self._state.place]
+        return [*phases, min(range(len(targets)), key=lambda k: seen[places[targets[k]]])]
 
 
-def plan_of(world: World) -> Plan:
+def plan_of(world: World, energy: Energy | None = None) -> Plan:
     """Return the plan that the policy remembers, or a new one that takes over its course."""
     plan = world.memory.plan
-    if not isinstance(plan, Plan) or not plan.fits(world):
-        plan = world.memory.plan = Plan(world, plan)
+    if not isinstance(plan, Plan) or not plan.fits(world, energy):
+        before = plan if isinstance(plan, Plan) else None
+        plan = world.memory.plan = Plan(world, energy, before)
     return plan

@@ -1,21 +1,26 @@
 """The map as the rules see it, and patrols on it that are simulated ahead.
 
 At each place the robot may only go to neighbours of the first class in the list of rules that has a
-member there, and a place is URGENT once it went unvisited for longer than the threshold
-(`RuleMap`). `roll_out` moves a `State` by a choice function until the state comes back, which
-proves the longest wait for ever, or until a horizon (a rollout, as in Bertsekas, "Rollout
-algorithms for combinatorial optimization", 1997).
+member there, and a place is URGENT once it went unvisited for longer than its threshold
+(`RuleMap`). Where the battery matters the robot may go charging from everywhere: a charge at the
+station number k is a stop with the index ``count + k``, beside the places 0 to ``count - 1``.
+
+`roll_out` moves a `State` by a choice function until the state comes back, which proves the longest
+wait for ever, or until a horizon (a rollout, as in Bertsekas, "Rollout algorithms for combinatorial
+optimization", 1997).
 """
 
 from __future__ import annotations
 
+import heapq
 import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
 
+from patrol_policy.battery import Energy
 from patrol_policy.graph import PatrolGraph
 from patrol_policy.world import World
 
@@ -25,8 +30,16 @@ NEVER = 9
 """A rank behind that of every place."""
 NEAR = 8
 """How many nearest places of each place are known."""
+LOCAL_REACH = 200
+"""Over how many places a way is searched on a large map before all ways from its start are."""
 HALF_OPEN = 1e-3
 """Seconds by which a wait must be longer than the threshold, so that rounding does not decide."""
+MOST_MOVES = 6000
+"""Moves that one simulation takes at most, whatever the threshold."""
+MOVES_A_PLACE = 4
+"""Further moves for each place of the map."""
+LOOK_EVERY = 64
+"""Moves between two looks at the clock."""
 
 
 class RuleMap:
@@ -37,44 +50,70 @@ class RuleMap:
         threshold: Seconds after which a place is URGENT.
         ranks: For each place, the position of its best class in the rules, URGENT left aside.
         urgent: The position of URGENT in the rules; `NEVER` when it is not among them.
+        own: Thresholds of places that differ, by index; inf: the place never is URGENT.
+        energy: What the charge comes to; None: the battery does not matter.
 
     Attributes:
-        legs: For each place, the seconds to each neighbour, exploring included.
-        away: Seconds from each place to each other, shape (n, n). A neighbour is entered by the leg
-            to it: where a way round by another place is shorter, the rules may not allow that.
-        overdue: A place that went unvisited for longer is URGENT, seconds.
+        leg_seconds: For each stop, the seconds to each neighbour, exploring included.
+        thresholds: For each place, seconds without a visit after which it is URGENT.
+        overdue_after: The same, so much longer that rounding does not decide.
+        wanted: The places that a plan visits: all that the charge allows.
+        slack: For each stop, by how much its threshold is above the least one, seconds: so much
+            later than others it may be visited. inf: it is not visited at all.
     """
 
     def __init__(
-        self, graph: PatrolGraph, threshold: float, ranks: Sequence[int], urgent: int
+        self,
+        graph: PatrolGraph,
+        threshold: float,
+        ranks: Sequence[int],
+        urgent: int,
+        own: Mapping[int, float] | None = None,
+        energy: Energy | None = None,
     ) -> None:
-        self.graph, self.threshold = graph, threshold
-        self.overdue = threshold + HALF_OPEN / 2.0
+        self.graph, self.threshold, self.energy = graph, threshold, energy
         self.ranks, self.urgent = list(ranks), urgent
-        self.count = len(graph.places)
-        index = graph.index
-        self.leg_seconds = [
-            {
-                index[other]: seconds + graph.exploration_seconds
-                for other, seconds in sorted(ways.items())
-            }
-            for ways in (graph.leg_seconds[place] for place in graph.places)
-        ]
-        self._shortest: list[list[float]] = graph.distances.tolist()
-        self._hops: dict[int, int] = {}
-        self._paths: dict[int, list[int]] = {}
-        self.away = self._seconds_away()
+        self.count = count = len(graph.places)
+        own = own or {}
+        self.thresholds = [own.get(place, threshold) for place in range(count)]
+        self.overdue_after = [limit + HALF_OPEN / 2.0 for limit in self.thresholds]
+        within = energy.within_range if energy else [True] * count
+        self.wanted = [place for place in range(count) if within[place]]
+        finite = [self.thresholds[p] for p in self.wanted if math.isfinite(self.thresholds[p])]
+        least, most = min(finite, default=0.0), max(finite, default=0.0)
+        self.is_even = least == most and len(finite) == len(self.wanted)
+        self.slack = [min(limit, most) - least for limit in self.thresholds]
+        for place in set(range(count)) - set(self.wanted):
+            self.slack[place] = math.inf
+        stations = energy.stations if energy else []
+        self.places = [*range(count), *stations]
+        self.leg_seconds = [*graph.ways, *(graph.ways[station] for station in stations)]
+        self.slack += [0.0] * len(stations)
+        self.away: Sequence[Mapping[int, float] | Sequence[float]]
+        if graph.has_all_pairs:
+            self._shortest: list[list[float]] = graph.distances.tolist()
+            self._hops: dict[tuple[int, int], int] = {}
+            self.away = self._seconds_away()
+        else:
+            self.away = [_FoundWays(self, stop) for stop in range(len(self.places))]
+        self._paths: dict[tuple[int, int], list[int]] = {}
+        self._near: dict[int, list[int]] = {}
+
+    # Ways.
 
     def _seconds_away(self) -> list[list[float]]:
+        """Return the seconds from each stop to each other, shape (stops, stops).
+
+        A neighbour is entered by the leg to it: where a way round by another place is shorter, the
+        rules may not allow that.
+        """
         shortest = self._shortest
         longer = {
             other
-            for place, ways in enumerate(self.leg_seconds)
-            for other, seconds in ways.items()
+            for place in range(self.count)
+            for other, seconds in self.leg_seconds[place].items()
             if seconds > shortest[place][other] + HALF_OPEN
         }
-        if not longer:
-            return shortest
         away = [row.copy() for row in shortest]
         for target in sorted(longer):
             to_target = self.graph.distances[:, target]
@@ -82,13 +121,113 @@ class RuleMap:
                 if place != target and math.isfinite(to_target[place]):
                     hop = self.hop(place, target)
                     away[place][target] = self.leg_seconds[place][hop] + away[hop][target]
+        if self.energy:
+            for number, drive in enumerate(self.energy.drive):
+                for place, row in enumerate(away):
+                    row.append(drive[self.places[place]])
+                away.append([*away[self.energy.stations[number]]])
+            for number, station in enumerate(self.energy.stations):
+                away[self.count + number][:] = away[station]
         return away
+
+    def seconds_between(self, stop: int, target: int) -> float:
+        """Return what `away` has for a large map, found by a search around the stop."""
+        if target >= self.count:
+            assert self.energy is not None
+            return float(self.energy.drive[target - self.count][self.places[stop]])
+        place = self.places[stop]
+        if place == target:
+            return 0.0
+        leg = self.leg_seconds[place].get(target)
+        return leg if leg is not None else self._search(place, target)[0]
+
+    def _search(self, start: int, goal: int) -> tuple[float, list[int]]:
+        """Return the seconds and the places of the shortest way, which is near as a rule."""
+        pending: list[tuple[float, int, int]] = [(0.0, start, -1)]
+        before: dict[int, int] = {}
+        while pending and len(before) < LOCAL_REACH:
+            seconds, place, last = heapq.heappop(pending)
+            if place in before:
+                continue
+            before[place] = last
+            if place == goal:
+                way = [goal]
+                while before[way[-1]] != start:
+                    way.append(before[way[-1]])
+                return seconds, way[::-1]
+            for other, leg in self.leg_seconds[place].items():
+                if other not in before:
+                    heapq.heappush(pending, (seconds + leg, other, place))
+        graph = self.graph
+        names = graph.route(graph.places[start], graph.places[goal])
+        return float(graph.row(start)[goal]), [graph.index[name] for name in names]
+
+    def hop(self, stop: int, target: int) -> int:
+        """Return the first stop on the way to a target."""
+        place = self.places[stop]
+        if target >= self.count or target in self.leg_seconds[place]:
+            return target
+        if not self.graph.has_all_pairs:
+            return self.path(place, target)[0]
+        found = self._hops.get((place, target))
+        if found is None:
+            ways, away = self.leg_seconds[place], self._shortest
+            found = min(ways, key=lambda other: ways[other] + away[other][target])
+            self._hops[place, target] = found
+        return found
+
+    def path(self, stop: int, target: int) -> list[int]:
+        """Return the stops on the way to a target, without the first."""
+        if target >= self.count:
+            return [target]
+        place = self.places[stop]
+        found = self._paths.get((place, target))
+        if found is None:
+            if target in self.leg_seconds[place]:
+                found = [target]
+            elif place == target or not self.graph.has_all_pairs:
+                found = [] if place == target else self._search(place, target)[1]
+            else:
+                hop = self.hop(place, target)
+                found = [hop, *self.path(hop, target)]
+            self._paths[place, target] = found
+        return found
+
+    def near(self, stop: int) -> list[int]:
+        """Return wanted places that are near a stop, at most `NEAR`, and the nearest station."""
+        place = self.places[stop]
+        found = self._near.get(place)
+        if found is None:
+            found = self._near[place] = self._nearest(place)
+        return found
+
+    def _nearest(self, place: int) -> list[int]:
+        wanted = set(self.wanted) - {place}
+        if self.graph.has_all_pairs:
+            both = self.graph.distances[place] + self.graph.distances[:, place]
+            order = np.argsort(both, kind='stable').tolist()
+            return [other for other in order if other in wanted][:NEAR]
+        found: list[int] = []
+        pending, done = [(0.0, place)], set[int]()
+        while pending and len(found) < NEAR:
+            seconds, other = heapq.heappop(pending)
+            if other in done:
+                continue
+            done.add(other)
+            if other in wanted:
+                found.append(other)
+            for after, leg in self.leg_seconds[other].items():
+                heapq.heappush(pending, (seconds + leg, after))
+        return found
+
+    # Rules.
 
     @cached_property
     def gates(self) -> list[int]:
         """For each place that is entered only when URGENT, where from; -1 for all others."""
         gates = []
-        for place, ways in enumerate(self.leg_seconds):
+        for place in range(self.count):
+            ways = self.leg_seconds[place]
             held = bool(ways) and all(self._held(place, other) for other in ways)
             gates.append(min(ways, key=lambda o: self.leg_seconds[o][place]) if held else -1)
         return gates
@@ -107,26 +246,20 @@ class RuleMap:
         A place that may be entered only when it is URGENT waits for the threshold and the leg to
         it. 0: there is none.
         """
-        held = [(gate, place) for place, gate in enumerate(self.gates) if gate >= 0]
-        legs = [self.leg_seconds[gate][place] for gate, place in held]
-        return self.threshold + max(legs) + HALF_OPEN if legs else 0.0
+        held = [
+            self.thresholds[place] + self.leg_seconds[self.gates[place]][place] + HALF_OPEN
+            for place in self.wanted
+            if self.gates[place] >= 0 and math.isfinite(self.thresholds[place])
+        ]
+        return max(held, default=0.0)
 
     @cached_property
     def least_round(self) -> float:
         """Seconds that no lawful round is known to fall below."""
+        if self.energy is not None or not self.is_even:
+            return 0.0
         tour = self.graph.tour
         return max(self.least_period, tour.length if tour.find_bound is None else 0.0)
-
-    @cached_property
-    def near(self) -> list[list[int]]:
-        """The places that are near each place, there and back, at most `NEAR`."""
-        both = self.graph.distances + self.graph.distances.T
-        np.fill_diagonal(both, np.inf)
-        count = min(NEAR, len(both) - 1)
-        if count < 1:
-            return [[] for _ in both]
-        near: list[list[int]] = np.argpartition(both, count - 1, axis=1)[:, :count].tolist()
-        return near
 
     @cached_property
     def mean_leg(self) -> float:
@@ -134,55 +267,20 @@ class RuleMap:
         legs = [seconds for ways in self.leg_seconds for seconds in ways.values()]
         return sum(legs) / max(1, len(legs))
 
-    def length(self, targets: Sequence[int]) -> float:
-        """Return the seconds that a closed round over the targets takes."""
-        away = self.away
-        return sum(away[a][b] for a, b in zip(targets, (*targets[1:], targets[0]), strict=True))
-
-    def hop(self, place: int, target: int) -> int:
-        """Return the first place on the way to a target."""
-        key = place * self.count + target
-        found = self._hops.get(key)
-        if found is None:
-            ways, away = self.leg_seconds[place], self._shortest
-            found = target
-            if target not in ways:
-                found = min(ways, key=lambda other: ways[other] + away[other][target])
-            self._hops[key] = found
-        return found
-
-    def path(self, place: int, target: int) -> list[int]:
-        """Return the places on the way to a target, without the first."""
-        key = place * self.count + target
-        found = self._paths.get(key)
-        if found is None:
-            found = self._paths[key] = []
-            while place != target:
-                place = self.hop(place, target)
-                found.append(place)
-        return found
-
-    def laps(self, walk: Sequence[int]) -> Iterator[tuple[int, ...]]:
-        """Yield the stretches at the end of a walk that visit every place, as targets."""
-        end, last, begun = walk[-4 * self.count :], dict[int, int](), -1
-        for step, place in enumerate(end):
-            last[place] = step
-            start = min(last.values())
-            if len(last) == self.count and start > begun:
-                begun = start
-                yield tuple(end[start : step + 1])
-
     def allowed(self, state: State) -> list[int]:
         """Return the neighbours that the rules allow; empty: there are none at all."""
-        seen, ranks, urgent = state.seen, self.ranks, self.urgent
-        limit = state.now - self.overdue
+        seen, ranks, urgent, overdue = state.seen, self.ranks, self.urgent, self.overdue_after
+        now = state.now
         best, found = NEVER + 1, []
         ways: Iterable[int] = self.leg_seconds[state.place]
         if state.avoided:
             ways = [other for other in ways if other not in state.avoided] or ways
+        if self.energy:
+            within = self.energy.within_range
+            ways = [other for other in ways if within[other]]
         for other in ways:
             rank = ranks[other]
-            if rank > urgent and seen[other] < limit:
+            if rank > urgent and now - seen[other] > overdue[other]:
                 rank = urgent
             if rank < best:
                 best, found = rank, [other]
@@ -190,17 +288,78 @@ class RuleMap:
                 found.append(other)
         return found
 
+    # Rounds.
 
-def rule_map(world: World) -> RuleMap:
-    """Return the map of a world with its rules."""
-    rules = world.rules
-    ranks = []
-    for place in world.graph.places:
-        classes = world.classes.get(place, frozenset()) - {URGENT}
-        positions = [rank for rank, name in enumerate(rules) if name in classes]
-        ranks.append(min(positions, default=len(rules)))
-    urgent = rules.index(URGENT) if URGENT in rules else NEVER
-    return RuleMap(world.graph, world.threshold, ranks, urgent)
+    def length(self, targets: Sequence[int]) -> float:
+        """Return the seconds that a closed round over the targets takes, charging left aside."""
+        away = self.away
+        return sum(away[a][b] for a, b in zip(targets, (*targets[1:], targets[0]), strict=True))
+
+    def laps(self, walk: Sequence[int]) -> Iterator[tuple[int, ...]]:
+        """Yield the stretches at the end of a walk that visit every place, as targets."""
+        end, last, begun = walk[-4 * self.count :], dict[int, int](), -1
+        for step, stop in enumerate(end):
+            last[self.places[stop]] = step
+            start = min(last.values())
+            if len(last) >= len(self.wanted) and start > begun:
+                begun = start
+                yield tuple(end[start : step + 1])
+
+    # Charge.
+
+    def affords(self, state: State, target: int) -> bool:
+        """Return whether the charge lets the robot go to a place and home from there."""
+        energy = self.energy
+        if energy is None or target >= self.count:
+            return True
+        left = state.level - energy.draw * self.away[state.place][target]
+        return bool(left >= energy.least[target])
+
+    def charge_from(self, place: int) -> int:
+        """Return the stop of the nearest station; -1: there is none."""
+        home = self.energy.home[place] if self.energy else -1
+        return self.count + home if home >= 0 else -1
+
+    def guarded(self, state: State, stop: int) -> int:
+        """Return the choice, or a charge where the charge does not allow it.
+
+        The robot's own place when it is at a station and full: then nothing helps.
+        """
+        if stop == state.place or self.affords(state, stop):
+            return stop
+        charge = self.charge_from(state.place)
+        energy = self.energy
+        assert energy is not None
+        if charge < 0 or (state.level >= energy.full and self.places[charge] == state.place):
+            return state.place
+        return charge
+
+    def go(self, state: State, stop: int) -> None:
+        """Move a state to a stop: time passes and the level falls; at a station it is charged."""
+        seconds = self.leg_seconds[state.place].get(stop, math.inf)
+        energy = self.energy
+        if stop >= self.count:
+            assert energy is not None
+            number = stop - self.count
+            seconds = energy.drive[number][state.place]
+            state.level -= energy.draw * seconds
+            seconds += energy.charge_seconds(number, state.level)
+            state.level = max(state.level, energy.full)
+        elif energy:
+            state.level -= energy.draw * seconds
+        state.now += seconds
+        state.place = self.places[stop]
+
+
+class _FoundWays(dict[int, float]):
+    """Seconds from one stop of a large map to others, found when they are first asked for."""
+
+    def __init__(self, rules: RuleMap, stop: int) -> None:
+        self._rules, self._stop = rules, stop
+
+    def __missing__(self, target: int) -> float:
+        seconds = self[target] = self._rules.seconds_between(self._stop, target)
+        return seconds
 
 
 @dataclass
@@ -214,6 +373,7 @@ class State:
         met: Whether the robot came to each place since the patrol began.
         avoided: Places that could not be reached lately: they count only when no other is open.
         position: How far the robot is on the course that it follows.
+        level: Of the charge, percent.
     """
 
     place: int
@@ -222,15 +382,16 @@ class State:
     met: list[bool]
     avoided: frozenset[int] = frozenset()
     position: int = 0
+    level: float = 100.0
 
     def fresh(self) -> State:
         """Return a copy at the beginning of a course, in which every place can be reached."""
-        return State(self.place, self.now, self.seen.copy(), self.met.copy())
+        return State(self.place, self.now, self.seen.copy(), self.met.copy(), level=self.level)
 
 
 Choice = Callable[[RuleMap, State], int]
-"""Returns a neighbour that the rules allow; the robot's own place when there is none. It may change
-the position, and goes on equally from an equal state."""
+"""Returns a stop: a neighbour that the rules allow, or a charge; the robot's own place when there
+is none. It may change the position, and goes on equally from an equal state."""
 
 
 @dataclass(frozen=True, order=True)
@@ -238,21 +399,25 @@ class Outcome:
     """What a way to choose comes to; less is better.
 
     Attributes:
-        settled: The longest wait from visit to visit, seconds.
-        first: The longest wait, that before a place's first visit included, seconds.
-        walk: The places that were entered.
+        settled: The longest wait from visit to visit, less what the place has more time, seconds.
+        first: The same with the waits before a place's first visit, seconds.
+        waits: For each place the longest wait, the last one as far as it was looked at, seconds.
+        walk: The stops that were entered.
         back: From where on the walk repeats itself; None: that was not found.
+        cut: Whether the simulation was ended before its horizon.
     """
 
     settled: float
     first: float
+    waits: Sequence[float] = field(default=(), compare=False)
     walk: Sequence[int] = field(default=(), compare=False)
     back: int | None = field(default=None, compare=False)
+    cut: bool = field(default=False, compare=False)
 
-    def repeated_from(self, count: int) -> int | None:
+    def repeated_from(self, rules: RuleMap) -> int | None:
         """Return from where on the walk may be repeated; None: it does not visit all places."""
-        last = {place: step for step, place in enumerate(self.walk)}
-        if self.back is not None or len(last) < count:
+        last = {rules.places[stop]: step for step, stop in enumerate(self.walk)}
+        if self.back is not None or any(place not in last for place in rules.wanted):
             return self.back
         return min(last.values())
 
@@ -263,6 +428,7 @@ def roll_out(
     state: State,
     horizon: float,
     stop: float = math.inf,
+    late: Callable[[], bool] = lambda: False,
 ) -> Outcome:
     """Simulate a patrol until the state comes back, the horizon, or a wait that is too long.
 
@@ -272,37 +438,60 @@ def roll_out(
         state: Where to begin; it is not changed.
         horizon: Seconds at most.
         stop: A wait from visit to visit that is too long, seconds.
+        late: Whether there is no time left; asked now and then.
     """
     at = state.fresh()
-    seen, met, legs = at.seen, at.met, rules.leg_seconds
+    seen, met, slack, places = at.seen, at.met, rules.slack, rules.places
     end = at.now + horizon
     settled = first = 0.0
+    waits = [0.0] * rules.count
     walk: list[int] = []
-    anchor = min(range(rules.count), key=lambda place: len(legs[place]))
+    # Comparing all ages at each step would be slow: only visits of one place are compared.
+    anchor = min(rules.wanted, key=lambda place: len(rules.leg_seconds[place]), default=at.place)
     states: dict[tuple[float, ...], int] = {}
-    back = None
+    back, cut, most = None, False, MOST_MOVES + MOVES_A_PLACE * rules.count
     while at.now < end and settled <= stop:
-        place = choose(rules, at)
-        if place == at.place:
+        if len(walk) >= most or (len(walk) % LOOK_EVERY == 0 and late()):
+            cut = True
             break
-        at.now += legs[at.place][place]
-        wait = at.now - seen[place]
-        at.place, seen[place] = place, at.now
-        walk.append(place)
+        choice = rules.guarded(at, choose(rules, at))
+        if choice == at.place:  # It stays there for good.
+            at.now = end
+            break
+        rules.go(at, choice)
+        walk.append(choice)
+        place = places[choice]
+        wait, seen[place] = at.now - seen[place], at.now
+        waits[place] = max(waits[place], wait)
         if met[place]:
-            settled = max(settled, wait)
+            settled = max(settled, wait - slack[place])
         else:
             met[place] = True
-            first = max(first, wait)
+            first = max(first, wait - slack[place])
         if place == anchor:
-            key = (at.position, *(round(at.now - last, 3) for last in seen))
+            key = (at.position, round(at.level, 2), *(round(at.now - last, 3) for last in seen))
             if key in states:
                 back = states[key]
                 break
             states[key] = len(walk)
-    else:
-        settled = max(settled, at.now - min(seen))
-    return Outcome(settled, max(first, settled), walk, back)
+    if back is None:
+        waits = [max(wait, at.now - last) for wait, last in zip(waits, seen, strict=True)]
+        ends = (at.now - seen[place] - slack[place] for place in rules.wanted)
+        settled = max(settled, *ends, 0.0)
+    return Outcome(settled, max(first, settled), waits, walk, back, cut)
+
+
+def rule_map(world: World, energy: Energy | None = None) -> RuleMap:
+    """Return the map of a world with its rules."""
+    rules, index = world.rules, world.graph.index
+    ranks = []
+    for place in world.graph.places:
+        classes = world.classes.get(place, frozenset()) - {URGENT}
+        positions = [rank for rank, name in enumerate(rules) if name in classes]
+        ranks.append(min(positions, default=len(rules)))
+    urgent = rules.index(URGENT) if URGENT in rules else NEVER
+    own = {index[p]: seconds for p, seconds in world.own_thresholds.items() if p in index}
+    return RuleMap(world.graph, world.threshold, ranks, urgent, own, energy)
 
 
 def oldest(rules: RuleMap, state: State) -> int:
@@ -318,6 +507,6 @@ def lookahead(rules: RuleMap, state: State) -> int:
         return allowed[0] if allowed else state.place
     idle = state.now - np.array(state.seen)
     idle[state.place] = -np.inf
-    legs, away = rules.leg_seconds[state.place], rules.graph.distances
-    worth = {p: round(float((idle - away[p]).max()) - legs[p], 6) for p in allowed}
+    legs, graph = rules.leg_seconds[state.place], rules.graph
+    worth = {p: round(float((idle - graph.row(p)).max()) - legs[p], 6) for p in allowed}
     return max(allowed, key=lambda place: (worth[place], -state.seen[place], -place))

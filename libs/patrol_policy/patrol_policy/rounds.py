@@ -1,11 +1,13 @@
 """Searches a closed round through all places that the rules let a robot walk again and again.
 
-A round is a cyclic list of targets; the robot takes the shortest way from each to the next. Walked
-again and again it is periodic: how long each place went unvisited at each step is known, and so is
-whether the rules allow the step. The search makes the round short and lawful: the cost of a round
-is its length plus a penalty for each step that the rules forbid, and simulated annealing changes
-the round where that costs little. It begins with a short tour, which usually needs a few changes:
-a place beside the way that the rules would force the robot into is taken along.
+A round is a cyclic list of targets, charges among them; the robot takes the shortest way from each
+to the next. Walked again and again it is periodic: how long each place went unvisited at each step
+is known, what is left of the charge, and so is whether the rules allow the step. The search makes
+the waits on the round short and the round lawful: its cost is the longest wait plus a penalty for
+each step that the rules or the charge forbid, and simulated annealing (Kirkpatrick et al., 1983)
+changes the round where that costs little. It begins with a short tour, which usually needs a few
+changes: a place beside the way that the rules would force the robot into is taken along, a charge
+is put elsewhere.
 
 Where places may be entered only when they are URGENT, a round can be shorter than they allow. Then
 the robot waits by going to and fro, or the round is filled: another search adds the visits that
@@ -18,9 +20,11 @@ import itertools
 import math
 import random
 from bisect import bisect_right
-from collections.abc import Iterable
+from collections import Counter
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
+from patrol_policy.battery import WORTH_CHARGING
 from patrol_policy.rollout import RuleMap
 
 PENALTY = 4.0
@@ -29,6 +33,11 @@ HEAT, FILLING_HEAT = 0.04, 0.3
 """The first temperature of an annealing, in penalties; of one that fills rounds."""
 FILLING = 0.1
 """Part of the changes that add a visit where rounds are filled."""
+CHARGES = 0.12
+"""Part of the changes that add or move a charge where the battery matters."""
+EMPTY = 3.0
+"""What it costs to come home with nothing left, in penalties, and once more for each mean leg by
+which the charge is too short."""
 FIRST_CYCLE = 200_000.0
 """Work of the first annealing; each later one takes twice as much as the one before."""
 ALL_WORK = 10e6
@@ -55,14 +64,19 @@ class Round:
     """A cyclic list of targets.
 
     Attributes:
-        targets: Every place at least once.
-        length: Seconds for walking it once, with the time that it waits for places to be URGENT.
+        targets: Stops; every wanted place at least once.
+        length: Seconds for walking it once, with charging and with the time that it waits for
+            places to be URGENT.
+        wait: The longest wait on it, less what the place has more time than others, seconds.
         breaches: The steps that the rules forbid.
+        short: By how much the charge is too short at the worst places, seconds in all.
     """
 
     targets: tuple[int, ...]
     length: float
+    wait: float = 0.0
     breaches: tuple[Breach, ...] = ()
+    short: float = 0.0
 
 
 class RoundSearch:
@@ -85,7 +99,8 @@ class RoundSearch:
         self._rules = rules
         self._least = 0.0 if fills else rules.least_period
         self._heat = FILLING_HEAT if fills else HEAT
-        self._filling = FILLING if fills else 0.0
+        # A place with less time than others is visited more than once.
+        self._filling = FILLING if fills or not rules.is_even else 0.0
         self._draw = random.Random(0)
         self._penalty = PENALTY * rules.mean_leg
         self.work = 0.0
@@ -95,40 +110,98 @@ class RoundSearch:
         self._cycle, self._cycle_end = FIRST_CYCLE / 2.0, 0.0
 
     def cost(self, found: Round) -> float:
-        """Return the length of a round with the penalties for what the rules forbid, seconds."""
-        return found.length + self._penalty * len(found.breaches)
+        """Return the longest wait of a round with the penalties for what is forbidden, seconds."""
+        cost = found.wait + self._penalty * len(found.breaches)
+        if found.short > 0.0:
+            cost += EMPTY * self._penalty * (1.0 + found.short / self._rules.mean_leg)
+        return cost
 
     def judged(self, targets: tuple[int, ...], limit: float = math.inf) -> Round:
-        """Return a round with its length and the steps that the rules forbid.
+        """Return a round with its length, waits and the steps that the rules forbid.
 
         Args:
             targets: Of the round.
             limit: Of the cost; a round that costs more may be judged in part only.
         """
-        walk, ends, times = self._walked(targets)
+        walk, ends = self._walked(targets)
+        times, short = self._timed(walk)
         length = max(times[-1] if times else 0.0, self._least)
-        most = (limit - length) / max(self._penalty, 1e-9)
+        wait = length
+        if not self._rules.is_even:
+            wait = self._longest_wait(walk, times, length)
+        most = (limit - wait) / max(self._penalty, 1e-9)
         breaches = self._breaches(walk, ends, times, length, most)
-        return Round(targets, length, tuple(breaches))
+        return Round(targets, length, wait, tuple(breaches), short)
 
-    def _walked(self, targets: tuple[int, ...]) -> tuple[list[int], list[int], list[float]]:
-        """Return the places that a round enters, where in them each target is, and when."""
+    def _walked(self, targets: tuple[int, ...]) -> tuple[list[int], list[int]]:
+        """Return the stops that a round enters, and where in them each target is."""
         rules = self._rules
         walk: list[int] = []
         ends: list[int] = []
-        place = targets[-1]
+        stop = targets[-1]
         for target in targets:
-            if target != place:
-                walk += rules.path(place, target)
+            if target != stop:
+                walk += rules.path(stop, target)
             ends.append(len(walk))
-            place = target
+            stop = target
         self.work += STEP_WORK * len(walk)
-        times, now = [], 0.0
-        for other in walk:
-            now += rules.leg_seconds[place][other]
+        return walk, ends
+
+    def _timed(self, walk: list[int]) -> tuple[list[float], float]:
+        """Return when each stop of a walk is left, and by how much the charge is too short.
+
+        The level is followed from the last charge on the round, after which it is full.
+        """
+        rules, energy, count = self._rules, self._rules.energy, self._rules.count
+        legs, now, times = rules.leg_seconds, 0.0, []
+        if not walk:
+            return [], 0.0
+        before = walk[-1]
+        if energy is None:
+            for stop in walk:
+                now += legs[before][stop]
+                times.append(now)
+                before = stop
+            return times, 0.0
+        drives, least, full, draw = energy.drive, energy.least, energy.full, energy.draw
+        places = rules.places
+        seconds = []
+        for stop in walk:
+            if stop < count:
+                seconds.append(legs[before][stop])
+            else:
+                seconds.append(drives[stop - count][places[before]])
+            before = stop
+        last = max((step for step, stop in enumerate(walk) if stop >= count), default=-1)
+        if last < 0:
+            return list(itertools.accumulate(seconds)), sum(seconds)
+        level = full - draw * sum(seconds[last + 1 :])
+        # Of several charges none is a mere excuse for driving without exploring.
+        charges = sum(stop >= count for stop in walk)
+        most = full - WORTH_CHARGING if charges > 1 else math.inf
+        lacking = 0.0
+        for stop, passed in zip(walk, seconds, strict=True):
+            level -= draw * passed
+            now += passed
+            if stop >= count:
+                lacking += max(0.0, -level, level - most)
+                now += energy.charge_seconds(stop - count, max(level, 0.0))
+                level = full
+            elif level < least[stop]:
+                lacking += least[stop] - level
             times.append(now)
-            place = other
-        return walk, ends, times
+        return times, lacking / draw
+
+    def _longest_wait(self, walk: list[int], times: list[float], length: float) -> float:
+        """Return the longest wait on a periodic walk, less the slack of the place."""
+        places, slack = self._rules.places, self._rules.slack
+        seen = {places[stop]: then - length for stop, then in zip(walk, times, strict=True)}
+        longest = 0.0
+        for stop, then in zip(walk, times, strict=True):
+            place = places[stop]
+            longest = max(longest, then - seen[place] - slack[place])
+            seen[place] = then
+        return longest
 
     def _breaches(
         self, walk: list[int], ends: list[int], times: list[float], length: float, most: float
@@ -137,25 +210,34 @@ class RoundSearch:
         if not walk:
             return []
         rules = self._rules
-        legs, ranks, urgent = rules.leg_seconds, rules.ranks, rules.urgent
+        legs, ranks, urgent, places = rules.leg_seconds, rules.ranks, rules.urgent, rules.places
+        overdue, count = rules.overdue_after, rules.count
+        within = rules.energy.within_range if rules.energy else None
         # When each place was visited last, for the first step: in the round before.
-        seen = {other: then - length for other, then in zip(walk, times, strict=True)}
-        breaches, now, place = list[Breach](), 0.0, walk[-1]
+        seen = {places[stop]: then - length for stop, then in zip(walk, times, strict=True)}
+        breaches, now, place = list[Breach](), 0.0, places[walk[-1]]
         seen[place] = 0.0
-        for step, (other, then) in enumerate(zip(walk, times, strict=True)):
-            limit = now - rules.overdue
-            rank = ranks[other]
-            if rank > urgent and seen[other] < limit:
+        for step, (stop, then) in enumerate(zip(walk, times, strict=True)):
+            if stop >= count:
+                place, now = places[stop], then
+                seen[place] = then
+                continue
+            rank = ranks[stop]
+            if rank > urgent and now - seen[stop] > overdue[stop]:
                 rank = urgent
             if rank:
                 for instead in legs[place]:
-                    if ranks[instead] < rank or (urgent < rank and seen[instead] < limit):
+                    if within and not within[instead]:
+                        continue
+                    if ranks[instead] < rank or (
+                        urgent < rank and now - seen.get(instead, now) > overdue[instead]
+                    ):
                         breaches.append(Breach(bisect_right(ends, step), instead))
                         break
                 if len(breaches) > most:
                     break
-            seen[other] = now = then
-            place = other
+            seen[stop] = now = then
+            place = stop
         return breaches
 
     @property
@@ -164,7 +246,9 @@ class RoundSearch:
         best = self.best
         if self.work > ALL_WORK or len(best.targets) < 4:
             return True
-        return not best.breaches and best.length <= self._rules.least_round + 1e-6
+        if best.breaches or best.short > 0.0:
+            return False
+        return best.wait <= self._rules.least_round + 1e-6
 
     def improve(self, work: float) -> None:
         """Search on."""
@@ -180,8 +264,13 @@ class RoundSearch:
             heat = self._heat * self._penalty * max(0.0, cooling)
             limit = self._cost + 6.0 * heat
             changes = self._changes
-            fill = self._filling and self._draw.random() < self._filling
-            targets = changes.doubled(limit) if fill else changes.one(limit)
+            chance = self._draw.random()
+            if chance < self._filling:
+                targets = changes.doubled(limit)
+            elif self._rules.energy and chance < self._filling + CHARGES:
+                targets = changes.charged()
+            else:
+                targets = changes.one(limit)
             if targets is None:
                 continue
             found = self.judged(targets, limit)
@@ -220,10 +309,14 @@ class RoundChanges:
             back.append(back[-1] + away[after][before])
         self._there, self._back = there, back
         self._length = there[-1] + away[targets[-1]][targets[0]]
+        # What a change adds to the length says nothing of the waits where thresholds differ.
+        self._has_limit = rules.is_even
 
     def one(self, limit: float) -> tuple[int, ...] | None:
         """Return the targets with one random change; None: it would be longer than the limit."""
         draw, breaches = self._draw, self._breaches
+        if not self._has_limit:
+            limit = math.inf
         choice = draw.random()
         if breaches and choice < 0.3:
             return self._taken_along(breaches[draw.randrange(len(breaches))], limit)
@@ -233,7 +326,10 @@ class RoundChanges:
         if count < 4:
             return None
         first = draw.randrange(count)
-        beside = self._at[draw.choice(self._rules.near[self._targets[first]])]
+        near = self._rules.near(self._targets[first])
+        if not near:
+            return None
+        beside = self._at.get(draw.choice(near), first)
         if choice < 0.7:
             return self._turned_round(min(first, beside), max(first, beside), limit)
         return self._moved(first, beside, limit)
@@ -248,7 +344,9 @@ class RoundChanges:
             if self._length + added > limit:
                 return None
             return (*targets[:position], place, *targets[position:])
-        old = self._at[place]
+        old = self._at.get(place)
+        if old is None:  # It is visited by charging there.
+            return (*targets[:position], place, *targets[position:])
         rest = targets[:old] + targets[old + 1 :]
         position -= old < position
         return (*rest[:position], place, *rest[position:])
@@ -258,23 +356,42 @@ class RoundChanges:
         targets, away = self._targets, self._rules.away
         position = self._draw.randrange(len(targets))
         before, after = targets[position - 1], targets[position]
-        if not self._rules.near[after]:
+        near = self._rules.near(after)
+        if not near:
             return None
-        place = self._draw.choice(self._rules.near[after])
+        place = self._draw.choice(near)
+        if not self._has_limit:
+            limit = math.inf
         added = away[before][place] + away[place][after] - away[before][after]
         if self._length + added > limit:
             return None
         return (*targets[:position], place, *targets[position:])
 
+    def charged(self) -> tuple[int, ...] | None:
+        """Return the targets with one more charge, or one that was put elsewhere."""
+        targets, draw, rules = self._targets, self._draw, self._rules
+        charges = [k for k, target in enumerate(targets) if target >= rules.count]
+        if charges and draw.random() < 0.5:
+            gone = draw.choice(charges)
+            targets = targets[:gone] + targets[gone + 1 :]
+        position = draw.randrange(len(targets))
+        stop = rules.charge_from(rules.places[targets[position - 1]])
+        assert rules.energy is not None
+        if draw.random() < 0.2:
+            stop = rules.count + draw.randrange(len(rules.energy.stations))
+        return (*targets[:position], stop, *targets[position:])
+
     def _without_double(self) -> tuple[int, ...] | None:
-        """Leave out one of the targets that stand twice."""
-        targets = self._targets
-        if len(targets) == self._rules.count:
+        """Leave out one of the targets that stand twice, or a charge."""
+        targets, places, count = self._targets, self._rules.places, self._rules.count
+        times = Counter(places[target] for target in targets)
+        twice = [k for k, target in enumerate(targets) if times[places[target]] > 1]
+        charges = sum(target >= count for target in targets)
+        if charges == 1:
+            twice = [k for k in twice if targets[k] < count]
+        if not twice:
             return None
-        twice = [k for k, target in enumerate(targets) if self._at[target] != k]
         position = self._draw.choice(twice)
-        if self._draw.random() < 0.5:
-            position = self._at[targets[position]]
         return targets[:position] + targets[position + 1 :]
 
     def _turned_round(self, first: int, last: int, limit: float) -> tuple[int, ...] | None:
@@ -322,3 +439,28 @@ class RoundChanges:
         if where > last:
             where -= size
         return rest[:where] + stretch + rest[where:]
+
+
+def with_charges(rules: RuleMap, targets: Sequence[int]) -> tuple[int, ...]:
+    """Return a round with charges where they are needed: before the charge is too short.
+
+    Args:
+        rules: The map; its energy is known.
+        targets: The round without charges.
+    """
+    energy = rules.energy
+    assert energy is not None
+    begin = min(range(len(targets)), key=lambda k: energy.home_seconds[targets[k]])
+    ordered = [*targets[begin:], *targets[:begin]]
+    found: list[int] = []
+    stop, used = rules.charge_from(ordered[0]), 0.0
+    for target in ordered:
+        used += rules.away[stop][target]
+        if found and energy.full - energy.draw * used < energy.least[target]:
+            charge = rules.charge_from(rules.places[stop])
+            found.append(charge)
+            used = rules.away[charge][target]
+        found.append(target)
+        stop = target
+    found.append(rules.charge_from(rules.places[stop]))
+    return tuple(found)

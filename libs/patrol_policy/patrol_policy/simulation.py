@@ -7,23 +7,19 @@ and what the tests search for mistakes; thousands of moves take a second.
 from __future__ import annotations
 
 import random
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
-from patrol_policy.battery_reserve import Battery, BatteryLimits, Draw
-from patrol_policy.decision import (
-    RECHARGE,
-    URGENT,
-    DecisionSettings,
-    Rules,
-    decide,
-    why_charge,
-)
+from patrol_policy.battery import Battery, BatteryLimits, ChargeCurve, Draw
+from patrol_policy.decision import QUIET, RECHARGE, URGENT, DecisionSettings, Rules, decide
 from patrol_policy.graph import PatrolGraph
+from patrol_policy.hours import NO_CALENDAR, Calendar
 from patrol_policy.rollout import HALF_OPEN
 from patrol_policy.world import Decision, PolicyMemory, World
 
 CORRIDOR, ROOM = 'CORRIDOR', 'ROOM'
+QUIET_STEP = 300.0
+"""Seconds that the robot stays at its station before it decides anew."""
 
 
 @dataclass(frozen=True)
@@ -34,7 +30,8 @@ class SimulatedBattery:
         draw: Percent per second away from the station.
         charge: Percent per second at the station.
         limits: When to charge.
-        keeps_reserve: Whether the way home counts, or only the fixed level.
+        keeps_reserve: Whether the draw is known, so that charging is planned and the way home
+            counts, or only the fixed level.
     """
 
     draw: float
@@ -55,6 +52,7 @@ class PatrolRun:
         recharges: Times charged.
         strandings: Times the battery was empty away from the station.
         rules: Decisions by rule.
+        waits: The longest time each place went unvisited, seconds.
     """
 
     longest: float = 0.0
@@ -64,6 +62,7 @@ class PatrolRun:
     recharges: int = 0
     strandings: int = 0
     rules: dict[str, int] = field(default_factory=dict)
+    waits: dict[str, float] = field(default_factory=dict)
 
 
 @dataclass
@@ -77,6 +76,10 @@ class Patrol:
         threshold: Seconds after which a place is URGENT.
         station: Where the robot starts and charges.
         battery: None: it never gets empty.
+        own_thresholds: Of places that differ.
+        calendar: The hours of the places.
+        stations: Where it can charge; default: where it starts.
+        began: When it starts, seconds since 1970.
     """
 
     graph: PatrolGraph
@@ -85,20 +88,24 @@ class Patrol:
     threshold: float
     station: str
     battery: SimulatedBattery | None = None
+    own_thresholds: Mapping[str, float] = field(default_factory=dict)
+    calendar: Calendar = NO_CALENDAR
+    stations: tuple[str, ...] = ()
+    began: float = 0.0
     generator: random.Random = field(default_factory=lambda: random.Random(1))
 
     def __post_init__(self) -> None:
         self.place = self.station
-        self.now = 0.0
+        self.now = self.began
         self.level = 100.0
         self.target: str | None = None
-        self.visited_at = dict.fromkeys(self.graph.places, 0.0)
+        self.visited_at = dict.fromkeys(self.graph.places, self.began)
         self._memory = PolicyMemory(self.generator)
-        self._settings = DecisionSettings(
+        self.settings = DecisionSettings(
             self.rules,
             self.policy,
             self.threshold,
-            (self.station,),
+            self.stations or (self.station,),
             self.battery.limits if self.battery else BatteryLimits(),
         )
         self._seen: set[str] = set()
@@ -115,7 +122,8 @@ class Patrol:
         urgent = {
             place: self._classes[place] | {URGENT}
             for place in reachable
-            if self.now - self.visited_at[place] > self.threshold + HALF_OPEN / 2.0
+            if self.now - self.visited_at[place]
+            > self.own_thresholds.get(place, self.threshold) + HALF_OPEN / 2.0
         }
         return World(
             place=self.place,
@@ -127,16 +135,25 @@ class Patrol:
             threshold=self.threshold,
             target=self.target,
             rules=self.rules.classes,
+            own_thresholds=self.own_thresholds,
+            since=self.began,
+            openings=self.calendar.at(self.now),
             memory=self._memory,
         )
 
     def step(self) -> Decision:
         """Charge if need be, or move to the next place; return the decision behind it."""
         world = self.world()
-        decision = decide(world, self._battery(world), self._settings)
-        self._go(decision.place)
-        if decision.rule == RECHARGE:
-            self._charge()
+        decision = decide(world, self.known_battery(), self.settings)
+        if decision.rule == QUIET and decision.place == self.place:
+            self.now += min(QUIET_STEP, world.openings.quiet_for or QUIET_STEP)
+            self.visited_at[self.place] = self.now
+        elif decision.rule in (RECHARGE, QUIET):
+            self._go(decision.place, self._drive_seconds(decision.place))
+            if decision.rule == RECHARGE:
+                self._charge()
+        else:
+            self._go(decision.place, self.graph.move(self.place, decision.place))
         self.target = decision.target
         self.run.rules[decision.rule] = self.run.rules.get(decision.rule, 0) + 1
         return decision
@@ -147,18 +164,24 @@ class Patrol:
             yield self.step()
         for place in self.graph.places:
             self._count_gap(place)
-        self.run.mean = self._area / (self.now * len(self.graph.places))
+        self.run.mean = self._area / ((self.now - self.began) * len(self.graph.places))
 
-    def _battery(self, world: World) -> Battery:
+    def known_battery(self) -> Battery:
+        """Return what the robot knows of its battery."""
         if self.battery is None:
             return Battery()
-        draw = Draw(self.battery.draw) if self.battery.keeps_reserve else Draw()
-        battery = Battery(self.level, draw=draw)
-        charged = self.place == self.station and self.level >= 99.0
-        return Battery() if charged and why_charge(world, battery, self._settings) else battery
+        if not self.battery.keeps_reserve:
+            return Battery(self.level)
+        curve = ChargeCurve.even(self.battery.charge)
+        curves = dict.fromkeys(self.settings.recharge_rooms, curve)
+        return Battery(self.level, draw=Draw(self.battery.draw), curves=curves)
 
-    def _go(self, place: str) -> None:
-        seconds = self.graph.move(self.place, place)
+    def _drive_seconds(self, place: str) -> float:
+        """Return the seconds to a station; nothing is explored on the way."""
+        seconds, _ = self.graph.drive_home([place])
+        return seconds[self.graph.index[self.place]]
+
+    def _go(self, place: str, seconds: float) -> None:
         self.now += seconds
         if self.battery is not None:
             self.level -= self.battery.draw * seconds
@@ -175,10 +198,13 @@ class Patrol:
         wanted = self.battery.limits.stop_recharge
         self.now += max(0.0, wanted - self.level) / self.battery.charge
         self.level = max(self.level, wanted)
+        self._count_gap(self.place)
+        self.visited_at[self.place] = self.now
         self.run.recharges += 1
 
     def _count_gap(self, place: str) -> None:
         gap = self.now - self.visited_at[place]
+        self.run.waits[place] = max(self.run.waits.get(place, 0.0), gap)
         self.run.longest = max(self.run.longest, gap)
         if place in self._seen:
             self.run.settled = max(self.run.settled, gap)

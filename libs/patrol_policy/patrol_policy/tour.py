@@ -12,8 +12,10 @@ the mean of both directions, in its shorter sense. All functions are determinist
 
 from __future__ import annotations
 
+import heapq
+import math
 import random
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -28,6 +30,12 @@ NEIGHBOURS = 12
 """How many nearest places each place is tried beside when a tour is improved."""
 ASCENT_STEPS = 150
 """Steps of the subgradient ascent that raises the lower bound."""
+DENSE_BLOCK_UP_TO = 1500
+"""The largest block of a map, in places, for which all distances are kept."""
+LOCAL_REACH = 120
+"""Over how many places a way is searched when the tour of a larger block is improved."""
+LARGE_STEPS = 60_000
+"""How many places are looked at when the tour of a larger block is improved."""
 KICKS = 600_000
 """How often a good tour is disturbed and improved again, times its places; at most `MOST_KICKS`."""
 MOST_KICKS = 4000
@@ -71,31 +79,133 @@ def shortest_tour(distances: Matrix) -> Tour:
     return Tour(order, length, lambda: _one_tree_bound(np.minimum(distances, distances.T), length))
 
 
-def tour_over_blocks(distances: Matrix, blocks: Iterable[Sequence[int]]) -> Tour:
+def tour_over_blocks(ways: Sequence[Mapping[int, float]], blocks: Iterable[Sequence[int]]) -> Tour:
     """Return the tour of a map from the tours of its biconnected blocks.
 
     A closed walk through the whole map passes from block to block only at the places they share,
-    so it splits there into one closed walk for each block: the shortest tours add up.
+    so it splits there into one closed walk for each block: the shortest tours add up. A shortest
+    way between two places of a block does not leave it, so each block is looked at alone.
 
     Args:
-        distances: Shape (n, n), shortest ways on the map.
+        ways: For each place, the seconds to each neighbour.
         blocks: The biconnected components of the map, as indices.
     """
     rings: list[list[int]] = []
     at: dict[int, list[int]] = {}
     tours = []
     for members in blocks:
-        chosen = np.asarray(members, dtype=np.intp)
-        tour = shortest_tour(np.ascontiguousarray(distances[np.ix_(chosen, chosen)]))
+        tour = _tour_of_block(ways, members)
         tours.append(tour)
         for place in members:
             at.setdefault(place, []).append(len(rings))
         rings.append([members[position] for position in tour.order])
     order = tuple(_joined(rings, at))
-    length = tour_length(distances, order)
+    length = sum(tour.length for tour in tours)
     if all(tour.find_bound is None for tour in tours):
         return Tour(order, length)
     return Tour(order, length, lambda: sum(tour.bound for tour in tours))
+
+
+def _tour_of_block(ways: Sequence[Mapping[int, float]], members: Sequence[int]) -> Tour:
+    """Return the tour of one block; its order counts from 0."""
+    if len(members) == 2:
+        first, second = members
+        return Tour((0, 1), ways[first][second] + ways[second][first])
+    row_of = {place: row for row, place in enumerate(members)}
+    inner = [
+        {row_of[other]: seconds for other, seconds in ways[place].items() if other in row_of}
+        for place in members
+    ]
+    if len(members) > DENSE_BLOCK_UP_TO:
+        return _tour_of_large_block(inner)
+    legs = np.full((len(members), len(members)), np.inf)
+    for row, others in enumerate(inner):
+        legs[row, list(others)] = list(others.values())
+    np.fill_diagonal(legs, 0.0)
+    if len(members) <= EXACT_UP_TO:
+        for middle in range(len(members)):
+            np.minimum(legs, legs[:, middle, None] + legs[middle], out=legs)
+        return shortest_tour(legs)
+    from scipy.sparse.csgraph import csgraph_from_dense, dijkstra
+
+    return shortest_tour(dijkstra(csgraph_from_dense(legs, null_value=np.inf)))
+
+
+class _LocalDistances(dict[int, float]):
+    """Distances from one place of a large block, each found when it is first asked for.
+
+    A place that is not near is taken to be infinitely far: no change of a tour that would lead
+    there is looked at, and memory grows with the places times their surroundings.
+    """
+
+    def __init__(self, rows: list[_LocalDistances], ways: list[dict[int, float]], place: int):
+        self._rows, self._ways, self._place = rows, ways, place
+
+    def __missing__(self, goal: int) -> float:
+        return self.find(goal, LOCAL_REACH)
+
+    def find(self, goal: int, reach: float) -> float:
+        """Search a way over at most so many places, and keep what that found."""
+        nearest = _nearest_first(self._ways, self._place, reach)
+        seconds = next((found for place, found in nearest if place == goal), math.inf)
+        self[goal] = self._rows[goal][self._place] = seconds
+        return seconds
+
+
+def _nearest_first(
+    ways: Sequence[Mapping[int, float]], start: int, reach: float
+) -> Iterator[tuple[int, float]]:
+    """Yield places by rising distance from one, at most ``reach`` of them (Dijkstra)."""
+    pending, done = [(0.0, start)], set[int]()
+    while pending and len(done) < reach:
+        seconds, place = heapq.heappop(pending)
+        if place in done:
+            continue
+        done.add(place)
+        yield place, seconds
+        for other, leg in ways[place].items():
+            if other not in done:
+                heapq.heappush(pending, (seconds + leg, other))
+
+
+def _tour_of_large_block(ways: list[dict[int, float]]) -> Tour:
+    """Return a good tour of a block for which all distances would not fit into memory.
+
+    It begins with the order in which a depth-first walk meets the places of the minimum spanning
+    tree, at most twice as long as the shortest tour, and is improved as on smaller maps. The bound
+    is the length of that tree.
+    """
+    import networkx
+
+    count = len(ways)
+    mean = [
+        {other: (seconds + ways[other][place]) / 2.0 for other, seconds in others.items()}
+        for place, others in enumerate(ways)
+    ]
+    network: networkx.Graph[int] = networkx.Graph()
+    network.add_weighted_edges_from(
+        (a, b, s) for a, others in enumerate(mean) for b, s in others.items()
+    )
+    tree = networkx.minimum_spanning_tree(network)
+    order = list(networkx.dfs_preorder_nodes(tree, 0))
+    rows: list[_LocalDistances] = []
+    rows += (_LocalDistances(rows, mean, place) for place in range(count))
+    near = []
+    for place in range(count):
+        found = list(_nearest_first(mean, place, NEIGHBOURS + 1))[1:]
+        rows[place].update(found)
+        near.append([other for other, _ in found])
+    for place, after in zip(order, (*order[1:], order[0]), strict=True):
+        if not math.isfinite(rows[place][after]):
+            rows[place].find(after, math.inf)
+    tour = _Improvement(rows, near, order)
+    tour.improve(list(order), LARGE_STEPS)
+    length = sum(
+        rows[place][after]
+        for place, after in zip(tour.order, (*tour.order[1:], tour.order[0]), strict=True)
+    )
+    least = tree.size(weight='weight')
+    return Tour(tuple(tour.order), length, lambda: float(least))
 
 
 def _joined(rings: list[list[int]], at: dict[int, list[int]]) -> Iterator[int]:
@@ -194,7 +304,12 @@ class _Improvement:
     (Bentley's don't-look bits), which makes it near linear in the number of places.
     """
 
-    def __init__(self, rows: list[list[float]], near: list[list[int]], order: list[int]) -> None:
+    def __init__(
+        self,
+        rows: Sequence[Sequence[float] | Mapping[int, float]],
+        near: list[list[int]],
+        order: list[int],
+    ) -> None:
         self._rows = rows
         self._near = near
         self.order = order
@@ -205,11 +320,12 @@ class _Improvement:
         for position in range(first, end):
             self._at[self.order[position]] = position
 
-    def improve(self, waiting: list[int]) -> float:
-        """Improves around the given places; what that saved."""
+    def improve(self, waiting: list[int], steps: float = math.inf) -> float:
+        """Improve around the given places, looking at so many at most; return what that saved."""
         listed = set(waiting)
         saved = 0.0
-        while waiting:
+        while waiting and steps > 0:
+            steps -= 1
             place = waiting.pop()
             listed.discard(place)
             gain, touched = self._two_opt(place)

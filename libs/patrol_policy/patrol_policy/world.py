@@ -12,7 +12,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from patrol_policy.battery import Energy
 from patrol_policy.graph import PatrolGraph
+from patrol_policy.hours import ALWAYS_OPEN, Openings
 
 
 @dataclass(eq=False)
@@ -22,13 +24,25 @@ class PolicyMemory:
     Attributes:
         generator: Where the random policies draw from.
         plan: What a policy that plans ahead has planned; see `patrol_policy.plan`.
-        passes: Where on a tour the robot is, by the tour's steps.
+        energy: What the charge comes to on the maps of the last decision.
     """
 
     generator: random.Random = field(default_factory=random.Random)
     plan: Any = None
-    passes: dict[tuple[str, ...], int] = field(default_factory=dict)
+    energy: dict[Any, Energy] = field(default_factory=dict)
+    _part: tuple[Any, PatrolGraph] | None = field(default=None, init=False, repr=False)
     _asked: PolicyMemory | None = field(default=None, init=False, repr=False)
+
+    def without(self, graph: PatrolGraph, gone: frozenset[str], place: str) -> PatrolGraph:
+        """Return the part of a map that is left without some places; the same one again and again.
+
+        The place of the robot is never taken away.
+        """
+        key = (graph, gone - {place})
+        if self._part is None or self._part[0] != key or place not in self._part[1].index:
+            rest = graph.restricted(set(graph.places) - key[1])
+            self._part = (key, rest.connected(place))
+        return self._part[1]
 
     def for_a_question(self) -> PolicyMemory:
         """Return a copy to answer a question with, which changes nothing of the next choice.
@@ -37,7 +51,7 @@ class PolicyMemory:
         """
         plan = self.plan or (self._asked and self._asked.plan)
         plan = plan and plan.for_a_question()
-        self._asked = PolicyMemory(copy(self.generator), plan, self.passes.copy())
+        self._asked = PolicyMemory(copy(self.generator), plan, self.energy.copy())
         return self._asked
 
 
@@ -57,9 +71,12 @@ class World:
         since: When the patrol began, seconds.
         threshold: Seconds after which the ontology counts a place as URGENT.
         target: What the last decision was heading for, if that was not reached yet.
+        own_thresholds: The same for places that differ, seconds; inf: the place never is URGENT.
+        level: Of the charge, percent; 100 while it is not known.
         avoided: Places that could not be reached lately.
         rules: The classes of places by priority that the ontology was asked for.
         requested: Where an operator has sent the robot; empty: nowhere.
+        openings: What the hours of the places come to now.
         contradiction: Which facts of the ontology clash, as a sentence; empty: none do.
         memory: What the policies remember.
     """
@@ -74,9 +91,12 @@ class World:
     since: float = 0.0
     threshold: float = 0.0
     target: str | None = None
+    own_thresholds: Mapping[str, float] = field(default_factory=dict)
+    level: float = 100.0
     avoided: frozenset[str] = frozenset()
     rules: tuple[str, ...] = ()
     requested: str = ''
+    openings: Openings = ALWAYS_OPEN
     contradiction: str = ''
     memory: PolicyMemory = field(default_factory=PolicyMemory)
 
@@ -89,6 +109,10 @@ class World:
         if place not in self.visited_at:
             return 'not visited yet'
         return f'last visit {self.unvisited(place):.1f} s ago'
+
+    def threshold_of(self, place: str) -> float:
+        """Return the seconds after which a place is URGENT."""
+        return self.own_thresholds.get(place, self.threshold)
 
     @cached_property
     def idleness(self) -> NDArray[np.float64]:
@@ -120,7 +144,8 @@ class Decision:
         from_place: Where the robot was.
         place: Where it goes.
         target: Where that leads in the end.
-        rule: ``recharge``, ``request``, the class of places whose turn it was, or ``any``.
+        rule: ``recharge``, ``request``, ``quiet``, ``any``, or the class of places whose turn it
+            was.
         policy: The policy that chose among the rule's candidates.
         reason: One sentence with the numbers that decided.
         scores: The policy's value of each candidate.

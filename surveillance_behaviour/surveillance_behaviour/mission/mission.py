@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
-from patrol_policy.battery_reserve import Battery
+from patrol_policy.battery import Battery
 from patrol_policy.decision import DecisionSettings
 from patrol_policy.world import Decision
 from state_machines import Clock, Interrupt

@@ -1,0 +1,147 @@
+"""What a patrol can keep, told beforehand: for each place how long it will wait, or why for ever.
+
+`promises` is a pure function of what is known when a decision is made. It follows the plan of the
+policy `tour` from where the robot is until it repeats itself, so what it says is what comes, as
+long as legs, doors and battery stay as they are.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from patrol_policy.battery import Battery, Energy
+from patrol_policy.decision import (
+    DecisionSettings,
+    classes_of,
+    energy_of,
+    stations_within_reach,
+    world_with_charge,
+)
+from patrol_policy.plan import plan_of
+from patrol_policy.world import World
+
+WITHIN, LATER, NEVER, UNKNOWN = 'within', 'later', 'never', 'unknown'
+ROUNDING = 0.05
+"""Seconds by which a wait may be above the threshold and counts as within it."""
+
+
+@dataclass(frozen=True)
+class Promise:
+    """What can be kept of one place.
+
+    Attributes:
+        place: The place.
+        verdict: ``within`` its threshold, ``later``, ``never``, or ``unknown``.
+        threshold: Seconds that it may go unvisited; inf: as long as it likes.
+        wait: The longest time from visit to visit, seconds; inf: it is not visited.
+        words: The same as a sentence.
+    """
+
+    place: str
+    verdict: str
+    threshold: float
+    wait: float
+    words: str
+
+
+def promises(
+    world: World, battery: Battery, settings: DecisionSettings, places: Sequence[str] = ()
+) -> tuple[Promise, ...]:
+    """Return what can be kept of each place, by its name.
+
+    Args:
+        world: What is known of the surroundings; nothing of it is changed.
+        battery: What is known of the battery.
+        settings: Of decisions.
+        places: All places, also those that no open door leads to.
+    """
+    asked = world_with_charge(replace(world, memory=world.memory.for_a_question()), battery)
+    names = sorted({*world.graph.places, *places} | world.openings.closed.keys())
+    energy = energy_of(asked, battery, settings)
+    waits: dict[str, float] = {}
+    cut = ''
+    if settings.policy == 'tour' and world.place in asked.graph.index:
+        seen = {place: classes_of(world, place) for place in world.classes}
+        plan = plan_of(replace(asked, classes=seen), energy)
+        waits = dict(zip(plan.places, plan.settled_waits(), strict=True))
+        cut = plan.cut
+    found = []
+    for place in names:
+        threshold = asked.threshold_of(place)
+        never = _why_never(place, world, asked, battery, settings, energy)
+        wait = waits.get(place, math.inf)
+        if never:
+            found.append(Promise(place, NEVER, threshold, math.inf, f'{place}: {never}'))
+        elif math.isinf(wait):
+            why = cut or f'the policy {settings.policy} plans nothing ahead'
+            words = f'{place}: it is not known when it is visited, {why}'
+            found.append(Promise(place, UNKNOWN, threshold, wait, words))
+        else:
+            found.append(_timely(place, wait, threshold, world))
+    return tuple(found)
+
+
+def _timely(place: str, wait: float, threshold: float, world: World) -> Promise:
+    """Return the promise for a place that is visited again and again."""
+    hours = ' while it is open' if place in world.openings.closes_in else ''
+    if wait <= threshold + ROUNDING:
+        words = f'{place}: visited every {wait:.0f} s at the latest{hours}'
+        if math.isfinite(threshold):
+            words += f', within its threshold of {threshold:g} s'
+        return Promise(place, WITHIN, threshold, wait, words)
+    words = (
+        f'{place}: visited every {wait:.0f} s at the latest{hours}, '
+        f'{wait - threshold:.0f} s later than its threshold of {threshold:g} s'
+    )
+    return Promise(place, LATER, threshold, wait, words)
+
+
+def _why_never(
+    place: str,
+    world: World,
+    asked: World,
+    battery: Battery,
+    settings: DecisionSettings,
+    energy: Energy | None,
+) -> str:
+    """Return why a place is not visited as things are; empty: it is."""
+    if place in world.openings.closed:
+        return f'not visited now, {world.openings.closed[place]}'
+    if place not in world.graph.index:
+        return 'never visited, no open door leads to it'
+    if place not in asked.graph.index:
+        return 'not visited now, the way there leads through a place that may not be entered'
+    if battery.level is not None and battery.draw.rate > 0.0:
+        if not stations_within_reach(world, settings.recharge_rooms):
+            return 'never visited, no charging place can be reached'
+        if energy is not None and not energy.within_range[energy.index[place]]:
+            return f'never visited, {energy.why_never(place)}{_remedy(place, asked, energy)}'
+    return ''
+
+
+def _remedy(place: str, world: World, energy: Energy) -> str:
+    """Return what would help a place that the charge does not suffice for."""
+    graph, at = world.graph, energy.index[place]
+    home, _ = graph.drive_home([place])
+    ways = sorted(range(len(home)), key=lambda other: (energy.out_seconds[other], other))
+    for other in ways:
+        # From a station there the place would be left with at least what the way back takes.
+        back = graph.drive_home([graph.places[other]])[0][at]
+        out = float(graph.row(other)[at])
+        if energy.within_range[other] and energy.suffices(out, back):
+            return f'; a second station in {graph.places[other]} would do'
+    return '; no second station within reach would do'
+
+
+def summary(found: Sequence[Promise]) -> str:
+    """Return the promises in one sentence for a log, those that cannot be kept in full."""
+    if not found:
+        return 'there are no places to visit'
+    within = [each.place for each in found if each.verdict == WITHIN]
+    rest = [each.words for each in found if each.verdict != WITHIN]
+    if not rest:
+        return f'all {len(within)} places can be visited within their thresholds'
+    kept = f'{len(within)} of {len(found)} places can be visited within their thresholds'
+    return f'{kept}; {"; ".join(rest)}'

@@ -1,0 +1,187 @@
+"""The charge: what must be left for the way home, how long charging takes, plans that know it."""
+
+from __future__ import annotations
+
+import itertools
+import math
+import random
+
+import pytest
+
+from patrol_policy.battery import (
+    BatteryLimits,
+    ChargeCurve,
+    Draw,
+    Energy,
+    Station,
+)
+from patrol_policy.bounds import charge_bound, default_ranks
+from patrol_policy.decision import RECHARGE, Rules
+from patrol_policy.graph import PatrolGraph
+from patrol_policy.promises import LATER, NEVER, WITHIN, promises, summary
+from patrol_policy.rollout import RuleMap
+from patrol_policy.simulation import Patrol, SimulatedBattery
+
+from .worlds import seven_rooms
+
+
+def test_what_must_be_left_is_what_driving_home_takes() -> None:
+    graph = seven_rooms(300.0)
+    energy = Energy(graph, [Station('E')], Draw(1.0), 0.0, BatteryLimits(0, 90, 5))
+    home = graph.leg_seconds['R4']['C2'] + graph.leg_seconds['C2']['E']
+    # Nothing is explored on the way home.
+    assert energy.least[graph.index['R4']] == pytest.approx(home + 5.0)
+    assert energy.out_seconds[graph.index['R4']] == pytest.approx(home + 600.0)
+    assert not energy.within_range[graph.index['R4']]
+
+
+def test_the_level_of_the_seeds_stays_the_floor() -> None:
+    graph = seven_rooms()
+    energy = Energy(graph, [Station('E')], Draw(0.1), 0.0, BatteryLimits(20, 90, 5))
+    assert set(energy.least) == {20.0}
+
+
+def test_a_charge_takes_what_was_learned_of_each_part_of_it() -> None:
+    curve = ChargeCurve((1.0,) * 16 + (0.25,) * 4)
+    assert curve.seconds(20.0, 80.0) == pytest.approx(60.0)
+    assert curve.seconds(70.0, 90.0) == pytest.approx(10.0 + 40.0)
+    assert curve.seconds(90.0, 70.0) == 0.0
+
+
+def test_battery_limits_out_of_order_are_named() -> None:
+    with pytest.raises(ValueError, match=r'expected 0 <= battery_require_recharge < .* got 95 and'):
+        BatteryLimits(95.0, 90.0)
+
+
+def patrolled(
+    graph: PatrolGraph, factor: float, reach: float, charge: float, laps: float = 25.0
+) -> Patrol:
+    """Return a patrol that lasted for some laps; reach and charge are in tours."""
+    tour = graph.tour.length
+    battery = SimulatedBattery(100.0 / (reach * tour), 100.0 / (charge * tour))
+    patrol = Patrol(graph, Rules(), 'tour', factor * tour, graph.places[0], battery)
+    patrol.level = battery.limits.stop_recharge
+    for _ in patrol.until(laps * tour):
+        pass
+    return patrol
+
+
+@pytest.mark.parametrize(('reach', 'stop'), [(1260.0, 300.0), (1980.0, 300.0), (660.0, 120.0)])
+def test_a_short_range_leaves_no_room_unvisited(reach: float, stop: float) -> None:
+    graph = seven_rooms(stop)
+    patrol = Patrol(graph, Rules(), 'tour', 240.0, 'E', SimulatedBattery(100.0 / reach, 0.2))
+    for _ in patrol.until(4 * 3600.0):
+        pass
+    assert set(patrol.run.waits) == set(graph.places)
+    assert patrol.run.settled < 3600.0
+    assert patrol.run.strandings == 0
+
+
+@pytest.mark.parametrize('seed', range(3))
+def test_the_plan_comes_near_the_bound_that_knows_the_charge(seed: int) -> None:
+    draw = random.Random(seed)
+    graph = seven_rooms(draw.uniform(2.0, 300.0))
+    reach, charge = draw.uniform(3.0, 12.0), draw.uniform(0.1, 2.0)
+    patrol = patrolled(graph, draw.choice((0.5, 1.0)), reach, charge)
+    rules = patrol.world().memory.plan.rules
+    bound = charge_bound(rules, states=20_000)
+    patrol.run.settled = 0.0  # What came before is the way into the round.
+    for _ in patrol.until(2.0 * patrol.now):
+        pass
+    assert bound.low <= patrol.run.settled * 1.001
+    assert patrol.run.settled <= 1.1 * bound.low
+
+
+def shortest_lawful_wait(rules: RuleMap, most: int) -> float:
+    """Return the least longest wait of all periodic walks of up to so many stops, by trying all."""
+    energy, best = rules.energy, math.inf
+    assert energy is not None
+    stops = range(rules.count + len(energy.stations))
+    for size in range(2, most + 1):
+        for walk in itertools.product(stops, repeat=size):
+            places = [rules.places[stop] for stop in walk]
+            if walk[0] < rules.count or set(places) != set(range(rules.count)):
+                continue  # Each begins with a charge.
+            seen, level, now, longest = dict.fromkeys(places, -math.inf), energy.full, 0.0, 0.0
+            place, lawful = places[-1], True
+            for lap, (step, stop) in itertools.product(range(3), enumerate(walk)):
+                if stop < rules.count and stop not in rules.leg_seconds[place]:
+                    lawful = False
+                    break
+                if stop < rules.count:
+                    ways = rules.leg_seconds[place]
+                    ranked = {
+                        o: 0 if now - seen[o] > rules.threshold else rules.ranks[o] for o in ways
+                    }
+                    lawful = lap == 0 or ranked[stop] == min(ranked.values())
+                    now += ways[stop]
+                    level -= energy.draw * ways[stop]
+                    lawful = lawful and level >= energy.least[stop]
+                else:
+                    drive = energy.drive[0][place]
+                    now += drive
+                    level -= energy.draw * drive
+                    now += energy.charge_seconds(0, level)
+                    level = energy.full
+                place = places[step]
+                if lap == 2:
+                    longest = max(longest, now - seen[place])
+                seen[place] = now
+                if not lawful:
+                    break
+            best = min(best, longest) if lawful else best
+    return best
+
+
+@pytest.mark.parametrize(('reach', 'factor'), [(200.0, 0.5), (90.0, 0.5), (140.0, 1.0)])
+def test_the_bound_is_that_of_trying_all_walks(reach: float, factor: float) -> None:
+    legs = {'A': {'B': 8.0, 'C': 9.0}, 'B': {'A': 8.0, 'C': 7.0}, 'C': {'A': 9.0, 'B': 7.0}}
+    graph = PatrolGraph(legs, 6.0)
+    station = Station('A', ChargeCurve.even(2.0))
+    energy = Energy(graph, [station], Draw(100.0 / reach), 0.0, BatteryLimits())
+    rules = RuleMap(graph, factor * graph.tour.length, default_ranks(graph), 0, energy=energy)
+    bound = charge_bound(rules)
+    shortest = shortest_lawful_wait(rules, 6)
+    assert bound.low <= shortest + 0.01
+    assert bound.high == pytest.approx(shortest, rel=0.02)
+
+
+def test_what_is_promised_is_what_comes() -> None:
+    for seed in range(3):
+        draw = random.Random(seed)
+        graph = seven_rooms(draw.uniform(2.0, 300.0))
+        patrol = patrolled(graph, 0.9, draw.uniform(2.0, 15.0), draw.uniform(0.1, 2.0), 3.0)
+        told = promises(patrol.world(), patrol.known_battery(), patrol.settings)
+        assert all(each.verdict in (WITHIN, LATER) for each in told)
+        patrol.run.waits.clear()
+        for _ in range(200):
+            patrol.step()
+        for each in told:
+            assert patrol.run.waits[each.place] <= each.wait + 1e-3
+
+
+def test_it_says_beforehand_which_place_is_never_visited_and_what_would_help() -> None:
+    graph = seven_rooms(300.0)
+    patrol = Patrol(graph, Rules(), 'tour', 240.0, 'E', SimulatedBattery(100.0 / 860.0, 1.0))
+    told = {
+        each.place: each
+        for each in promises(patrol.world(), patrol.known_battery(), patrol.settings)
+    }
+    assert told['R4'].verdict == NEVER
+    assert 'R4: never visited, out takes 612 s and home 12 s, which needs 91 % of charge' in (
+        told['R4'].words
+    )
+    assert 'a second station in C2 would do' in told['R4'].words
+    assert told['C1'].verdict == LATER
+    assert 'R4: never visited' in summary(tuple(told.values()))
+    for _ in patrol.until(3600.0):
+        pass
+    assert patrol.run.strandings == 0
+    assert set(patrol.run.waits) >= {'C1', 'C2', 'E', 'R1', 'R3'}
+
+
+def test_a_planned_charge_says_so_in_its_reason() -> None:
+    patrol = patrolled(seven_rooms(60.0), 0.5, 6.0, 0.5, 2.0)
+    reasons = [d.reason for d in (patrol.step() for _ in range(40)) if d.rule == RECHARGE]
+    assert reasons
+    assert all('a charge in C1 costs least now, at ' in reason for reason in reasons)
