@@ -22,7 +22,7 @@ from .ros_servers import (
 
 def wrapped(graph, container, **arguments):
     server = graph.add(PatrolNode, name='server')
-    wrapper = ActionServerWrapper(
+    return ActionServerWrapper(
         server,
         'follow_path',
         FollowPath,
@@ -32,8 +32,6 @@ def wrapped(graph, container, **arguments):
         preempted_outcomes=['preempted'],
         **arguments,
     )
-    wrapper.run_server()
-    return wrapper
 
 
 def container_of(state):
@@ -43,6 +41,21 @@ def container_of(state):
     with container:
         fsm.StateMachine.add('STATE', state)
     return container
+
+
+def test_the_states_inside_find_the_actions_own_messages(graph):
+    """As a machine written for SMACH of ROS 2 does, which never calls `run_server`."""
+    seen = []
+
+    def look(ud):
+        seen.append(ud.action_goal.path[0].x)
+        return 'done'
+
+    state = fsm.CBState(look, outcomes=['done'], input_keys=['action_goal'])
+    wrapped(graph, container_of(state)).run_server()
+    goal = {'path': [Point(x=4.0)]}
+    assert machine_of(action(graph.node, goal_slots=['path']), goal).execute() == 'succeeded'
+    assert seen == [4.0]
 
 
 def test_a_machine_serves_an_action(graph):
