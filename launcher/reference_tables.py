@@ -31,7 +31,7 @@ from surveillance_runtime.configuration import (
 )
 from surveillance_runtime.launch_protocol import NotNowError
 from surveillance_runtime.parameters import ParameterError, ParameterSpec
-from surveillance_runtime.place.rooms import GEOMETRY_KEYS, PLACE_KEYS
+from surveillance_runtime.place.rooms import GEOMETRY_KEYS, PATROL_KEYS, PLACE_KEYS
 from surveillance_runtime.testing import claim_domain
 
 _NAMESPACE = '/robot'
@@ -151,7 +151,7 @@ def survey() -> Survey:
 
 def _variants(node: node_table.Node) -> Iterator[dict[str, Any]]:
     config = CHECKOUT / 'config'
-    schema = {node.name: NodeSchema(prefixes=(*PLACE_KEYS, *GEOMETRY_KEYS))}
+    schema = {node.name: NodeSchema(prefixes=(*PLACE_KEYS, *GEOMETRY_KEYS, *PATROL_KEYS))}
     for behaviour, place in (('surveillance', 'seven_rooms.yaml'), ('patrol', 'patrol_world.yaml')):
         layers = (file_layer(config / place),)
         settings = Configuration(layers, schema).resolve(node.name)

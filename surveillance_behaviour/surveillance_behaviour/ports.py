@@ -98,6 +98,10 @@ class Reasoner(Protocol):
             to_charge: Only a charging place will do.
         """
 
+    def exploring(self, place: str, usual: float) -> float:
+        """Return the seconds for which a place is explored; ``usual`` unless it differs."""
+        return usual
+
     def why_charge(self) -> str:
         """Return why the robot must charge now, as a sentence; empty: it need not."""
 

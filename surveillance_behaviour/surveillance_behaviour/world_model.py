@@ -32,6 +32,7 @@ from patrol_policy.decision import (
 )
 from patrol_policy.graph import GraphError, PatrolGraph
 from patrol_policy.plan import LEG_CHANGE
+from patrol_policy.promises import Promise, promises, summary
 from patrol_policy.world import Decision, PolicyMemory, World
 from state_machines import Interrupt
 from state_machines.exceptions import CallError
@@ -39,6 +40,7 @@ from surveillance_behaviour.charging import BatteryMonitor
 from surveillance_behaviour.experience import Experience
 from surveillance_behaviour.ports import Ontology, Places, Point, UnknownPlaceError
 from surveillance_ontology.patrol_ontology import Snapshot
+from surveillance_runtime.place.patrol_rules import PatrolRules
 from surveillance_runtime.suggestions import nearest
 
 
@@ -57,6 +59,8 @@ class WorldModel:
         announce: Told each decision.
         elapsed: Seconds as they pass, whatever the date is set to: drives are measured by them;
             None: by the times that are told.
+        rules: What holds for single places.
+        tell: Told what can be kept of the places, at the start and when that changes.
 
     Attributes:
         settings: Those.
@@ -78,6 +82,8 @@ class WorldModel:
         warn: Callable[[str], None] = lambda sentence: None,
         announce: Callable[[Decision], None] = lambda decision: None,
         elapsed: Callable[[], float] | None = None,
+        rules: PatrolRules | None = None,
+        tell: Callable[[str], None] = lambda sentence: None,
     ) -> None:
         self.settings = settings
         self.experience = experience or Experience()
@@ -101,6 +107,10 @@ class WorldModel:
         # for: it must not wait for the look.
         self._saving = threading.Lock()
         self._warn = warn
+        self._rules = rules or PatrolRules()
+        self._tell = tell
+        self._told = ''
+        self._told_about: object = None
         self._announce = announce
         self._warned = False
         self._checked_threshold: object = None
@@ -158,6 +168,7 @@ class WorldModel:
             world = self.world = self._refreshed(now, interrupt, avoided)
         self._check_threshold(world)
         self._check_rules(interrupt)
+        self._tell_promises(world)
         return world
 
     def _refreshed(self, now: float, interrupt: Interrupt, avoided: frozenset[str]) -> World:
@@ -188,6 +199,8 @@ class WorldModel:
             time_spread=experience.leg_times.spread,
             since=self._since,
             threshold=threshold,
+            own_thresholds=self._rules.thresholds,
+            openings=self._rules.calendar.at(now),
             target=self._target,
             avoided=avoided,
             rules=classes,
@@ -222,7 +235,8 @@ class WorldModel:
         if (found.place in self.graph.index, legs, exploring) == self._graph_key:
             return self.graph
         try:
-            graph = PatrolGraph(legs, exploring).connected(found.place)
+            whole = PatrolGraph(legs, exploring, self._rules.exploration)
+            graph = whole.connected(found.place)
         except GraphError as error:
             raise CallError(f'ontology: {error}') from None
         self._graph_key = (True, legs, exploring)
@@ -251,6 +265,30 @@ class WorldModel:
         self._warned = bool(warning)
         if warning:
             self._warn(warning)
+
+    def promises(self, world: World) -> tuple[Promise, ...]:
+        """Return what can be kept of each place, as things are."""
+        return promises(world, self.battery(), self.settings, sorted(self.places))
+
+    def _tell_promises(self, world: World) -> None:
+        """Say what can be kept of the places, at the start and when what it rests on changes."""
+        battery, settings = self.battery(), self.settings
+        about = (
+            world.graph,
+            world.threshold,
+            settings.policy,
+            settings.recharge_rooms,
+            f'{battery.draw.rate:.1g}',
+            frozenset(world.openings.closed),
+            self.places,
+        )
+        if about == self._told_about:
+            return
+        self._told_about = about
+        sentence = summary(self.promises(world))
+        if sentence != self._told:
+            self._told = sentence
+            self._tell(sentence)
 
     def _check_rules(self, interrupt: Interrupt) -> None:
         """Say which class of the rules no place can ever be in."""
@@ -330,6 +368,10 @@ class WorldModel:
     def _save(self) -> None:
         with self._saving:
             self.experience.save()
+
+    def exploring(self, place: str, usual: float) -> float:
+        """Return the seconds for which a place is explored; ``usual`` unless it differs."""
+        return self._rules.exploration.get(place, usual)
 
     def why_charge(self) -> str:
         """Return why the robot must charge now, as far as is known without looking; empty: no."""

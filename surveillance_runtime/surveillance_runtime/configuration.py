@@ -29,7 +29,7 @@ from surveillance_runtime.node_table import LOG_LEVELS
 from surveillance_runtime.parameters import Check, ParameterError, ParameterSpec
 from surveillance_runtime.place import Place, PlaceError, checked_plan
 from surveillance_runtime.place.description import map_file_beside
-from surveillance_runtime.place.rooms import GEOMETRY_KEYS, PLACE_KEYS, tables_of
+from surveillance_runtime.place.rooms import GEOMETRY_KEYS, PATROL_KEYS, PLACE_KEYS, tables_of
 from surveillance_runtime.robot_base import ROBOT_RADIUS
 from surveillance_runtime.suggestions import nearest
 from surveillance_runtime.yaml_file import (
@@ -41,7 +41,7 @@ from surveillance_runtime.yaml_file import (
 )
 
 SCHEMA = Path(__file__).with_name('parameter_schema.json')
-_PLACE = frozenset((*PLACE_KEYS, *GEOMETRY_KEYS))
+_PLACE = frozenset((*PLACE_KEYS, *GEOMETRY_KEYS, *PATROL_KEYS))
 _TYPES = {'bool': bool, 'int': int, 'float': float, 'str': str}
 _OWN = {  # every rclpy node has these; a clock that changes makes all times that were taken wrong
     name: ParameterSpec(name, False, text, read_only=True)

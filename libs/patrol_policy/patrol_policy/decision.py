@@ -154,9 +154,14 @@ class DecisionSettings:
 
 
 def classes_of(world: World, place: str) -> frozenset[str]:
-    """Return the classes of a place; one that only may be visited now is not URGENT."""
+    """Return the classes of a place; its own threshold and its hours say whether it is URGENT."""
     classes = world.classes.get(place, frozenset())
-    return classes - {URGENT} if place in world.openings.optional else classes
+    if place in world.openings.optional:
+        return classes - {URGENT}
+    if place in world.own_thresholds and place in world.visited_at:
+        late = world.unvisited(place) > world.own_thresholds[place]
+        return classes | {URGENT} if late else classes - {URGENT}
+    return classes
 
 
 def is_closed(world: World, place: str) -> bool:

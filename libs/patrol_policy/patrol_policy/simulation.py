@@ -14,6 +14,7 @@ from patrol_policy.battery import Battery, BatteryLimits, ChargeCurve, Draw
 from patrol_policy.decision import QUIET, RECHARGE, URGENT, DecisionSettings, Rules, decide
 from patrol_policy.graph import PatrolGraph
 from patrol_policy.hours import NO_CALENDAR, Calendar
+from patrol_policy.plan import Plan
 from patrol_policy.rollout import HALF_OPEN
 from patrol_policy.world import Decision, PolicyMemory, World
 
@@ -140,6 +141,17 @@ class Patrol:
             openings=self.calendar.at(self.now),
             memory=self._memory,
         )
+
+    @property
+    def plan(self) -> Plan:
+        """The plan that is followed.
+
+        Raises:
+            ValueError: The policy plans nothing ahead, or nothing was decided yet.
+        """
+        if not isinstance(self._memory.plan, Plan):
+            raise ValueError(f'{self.policy} has no plan')
+        return self._memory.plan
 
     def step(self) -> Decision:
         """Charge if need be, or move to the next place; return the decision behind it."""

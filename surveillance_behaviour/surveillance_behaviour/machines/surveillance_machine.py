@@ -71,7 +71,8 @@ class ExploreTask(MissionState):
     def _explore(self, interrupt: fsm.Interrupt) -> bool:
         """Explore the place for what is left of its time since the last visit; whether it did."""
         mission = self.mission
-        seconds = mission.settings.choice.exploration_seconds
+        usual = mission.settings.choice.exploration_seconds
+        seconds = mission.ports.reasoner.exploring(mission.place, usual)
         elapsed = elapsed_of(mission.clock)
         begin = elapsed() - min(mission.explored, seconds)
         mission.explored = 0.0

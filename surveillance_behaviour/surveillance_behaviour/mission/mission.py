@@ -6,17 +6,20 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 from patrol_policy.battery import Battery
-from patrol_policy.decision import DecisionSettings
+from patrol_policy.decision import QUIET, DecisionSettings
 from patrol_policy.world import Decision
 from state_machines import Clock, Interrupt
 from state_machines.clock import elapsed_of
-from state_machines.exceptions import CallError
+from state_machines.exceptions import CallError, CallInterruptedError
 from surveillance_behaviour.charging import BatteryMonitor, charge
 from surveillance_behaviour.mission.mission_log import MissionRecord, is_other_simulation
 from surveillance_behaviour.mission.recovery import Failure, Recovery, RecoveryLimits
 from surveillance_behaviour.ports import Point, Ports
 from surveillance_runtime.files import FileError
 from surveillance_runtime.parameters import parameter, parameters
+
+QUIET_SECONDS = 60.0
+"""How long the robot stays at its station before it is decided anew, seconds."""
 
 
 @dataclass
@@ -156,6 +159,13 @@ class Mission:
         reasoner, now = self.ports.reasoner, self.now()
         avoided = self.recovery.avoided(now)
         decision = reasoner.decide(now, interrupt, avoided, to_charge=to_charge)
+        while decision.rule == QUIET and decision.place == self.place:
+            # Nothing is to be done: it is decided anew now and then, and when it is interrupted.
+            self.say(decision.reason)
+            if not self.clock.sleep(QUIET_SECONDS, interrupt):
+                raise CallInterruptedError
+            now = self.now()
+            decision = reasoner.decide(now, interrupt, avoided, to_charge=to_charge)
         if decision.from_place:
             self.place = decision.from_place
         self.heading_to = decision.place

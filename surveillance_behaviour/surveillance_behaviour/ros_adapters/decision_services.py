@@ -21,6 +21,7 @@ from surveillance_interfaces.msg import Decision as DecisionMessage
 from surveillance_interfaces.srv import GoTo, WhyNot
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.parameters import parameter
+from surveillance_runtime.place.patrol_rules import described_patrol_rules
 from surveillance_runtime.state_topics import OwnedTopic
 from surveillance_runtime.waiting import AwaitedWork
 
@@ -49,7 +50,6 @@ def world_model_of(
     elapsed: Callable[[], float],
 ) -> WorldModel:
     """Return what a robot knows when it decides, with what it learned before.
-
 
     It learns how fast the battery falls. Its decisions are published and logged, numbered from 1.
 
@@ -90,6 +90,8 @@ def world_model_of(
         lambda w: log.warn(w),
         announce,
         elapsed,
+        described_patrol_rules(node),
+        lambda sentence: log.info(sentence),
     )
     world_model.learn_draw(elapsed)
     return world_model

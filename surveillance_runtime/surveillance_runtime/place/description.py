@@ -6,7 +6,7 @@ Rooms always; walls, doors and the map that the place refers to where they are g
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,9 +14,11 @@ from surveillance_runtime.files import FileError
 from surveillance_runtime.parameters import ParameterError, parameter
 from surveillance_runtime.place.floor_plan import FloorPlan
 from surveillance_runtime.place.occupancy_map import is_map_description, is_picture
+from surveillance_runtime.place.patrol_rules import PatrolRules, patrol_rules
 from surveillance_runtime.place.regions import Regions, check_passable
 from surveillance_runtime.place.rooms import (
     GEOMETRY_KEYS,
+    PATROL_KEYS,
     PLACE_KEYS,
     Place,
     PlaceError,
@@ -38,10 +40,12 @@ class PlaceFile:
     Attributes:
         place: The rooms, which doors join them, a point in each.
         plan: Walls, map, doors and markers, as far as the file has them.
+        rules: What holds for single places when they are patrolled.
     """
 
     place: Place
     plan: FloorPlan
+    rules: PatrolRules = field(default_factory=PatrolRules)
 
 
 def read_place_file(path: str | Path, *, radius: float = ROBOT_RADIUS) -> PlaceFile:
@@ -74,7 +78,7 @@ def read_place_file(path: str | Path, *, radius: float = ROBOT_RADIUS) -> PlaceF
         described = tables_of(given.items())
         if isinstance(name := described.get('map_file'), str) and name:
             described['map_file'] = map_file_beside(file.path, name)
-        known = (*PLACE_KEYS, *GEOMETRY_KEYS)
+        known = (*PLACE_KEYS, *GEOMETRY_KEYS, *PATROL_KEYS)
         for key in described:
             if key not in known:
                 raise PlaceError((key,), f'unknown parameter, expected {nearest(key, known)}')
@@ -82,9 +86,10 @@ def read_place_file(path: str | Path, *, radius: float = ROBOT_RADIUS) -> PlaceF
             if key not in described:
                 raise PlaceError((), f"parameter '{key}' is missing")
         plan = checked_plan(described, radius)
+        rules = patrol_rules(described, plan.place.rooms)
     except PlaceError as error:
         raise file.error(error.where, error.problem) from None
-    return PlaceFile(plan.place, plan)
+    return PlaceFile(plan.place, plan, rules)
 
 
 def map_file_beside(place: Path, name: str) -> str:

@@ -21,7 +21,9 @@ GEOMETRY_KEYS = (
     *('walls', 'doors', 'markers', 'marker_size', 'marker_dictionary', 'station'),
     *('map_file', 'map_file_resolution', 'map_file_origin'),
 )
-PLACE_TABLES = ('map', 'room_positions', 'walls', 'doors', 'markers')
+PATROL_TABLES = ('thresholds', 'exploration', 'hours')
+PATROL_KEYS = (*PATROL_TABLES, 'keep_out', 'quiet_hours', 'time_zone')
+PLACE_TABLES = ('map', 'room_positions', 'walls', 'doors', 'markers', *PATROL_TABLES)
 """Those that hold an entry for each room, wall, door or marker: `map.R1`, `map.R2`, ..."""
 _NAME = re.compile(r'[A-Za-z_][A-Za-z0-9_-]*\Z')
 
