@@ -15,7 +15,7 @@ from armor_service.rendering import shown
 from armor_service.settings import names_expected, parameter
 
 CODE = Path(__file__).resolve().parent.parent
-ONTOLOGY_ENDINGS = ('.nt', '.owl', '.owx', '.rdf', '.ttl', '.xml')
+ONTOLOGY_ENDINGS = ('.nt', '.omn', '.owl', '.owx', '.rdf', '.ttl', '.xml')
 LOG_ENDINGS = ('.log', '.txt')
 MAX_PATH = 4096
 _CONTROL = re.compile(r'[\x00-\x1f\x7f]')

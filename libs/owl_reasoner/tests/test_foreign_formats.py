@@ -276,10 +276,6 @@ def test_what_says_nothing_is_left_out_and_reported(text, report):
 @pytest.mark.parametrize(
     ('text', 'complaint'),
     [
-        (
-            'Prefix: : <http://x/>\nOntology: <http://x>\n',
-            f"expected {FORMATS}, got Manchester syntax, which is not read: 'Prefix: :",
-        ),
         ('Prefixes: none', f"expected {FORMATS}, got 'Prefixes: none'"),
         (b'\x1f\x8b\x08\x00', f'expected {FORMATS}'),
         ('{"a": 1}', 'not JSON-LD: it states nothing'),

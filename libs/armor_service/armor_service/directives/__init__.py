@@ -6,6 +6,7 @@ mean, the others the `ArmorService`.
 
 from armor_service.directives import (  # noqa: F401 - the modules fill the table
     closing,
+    manchester,
     manipulations,
     queries,
     references,

@@ -34,6 +34,8 @@ from owl_reasoner.reasoner.budget import ReasoningBudgetError
 if TYPE_CHECKING:
     from armor_service.service import ArmorService
 
+_BY_ENDING = {'.nt': 'ntriples', '.omn': 'manchester'}
+"""What SAVE writes by the ending of the path."""
 RELEASE_AFTER = 0.2
 DROP_WITHIN = 0.5
 """Seconds for which DROP waits for who uses the reference; it goes in any case."""
@@ -195,7 +197,8 @@ def _release(service: ArmorService, ref: Reference) -> None:
     'Written beside the file and renamed, so that a crash leaves the old file whole; it keeps its '
     'rights, and a read-only one is refused. '
     'Turtle and JSON-LD are written as N-Triples, OWL/XML and functional syntax as RDF/XML; a path '
-    'that ends in .nt gets N-Triples, which hold names that RDF/XML cannot.',
+    'that ends in .nt gets N-Triples, which hold names that RDF/XML cannot, and one that ends in '
+    '.omn Manchester syntax.',
     slow=True,
 )
 def _save(service: ArmorService, request: DirectiveRequest, path: str) -> DirectiveResponse:
@@ -217,7 +220,7 @@ def _save(service: ArmorService, request: DirectiveRequest, path: str) -> Direct
         if request.primary:
             axioms = list(dict.fromkeys([*axioms, *ref.kb.facts()]))
         iri, origin = ref.kb.iri, ref.origin
-    form = 'ntriples' if target.suffix.lower() == '.nt' else origin.format
+    form = _BY_ENDING.get(target.suffix.lower(), origin.format)
     with service.saving(target):
         if taken < service.saved.get(target, 0):
             return DirectiveResponse()  # A newer state is there already.

@@ -16,6 +16,7 @@ from urllib.parse import unquote, urlsplit
 
 from owl_reasoner.documents.catalogs import CATALOG, catalog_entries
 from owl_reasoner.documents.functional_syntax import is_functional, parse_functional
+from owl_reasoner.documents.manchester import ManchesterDocument
 from owl_reasoner.documents.mapping import Mapping
 from owl_reasoner.documents.owl_xml import is_owl_xml, parse_owl_xml
 from owl_reasoner.documents.rdf_xml import Graph, Node, parse_rdf_xml
@@ -47,10 +48,10 @@ _TURTLE = re.compile(rb'@(?:prefix|base)\b|(?:prefix|base)\s|<|_:|\[|\(', re.IGN
 _MANCHESTER = re.compile(rb'(?:Prefix|Namespace|Ontology|Import|Class|Individual|\w+Property):\s')
 _PARSER_PLACE = re.compile(r'Parser error (?:at|between) line [\w ]*: ')
 _NAMES = {'turtle': 'Turtle', 'ntriples': 'N-Triples', 'jsonld': 'JSON-LD'}
-FORMATS = 'RDF/XML, OWL/XML, Turtle, N-Triples, JSON-LD or OWL functional syntax'
+FORMATS = 'RDF/XML, OWL/XML, Turtle, N-Triples, JSON-LD, OWL functional syntax or Manchester syntax'
 PACKAGE_DEPTH = 6
 """Folders above a document in which a package is looked for."""
-_ENDINGS = ('.owl', '.rdf', '.ttl', '.ofn', '.owx', '.xml', '.nt', '.jsonld')
+_ENDINGS = ('.owl', '.rdf', '.ttl', '.ofn', '.owx', '.xml', '.nt', '.jsonld', '.omn')
 DEFAULT_SIZE_LIMIT = 256 * 1024 * 1024
 
 
@@ -61,7 +62,7 @@ class OntologyDocument:
     Attributes:
         axioms: In document order, without repeats.
         unsupported: One sentence for each statement that was not understood.
-        format: 'rdfxml', 'ntriples', 'owlxml', 'turtle', 'jsonld' or 'functional'.
+        format: 'rdfxml', 'ntriples', 'owlxml', 'turtle', 'jsonld', 'functional' or 'manchester'.
         iri: The IRI in the document's owl:Ontology header, '' without one.
         prefixes: Namespace prefixes declared by the document.
     """
@@ -83,9 +84,10 @@ def read_ontology(
 ) -> OntologyDocument:
     """Read a document and the documents beside it that it imports.
 
-    Its format is told by how it begins: RDF/XML, OWL/XML, Turtle, N-Triples, JSON-LD, or OWL
-    functional syntax. An import is followed where a file of its name (with any ending) lies in the
-    folder of the document, where a catalog says where it is (`catalogs`), or where it is a file
+    Its format is told by how it begins: RDF/XML, OWL/XML, Turtle, N-Triples, JSON-LD, OWL
+    functional syntax or Manchester syntax. An import is followed where a file of its name (with any
+    ending) lies in the folder of the document, where a catalog says where it is (`catalogs`), or
+    where it is a file
     IRI; its axioms then take the place of the import.
     Any other import is reported.
 
@@ -245,10 +247,11 @@ def _parsed(data: bytes, iri: str) -> tuple[str, Mapping | Axioms]:
         return 'jsonld', Mapping(_rdf_text(data, iri, 'jsonld'))
     if _TURTLE.match(data, place):
         return 'turtle', Mapping(_rdf_text(data, iri, 'turtle'))
+    if _MANCHESTER.match(data, place):
+        return 'manchester', ManchesterDocument(_text(data), iri)
     shown = data[place : place + 40].decode('latin-1')
-    kind = 'Manchester syntax, which is not read: ' if _MANCHESTER.match(data, place) else ''
     raise OntologyFileError(
-        f'expected {FORMATS}, got {kind}{shown!r}',
+        f'expected {FORMATS}, got {shown!r}',
         data.count(b'\n', 0, place) + 1,
         1,
     )

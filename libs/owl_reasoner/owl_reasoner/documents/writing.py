@@ -25,7 +25,7 @@ from owl_reasoner.owl.expressions import Literal
 from owl_reasoner.owl.vocabulary import OWL, RDF, RDFS, SWRL, XSD
 from owl_reasoner.suggestions import nearest
 
-FORMATS = ('rdfxml', 'ntriples')
+FORMATS = ('rdfxml', 'ntriples', 'manchester')
 _XML = ('http://www.w3.org/XML/1998/namespace', 'http://www.w3.org/2000/xmlns/')
 _PREFIXES = {'rdf': RDF, 'rdfs': RDFS, 'owl': OWL, 'xsd': XSD, 'swrl': SWRL}
 _LOCAL = re.compile(r'[^\W\d][\w.\-]*')
@@ -68,6 +68,10 @@ def ontology_bytes(
     prefixes: Mapping[str, str] | None = None,
 ) -> bytes:
     """Return the document as bytes; arguments and errors as in `write_ontology`."""
+    if format == 'manchester':
+        from owl_reasoner.documents.manchester import ManchesterWriter
+
+        return ManchesterWriter(prefixes or {}).document(axioms, iri).encode()
     triples = triples_of(axioms, iri)
     if format == 'ntriples':
         return ''.join(map(_ntriple, triples)).encode()

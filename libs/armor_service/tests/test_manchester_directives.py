@@ -1,0 +1,79 @@
+"""Axioms, rules and class expressions by directive, in Manchester syntax."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from armor_service.client import ArmorClient, InProcessTransport
+from armor_service.service import ArmorService
+
+from .seven_rooms import IRI, Ask, asker, build_seven_rooms, names
+
+
+@pytest.fixture
+def rooms(service: ArmorService) -> Ask:
+    """Provide the seven rooms."""
+    build_seven_rooms(ArmorClient('c', 'map', InProcessTransport(service)), False, False)
+    return asker(service)
+
+
+def test_axioms_come_and_go(rooms: Ask) -> None:
+    axiom = 'Class: Crossing EquivalentTo: LOCATION and (hasDoor min 3 DOOR)'
+    assert rooms('ADD AXIOM', axiom).success
+    assert names(rooms('QUERY IND CLASS', 'Crossing')) == ['C1', 'C2']
+    (shown,) = rooms('QUERY AXIOMS', 'Crossing').queried_objects[-1:]
+    assert 'Crossing' in shown
+    assert rooms('REMOVE AXIOM', axiom).error_description == ''
+    assert names(rooms('QUERY IND CLASS', 'Crossing')) == []
+    assert rooms('ADD AXIOM', 'Individual: R1 Types: hasDoor max 1').success
+    for written in rooms('QUERY AXIOMS', 'R1').queried_objects:
+        assert rooms('REMOVE AXIOM', written).error_description == '', written
+    assert rooms('QUERY AXIOMS', 'R1').queried_objects == []
+
+
+def test_rules_come_and_go(rooms: Ask) -> None:
+    rule = 'ROOM(?r), visitedAt(?r, ?t), greaterThan(?t, 5) -> Visited(?r)'
+    before = rooms('QUERY RULES').queried_objects
+    assert len(before) == 3
+    assert rooms('ADD RULE', rule).success
+    assert names(rooms('QUERY IND CLASS', 'Visited')) == ['C1', 'C2', 'E', 'R1', 'R2', 'R3', 'R4']
+    (new,) = set(rooms('QUERY RULES').queried_objects) - set(before)
+    assert rooms('REMOVE RULE', new).error_description == ''
+    assert names(rooms('QUERY IND CLASS', 'Visited')) == []
+    for written in before:
+        assert rooms('REMOVE RULE', written).error_description == '', written
+    assert rooms('QUERY RULES').queried_objects == []
+
+
+def test_the_individuals_of_an_expression(rooms: Ask) -> None:
+    assert names(rooms('QUERY IND EXPRESSION', 'hasDoor value D7')) == ['C2', 'E']
+    assert names(rooms('QUERY IND EXPRESSION', 'CORRIDOR and not (hasDoor min 3)')) == []
+    assert names(rooms('QUERY IND EXPRESSION', 'CORRIDOR and (hasDoor min 3)')) == ['C1', 'C2']
+
+
+@pytest.mark.parametrize(
+    ('directive', 'problem'),
+    [
+        (('ADD AXIOM', 'Class: A SubClassOf'), 'ADD AXIOM: argument axiom: 1:10: expected'),
+        (('ADD RULE', 'ROOM(?r)'), "argument rule: 1:9: expected '->'"),
+        (('QUERY IND EXPRESSION', 'ROOM and'), 'argument class expression: 1:9: expected a'),
+        (('ADD AXIOM', 'Prefix: x: <urn:x>'), 'expected'),
+    ],
+)
+def test_a_wrong_text_is_refused_with_its_place(
+    rooms: Ask, directive: tuple[str, ...], problem: str
+) -> None:
+    answer = rooms(*directive)
+    assert (answer.success, answer.exit_code) == (False, 205)
+    assert problem in answer.error_description
+
+
+def test_an_ontology_is_saved_and_loaded_in_it(rooms: Ask, tmp_path: Path) -> None:
+    assert rooms('SAVE', str(tmp_path / 'map.omn')).success
+    assert (tmp_path / 'map.omn').read_text().startswith('Prefix: ')
+    path = str(tmp_path / 'map.omn')
+    assert rooms('LOAD FILE', path, IRI, 'false', '', 'false', reference='again').success
+    again = names(rooms('QUERY OBJECTPROP IND', 'canReach', 'Robot1', reference='again'))
+    assert again == names(rooms('QUERY OBJECTPROP IND', 'canReach', 'Robot1'))

@@ -1,0 +1,851 @@
+"""OWL 2 in Manchester syntax, read and written (https://www.w3.org/TR/owl2-manchester-syntax/).
+
+Rules are ``Rule: ROOM(?r), hasDoor(?r, ?d) -> Open(?r)``, as Protege has them; a built-in stands by
+its name behind ``swrlb:`` or without. A general class axiom has its expression in the place of the
+class: ``Class: A and B SubClassOf: C``.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from typing import Any, NamedTuple
+
+from owl_reasoner.documents.structural import PREFIXES, Axioms
+from owl_reasoner.documents.xml_reading import DEEPEST, OntologyFileError, is_absolute
+from owl_reasoner.owl import axioms as ax
+from owl_reasoner.owl import expressions as ex
+from owl_reasoner.owl.axioms import Axiom
+from owl_reasoner.owl.expressions import Literal, language_tag
+from owl_reasoner.owl.vocabulary import (
+    OWL,
+    RDF,
+    RDFS,
+    SWRLB,
+    THING,
+    TOP_LITERAL,
+    XSD,
+    local_name,
+)
+
+_TOKENS = re.compile(
+    r'\s+|(?<!\S)\#[^\n]*'
+    r'|(?P<iri><[^<>\s]*>)'
+    r'|(?P<string>"[^"\\]*+(?:\\.[^"\\]*+)*+")'
+    r'|(?P<mark>\^\^|->|>=|<=|[()\[\]{},<>])'
+    r'|(?P<language>@[A-Za-z][\w-]*)'
+    r'|(?P<variable>\?(?:<[^<>\s]*>|[\w:.#/-]+))'
+    r'|(?P<number>[+-]?\d+(?:\.\d+)?(?:[eE][+-]?\d+)?[fF]?(?![\w:]))'
+    r'|(?P<keyword>[A-Za-z]+:(?=\s|$|[<"(]))'
+    r'|(?P<name>[^\s()\[\]{},<>"^@]+)',
+    re.DOTALL,
+)
+_FACETS = {
+    **{'>=': 'minInclusive', '<=': 'maxInclusive', '>': 'minExclusive', '<': 'maxExclusive'},
+    **{word: word for word in ('length', 'minLength', 'maxLength', 'pattern')},
+    'langRange': 'langRange',
+}
+_SIGNS = {XSD + name: sign for sign, name in _FACETS.items()}
+_DATATYPES = {name: XSD + name for name in ('integer', 'decimal', 'float', 'string')}
+_COUNTS: dict[str, tuple[Any, Any]] = {
+    'min': (ex.ObjectMinCardinality, ex.DataMinCardinality),
+    'max': (ex.ObjectMaxCardinality, ex.DataMaxCardinality),
+    'exactly': (ex.ObjectExactCardinality, ex.DataExactCardinality),
+}
+_RESTRICTIONS = ('some', 'only', 'value', 'Self', *_COUNTS)
+_CHARACTERISTICS: dict[str, Any] = {
+    'Functional': ax.FunctionalObjectProperty,
+    'InverseFunctional': ax.InverseFunctionalObjectProperty,
+    'Reflexive': ax.ReflexiveObjectProperty,
+    'Irreflexive': ax.IrreflexiveObjectProperty,
+    'Symmetric': ax.SymmetricObjectProperty,
+    'Asymmetric': ax.AsymmetricObjectProperty,
+    'Transitive': ax.TransitiveObjectProperty,
+}
+_FRAMES = {
+    'Class': 'class',
+    'ObjectProperty': 'object_property',
+    'DataProperty': 'data_property',
+    'AnnotationProperty': 'annotation_property',
+    'Datatype': 'datatype',
+    'Individual': 'individual',
+}
+_LISTS = ('EquivalentClasses', 'DisjointClasses', 'EquivalentProperties', 'DisjointProperties')
+_SETS: dict[str, Any] = {
+    'SameIndividual': ax.SameIndividual,
+    'DifferentIndividuals': ax.DifferentIndividuals,
+}
+_RULES = ('Rule', 'DLSafeRule')
+_HEADS = (*_FRAMES, *_LISTS, *_SETS, *_RULES, 'Prefix', 'Ontology', 'Import')
+MOST_DIGITS = 18
+
+
+class _Token(NamedTuple):
+    kind: str
+    text: str
+    place: int
+
+
+class ManchesterParser:
+    """Reads class expressions, frames and rules.
+
+    Args:
+        text: The text.
+        named: Gives the IRI of a name, prefixed or not; raises ValueError.
+        kinds: What is known of names: (kind, IRI).
+
+    Raises:
+        OntologyFileError: From every method, with line and column: what was expected.
+    """
+
+    def __init__(
+        self, text: str, named: Callable[[str], str], kinds: Iterable[tuple[str, str]] = ()
+    ) -> None:
+        self._text = text
+        self._named = named
+        self._kinds = set(kinds)
+        self._tokens = list(self._tokenized())
+        self._at = 0
+        self._depth = 0
+
+    def _tokenized(self) -> Iterator[_Token]:
+        place = 0
+        while place < len(self._text):
+            match = _TOKENS.match(self._text, place)
+            if match is None:
+                raise self._error('a name', place)
+            if match.lastgroup:
+                yield _Token(match.lastgroup, match[0], place)
+            place = match.end()
+        yield _Token('end', '', len(self._text))
+
+    # --- tokens ---
+
+    @property
+    def _next(self) -> _Token:
+        return self._tokens[self._at]
+
+    def _take(self, *texts: str) -> _Token:
+        token = self._next
+        if texts and token.text not in texts:
+            raise self._error(' or '.join(map(repr, texts)))
+        self._at += 1
+        return token
+
+    def _error(self, expected: str, place: int | None = None) -> OntologyFileError:
+        if place is None:
+            place = self._next.place
+        shown = self._text[place : place + 20].split('\n')[0] or 'the end'
+        line = self._text.count('\n', 0, place) + 1
+        column = place - (self._text.rfind('\n', 0, place) + 1) + 1
+        return OntologyFileError(f'expected {expected}, got {shown!r}', line, column)
+
+    def _is(self, *texts: str) -> bool:
+        token = self._next
+        return token.text in texts and token.kind in ('name', 'mark', 'keyword')
+
+    def _accept(self, *texts: str) -> bool:
+        if self._is(*texts):
+            self._at += 1
+            return True
+        return False
+
+    def _iri(self, what: str = 'a name') -> str:
+        token = self._next
+        if token.kind == 'iri':
+            iri = token.text[1:-1]
+            if not is_absolute(iri):
+                raise self._error('a full IRI')
+        elif token.kind in ('name', 'number'):
+            try:
+                iri = self._named(token.text)
+            except ValueError as error:
+                raise self._error(f'{what} ({error})') from None
+        else:
+            raise self._error(what)
+        self._at += 1
+        return iri
+
+    def _number(self) -> int:
+        token = self._take()
+        if not token.text.isdigit() or len(token.text) > MOST_DIGITS:
+            raise self._error('a whole number', token.place)
+        return int(token.text)
+
+    def _several(self, read: Callable[[], Any]) -> list[Any]:
+        """Read a list with commas; annotations in front of a member are read over."""
+        found = []
+        while True:
+            self._skip_annotations()
+            found.append(read())
+            if not self._accept(','):
+                return found
+
+    def _skip_annotations(self) -> None:
+        while self._accept('Annotations:'):
+            self._annotations()
+
+    def _annotations(self) -> list[tuple[str, str | Literal]]:
+        found = []
+        while True:
+            prop = self._iri('an annotation property')
+            value = self._literal() if self._at_literal() else self._iri()
+            found.append((prop, value))
+            if not self._accept(','):
+                return found
+
+    # --- expressions ---
+
+    def whole(self, read: Callable[[], Any]) -> Any:
+        """Read what the text as a whole holds."""
+        found = read()
+        if self._next.kind != 'end':
+            raise self._error('the end')
+        return found
+
+    def class_expression(self) -> ex.ClassExpression:
+        """Read ``A and (p some B) or not C``."""
+        found: ex.ClassExpression = self._nested(
+            'or', ex.ObjectUnionOf, lambda: self._joined('and', ex.ObjectIntersectionOf)
+        )
+        return found
+
+    def _joined(self, word: str, record: Any) -> Any:
+        parts = [self._primary()]
+        while self._accept(word, 'that'):
+            parts.append(self._primary())
+        return parts[0] if len(parts) == 1 else record(tuple(parts))
+
+    def _nested(self, word: str, record: Any, read: Callable[[], Any]) -> Any:
+        self._depth += 1
+        if self._depth > DEEPEST:
+            raise self._error(f'expressions that nest no deeper than {DEEPEST}')
+        parts = [read()]
+        while self._accept(word):
+            parts.append(read())
+        self._depth -= 1
+        return parts[0] if len(parts) == 1 else record(tuple(parts))
+
+    def _primary(self) -> ex.ClassExpression:
+        if self._accept('not'):
+            return ex.ObjectComplementOf(self._primary())
+        if self._is('('):
+            before = self._at
+            self._take('(')
+            if self._is('inverse'):
+                self._at = before
+                return self._restriction()
+            found = self.class_expression()
+            self._take(')')
+            return found
+        if self._accept('{'):
+            individuals = self._several(self._iri)
+            self._take('}')
+            return ex.ObjectOneOf(tuple(individuals))
+        follows = self._tokens[self._at + 1] if self._next.kind != 'end' else self._next
+        if self._is('inverse') or follows.text in _RESTRICTIONS:
+            return self._restriction()
+        return self._iri('a class')
+
+    def _property(self) -> ex.PropertyExpression:
+        brackets = self._accept('(')
+        if not self._accept('inverse'):
+            return self._iri('a property')
+        inner = self._accept('(')
+        prop = ex.ObjectInverseOf(self._iri('a property'))
+        for open_one in (inner, brackets):
+            if open_one:
+                self._take(')')
+        return prop
+
+    def _restriction(self) -> ex.ClassExpression:
+        prop = self._property()
+        word = self._take(*_RESTRICTIONS).text
+        if word == 'Self':
+            return ex.ObjectHasSelf(prop)
+        if word == 'value':
+            if self._at_literal():
+                return ex.DataHasValue(str(prop), self._literal())
+            return ex.ObjectHasValue(prop, self._iri('an individual'))
+        count = self._number() if word in _COUNTS else 0
+        if self._is_data(prop):
+            return self._of_values(str(prop), word, count)
+        if word in _COUNTS:
+            record = _COUNTS[word][0]
+            made: ex.ClassExpression = record(count, prop, self._filler(THING, self._primary))
+            return made
+        quantified = ex.ObjectSomeValuesFrom if word == 'some' else ex.ObjectAllValuesFrom
+        return quantified(prop, self._primary())
+
+    def _of_values(self, prop: str, word: str, count: int) -> ex.ClassExpression:
+        if word in _COUNTS:
+            ranged = self._filler(TOP_LITERAL, self._data_primary)
+            made: ex.ClassExpression = _COUNTS[word][1](count, prop, ranged)
+            return made
+        data = ex.DataSomeValuesFrom if word == 'some' else ex.DataAllValuesFrom
+        return data(prop, self._data_primary())
+
+    def _filler(self, default: Any, read: Callable[[], Any]) -> Any:
+        begins = self._next.kind in ('iri', 'name') or self._is('(', '{', 'not')
+        return read() if begins and not self._is('and', 'or', 'that') else default
+
+    def _is_data(self, prop: ex.PropertyExpression) -> bool:
+        """Tell whether a property has values: by its declaration, else by what stands behind it."""
+        if not isinstance(prop, str) or ('object_property', prop) in self._kinds:
+            return False
+        if ('data_property', prop) in self._kinds:
+            return True
+        token = self._next
+        if token.text == '{':
+            token = self._tokens[self._at + 1]
+            return token.kind in ('string', 'number') or token.text in ('true', 'false')
+        if token.kind not in ('iri', 'name') or token.text in ('and', 'or', 'not'):
+            return False
+        if token.text in _DATATYPES:
+            return True
+        before = self._at
+        try:
+            iri = self._iri()
+        except OntologyFileError:
+            return False
+        finally:
+            self._at = before
+        is_range = ('datatype', iri) in self._kinds
+        return is_range or iri.startswith(XSD) or iri in (RDFS + 'Literal', RDF + 'PlainLiteral')
+
+    # --- data ---
+
+    def data_range(self) -> ex.DataRange:
+        """Read ``integer[>= 0] or {"a"}``."""
+        found: ex.DataRange = self._nested('or', ex.DataUnionOf, self._data_joined)
+        return found
+
+    def _data_joined(self) -> ex.DataRange:
+        parts = [self._data_primary()]
+        while self._accept('and'):
+            parts.append(self._data_primary())
+        return parts[0] if len(parts) == 1 else ex.DataIntersectionOf(tuple(parts))
+
+    def _data_primary(self) -> ex.DataRange:
+        if self._accept('not'):
+            return ex.DataComplementOf(self._data_primary())
+        if self._accept('('):
+            found = self.data_range()
+            self._take(')')
+            return found
+        if self._accept('{'):
+            literals = self._several(self._literal)
+            self._take('}')
+            return ex.DataOneOf(tuple(literals))
+        if self._next.text in _DATATYPES:
+            datatype = _DATATYPES[self._take().text]
+        else:
+            datatype = self._iri('a datatype')
+        if not self._accept('['):
+            return datatype
+        facets = self._several(self._facet)
+        self._take(']')
+        return ex.DatatypeRestriction(datatype, tuple(facets))
+
+    def _facet(self) -> tuple[str, Literal]:
+        word = self._take(*_FACETS).text
+        space = RDF if word == 'langRange' else XSD
+        return space + _FACETS[word], self._literal()
+
+    def _at_literal(self) -> bool:
+        return self._next.kind in ('string', 'number') or self._is('true', 'false')
+
+    def _literal(self) -> Literal:
+        token = self._take()
+        if token.text in ('true', 'false'):
+            return Literal(token.text, XSD + 'boolean')
+        if token.kind == 'number':
+            text = token.text
+            if text[-1] in 'fF':
+                return Literal(text[:-1], XSD + 'float')
+            kind = 'double' if 'e' in text.lower() else 'decimal' if '.' in text else 'integer'
+            return Literal(text, XSD + kind)
+        if token.kind != 'string':
+            raise self._error('a value', token.place)
+        text = re.sub(r'\\(.)', r'\1', token.text[1:-1], flags=re.DOTALL)
+        if self._next.kind == 'language':
+            return Literal(text, RDF + 'langString', language_tag(self._take().text[1:]))
+        if self._accept('^^'):
+            if self._next.text in _DATATYPES:
+                return Literal(text, _DATATYPES[self._take().text])
+            return Literal(text, self._iri('a datatype'))
+        return Literal(text)
+
+    # --- rules ---
+
+    def rule(self) -> ax.Rule:
+        """Read ``ROOM(?r), hasDoor(?r, ?d) -> Open(?r)``."""
+        body = [] if self._is('->') else self._several(self._atom)
+        self._take('->')
+        head = [] if self._next.kind in ('end', 'keyword') else self._several(self._atom)
+        return ax.Rule(tuple(body), tuple(head))
+
+    def _atom(self) -> Any:
+        if self._is('sameAs', 'SameAs', 'differentFrom', 'DifferentFrom'):
+            same = self._take().text.lower() == 'sameas'
+            first, second = self._arguments(2)
+            record = ex.SameIndividualAtom if same else ex.DifferentIndividualsAtom
+            return record(first, second)
+        token = self._next
+        before = self._at
+        if token.kind == 'name' and self._tokens[before + 1].text == '(':
+            name = token.text.removeprefix('swrlb:')
+            if name != token.text or self._is_builtin(name):
+                self._take()
+                return ex.BuiltinAtom(SWRLB + name, tuple(self._arguments(0)))
+            predicate: Any = self._iri('a class, property or built-in')
+        elif token.kind == 'iri' and self._tokens[before + 1].text == '(':
+            predicate = self._iri()
+            if predicate.startswith(SWRLB):
+                return ex.BuiltinAtom(predicate, tuple(self._arguments(0)))
+        else:
+            predicate = self._primary()
+        arguments = self._arguments(0)
+        if len(arguments) == 1:
+            is_range = isinstance(predicate, str) and (
+                ('datatype', predicate) in self._kinds or predicate.startswith(XSD)
+            )
+            return (ex.DataRangeAtom if is_range else ex.ClassAtom)(predicate, arguments[0])
+        if len(arguments) != 2 or not isinstance(predicate, str):
+            raise self._error('one or two arguments', token.place)
+        data = ('data_property', predicate) in self._kinds or isinstance(arguments[1], Literal)
+        record2: Any = ex.DataPropertyAtom if data else ex.ObjectPropertyAtom
+        return record2(predicate, *arguments)
+
+    def _is_builtin(self, name: str) -> bool:
+        from owl_reasoner.reasoner.swrl_builtins import builtin
+
+        if any(builtin(name, count) for count in range(1, 5)):
+            try:
+                iri = self._named(name)
+            except ValueError:
+                return True
+            return not any(known == iri for _, known in self._kinds)
+        return False
+
+    def _arguments(self, count: int) -> list[Any]:
+        self._take('(')
+        found = self._several(self._argument)
+        if count and len(found) != count:
+            raise self._error(f'{count} arguments')
+        self._take(')')
+        return found
+
+    def _argument(self) -> Any:
+        if self._next.kind == 'variable':
+            name = self._take().text[1:]
+            return ex.Variable(name[1:-1] if name[0] == '<' else f'urn:swrl:var#{name}')
+        return self._literal() if self._at_literal() else self._iri('an individual')
+
+    # --- frames ---
+
+    def axioms(self) -> list[Axiom]:
+        """Read frames and rules, ``Class: A SubClassOf: B``."""
+        found: list[Axiom] = []
+        while self._next.kind != 'end':
+            found += self.frame()
+        return found
+
+    def frame(self) -> list[Axiom]:
+        """Read one frame, list or rule."""
+        word = self._take().text
+        head = word.removesuffix(':')
+        if word == head or head not in _HEADS:
+            self._at -= 1
+            raise self._error('a frame such as Class: or Individual:')
+        if head in _RULES:
+            self._skip_annotations()
+            return [self.rule()]
+        if head in _SETS:
+            return [_SETS[head](frozenset(self._several(self._iri)))]
+        if head in _LISTS:
+            return [self._listed(head)]
+        if head not in _FRAMES:
+            raise self._error(f'no {word} here')
+        return list(self._entity(_FRAMES[head]))
+
+    def _listed(self, head: str) -> Axiom:
+        if head.endswith('Classes'):
+            classes = tuple(self._several(self.class_expression))
+            return (ax.EquivalentClasses if head[0] == 'E' else ax.DisjointClasses)(classes)
+        props = tuple(self._several(self._property))
+        data = all(('data_property', prop) in self._kinds for prop in props)
+        kind = 'Data' if data else 'Object'
+        made: Axiom = getattr(ax, head.replace('Properties', f'{kind}Properties'))(props)
+        return made
+
+    def _entity(self, kind: str) -> Iterator[Axiom]:
+        subject: Any
+        if kind == 'class':
+            subject = self.class_expression()
+        elif kind == 'object_property':
+            subject = self._property()
+        else:
+            subject = self._iri()
+        if isinstance(subject, str):
+            self._kinds.add((kind, subject))
+            if not subject.startswith('_:') and not subject.startswith((OWL, XSD, RDFS)):
+                yield ax.Declaration(kind, subject)
+        while self._next.kind == 'keyword' and self._next.text[:-1] not in _HEADS:
+            word = self._take().text[:-1]
+            if word == 'Annotations':
+                for prop, value in self._annotations():
+                    if isinstance(subject, str):
+                        yield ax.AnnotationAssertion(prop, subject, value)
+                continue
+            sections = getattr(self, f'_{kind}_section')
+            yield from sections(word, subject)
+
+    def _no_section(self, word: str) -> OntologyFileError:
+        self._at -= 1
+        return self._error(f'a section of this frame, not {word}:')
+
+    def _class_section(self, word: str, cls: Any) -> Iterator[Axiom]:
+        if word == 'HasKey':
+            objects: list[ex.PropertyExpression] = []
+            datas: list[ex.PropertyExpression] = []
+            while self._next.kind in ('iri', 'name'):
+                key = self._property()
+                is_data = ('data_property', key) in self._kinds
+                (datas if is_data else objects).append(key)
+                self._accept(',')
+            yield ax.HasKey(cls, tuple(objects), tuple(map(str, datas)))
+            return
+        if word not in ('SubClassOf', 'EquivalentTo', 'DisjointWith', 'DisjointUnionOf'):
+            raise self._no_section(word)
+        others = self._several(self.class_expression)
+        if word == 'DisjointUnionOf':
+            yield ax.DisjointUnion(cls, tuple(others))
+            return
+        for other in others:
+            if word == 'SubClassOf':
+                yield ax.SubClassOf(cls, other)
+            elif word == 'EquivalentTo':
+                yield ax.EquivalentClasses((cls, other))
+            else:
+                yield ax.DisjointClasses((cls, other))
+
+    def _object_property_section(self, word: str, prop: Any) -> Iterator[Axiom]:
+        if word == 'Characteristics':
+            for name in self._several(lambda: self._take(*_CHARACTERISTICS).text):
+                yield _CHARACTERISTICS[name](prop)
+        elif word == 'SubPropertyChain':
+            chain = [self._property()]
+            while self._accept('o'):
+                chain.append(self._property())
+            yield ax.SubPropertyChainOf(tuple(chain), prop)
+        elif word in ('Domain', 'Range'):
+            record = ax.ObjectPropertyDomain if word == 'Domain' else ax.ObjectPropertyRange
+            yield from (record(prop, cls) for cls in self._several(self.class_expression))
+        elif word in _PAIRED:
+            yield from (_PAIRED[word](prop, other) for other in self._several(self._property))
+        else:
+            raise self._no_section(word)
+
+    def _data_property_section(self, word: str, prop: str) -> Iterator[Axiom]:
+        if word == 'Characteristics':
+            self._take('Functional')
+            yield ax.FunctionalDataProperty(prop)
+        elif word == 'Domain':
+            yield from (
+                ax.DataPropertyDomain(prop, cls) for cls in self._several(self.class_expression)
+            )
+        elif word == 'Range':
+            yield from (ax.DataPropertyRange(prop, one) for one in self._several(self.data_range))
+        elif word in ('SubPropertyOf', 'EquivalentTo', 'DisjointWith'):
+            for other in self._several(self._iri):
+                if word == 'SubPropertyOf':
+                    yield ax.SubDataPropertyOf(prop, other)
+                elif word == 'EquivalentTo':
+                    yield ax.EquivalentDataProperties((prop, other))
+                else:
+                    yield ax.DisjointDataProperties((prop, other))
+        else:
+            raise self._no_section(word)
+
+    def _annotation_property_section(self, word: str, prop: str) -> Iterator[Axiom]:
+        names = {'SubPropertyOf': 'subPropertyOf', 'Domain': 'domain', 'Range': 'range'}
+        if word not in names:
+            raise self._no_section(word)
+        for other in self._several(self._iri):
+            yield ax.AnnotationAssertion(RDFS + names[word], prop, other)
+
+    def _datatype_section(self, word: str, datatype: str) -> Iterator[Axiom]:
+        if word != 'EquivalentTo':
+            raise self._no_section(word)
+        yield ax.DatatypeDefinition(datatype, self.data_range())
+
+    def _individual_section(self, word: str, ind: str) -> Iterator[Axiom]:
+        if word in ('Types', 'Type'):
+            for cls in self._several(self.class_expression):
+                yield ax.ClassAssertion(cls, ind)
+        elif word == 'Facts':
+            yield from self._several(lambda: self._fact(ind))
+        elif word in ('SameAs', 'DifferentFrom'):
+            record = _SETS['SameIndividual' if word == 'SameAs' else 'DifferentIndividuals']
+            for other in self._several(self._iri):
+                yield record(frozenset((ind, other)))
+        else:
+            raise self._no_section(word)
+
+    def _fact(self, ind: str) -> Axiom:
+        negative = self._accept('not')
+        prop = self._property()
+        if self._at_literal():
+            data = ax.NegativeDataPropertyAssertion if negative else ax.DataPropertyAssertion
+            return data(str(prop), ind, self._literal())
+        other = self._iri('an individual')
+        if isinstance(prop, ex.ObjectInverseOf):
+            prop, ind, other = prop.prop, other, ind
+        record = ax.NegativeObjectPropertyAssertion if negative else ax.ObjectPropertyAssertion
+        return record(prop, ind, other)
+
+
+_PAIRED: dict[str, Callable[[Any, Any], Axiom]] = {
+    'SubPropertyOf': ax.SubObjectPropertyOf,
+    'InverseOf': ax.InverseObjectProperties,
+    'EquivalentTo': lambda first, second: ax.EquivalentObjectProperties((first, second)),
+    'DisjointWith': lambda first, second: ax.DisjointObjectProperties((first, second)),
+}
+_HEADER = re.compile(
+    r'(?P<space>(?:\s+|\#[^\n]*\n)+)'
+    r'|Prefix:\s*(?P<prefix>[\w.-]*):\s*<(?P<base>[^<>\s]*)>'
+    r'|Ontology:\s*(?:<(?P<iri>[^<>\s]*)>\s*(?:<(?P<version>[^<>\s]*)>)?)?'
+    r'|Import:\s*<(?P<import>[^<>\s]*)>'
+)
+_DECLARED = re.compile(
+    r'(?<!\S)(Class|ObjectProperty|DataProperty|AnnotationProperty|Datatype|Individual):'
+    r'\s+(<[^<>\s]*>|[^\s()\[\]{},<>"^@]+)'
+)
+
+
+class ManchesterDocument(Axioms):
+    """A document, whose frames are read once it is known what its imports declare."""
+
+    def __init__(self, text: str, iri: str) -> None:
+        super().__init__(lambda place: text.count('\n', 0, place) + 1)
+        self._body, self._base = text, iri
+        place = 0
+        while (match := _HEADER.match(text, place)) is not None and match.end() > place:
+            if match['prefix'] is not None:
+                self.prefixes[match['prefix']] = match['base']
+            elif match['import'] is not None:
+                self.axioms[ax.Import(match['import'])] = None
+            elif match['space'] is None:
+                self.iri = match['iri'] or ''
+                if match['version']:
+                    self.version(match['version'])
+            place = match.end()
+        self._body = re.sub('[^\n]', ' ', text[:place]) + text[place:]
+
+    @property
+    def declared(self) -> Iterator[tuple[str, str]]:
+        """Pairs (kind, IRI) of what the document declares."""
+        for match in _DECLARED.finditer(self._body):
+            try:
+                name = match[2]
+                yield _FRAMES[match[1]], name[1:-1] if name[0] == '<' else self._full(name)
+            except ValueError:
+                continue
+
+    def read(self, declared: Iterable[tuple[str, str]] = ()) -> None:
+        """Read the frames."""
+        known = [*declared, *self.declared]
+        parser = ManchesterParser(self._body, self._full, known)
+        while parser._accept('Annotations:'):
+            for prop, value in parser._annotations():
+                self.axioms[ax.AnnotationAssertion(prop, self.iri, value)] = None
+        self.axioms.update(dict.fromkeys(parser.axioms()))
+
+    def _full(self, name: str) -> str:
+        if name.startswith('_:'):
+            return name
+        iri = self.named(name if ':' in name else f':{name}')
+        if iri is None and ':' not in name:
+            iri = (self.iri or self._base).rstrip('#') + '#' + name
+        if iri is None:
+            raise ValueError(f'the prefix of {name!r} is not declared')
+        return iri
+
+
+# --- writing ---
+
+
+class ManchesterWriter:
+    """Writes axioms.
+
+    Args:
+        prefixes: What namespaces are written as; others are written in full.
+    """
+
+    def __init__(self, prefixes: Mapping[str, str]) -> None:
+        known = {**PREFIXES, **prefixes}
+        self.prefixes = {name: base for name, base in known.items() if base}
+        self._bases = sorted(self.prefixes.items(), key=lambda item: -len(item[1]))
+
+    def document(self, axioms: Iterable[Axiom], iri: str) -> str:
+        """Return a document."""
+        lines = [f'Prefix: {name}: <{base}>' for name, base in self.prefixes.items()]
+        axioms = list(axioms)
+        lines += ['', f'Ontology: <{iri}>']
+        lines += [f'Import: <{axiom.iri}>' for axiom in axioms if isinstance(axiom, ax.Import)]
+        own = [a for a in axioms if isinstance(a, ax.AnnotationAssertion) and a.subject == iri]
+        lines += [f'Annotations: {self._note(a.prop, a.value)}' for a in own]
+        left = [a for a in axioms if not isinstance(a, ax.Import | ax.AxiomAnnotation)]
+        kinds: dict[str, list[str]] = {}
+        for axiom in left:
+            if isinstance(axiom, ax.Declaration):
+                kinds.setdefault(axiom.iri, []).append(axiom.kind)
+        taken = set(own)
+        lines += [self.axiom(axiom, kinds) for axiom in left if axiom not in taken]
+        return '\n'.join(lines) + '\n'
+
+    def name(self, iri: str) -> str:
+        """Return a name with its prefix, or in full."""
+        if iri.startswith('_:'):
+            return iri
+        for prefix, base in self._bases:
+            if iri.startswith(base) and re.fullmatch(r'[A-Za-z_][\w-]*', iri[len(base) :]):
+                return f'{prefix}:{iri[len(base) :]}'
+        return f'<{iri}>'
+
+    def literal(self, literal: Literal) -> str:
+        """Return a value."""
+        text = literal.lexical.replace('\\', '\\\\').replace('"', '\\"')
+        if literal.language:
+            return f'"{text}"@{literal.language}'
+        if literal.datatype == XSD + 'string':
+            return f'"{text}"'
+        return f'"{text}"^^{self.name(literal.datatype)}'
+
+    def expression(self, part: Any, *, inner: bool = True) -> str:
+        """Return a class expression, data range or property; in brackets where it needs them."""
+        if isinstance(part, str):
+            return self.name(part)
+        if isinstance(part, Literal):
+            return self.literal(part)
+        if isinstance(part, ex.ObjectInverseOf):
+            return (
+                f'inverse ({self.name(part.prop)})'
+                if not inner
+                else (f'(inverse ({self.name(part.prop)}))')
+            )
+        text = self._compound(part)
+        alone = isinstance(part, ex.ObjectOneOf | ex.DataOneOf | ex.DatatypeRestriction)
+        return f'({text})' if inner and not alone else text
+
+    def _compound(self, part: Any) -> str:
+        kind = type(part).__name__
+        if kind.endswith(('IntersectionOf', 'UnionOf')):
+            word = ' and ' if 'Inter' in kind else ' or '
+            return word.join(map(self.expression, part.operands))
+        if kind.endswith('ComplementOf'):
+            return f'not {self.expression(part.operand)}'
+        if kind.endswith('OneOf'):
+            members = part.literals if kind[0] == 'D' else part.individuals
+            return f'{{{", ".join(map(self.expression, members))}}}'
+        if isinstance(part, ex.DatatypeRestriction):
+            facets = ', '.join(
+                f'{_SIGNS.get(name, local_name(name))} {self.literal(bound)}'
+                for name, bound in part.facets
+            )
+            return f'{self.name(part.datatype)}[{facets}]'
+        prop = self.expression(part.prop)
+        if isinstance(part, ex.ObjectHasSelf):
+            return f'{prop} Self'
+        if kind.endswith('HasValue'):
+            held = part.literal if kind[0] == 'D' else part.individual
+            return f'{prop} value {self.expression(held)}'
+        filler = self.expression(part.range if kind[0] == 'D' else part.filler)
+        if kind.endswith('Cardinality'):
+            word = next(w for w, records in _COUNTS.items() if type(part) in records)
+            return f'{prop} {word} {part.n} {filler}'
+        return f'{prop} {"some" if "Some" in kind else "only"} {filler}'
+
+    def axiom(self, axiom: Axiom, kinds: Mapping[str, list[str]] | None = None) -> str:
+        """Return an axiom as a frame of its own.
+
+        Raises:
+            OntologyFileError: Manchester syntax has no form for it.
+        """
+        kind = type(axiom).__name__
+        say = self.expression
+        plain = kind.replace('Object', '').replace('Data', '')
+        data = 'DataProp' in kind
+        frame = 'DataProperty' if data else 'ObjectProperty'
+        if isinstance(axiom, ax.Declaration):
+            word = next(word for word, one in _FRAMES.items() if one == axiom.kind)
+            return f'{word}: {self.name(axiom.iri)}'
+        if isinstance(axiom, ax.AnnotationAssertion):
+            found = (kinds or {}).get(axiom.subject, ['individual'])[0]
+            word = next(word for word, one in _FRAMES.items() if one == found)
+            return f'{word}: {self.name(axiom.subject)} Annotations: ' + self._note(
+                axiom.prop, axiom.value
+            )
+        if isinstance(axiom, ax.Rule):
+            body, head = (', '.join(map(self._atom, atoms)) for atoms in (axiom.body, axiom.head))
+            return f'Rule: {body} -> {head}'
+        if isinstance(axiom, ax.SubClassOf):
+            return f'Class: {say(axiom.sub)} SubClassOf: {say(axiom.sup)}'
+        if isinstance(axiom, ax.EquivalentClasses | ax.DisjointClasses):
+            return f'{kind}: {", ".join(map(say, axiom.classes))}'
+        if isinstance(axiom, ax.DisjointUnion):
+            listed = ', '.join(map(say, axiom.classes))
+            return f'Class: {say(axiom.cls)} DisjointUnionOf: {listed}'
+        if isinstance(axiom, ax.HasKey):
+            keys = ', '.join(map(say, (*axiom.object_props, *axiom.data_props)))
+            return f'Class: {say(axiom.cls)} HasKey: {keys}'
+        if isinstance(axiom, ax.SameIndividual | ax.DifferentIndividuals):
+            return f'{kind}: {", ".join(map(self.name, sorted(axiom.individuals)))}'
+        if isinstance(axiom, ax.ClassAssertion):
+            return f'Individual: {self.name(axiom.individual)} Types: {say(axiom.cls)}'
+        if plain in ('PropertyAssertion', 'NegativePropertyAssertion'):
+            held: Any = getattr(axiom, 'literal', None) or getattr(axiom, 'object', '')
+            no = 'not ' if plain[0] == 'N' else ''
+            subject, prop = axiom.subject, axiom.prop  # type: ignore[attr-defined]
+            return f'Individual: {self.name(subject)} Facts: {no}{say(prop)} {say(held)}'
+        if isinstance(axiom, ax.SubPropertyChainOf):
+            chain = ' o '.join(map(say, axiom.chain))
+            return f'ObjectProperty: {say(axiom.sup, inner=False)} SubPropertyChain: {chain}'
+        if isinstance(axiom, ax.DatatypeDefinition):
+            return f'Datatype: {self.name(axiom.datatype)} EquivalentTo: {say(axiom.range)}'
+        if plain in ('EquivalentProperties', 'DisjointProperties'):
+            return f'{plain}: {", ".join(map(say, axiom.props))}'  # type: ignore[attr-defined]
+        if isinstance(axiom, ax.InverseObjectProperties):
+            return f'ObjectProperty: {say(axiom.first, inner=False)} InverseOf: {say(axiom.second)}'
+        if plain == 'SubPropertyOf':
+            sub, sup = axiom.sub, axiom.sup  # type: ignore[attr-defined]
+            return f'{frame}: {say(sub, inner=False)} SubPropertyOf: {say(sup)}'
+        prop = say(axiom.prop, inner=False)  # type: ignore[attr-defined]
+        if plain == 'PropertyDomain':
+            return f'{frame}: {prop} Domain: {say(axiom.domain)}'  # type: ignore[attr-defined]
+        if plain == 'PropertyRange':
+            return f'{frame}: {prop} Range: {say(axiom.range)}'  # type: ignore[attr-defined]
+        return f'{frame}: {prop} Characteristics: {plain.removesuffix("Property")}'
+
+    def _note(self, prop: str, value: str | Literal) -> str:
+        return f'{self.name(prop)} {self.expression(value)}'
+
+    def _atom(self, atom: Any) -> str:
+        if isinstance(atom, ex.SameIndividualAtom | ex.DifferentIndividualsAtom):
+            word = 'sameAs' if isinstance(atom, ex.SameIndividualAtom) else 'differentFrom'
+            return f'{word}({self._argument(atom.first)}, {self._argument(atom.second)})'
+        if isinstance(atom, ex.BuiltinAtom):
+            arguments = ', '.join(map(self._argument, atom.arguments))
+            return f'{self.name(atom.builtin)}({arguments})'
+        if isinstance(atom, ex.ClassAtom | ex.DataRangeAtom):
+            of = atom.cls if isinstance(atom, ex.ClassAtom) else atom.range
+            return f'{self.expression(of)}({self._argument(atom.argument)})'
+        first, second = map(self._argument, (atom.first, atom.second))
+        return f'{self.expression(atom.prop)}({first}, {second})'
+
+    def _argument(self, argument: Any) -> str:
+        if isinstance(argument, ex.Variable):
+            name = argument.name.removeprefix('urn:swrl:var#')
+            return f'?{name}' if re.fullmatch(r'\w+', name) else f'?<{argument.name}>'
+        return self.expression(argument)
