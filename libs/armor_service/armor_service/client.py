@@ -395,6 +395,40 @@ class Manipulation(ClientPart):
         """Give an object property another name."""
         return self._change('RENAME OBJECTPROP', old_name, new_name)
 
+    @operation
+    def add_axiom(self, axiom: str) -> Steps[bool]:
+        """Assert frames in Manchester syntax, ``Class: A SubClassOf: B``."""
+        return self._change('ADD AXIOM', axiom)
+
+    @operation
+    def remove_axiom(self, axiom: str) -> Steps[bool]:
+        """Retract frames in Manchester syntax."""
+        return self._change('REMOVE AXIOM', axiom)
+
+    @operation
+    def add_rule(self, rule: str) -> Steps[bool]:
+        """Assert a rule, ``ROOM(?r), hasDoor(?r, ?d) -> Open(?r)``."""
+        return self._change('ADD RULE', rule)
+
+    @operation
+    def remove_rule(self, rule: str) -> Steps[bool]:
+        """Retract a rule."""
+        return self._change('REMOVE RULE', rule)
+
+    @operation
+    def close_objectprop(self, objectprop_name: str, ind_name: str = '') -> Steps[bool]:
+        """State that an individual, or each, is related to nothing but what is known."""
+        if ind_name:
+            return self._change('CLOSE OBJECTPROP IND', objectprop_name, ind_name)
+        return self._change('CLOSE OBJECTPROP', objectprop_name)
+
+    @operation
+    def close_class(self, class_name: str, ind_name: str = '') -> Steps[bool]:
+        """State that an individual, or each that is not known to be of a class, is not."""
+        if ind_name:
+            return self._change('CLOSE CLASS IND', class_name, ind_name)
+        return self._change('CLOSE CLASS', class_name)
+
     def _dataprops(
         self, command: str, ind_name: str, properties: Iterable[Sequence[str]]
     ) -> list[DirectiveRequest]:
@@ -532,6 +566,26 @@ class Query(ClientPart):
         return self._objects('QUERY EXPLAIN ABSENCE', fact)
 
     @operation
+    def ind_b2_expression(self, expression: str, with_URI: bool = False) -> Steps[list[str]]:  # noqa: N803
+        """Yield individuals of a class expression in Manchester syntax."""
+        return self._names(with_URI, 'QUERY IND EXPRESSION', expression)
+
+    @operation
+    def axioms(self, name: str) -> Steps[list[str]]:
+        """Yield what is asserted of an entity, in Manchester syntax."""
+        return self._objects('QUERY AXIOMS', name)
+
+    @operation
+    def rules(self) -> Steps[list[str]]:
+        """Yield the rules, in Manchester syntax."""
+        return self._objects('QUERY RULES')
+
+    @operation
+    def taken_back(self) -> Steps[list[str]]:
+        """Yield the changes that were taken back for want of time: what, whose, when and why."""
+        return self._objects('QUERY TAKEN BACK')
+
+    @operation
     def explain_inconsistency(self) -> Steps[tuple[str, str] | None]:
         """Yield why the ontology contradicts itself; None when it does not."""
         objects = yield from self._objects('QUERY EXPLAIN INCONSISTENCY')
@@ -547,9 +601,19 @@ class Utils(ClientPart):
         return (yield from self._carry_out('APPLY')).is_consistent
 
     @operation
-    def sync_buffered_reasoner(self) -> Steps[bool]:
-        """Apply buffered manipulations and reason; whether the ontology is consistent."""
-        return (yield from self._carry_out('REASON')).is_consistent
+    def sync_buffered_reasoner(self, seconds: float = 0.0) -> Steps[bool]:
+        """Apply buffered manipulations and reason; whether the ontology is consistent.
+
+        Args:
+            seconds: Processor time after which it ends; 0 leaves it to the server.
+        """
+        args = (repr(float(seconds)),) if seconds else ()
+        return (yield from self._carry_out('REASON', *args)).is_consistent
+
+    @operation
+    def cancel(self) -> Steps[None]:
+        """End the reasoning that runs."""
+        yield from self._carry_out('CANCEL')
 
     @operation
     def save_ref_with_inferences(self, filepath: str) -> Steps[None]:

@@ -77,3 +77,23 @@ def test_an_ontology_is_saved_and_loaded_in_it(rooms: Ask, tmp_path: Path) -> No
     assert rooms('LOAD FILE', path, IRI, 'false', '', 'false', reference='again').success
     again = names(rooms('QUERY OBJECTPROP IND', 'canReach', 'Robot1', reference='again'))
     assert again == names(rooms('QUERY OBJECTPROP IND', 'canReach', 'Robot1'))
+
+
+def test_the_client_has_methods_for_them(service: ArmorService) -> None:
+    client = ArmorClient('c', 'map', InProcessTransport(service))
+    build_seven_rooms(client, False, False)
+    change, ask = client.manipulation, client.query
+    assert change.add_axiom('Class: DeadEnd EquivalentTo: LOCATION and (hasDoor exactly 1)')
+    assert change.close_objectprop('hasDoor', 'R1')
+    assert ask.ind_b2_class('DeadEnd') == ['R1'] == ask.ind_b2_expression('DeadEnd')
+    assert change.close_objectprop('hasDoor')
+    assert ask.ind_b2_class('DeadEnd') == ['R1', 'R2', 'R3', 'R4']
+    assert change.add_rule('DeadEnd(?r) -> Quiet(?r)')
+    assert change.remove_rule(next(rule for rule in ask.rules() if 'Quiet' in rule))
+    assert ask.ind_b2_class('Quiet') == []
+    assert change.close_class('URGENT', 'Robot1')
+    assert any('not' in axiom for axiom in ask.axioms('Robot1'))
+    assert change.remove_axiom('Individual: Robot1 Types: not URGENT')
+    assert ask.taken_back() == []
+    client.utils.cancel()
+    assert client.utils.sync_buffered_reasoner(60.0)
