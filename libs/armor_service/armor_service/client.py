@@ -601,14 +601,14 @@ class Utils(ClientPart):
         return (yield from self._carry_out('APPLY')).is_consistent
 
     @operation
-    def sync_buffered_reasoner(self, seconds: float = 0.0) -> Steps[bool]:
-        """Apply buffered manipulations and reason; whether the ontology is consistent.
+    def sync_buffered_reasoner(self) -> Steps[bool]:
+        """Apply buffered manipulations and reason; whether the ontology is consistent."""
+        return (yield from self._carry_out('REASON')).is_consistent
 
-        Args:
-            seconds: Processor time after which it ends; 0 leaves it to the server.
-        """
-        args = (repr(float(seconds)),) if seconds else ()
-        return (yield from self._carry_out('REASON', *args)).is_consistent
+    @operation
+    def reason_within(self, seconds: float) -> Steps[bool]:
+        """Reason as `sync_buffered_reasoner` does, for so many seconds of processor time."""
+        return (yield from self._carry_out('REASON', repr(float(seconds)))).is_consistent
 
     @operation
     def cancel(self) -> Steps[None]:

@@ -96,4 +96,4 @@ def test_the_client_has_methods_for_them(service: ArmorService) -> None:
     assert change.remove_axiom('Individual: Robot1 Types: not URGENT')
     assert ask.taken_back() == []
     client.utils.cancel()
-    assert client.utils.sync_buffered_reasoner(60.0)
+    assert client.utils.reason_within(60.0)
