@@ -340,7 +340,7 @@ class Plan:
         self._course = course or self._entered(self._phases()[0])
         self._outcome = self._followed(self._course, math.inf)
         self._began = self._state
-        end = self._work + 0.3 * work
+        end = self._work + work
         for candidate in self._candidates(filled):
             if self._work > end or self._is_finished() or self._late():
                 break
