@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import errno
+import importlib
 import io
 import os
 import signal
@@ -12,7 +13,15 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from launcher import interrupt, package_commands, system
-from launcher.environment import CHECKOUT, Environment, clean_environ, keep_bytecode
+from launcher.environment import (
+    CHECKOUT,
+    INSTALLED,
+    PROGRAM,
+    Environment,
+    clean_environ,
+    compile_interfaces,
+    keep_bytecode,
+)
 from launcher.instance_lock import claim
 from launcher.run import Run, make_parser, shared_options, wanted_run
 from surveillance_runtime import node_table
@@ -26,7 +35,7 @@ def runs_folder(checkout: Path = CHECKOUT) -> Path:
     """Return where runs leave what they write: in the checkout, or the user's own of a read-only
     one.
     """
-    if os.access(checkout, os.W_OK):
+    if not INSTALLED and os.access(checkout, os.W_OK):
         return checkout / 'runs'
     state = os.environ.get('XDG_STATE_HOME') or os.path.expanduser('~/.local/state')
     return Path(state, 'surveillance', 'runs')
@@ -45,6 +54,11 @@ Runs the whole test suite on five processes. Further words go to pytest:
 All that pytest takes: .venv/bin/python -m pytest --help"""
 
 
+def entry() -> int:
+    """Run the command `surveillance` of an installed wheel."""
+    return main(sys.argv[1:])
+
+
 def main(argv: Sequence[str]) -> int:
     """Run one command and return its exit code."""
     # A set-up that is told to end has to take its compilers along.
@@ -57,19 +71,19 @@ def main(argv: Sequence[str]) -> int:
             interrupt.raise_if_lost()
             raise
     except ValueError as error:
-        print(f'launch.py: {error}', file=sys.stderr)
+        print(f'{PROGRAM}: {error}', file=sys.stderr)
         return os.EX_TEMPFAIL if isinstance(error, NotNowError) else EXIT_BAD_INPUT
     except BrokenPipeError:  # as when the output goes to `head`
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
     except OSError as error:  # a full disk, a folder that is not ours
-        print(f'launch.py: {in_one_line(error)}', file=sys.stderr)
+        print(f'{PROGRAM}: {in_one_line(error)}', file=sys.stderr)
         return os.EX_TEMPFAIL
     except KeyboardInterrupt:
         signal.signal(signal.SIGINT, signal.SIG_IGN)  # one is enough
-        ready = Environment(CHECKOUT).ready()
+        ready = INSTALLED or Environment(CHECKOUT).ready()
         more = '' if ready else '; the next start continues the set-up'
-        print(f'\nlaunch.py: interrupted{more}', file=sys.stderr)
+        print(f'\n{PROGRAM}: interrupted{more}', file=sys.stderr)
         return EXIT_INTERRUPTED
 
 
@@ -94,6 +108,8 @@ def _dispatch(argv: list[str]) -> int:
         'test': _test,
         'lint': _lint,
     }
+    if argv and argv[0] in ('setup', 'test', 'lint') and INSTALLED:
+        raise ValueError(f'{argv[0]!r} works in a checkout only: this is an installed {PROGRAM}')
     if argv and argv[0] in commands:
         return commands[argv[0]](argv[1:])
     if argv and argv[0] in package_commands.COMMANDS:
@@ -121,12 +137,12 @@ def _run(argv: list[str]) -> int:
 
 def _node(argv: list[str]) -> int:
     parser = CommandParser(
-        prog='launch.py node',
+        prog=f'{PROGRAM} node',
         usage='%(prog)s [options] NAME [--ros-args ...]',
         description='Runs one node in this terminal with the parameters of config/.',
         parents=[shared_options()],
     )
-    parser.add_argument('name', metavar='NAME', help='see launch.py list')
+    parser.add_argument('name', metavar='NAME', help=f'see {PROGRAM} list')
     parser.add_argument(
         '--ros-args',
         dest='rest',
@@ -164,7 +180,7 @@ def _node(argv: list[str]) -> int:
 
 
 def _list(argv: list[str]) -> int:
-    CommandParser(prog='launch.py list', description='Lists the nodes.').parse_args(argv)
+    CommandParser(prog=f'{PROGRAM} list', description='Lists the nodes.').parse_args(argv)
     width = max(len(node.name) for node in node_table.NODES)
     for package in dict.fromkeys(node.package for node in node_table.NODES):
         print(package)
@@ -176,7 +192,7 @@ def _list(argv: list[str]) -> int:
 
 def _params(argv: list[str]) -> int:
     parser = CommandParser(
-        prog='launch.py params',
+        prog=f'{PROGRAM} params',
         usage='%(prog)s [options] [NODE]',
         description='Prints the value of each parameter and where it comes from.',
         parents=[shared_options()],
@@ -206,7 +222,7 @@ def _service(argv: list[str]) -> int:
     from launcher import service
 
     parser = CommandParser(
-        prog='launch.py service',
+        prog=f'{PROGRAM} service',
         usage='%(prog)s [--print] [options of run]',
         description='Writes a systemd user unit that keeps the robot running.',
         parents=[make_parser(help_too=False)],
@@ -230,7 +246,7 @@ def _service(argv: list[str]) -> int:
 
 def _setup(argv: list[str]) -> int:
     CommandParser(
-        prog='launch.py setup', description='Sets up .venv for the other commands.'
+        prog=f'{PROGRAM} setup', description='Sets up .venv for the other commands.'
     ).parse_args(argv)
     environment = _environment(())
     if environment is not None:
@@ -259,7 +275,7 @@ def _test(argv: list[str]) -> int:
 
 def _lint(argv: list[str]) -> int:
     CommandParser(
-        prog='launch.py lint', description='Runs ruff check, ruff format --check and mypy.'
+        prog=f'{PROGRAM} lint', description='Runs ruff check, ruff format --check and mypy.'
     ).parse_args(argv)
     _enter(['lint'], extras=('test', 'lint'))
     import subprocess
@@ -298,13 +314,17 @@ def _environment(extras: Sequence[str]) -> Environment | None:
 
 def _enter(argv: list[str], extras: Sequence[str] = ()) -> None:
     """Set the project's environment up, and go on as a process of it."""
+    if INSTALLED:
+        compile_interfaces()
+        importlib.invalidate_caches()
+        return
     keep_bytecode(os.environ)
     environment = _environment(extras)
     if environment is None:
         return
     environment.prepare()
     for line in environment.drop_missing_middleware(os.environ):
-        print(f'launch.py: {line}', file=sys.stderr)
+        print(f'{PROGRAM}: {line}', file=sys.stderr)
     if not environment.active():
         words = [str(environment.python), str(CHECKOUT / 'launch.py'), *argv]
         interrupt.hold_back()

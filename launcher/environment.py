@@ -19,6 +19,7 @@ import shutil
 import signal
 import subprocess
 import sys
+import tempfile
 import tomllib
 from collections import deque
 from collections.abc import Iterable, Iterator, MutableMapping, Sequence
@@ -34,7 +35,14 @@ from state_machines.files import parse_json
 from surveillance_runtime.files import replace_text
 from surveillance_runtime.launch_protocol import NotNowError
 
-CHECKOUT = Path(__file__).resolve().parent.parent
+_HERE = Path(__file__).resolve().parent.parent
+INSTALLED = not (_HERE / 'launch.py').exists()
+"""Whether this is no checkout: installed from a wheel, into an environment of the user's."""
+PROGRAM = 'surveillance' if INSTALLED else 'launch.py'
+"""What the user typed."""
+COMMAND = [PROGRAM] if INSTALLED else ['python3', PROGRAM]
+CHECKOUT = Path(sys.prefix) / 'share' / 'surveillance' if INSTALLED else _HERE
+"""What holds `config` and the sources of the messages."""
 LIBRARIES = (
     'owl_reasoner',
     'armor_service',
@@ -438,6 +446,38 @@ def interpreter() -> str:
     if sys.prefix == sys.base_prefix:
         return sys.executable
     return str(Path(sys.prefix).resolve() / 'bin' / Path(sys.executable).name)
+
+
+def compile_interfaces() -> None:
+    """Compile and install the messages into this environment, where they are missing.
+
+    Only needed where the robot was installed from a wheel: its messages depend on the machine.
+
+    Raises:
+        ValueError: A compiler or the headers of Python are missing.
+        NotNowError: It failed.
+    """
+    if system.sourced_workspace():
+        return
+    if missing := system.missing_packages():
+        system.install_packages(missing)
+    folder = CHECKOUT / INTERFACES
+    print('Compiling messages, services and actions: once, about a minute ...', flush=True)
+    with tempfile.TemporaryDirectory() as place:
+        # From a copy: a build leaves folders beside the sources, which may be read-only.
+        copy = shutil.copytree(folder, Path(place) / INTERFACES)
+        words = ['install', '--quiet', '--no-deps', '--disable-pip-version-check', str(copy)]
+        done = subprocess.run(
+            [sys.executable, '-m', 'pip', *words],
+            env=clean_environ(),
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+    if done.returncode:
+        last = [line for line in done.stderr.splitlines() if line.strip()][-1:]
+        raise NotNowError(f'the messages could not be compiled: {"".join(last)}')
 
 
 def users_of(venv: Path) -> list[int]:

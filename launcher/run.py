@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from launcher import package_commands
+from launcher.environment import PROGRAM
 from surveillance_runtime import node_table, parameter_checks
 from surveillance_runtime.command_line import CommandParser, page_address
 from surveillance_runtime.discovery import LAST_DOMAIN
@@ -324,7 +325,7 @@ def make_parser(*, help_too: bool = True) -> argparse.ArgumentParser:
         f'  {name:<25} {purpose}\n' for name, (_, purpose) in package_commands.COMMANDS.items()
     )
     parser = CommandParser(
-        prog='launch.py',
+        prog=PROGRAM,
         description=_DESCRIPTION,
         usage='%(prog)s [COMMAND] [options]',
         epilog=_COMMANDS + package_lines,

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from launcher import run_folder
 from launcher.alarm import Alarm, caller
+from launcher.environment import COMMAND
 from launcher.instance_lock import claim
 from launcher.log_merge import MergedLog
 from launcher.run import NOT_RECORDED, Run
@@ -141,13 +142,13 @@ def what_to_look_at(folder: Path) -> list[str]:
         except FileError as error:
             lines.append(f'report: {error}')
     if (folder / TIMELINE).exists():
-        lines.append(f'replay: python3 launch.py replay {shlex.quote(_short(folder))}')
+        lines.append(f'replay: {" ".join(COMMAND)} replay {shlex.quote(_short(folder))}')
     return lines
 
 
 def watch_command(run: Run) -> str:
     """Return what to type in another terminal to see this run."""
-    words = ['python3', 'launch.py', 'watch']
+    words = [*COMMAND, 'watch']
     if ros_domain(run) != '0':
         words += ['--domain', ros_domain(run)]
     if run.namespace is not None:

@@ -10,6 +10,8 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from launcher.environment import INSTALLED, PROGRAM
+
 UNIT = 'surveillance.service'
 _SOCKET = 'NOTIFY_SOCKET'
 _PROCESS = 'SYSTEMD_EXEC_PID'
@@ -53,7 +55,10 @@ def unit_text(checkout: Path, arguments: Sequence[str], memory: int) -> str:
     """
     # The interpreter below the environment, which outlives it.
     python = getattr(sys, '_base_executable', sys.executable)
-    words = [python, str(checkout / 'launch.py'), 'run', *arguments]
+    program = [python, str(checkout / 'launch.py')]
+    if INSTALLED:
+        program = [str(Path(sys.prefix) / 'bin' / PROGRAM)]
+    words = [*program, 'run', *arguments]
     # Also within quotes systemd reads a backslash as C does, % as a specifier, $ as a variable.
     command = shlex.join(words).replace('\\', '\\\\').replace('%', '%%').replace('$', '$$')
     folder = str(checkout).replace('%', '%%')

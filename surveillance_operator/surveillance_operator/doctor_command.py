@@ -17,7 +17,9 @@ from surveillance_runtime.profile import find_profile, read_profile
 from surveillance_runtime.profile.check_up import awaited, findings, table
 from surveillance_runtime.run_options import BUILT_IN_ROBOT, OPTIONS
 
-CONFIG = Path(__file__).resolve().parents[2] / 'config'
+_IN_CHECKOUT = Path(__file__).resolve().parents[2] / 'config'
+_INSTALLED = Path(sys.prefix) / 'share' / 'surveillance' / 'config'
+CONFIG = _IN_CHECKOUT if _IN_CHECKOUT.exists() else _INSTALLED
 SECONDS = 4.0
 """For how long is listened, unless asked otherwise; s."""
 
