@@ -1,0 +1,181 @@
+#!/usr/bin/env python3
+"""Build the documentation site with MkDocs Material, in `build/site`.
+
+    python3 .ci/site.py
+
+The pages are those of `docs/`, each library's README, the examples, and a reference of every public
+module, made by mkdocstrings from the docstrings. Links between them that would leave the site in a
+checkout are turned to the page that they mean. `--strict` makes a link that leads nowhere an error.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+import venv
+from pathlib import Path
+
+CHECKOUT = Path(__file__).resolve().parent.parent
+sys.path.insert(0, str(CHECKOUT))
+
+from launcher.environment import LIBRARIES, PACKAGES  # noqa: E402
+
+SITE = CHECKOUT / 'build' / 'site'
+TOOLS = ['mkdocs-material>=9.5,<10', 'mkdocstrings[python]>=0.26,<2']
+START = {'index.md': 'Start', 'your_building.md': 'Your building', 'your_robot.md': 'Your robot'}
+HOW_TO = ('running', 'watching', 'fleet', 'long_runs', 'operator', 'security')
+FROM = ('from_armor', 'from_smach', 'from_yasmin')
+CONFIG = """\
+site_name: Surveillance robot
+docs_dir: pages
+site_dir: html
+use_directory_urls: false
+theme:
+  name: material
+  font: false
+  features: [navigation.sections, navigation.top, toc.follow]
+  palette:
+    - media: '(prefers-color-scheme: light)'
+      scheme: default
+    - media: '(prefers-color-scheme: dark)'
+      scheme: slate
+plugins:
+  - search
+  - mkdocstrings:
+      handlers:
+        python:
+          paths: [{paths}]
+          options:
+            docstring_style: google
+            show_source: false
+            show_root_heading: true
+            members_order: source
+            filters: ['!^_']
+markdown_extensions:
+  - tables
+  - admonition
+  - toc:
+      permalink: true
+  - pymdownx.superfences:
+      custom_fences:
+        - name: mermaid
+          class: mermaid
+          format: !!python/name:pymdownx.superfences.fence_code_format
+validation:
+  links:
+    not_found: warn
+    anchors: info
+nav:
+{nav}
+"""
+
+
+def main() -> int:
+    """Assemble the pages, build, and return the exit code."""
+    shutil.rmtree(SITE / 'pages', ignore_errors=True)
+    pages = SITE / 'pages'
+    moved = gather(pages)
+    references = reference(pages)
+    for path in pages.rglob('*.md'):
+        text = path.read_text(encoding='utf-8')
+        path.write_text(relinked(text, path.relative_to(pages), moved), encoding='utf-8')
+    paths = ', '.join(
+        str(CHECKOUT / folder) for folder in (*(f'libs/{name}' for name in LIBRARIES), *PACKAGES)
+    )
+    config = CONFIG.format(paths=paths, nav=navigation(pages, references))
+    (SITE / 'mkdocs.yml').write_text(config, encoding='utf-8')
+    python = SITE / 'venv' / 'bin' / 'python'
+    if not python.exists():
+        venv.create(SITE / 'venv', with_pip=True)
+    pip = [str(python), '-m', 'pip', 'install', '-q', '--disable-pip-version-check', *TOOLS]
+    subprocess.run(pip, check=True)
+    build = [str(python), '-m', 'mkdocs', 'build', '--strict', '-q', '-f', str(SITE / 'mkdocs.yml')]
+    environ = {**os.environ, 'NO_MKDOCS_2_WARNING': '1', 'DISABLE_MKDOCS_2_WARNING': 'true'}
+    code = subprocess.run(build, env=environ, check=False).returncode
+    if code == 0:
+        print(f'the site is in {SITE / "html"}: {len(list((SITE / "html").rglob("*.html")))} pages')
+    return code
+
+
+def gather(pages: Path) -> dict[str, str]:
+    """Copy what people read; return where each file of the checkout stands in the site."""
+    wanted = {f'docs/{path.name}': path.name for path in (CHECKOUT / 'docs').glob('*.md')}
+    wanted |= {'README.md': 'index.md', 'CONTRIBUTING.md': 'contributing.md'}
+    wanted |= {'CHANGELOG.md': 'changelog.md', 'examples/README.md': 'examples.md'}
+    wanted |= {'SECURITY.md': 'report_a_weakness.md', 'CODE_OF_CONDUCT.md': 'conduct.md'}
+    wanted |= {f'libs/{name}/README.md': f'libraries/{name}.md' for name in LIBRARIES}
+    for folder in ('images', 'proxy', 'nav2'):
+        for path in sorted((CHECKOUT / 'docs' / folder).glob('*')):
+            wanted[f'docs/{folder}/{path.name}'] = f'{folder}/{path.name}'
+    for source, target in wanted.items():
+        if (CHECKOUT / source).is_file():
+            (pages / target).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy2(CHECKOUT / source, pages / target)
+    return {source: target for source, target in wanted.items() if (CHECKOUT / source).is_file()}
+
+
+def relinked(text: str, page: Path, moved: dict[str, str]) -> str:
+    """Return a page whose links lead to pages of the site; what is no page becomes plain words."""
+    source = next((s for s, t in moved.items() if t == page.as_posix()), None)
+    if source is None:
+        return text
+    folder = Path(source).parent
+
+    def turned(match: re.Match[str]) -> str:
+        bang, label, target = match.groups()
+        path, _, anchor = target.partition('#')
+        if not path or re.match(r'[a-z]+:', path):
+            return match[0]
+        meant = os.path.normpath(folder / path)
+        if meant not in moved:
+            return f'{bang}{label}' if bang else f'{label} (`{meant}`)'
+        new = os.path.relpath(moved[meant], page.parent)
+        return f'{bang}[{label}]({new}{"#" + anchor if anchor else ""})'
+
+    return re.sub(r'(!?)\[((?:[^\[\]]|\[[^\]]*\])*)\]\(([^)\s]+)\)', turned, text)
+
+
+def reference(pages: Path) -> dict[str, list[str]]:
+    """Write a page for each package with its public modules; return the pages by floor."""
+    found: dict[str, list[str]] = {'Libraries': [], 'The robot': []}
+    (pages / 'reference').mkdir(parents=True, exist_ok=True)
+    for floor, names in (('Libraries', LIBRARIES), ('The robot', PACKAGES)):
+        for name in names:
+            folder = CHECKOUT / ('libs' if floor == 'Libraries' else '') / name / name
+            modules = sorted(
+                '.'.join([name, *path.relative_to(folder).with_suffix('').parts])
+                for path in folder.rglob('*.py')
+                if not any(part.startswith('_') for part in path.relative_to(folder).parts)
+                and (floor == 'Libraries' or not path.stem.endswith('_node'))
+            )
+            lines = [f'# {name}', '', f'::: {name}', '    options:', '      members: false', '']
+            for module in modules:
+                lines += [f'::: {module}', '']
+            (pages / 'reference' / f'{name}.md').write_text('\n'.join(lines), encoding='utf-8')
+            found[floor].append(f'reference/{name}.md')
+    return found
+
+
+def navigation(pages: Path, references: dict[str, list[str]]) -> str:
+    """Return the tree of pages as YAML."""
+    there = {path.relative_to(pages).as_posix() for path in pages.rglob('*.md')}
+    sections: dict[str, list[str]] = {
+        'Start': [name for name in START if name in there],
+        'How to': [f'{name}.md' for name in HOW_TO if f'{name}.md' in there],
+        'Coming from elsewhere': [f'{name}.md' for name in FROM if f'{name}.md' in there],
+    }
+    told = {page for pages_of in sections.values() for page in pages_of}
+    sections['Libraries'] = sorted(page for page in there if page.startswith('libraries/'))
+    sections['Explanation'] = sorted(page for page in there if '/' not in page and page not in told)
+    sections['Reference'] = [page for pages_of in references.values() for page in pages_of]
+    lines = []
+    for title, names in sections.items():
+        lines += [f'  - {title}:', *(f'      - {name}' for name in names)]
+    return '\n'.join(lines)
+
+
+if __name__ == '__main__':
+    sys.exit(main())
