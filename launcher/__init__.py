@@ -6,5 +6,5 @@ from pathlib import Path
 # The table of the nodes is the runtime package's, which the installed robot has too. It is read
 # before anything is set up, and so is the library on whose files the runtime's stand.
 _CHECKOUT = Path(__file__).resolve().parent.parent
-if (_CHECKOUT / 'launch.py').exists():  # else installed from wheels, with all that they need
+if (_CHECKOUT / 'surveillance_runtime' / 'surveillance_runtime').exists():  # else from wheels
     sys.path += [str(_CHECKOUT / name) for name in ('surveillance_runtime', 'libs/state_machines')]

@@ -36,7 +36,7 @@ from surveillance_runtime.files import replace_text
 from surveillance_runtime.launch_protocol import NotNowError
 
 _HERE = Path(__file__).resolve().parent.parent
-INSTALLED = not (_HERE / 'launch.py').exists()
+INSTALLED = not (_HERE / 'surveillance_runtime' / 'surveillance_runtime').exists()
 """Whether this is no checkout: installed from a wheel, into an environment of the user's."""
 PROGRAM = 'surveillance' if INSTALLED else 'launch.py'
 """What the user typed."""
