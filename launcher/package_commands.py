@@ -28,6 +28,7 @@ COMMANDS = {
     'replay': ('surveillance_operator.replay', 'show a recorded mission in a browser'),
     'report': ('surveillance_operator.report', 'write what a mission did into one HTML file'),
     'map': ('surveillance_operator.map_command', 'check a place and draw it as a picture'),
+    'import': ('surveillance_operator.import_command', 'make a place of a map'),
     'detect': ('surveillance_perception.detect_command', 'find ArUco markers in pictures'),
     'check-behaviour': (
         'surveillance_behaviour.check_command',

@@ -32,8 +32,11 @@ def graph_over_doors(plan: FloorPlan) -> PatrolGraph:
     """
     place = plan.place
     legs: dict[str, dict[str, float]] = {name: {} for name in place.rooms}
-    for name, (first, second) in place.doors.items():
-        ends = [place.positions[room][:2] for room in (first, second)]
+    for name, sides in place.doors.items():
+        if len(sides) < 2:
+            continue  # the door of the only room
+        first, second = sides
+        ends = [place.positions[room][:2] for room in sides]
         door = plan.doors.get(name)
         if door is None:
             length = math.dist(*ends)

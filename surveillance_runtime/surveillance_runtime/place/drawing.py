@@ -108,13 +108,22 @@ class _Picture:
         if not self._plan.is_enclosed:
             return  # where a room ends is not known
         grid, masks = self._regions.grid, self._regions.masks()
-        if self._plan.map is not None:
-            masks = {name: mask & grid.free for name, mask in masks.items()}
         longest = max(run.waits.values(), default=0.0) if run else 0.0
-        for name, mask in masks.items():
-            colour = self._floor_colour(name)
+
+        def colour_of(name: str) -> str:
             if run is not None and longest > 0:
-                colour = blend(_CALM, _LATE, run.waits.get(name, 0.0) / longest)
+                return blend(_CALM, _LATE, run.waits.get(name, 0.0) / longest)
+            return self._floor_colour(name)
+
+        if self._plan.map is not None:
+            # As cells: around what stands in a room, an outline has holes.
+            which = np.zeros(grid.cells.shape, np.uint16)
+            for number, mask in enumerate(masks.values(), start=1):
+                which[mask & grid.free] = number
+            self._canvas.raster(which, grid.origin, grid.resolution, list(map(colour_of, masks)))
+            return
+        for name, mask in masks.items():
+            colour = colour_of(name)
             outlines = cv2.findContours(
                 mask.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE
             )[0]
@@ -136,7 +145,13 @@ class _Picture:
     def walls(self) -> None:
         if self._plan.map is not None:
             grid = self._plan.map.grid
-            self._canvas.raster(grid.occupied, grid.origin, grid.resolution, _WALL)
+            occupied = grid.occupied.astype(np.uint8)
+            if grid.resolution * self._canvas.scale * _FINE < 1.0:
+                # Walls of one cell stay, however small the picture.
+                reach = 2 * math.ceil(0.5 / (grid.resolution * self._canvas.scale * _FINE)) + 1
+                thicker = cv2.dilate(occupied, np.ones((reach, reach), np.uint8))
+                occupied = np.asarray(thicker, dtype=np.uint8)
+            self._canvas.raster(occupied, grid.origin, grid.resolution, [_WALL])
         solid = boxes.boxes_around(self._plan.wall_pieces(), WALL_THICKNESS)
         solid[:, 5] = max(WALL_THICKNESS / 2, 1.6 / self._canvas.scale)
         jambs = {end for door in self._plan.doors.values() for end in door.ends}
@@ -189,7 +204,10 @@ class _Picture:
         return len(doors.get(left or '', ())) <= len(doors.get(right or '', ()))
 
     def graph(self) -> None:
-        for name, (first, second) in self._place.doors.items():
+        for name, sides in self._place.doors.items():
+            if len(sides) < 2:
+                continue
+            first, second = sides
             door = self._plan.doors.get(name)
             way = [self._place.positions[first][:2], self._place.positions[second][:2]]
             if door is not None:
@@ -415,26 +433,32 @@ class Canvas:
             )
 
     def raster(
-        self, mask: npt.NDArray[np.bool_], origin: Point, resolution: float, colour: str
+        self,
+        values: npt.NDArray[np.unsignedinteger],
+        origin: Point,
+        resolution: float,
+        colours: Sequence[str],
     ) -> None:
-        """Fill the cells of a map, row 0 in the south; its origin and resolution in metres."""
-        rows, columns = mask.shape
+        """Fill cells of a map, row 0 in the south: those of value 1 with the first colour, ...
+
+        Args:
+            values: Shape (rows, columns); 0: not filled.
+            origin: South-west corner, metres.
+            resolution: Side of a cell, metres.
+            colours: One for each value from 1.
+        """
+        rows, columns = values.shape
         left, bottom = self._fine(self.at(origin))
         side = resolution * self.scale * _FINE
-        size = self._image.size
+        wide, high = self._image.size
         # Each fine pixel is what the cell is that its middle lies in.
-        column = np.floor((np.arange(size[0]) + 0.5 - left) / side).astype(np.intp)
-        row = np.floor((bottom - np.arange(size[1]) - 0.5) / side).astype(np.intp)
-        across = np.clip(column, 0, columns - 1)
-        upwards = np.clip(row, 0, rows - 1)
-        if side < 1.0:
-            # Thin walls of a large map stay: a pixel is filled where one of its cells is.
-            reach = 2 * math.ceil(0.5 / side) + 1
-            mask = cv2.dilate(mask.astype(np.uint8), np.ones((reach, reach), np.uint8)) > 0
-        paint = mask[upwards[:, None], across[None, :]]
-        paint &= ((row >= 0) & (row < rows))[:, None] & ((column >= 0) & (column < columns))
-        ink = Image.new('RGB', size, ImageColor.getrgb(colour))
-        self._image.paste(ink, mask=Image.fromarray(paint * np.uint8(255)))
+        column = np.floor((np.arange(wide) + 0.5 - left) / side).astype(np.intp)
+        row = np.floor((bottom - np.arange(high) - 0.5) / side).astype(np.intp)
+        here = values[np.clip(row, 0, rows - 1)[:, None], np.clip(column, 0, columns - 1)[None, :]]
+        on_map = ((row >= 0) & (row < rows))[:, None] & ((column >= 0) & (column < columns))
+        palette = np.array([(0, 0, 0), *map(ImageColor.getrgb, colours)], np.uint8)
+        mask = ((here > 0) & on_map).astype(np.uint8) * np.uint8(255)
+        self._image.paste(Image.fromarray(palette[here]), mask=Image.fromarray(mask))
 
     def arc(
         self,

@@ -201,7 +201,7 @@ class FloorPlan:
                     f'({door.x:g}, {door.y:g}) with width {door.width:g} m lies on no wall: '
                     f'expected both its jambs on the centre line of one wall',
                 )
-        for name, (first, _) in self.place.doors.items():
+        for name, (first, *_) in self.place.doors.items():
             if name not in self.doors and self.walls and self.map is None:
                 raise PlaceError(
                     ('map', first), f"door '{name}' has no position: expected an entry doors.{name}"

@@ -1,0 +1,161 @@
+#!/usr/bin/env python3
+"""Measure how well rooms are found on maps with drawn truth, beside a plain watershed.
+
+    .venv/bin/python benchmarks/rooms.py FOLDER [--doors] [--turned] [--quick]
+
+FOLDER holds `NAME.png`, `NAME_furnitures.png` and `NAME_gt_segmentation.png`, as the collection of
+Bormann et al., "Room Segmentation: Survey, Implementation, and Analysis" (ICRA 2016) has them:
+0.05 m a pixel; in the truth, rooms are white and closed by black lines. Recall and precision are
+that survey's; "matched" is the share of true rooms that a found one overlaps (intersection over
+union) by at least 0.7. The peer: distance transform, the threshold with most components as seeds,
+watershed.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from skimage.segmentation import watershed
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from surveillance_runtime.map_rooms import segment
+from surveillance_runtime.place.occupancy_grid import Grid
+
+FREE = 205
+SMALLEST = 400
+TRUTH = '_gt_segmentation.png'
+Image = NDArray[np.uint8]
+Labels = NDArray[np.int32]
+
+
+def ours(image: Image, resolution: float) -> Labels:
+    """Return the project's rooms of a picture, in the picture's order of rows."""
+    cells = np.full(image.shape, -1, np.int8)
+    cells[image > FREE] = 0
+    cells[image < 255 * 0.35] = 100
+    cells = cells[::-1]
+    return segment(Grid(np.ascontiguousarray(cells), resolution)).labels[::-1]
+
+
+def peer(image: Image, resolution: float) -> Labels:
+    """Return the basins of the plain watershed."""
+    free = image > FREE
+    away = cv2.distanceTransform(free.astype(np.uint8), cv2.DIST_L2, 5)
+    thresholds = np.arange(2, 60) * 0.05 / resolution
+    best = max(thresholds, key=lambda t: cv2.connectedComponents((away > t).astype(np.uint8))[0])
+    seeds = cv2.connectedComponents((away > best).astype(np.uint8))[1]
+    return np.asarray(watershed(-away, seeds, mask=free), np.int32)
+
+
+def true_rooms(image: Image) -> Labels:
+    """Return the rooms of a truth picture at 0.05 m."""
+    _, labels, stats, _ = cv2.connectedComponentsWithStats(
+        (image > 230).astype(np.uint8), connectivity=4
+    )
+    small = stats[:, cv2.CC_STAT_AREA] < SMALLEST
+    return np.where(small[labels], 0, labels).astype(np.int32)
+
+
+def scores(found: Labels, truth: Labels) -> tuple[float, float, float]:
+    """Return recall, precision and the share of true rooms that are matched."""
+    inside = truth > 0
+    pairs, areas = np.unique(np.stack([truth[inside], found[inside]]), axis=1, return_counts=True)
+    of_truth = dict(zip(*np.unique(truth[inside], return_counts=True), strict=True))
+    of_found = dict(zip(*np.unique(found[inside], return_counts=True), strict=True))
+    of_found.pop(0, None)
+    recall, precision, match = (dict[int, float]() for _ in range(3))
+    for (room, segment_), area in zip(pairs.T.tolist(), areas.tolist(), strict=True):
+        if segment_:
+            union = of_truth[room] + of_found[segment_] - area
+            for table, key, value in (
+                (recall, room, area / of_truth[room]),
+                (precision, segment_, area / of_found[segment_]),
+                (match, room, area / union),
+            ):
+                table[key] = max(table.get(key, 0.0), value)
+    matched = sum(value >= 0.7 for value in match.values())
+    return (
+        sum(recall.values()) / len(of_truth),
+        sum(precision.values()) / max(1, len(of_found)),
+        matched / len(of_truth),
+    )
+
+
+def variants(
+    image: Image, truth: Labels, turned: bool
+) -> Iterator[tuple[str, float, Image, Labels]]:
+    """Yield a map and its truth as it is, and at other resolutions and turned."""
+    yield 'as drawn', 0.05, image, truth
+    if not turned:
+        return
+    rows, columns = image.shape
+    for name, side in (('0.025 m', 0.025), ('0.1 m', 0.1)):
+        size = (round(columns * 0.05 / side), round(rows * 0.05 / side))
+        how = cv2.INTER_NEAREST if side < 0.05 else cv2.INTER_AREA
+        other = cv2.resize(image, size, interpolation=how)
+        if side > 0.05:
+            # A mapper marks a cell in which any ray ended.
+            dark = cv2.erode(image, np.ones((2, 2), np.uint8), anchor=(0, 0))
+            other = np.minimum(other, cv2.resize(dark, size, interpolation=cv2.INTER_NEAREST))
+        yield name, side, other, truth
+    span = int(np.hypot(rows, columns)) + 4
+    turn = cv2.getRotationMatrix2D((columns / 2, rows / 2), 17.0, 1.0)
+    turn[:, 2] += ((span - columns) / 2, (span - rows) / 2)
+    flags = {'flags': cv2.INTER_NEAREST, 'borderMode': cv2.BORDER_CONSTANT}
+    yield (
+        'turned 17 deg',
+        0.05,
+        cv2.warpAffine(image, turn, (span, span), borderValue=128, **flags),
+        cv2.warpAffine(truth, turn, (span, span), borderValue=0, **flags),
+    )
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument('folder', type=Path)
+    parser.add_argument('--turned', action='store_true', help='other resolutions and directions')
+    parser.add_argument('--quick', action='store_true', help='the first three maps')
+    parser.add_argument('--each', action='store_true', help='a line for each map')
+    options = parser.parse_args()
+    names = sorted(path.name.removesuffix(TRUTH) for path in options.folder.glob('*' + TRUTH))
+    methods: dict[str, Callable[[Image, float], Labels]] = {'watershed': peer, 'ours': ours}
+    results: dict[tuple[str, str, str], list[tuple[float, ...]]] = {}
+    for name in names[:3] if options.quick else names:
+        drawn = cv2.imread(str(options.folder / (name + TRUTH)), cv2.IMREAD_GRAYSCALE)
+        truth = true_rooms(drawn)
+        for kind, ending in (('empty', '.png'), ('furnished', '_furnitures.png')):
+            image = cv2.imread(str(options.folder / (name + ending)), cv2.IMREAD_GRAYSCALE)
+            for variant, side, other, true in variants(image, truth, options.turned):
+                for method, find in methods.items():
+                    begin = time.perf_counter()
+                    labels = find(other, side)
+                    seconds = time.perf_counter() - begin
+                    if labels.shape != true.shape:
+                        size = (true.shape[1], true.shape[0])
+                        labels = cv2.resize(
+                            labels.astype(np.float32), size, interpolation=cv2.INTER_NEAREST
+                        ).astype(np.int32)
+                    row = (*scores(labels, true), seconds)
+                    results.setdefault((kind, variant, method), []).append(row)
+                    if options.each and method == 'ours':
+                        print(name, kind, variant, *(f'{value:.3f}' for value in row))
+    print(f'{"maps":10} {"variant":14} {"method":10} recall precision matched  seconds')
+    for (kind, variant, method), rows in results.items():
+        recall, precision, matched, seconds = np.mean(rows, axis=0)
+        print(
+            f'{kind:10} {variant:14} {method:10} {recall:6.3f} {precision:9.3f} {matched:7.3f} '
+            f'{seconds:8.2f}'
+        )
+    return 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,279 @@
+"""A place made of a map: rooms and doors with names, and in each room a point the robot can reach.
+
+Where two rooms meet there is a border of free cells. Its pieces that the robot fits through are
+doors, as wide as they are from jamb to jamb; the others are walls that the map does not show, as a
+gap that a scan left. Rooms that the robot cannot reach are left out and counted.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from surveillance_runtime.map_rooms.segmentation import Segmentation, segment
+from surveillance_runtime.place.occupancy_grid import Grid, distance_to
+from surveillance_runtime.place.occupancy_map import OccupancyMap
+
+Labels = NDArray[np.int32]
+Mask = NDArray[np.bool_]
+Point = tuple[float, float]
+
+_NEAR_POINT = 3.0
+"""A room's point need not be farther from walls than this many radii of the robot."""
+_WIDEST = 20.0
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """What is proposed for a map.
+
+    Attributes:
+        parameters: All of the place's file below `ros__parameters`, but for the map's file.
+        segmentation: The rooms as they were found.
+        names: Name of each room by its number.
+        left_out: Numbers of the rooms that the robot cannot reach.
+    """
+
+    parameters: Mapping[str, Any]
+    segmentation: Segmentation
+    names: Mapping[int, str]
+    left_out: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class _Opening:
+    """A piece of a border: the rooms, its ends and the cell that is freest, column and row."""
+
+    rooms: tuple[int, int]
+    start: tuple[float, float]
+    end: tuple[float, float]
+    middle: tuple[float, float]
+    clearance: float
+
+
+def propose(building: OccupancyMap, radius: float) -> Proposal:
+    """Return a place with the rooms and doors of a map.
+
+    Args:
+        building: The map.
+        radius: Of the robot, metres.
+
+    Raises:
+        ValueError: The robot fits nowhere.
+    """
+    found = segment(building.own_grid)
+    grid = found.working
+    # A working cell is not exactly 0.05 m where the map's are of another size.
+    scale = building.cells.shape[1] * building.resolution / grid.cells.shape[1]
+    labels = found.working_labels
+    free = grid.free
+    clearance = distance_to(~free, grid.resolution)
+    reach = _reachable(labels, clearance, radius)
+    needed = radius + 1.5 * grid.resolution
+    openings = _openings(labels, free, clearance)
+    doors = [each for each in openings if each.clearance > needed and _fits(reach, each)]
+    rooms = _joined_rooms({number for number in np.unique(labels[reach]).tolist() if number}, doors)
+    if not rooms:
+        raise ValueError(f'a robot with a radius of {radius:g} m fits nowhere: expected free floor')
+    doors = [each for each in doors if set(each.rooms) <= rooms]
+    listed = {id(each) for each in doors}
+    names = _names(rooms, found)
+
+    def world(points: list[tuple[float, float]]) -> NDArray[np.float64]:
+        return building.to_world((np.array(points) + 0.5) * scale)
+
+    positions: dict[str, list[float]] = {}
+    for number in sorted(rooms):
+        cell = _point_in(labels == number, reach, clearance, radius)
+        positions[names[number]] = _rounded(world([cell])[0])
+    table: dict[str, list[str]] = {names[number]: [] for number in sorted(rooms)}
+    placed: dict[str, list[float]] = {}
+    for index, door in enumerate(doors, start=1):
+        placed[f'D{index}'] = _line(world([door.start, door.end, door.middle]), scale)
+        for number in door.rooms:
+            table[names[number]].append(f'D{index}')
+    if len(rooms) == 1:
+        table[next(iter(table))].append('D1')  # the door that leads out of the place
+    walls: dict[str, list[float]] = {}
+    for opening in openings:
+        if id(opening) not in listed and set(opening.rooms) <= rooms:
+            start, end = world([opening.start, opening.end])
+            gap = math.dist(start, end)
+            along = (end - start) / max(gap, 1e-9)
+            longer = max(scale, (0.12 - gap) / 2)
+            if gap < 1e-9:
+                along = np.array([1.0, 0.0])
+            walls[f'W{len(walls) + 1}'] = [
+                *_rounded(start - along * longer),
+                *_rounded(end + along * longer),
+            ]
+    station, home = _station(building, labels, reach, rooms, names, positions, scale)
+    parameters: dict[str, Any] = {
+        'map': table,
+        'room_positions': positions,
+        'robot_room': home,
+        'recharge_rooms': [home],
+        'station': station,
+    }
+    if placed:
+        parameters['doors'] = placed
+    if walls:
+        parameters['walls'] = walls
+    everything = set(range(1, found.rooms + 1))
+    return Proposal(parameters, found, names, tuple(sorted(everything - rooms)))
+
+
+def _reachable(labels: Labels, clearance: NDArray[np.float32], radius: float) -> Mask:
+    """Return the cells of the largest part of the floor that the robot can be in."""
+    fits = (clearance > radius) & (labels > 0)
+    count, pieces, stats, _ = cv2.connectedComponentsWithStats(
+        fits.astype(np.uint8), connectivity=8
+    )
+    if count < 2:
+        return np.zeros_like(fits)
+    largest = 1 + int(np.argmax(stats[1:, cv2.CC_STAT_AREA]))
+    return np.asarray(pieces == largest)
+
+
+def _openings(labels: Labels, free: Mask, clearance: NDArray[np.float32]) -> list[_Opening]:
+    """Return the pieces of free borders between rooms, in the order of the rooms."""
+    walkable = np.where(free, labels, 0)
+    padded = np.pad(walkable, 1)
+    found: list[_Opening] = []
+    pairs: dict[tuple[int, int], list[NDArray[np.intp]]] = {}
+    here = padded[1:-1, 1:-1]
+    # On the side of the lower number, so that a border is one cell wide.
+    for up, right in ((0, 1), (2, 1), (1, 0), (1, 2)):
+        other = padded[up : up + here.shape[0], right : right + here.shape[1]]
+        cells = np.argwhere((here > 0) & (other > here))
+        beside = other[cells[:, 0], cells[:, 1]]
+        own = here[cells[:, 0], cells[:, 1]]
+        for pair in np.unique(np.stack([own, beside], axis=1), axis=0):
+            mask = (own == pair[0]) & (beside == pair[1])
+            pairs.setdefault((int(pair[0]), int(pair[1])), []).append(cells[mask])
+    for rooms, several in sorted(pairs.items()):
+        cells = np.unique(np.vstack(several), axis=0)
+        low, high = cells.min(axis=0), cells.max(axis=0)
+        window = np.zeros(tuple(high - low + 1), np.uint8)
+        window[tuple((cells - low).T)] = 1
+        # Steps of a slanted border touch at corners, or miss by a cell.
+        grown = cv2.dilate(window, np.ones((3, 3), np.uint8))
+        pieces = cv2.connectedComponents(grown, connectivity=8)[1]
+        which = pieces[tuple((cells - low).T)]
+        for piece in np.unique(which):
+            mine = cells[which == piece]
+            found.append(_opening_of(rooms, mine, clearance))
+    return found
+
+
+def _opening_of(
+    rooms: tuple[int, int], cells: NDArray[np.intp], clearance: NDArray[np.float32]
+) -> _Opening:
+    points = cells[:, ::-1].astype(float)
+    centre = points.mean(axis=0)
+    start = points[np.argmax(np.hypot(*(points - centre).T))]
+    end = points[np.argmax(np.hypot(*(points - start).T))]
+    clear = clearance[cells[:, 0], cells[:, 1]]
+    # Of the freest cells the one in the middle.
+    best = clear >= clear.max() - 0.05
+    middle = points[best][np.argmin(np.hypot(*(points[best] - (start + end) / 2).T))]
+    as_pair = [(float(x), float(y)) for x, y in (start, end, middle)]
+    return _Opening(rooms, as_pair[0], as_pair[1], as_pair[2], float(clear.max()))
+
+
+def _fits(reach: Mask, opening: _Opening) -> bool:
+    column, row = (int(each) for each in opening.middle)
+    return bool(reach[max(0, row - 1) : row + 2, max(0, column - 1) : column + 2].any())
+
+
+def _joined_rooms(rooms: set[int], doors: list[_Opening]) -> set[int]:
+    """Return the largest set of rooms that doors join."""
+    beside: dict[int, set[int]] = {number: set() for number in rooms}
+    for door in doors:
+        first, second = door.rooms
+        if first in rooms and second in rooms:
+            beside[first].add(second)
+            beside[second].add(first)
+    best: set[int] = set()
+    left = set(rooms)
+    while left:
+        seen = {left.pop()}
+        queue = list(seen)
+        while queue:
+            new = beside[queue.pop()] - seen
+            seen |= new
+            queue += new
+        left -= seen
+        best = max(best, seen, key=len)
+    return best
+
+
+def _names(rooms: set[int], found: Segmentation) -> dict[int, str]:
+    names, counts = {}, {'R': 0, 'C': 0}
+    for number in sorted(rooms):
+        kind = 'C' if number in found.corridors else 'R'
+        counts[kind] += 1
+        names[number] = f'{kind}{counts[kind]}'
+    return names
+
+
+def _point_in(
+    room: Mask, reach: Mask, clearance: NDArray[np.float32], radius: float
+) -> tuple[float, float]:
+    """Return a cell of a room that is free enough and near its middle, column and row."""
+    cells = np.argwhere(room & reach)
+    clear = clearance[cells[:, 0], cells[:, 1]]
+    # Also far from the room's own borders, so that the robot is clearly inside.
+    inside = cv2.distanceTransform(np.pad(room, 1).astype(np.uint8), cv2.DIST_L2, 3)[1:-1, 1:-1]
+    deep = np.minimum(clear, 0.05 * inside[cells[:, 0], cells[:, 1]])
+    enough = deep >= min(float(deep.max()), _NEAR_POINT * radius) - 1e-6
+    good = cells[enough]
+    middle = np.argwhere(room).mean(axis=0)
+    row, column = good[np.argmin(np.hypot(*(good - middle).T))]
+    return float(column), float(row)
+
+
+def _line(points: NDArray[np.float64], side: float) -> list[float]:
+    """Return x, y, yaw and width of a door with these ends and this freest point, metres."""
+    start, end, middle = points
+    length = math.dist(start, end)
+    along = (end - start) / length if length > 0 else np.array([1.0, 0.0])
+    # On the line between its ends, at the freest point; so long that it reaches both.
+    at = start + along * float((middle - start) @ along)
+    width = 2 * max(math.dist(at, start), math.dist(at, end)) + side
+    yaw = math.atan2(along[1], along[0])
+    if not -math.pi / 2 < yaw <= math.pi / 2 + 1e-9:
+        yaw -= math.copysign(math.pi, yaw)
+    return [*_rounded(at), round(yaw, 4), round(min(max(width, 0.3), _WIDEST), 3)]
+
+
+def _station(
+    building: OccupancyMap,
+    labels: Labels,
+    reach: Mask,
+    rooms: set[int],
+    names: Mapping[int, str],
+    positions: Mapping[str, list[float]],
+    scale: float,
+) -> tuple[list[float], str]:
+    """Return the pose and the room of the station: where the map began, if that is free.
+
+    A mapper begins at 0, 0, and usually that is the robot's dock.
+    """
+    own = Grid(np.zeros(labels.shape, np.int8), scale)
+    x, y = building.to_own([(0.0, 0.0)])[0]
+    if own.at(reach, x, y) and (number := own.at(labels, x, y)) in rooms:
+        return [0.0, 0.0, 0.0], names[number]
+    corridors = [name for name in positions if name.startswith('C')]
+    home = (corridors or list(positions))[0]
+    return [*positions[home], 0.0], home
+
+
+def _rounded(point: NDArray[np.float64]) -> list[float]:
+    return [round(float(each), 3) for each in point]
