@@ -13,6 +13,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from owl_reasoner.knowledge_base import Changes, KnowledgeBase
+from owl_reasoner.owl import axioms as ax
+from owl_reasoner.owl import expressions as ex
 from owl_reasoner.owl.axioms import (
     Assertion,
     Axiom,
@@ -431,3 +433,36 @@ def test_what_a_difference_gave_goes_with_the_sameness_it_rested_on() -> None:
         kb.remove(same)
     assert kb.reason()
     assert not kb.holds(ClassAssertion('x:B', 'x:j'))
+
+
+@pytest.mark.parametrize('seed', range(12))
+def test_a_transitive_property_step_by_step_is_as_at_once(seed: int) -> None:
+    chosen = random.Random(seed)
+    names = [f'x:n{number}' for number in range(9)]
+    schema: list[Axiom] = [
+        ax.TransitiveObjectProperty('x:p'),
+        ax.SubObjectPropertyOf('x:q', 'x:p'),
+        ax.SubObjectPropertyOf('x:p', 'x:r'),
+        ax.SubObjectPropertyOf('x:r', 'x:s'),
+        ax.TransitiveObjectProperty('x:s'),
+        ax.InverseObjectProperties('x:s', 'x:t'),
+        ax.FunctionalObjectProperty('x:f'),
+        ax.SubClassOf('x:A', ex.ObjectHasValue('x:q', names[0])),
+    ]
+    kb = KnowledgeBase('x:', schema)
+    possible: list[Axiom] = [
+        ax.ObjectPropertyAssertion(prop, *chosen.sample(names, 2))
+        for prop in ('x:p', 'x:q', 'x:q', 'x:s', 'x:f')
+        for _ in range(6)
+    ]
+    possible += [ClassAssertion('x:A', chosen.choice(names)), schema[0], schema[4], schema[1]]
+    for _ in range(60):
+        changing = chosen.sample(possible, chosen.choice((1, 1, 2, 5)))
+        kb.change(
+            [axiom for axiom in changing if axiom not in kb],
+            [axiom for axiom in changing if axiom in kb],
+        )
+        assert kb.reason()
+        anew = kb.copy()
+        anew.reason()
+        assert set(kb.derived_facts()) == set(anew.derived_facts())

@@ -161,7 +161,12 @@ class AtMostCounter(_Counter):
         self._nothing = nothing
         self._enqueue, self._overdelete, self._merge = enqueue, overdelete, merge
         self.recheck: set[str] = set()
-        self.hook(self.prop.on_insert, self._subjects(self.gain))
+        if self.n == 1:
+            gain = self._gain_value
+            turned = (lambda y, z: gain(z, y)) if self.inverse else gain
+            self.hook(self.prop.on_insert, turned)
+        else:
+            self.hook(self.prop.on_insert, self._subjects(self.gain))
         self.hook(self.prop.on_delete, self._subjects(self.lose))
         if self.label is not None:
             self.hook(self.label.on_insert, self.gain)
@@ -183,6 +188,10 @@ class AtMostCounter(_Counter):
         related = self.related(z)
         if len(related) <= self.n:
             return
+        if self.n == 1:
+            for other in related[1:]:
+                self._only_one(z, related[0], other)
+            return
         different = self.difference.different
         if self.is_data or clique(related, self.n + 1, different) is not None:
             if z not in self._nothing.members:
@@ -190,18 +199,41 @@ class AtMostCounter(_Counter):
             return
         facts = self._label_fact(z) + self.facts(z, related)
         for one, other in self._forced(related):
-            apart = self.differences(related) if self.n > 1 else ()
+            apart = self.differences(related)
             rest = tuple(fact for fact in apart if {one, other} != {*fact[1:]})
             self._merge(one, other, self.origin, facts + rest)
+
+    def _gain_value(self, z: Any, y: Any) -> None:
+        """Compare a value that came with one that was there, where one is allowed.
+
+        That is enough: the others are, or are about to be, the same as that one.
+        """
+        values = self.succ[z]
+        if len(values) == 1 or (self.label is not None and z not in self.label.members):
+            return
+        if self._counts(y):
+            first = next((one for one in values if one != y and self._counts(one)), None)
+            if first is not None:
+                self._only_one(z, first, y)
+
+    def _only_one(self, z: str, first: Any, other: Any) -> None:
+        if self.is_data or self.difference.different(first, other):
+            if z not in self._nothing.members:
+                self._enqueue((self._nothing, z))
+            return
+        facts = self._label_fact(z) + self.facts(z, [first, other])
+        self._merge(*sorted((first, other)), self.origin, facts)
+
+    def _counts(self, y: Any) -> bool:
+        if self.filler is not None:
+            return y in self.filler.members
+        return self.values is None or self.values.contains(y)
 
     def _forced(self, related: list[str]) -> Iterator[tuple[str, str]]:
         """Pairs that must be the same for the rest to fit."""
         different = self.difference.different
         related = sorted(related)
-        if self.n == 1:
-            for other in related[1:]:
-                yield related[0], other
-        elif len(related) == self.n + 1:
+        if len(related) == self.n + 1:
             pairs = [pair for pair in combinations(related, 2) if not different(*pair)]
             if len(pairs) == 1:
                 yield pairs[0]

@@ -247,6 +247,7 @@ class CaseRules:
             self._attempt(axiom, self._check_chains)
             self._attempt(axiom, self._axiom)
         self._origin = None
+        self._common_consequences()
         self.asked: dict[Asked, None] = {}
         for rule in self.named:
             for atom in rule.body:
@@ -264,6 +265,34 @@ class CaseRules:
             take(axiom)
         except UnsupportedError as reason:
             self.gaps[f'{axiom_text(axiom)}: {reason}'] = None
+
+    def _common_consequences(self) -> None:
+        """Add what all alternatives of a rule imply: it takes no cases.
+
+        Without it a chain of unions, each alternative of which implies the next union, is searched
+        in exponential time when its end is denied: no contradiction rests on a single choice.
+        """
+        single: dict[int, list[int]] = {}
+        wide: list[tuple[frozenset[int], Heads]] = [(_ALL, heads) for heads in self.always]
+        for rule in dict.fromkeys(rule for rules in self.of_node.values() for rule in rules):
+            if len(rule.heads) > 1:
+                wide.append((rule.body, rule.heads))
+            elif len(rule.body) == len(rule.heads) == 1:
+                (concept,) = rule.body
+                single.setdefault(concept, []).append(rule.heads[0][1])
+        if not single:
+            return
+        for body, heads in wide:
+            above = [closure(concept, lambda one: single.get(one, ())) for _, concept in heads]
+            common = [one for one in above[0] if all(one in others for others in above[1:])]
+            for concept in common:
+                # What another one of them implies needs no rule of its own.
+                if not any(
+                    concept in single.get(other, ()) for other in common if other != concept
+                ):
+                    self.node_rule(body, ((_X, concept),))
+                    if len(body) == 1 and body != _ALL:
+                        single.setdefault(next(iter(body)), []).append(concept)
 
     def _subject(self) -> str:
         return '' if self._origin is None else axiom_text(self._origin)

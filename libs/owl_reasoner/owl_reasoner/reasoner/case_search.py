@@ -432,7 +432,9 @@ class CaseSearch:
 
     def _count_all(self, x: int) -> None:
         model, rules = self.model, self.rules
-        limits = [(limit, 0) for limit in rules.functional]
+        # Ontologies have thousands of functional properties, an individual a few of them.
+        roles = dict.fromkeys(role for roles in model.out[x].values() for role in roles)
+        limits = [(self._functional[role], 0) for role in roles if role in self._functional]
         for concept in rules.at_most.keys() & model.labels[x].keys():
             limits.append((rules.at_most[concept], model.labels[x][concept]))
         for limit, choices in limits:

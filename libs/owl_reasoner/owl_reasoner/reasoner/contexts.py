@@ -203,6 +203,9 @@ class Contexts:
         self._always: list[tuple[Token | None, Axiom | None]] = []
         self._class_rules: dict[Token, list[tuple[Tokens, Token | None]]] = {}
         self.edge_rules: dict[Role, list[_EdgeRule]] = {}
+        # The same by one token of y, made when the first edge asks.
+        self._edge_index: dict[Role, dict[Token | None, list[_EdgeRule]]] = {}
+        self._has_names = False
         self._value_rules: dict[Predicate, list[_ValueRule]] = {}
         for clause in program.clauses:
             if not clause.named_only:
@@ -361,9 +364,12 @@ class Contexts:
         found: dict[str, None] = {}
         reached: dict[Context, None] = {}
         for core in cores:
-            start = self.context(core)
-            if start not in reached:
-                reached.update(closure(start, lambda one: [edge.target for edge in one.edges]))
+            pending = [self.context(core)]
+            while pending:
+                one = pending.pop()
+                if one not in reached:
+                    reached[one] = None
+                    pending += [edge.target for edge in one.edges]
         for context in reached:
             if not context.clash:
                 for (origin, what), condition in self._gaps.get(context, {}).items():
@@ -422,6 +428,8 @@ class Contexts:
 
     def _about_named(self, context: Context) -> Iterator[HeadAtom]:
         """Yield what named individuals are because of individuals that must exist."""
+        if not self._has_names:
+            return
         for one in closure(context, lambda one: [edge.target for edge in one.edges]):
             for name in one.names:
                 for token in one.tokens:
@@ -439,6 +447,7 @@ class Contexts:
         found = self._known.get((core, bare))
         if found is None:
             found = self._known[core, bare] = Context(core, bare)
+            self._has_names |= bool(found.names)
             found.clash = self._program.nothing in core
             self._opened.append(found)
         return found
@@ -485,6 +494,7 @@ class Contexts:
             context.unrelated.append(token)
             if _is_name(token):
                 context.names.append(token[1])
+                self._has_names = True
             self._changed = True
 
     def _close(self, context: Context) -> None:
@@ -556,7 +566,7 @@ class Contexts:
                 edge.seen = seen
                 size = len(edge.core)
                 for role in tuple(edge.roles):
-                    for rule in self.edge_rules.get(role, ()):
+                    for rule in self._rules_along(role, target):
                         if rule.xs <= tokens and rule.ys <= target.tokens:
                             if rule.roles <= edge.roles:
                                 self._fire(context, edge, rule)
@@ -565,6 +575,25 @@ class Contexts:
                 if len(edge.core) > size:
                     self._retarget(context, edge)
             self._join_parent(context, edge)
+
+    def _rules_along(self, role: Role, target: Context) -> Iterator[_EdgeRule]:
+        """Return the rules that may say something of who is related by a role to the target.
+
+        Ontologies have thousands of rules for one property, each for another class of what is
+        related: they are found by one of its classes (as in ELK; Kazakov, Kroetzsch and Simancik,
+        "The incredible ELK", Journal of Automated Reasoning 53, 2014).
+        """
+        if target.names:
+            yield from self.edge_rules.get(role, ())  # To tell what is left out.
+            return
+        index = self._edge_index.get(role)
+        if index is None:
+            index = self._edge_index[role] = {}
+            for rule in self.edge_rules.get(role, ()):
+                index.setdefault(next(iter(rule.ys), None), []).append(rule)
+        yield from index.get(None, ())
+        for token in tuple(target.tokens):
+            yield from index.get(token, ())
 
     def _fire(self, context: Context, edge: _Edge, rule: _EdgeRule) -> None:
         head = rule.head

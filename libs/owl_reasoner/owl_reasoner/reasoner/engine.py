@@ -109,6 +109,7 @@ class Engine:
             self.difference,
             self._queue.append,
             self._overdeleted.append,
+            self._insert_now,
             self._request,
             self.budget.due,
             self._looker,
@@ -832,6 +833,15 @@ class Engine:
                     flush()
                 if not queue:
                     return
+
+    def _insert_now(self, fact: Fact) -> None:
+        """Add a fact of a property that is not there, while another fact is being added."""
+        predicate, *arguments = fact
+        predicate.insert(fact)
+        if self.changed is not None:
+            self.changed.setdefault(fact, False)
+        for fire in predicate.on_insert:
+            fire(*arguments)
 
     def _stop_generating(self, predicate: Predicate, is_long: bool) -> None:
         """End a rule that makes a new value of every value; what it made so far stays."""

@@ -66,6 +66,7 @@ class Network:
         difference: Difference,
         enqueue: Emit,
         overdelete: Emit,
+        insert: Emit,
         merge: MergeRequest,
         due: Callable[[], bool],
         looker: Callable[[Axiom | None], Callable[[], None]],
@@ -83,6 +84,7 @@ class Network:
         self.touch_delete: list[Callable[[str], None]] = []
         self.touch_related: list[Callable[[str], list[str]]] = []
         self.thresholds: list[ThresholdIndex] = []
+        self._insert, self._closing = insert, set[Predicate]()
         self._hooks: dict[Clause, list[tuple[list[Any], Any]]] = {}
         program.different.supports.append((difference.premises, None))
         self.lower: list[AtLeastCounter] = []
@@ -136,10 +138,14 @@ class Network:
             gain = partial(trigger, emit=self._enqueue, present=False)
             lose = partial(trigger, emit=self._overdelete, present=True)
         triggered = False
+        closed = transitive(clause)
+        if closed is not None:
+            hook(closed.on_insert, partial(self._close, closed, context.looker(clause.origin)))
         for atom in body:
             if isinstance(atom, PredicateAtom):
                 triggered = True
-                hook(atom.predicate.on_insert, gain(atom, atom.terms))
+                if closed is None:
+                    hook(atom.predicate.on_insert, gain(atom, atom.terms))
                 if lose is not None:
                     hook(atom.predicate.on_delete, lose(atom, atom.terms))
             elif isinstance(atom, DifferentAtom):
@@ -152,6 +158,29 @@ class Network:
             hook(self.naming, run)
             if not triggered:
                 self.initial.append(run)
+
+    def _close(self, predicate: Predicate, look: Callable[[], None], x: str, y: str) -> None:
+        """Relate whoever leads to x with all that y leads to, by a transitive property.
+
+        The relation was transitive before x was related to y, and is again afterwards: so the
+        facts that are added here need not be joined with others, which would take a step for each
+        way in which each of them follows. They must be there at once for that: what is only
+        queued would be missed by the next fact.
+        """
+        sources, targets = (x, *predicate.pred.get(x, ())), (y, *predicate.succ.get(y, ()))
+        due, insert, succ = self.context.due, self._insert, predicate.succ
+        if predicate in self._closing:
+            return
+        self._closing.add(predicate)
+        for source in sources:
+            known = succ.get(source, ())
+            for target in targets:
+                if due():
+                    look()
+                if target not in known:
+                    insert((predicate, source, target))
+                    known = succ[source]
+        self._closing.discard(predicate)
 
     def detach(self, clause: Clause) -> None:
         """End a clause, which is no rule of a sorted index; what it derived stays."""
@@ -268,6 +297,25 @@ class Network:
             _touch_individuals(prop)
             _touch_individuals(negative)
         program.apart.touching = (1, 2)
+
+
+def transitive(clause: Clause) -> Predicate | None:
+    """Return the property of which a clause says that it is transitive; None for other clauses."""
+    head, body = clause.head, clause.body
+    if not isinstance(head, PredicateAtom) or head.predicate.kind != 'object' or len(body) != 2:
+        return None
+    if clause.named_only or any(isinstance(term, Constant) for term in head.terms):
+        return None
+    first, second = body
+    if not isinstance(first, PredicateAtom) or not isinstance(second, PredicateAtom):
+        return None
+    if first.predicate is not head.predicate or second.predicate is not head.predicate:
+        return None
+    if first.terms[0] != head.terms[0]:
+        first, second = second, first
+    (x, y), (z, w) = first.terms, second.terms
+    linked = y == z and (x, w) == head.terms and isinstance(y, int)
+    return head.predicate if linked and len({x, y, w}) == 3 else None
 
 
 def _also_touches(predicate: Predicate, position: int) -> None:
