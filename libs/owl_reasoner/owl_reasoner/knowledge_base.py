@@ -40,13 +40,13 @@ from owl_reasoner.owl.vocabulary import NOTHING, THING
 from owl_reasoner.reasoner.absence import Absence, Absences
 from owl_reasoner.reasoner.answers import Unknown
 from owl_reasoner.reasoner.budget import Budget, Cancel, Progress, ReasoningBudgetError
-from owl_reasoner.reasoner.cases import entails
-from owl_reasoner.reasoner.classification import Classification
 from owl_reasoner.reasoner.clauses import Fact as StoredFact
 from owl_reasoner.reasoner.clauses import Predicate
-from owl_reasoner.reasoner.completion import Completion
+from owl_reasoner.reasoner.consequence_based.classification import Classification
 from owl_reasoner.reasoner.engine import BY_CASES, Engine, FactView, is_public
 from owl_reasoner.reasoner.explanation import Explanation, Reasons
+from owl_reasoner.reasoner.horn_completeness import Completion
+from owl_reasoner.reasoner.hypertableau.entailment import entails
 from owl_reasoner.reasoner.program_change import ProgramChange, program_change
 
 
@@ -301,6 +301,8 @@ class KnowledgeBase:
         self._watched: set[Predicate] = set()
         self._feed = Feed()
         self._interrupted = False
+        # The axiom since which reasoning takes cases, where one alone was added.
+        self._costly: Axiom | None = None
         for axiom in axioms:
             self._told.insert(axiom)
 
@@ -373,6 +375,19 @@ class KnowledgeBase:
             return Unknown(('nothing was reasoned over',))
         left_out = self._completion.unsupported
         return Unknown(left_out) if left_out else True
+
+    @property
+    def cost(self) -> str:
+        """One sentence on what makes each change cost a search by cases, and how long the last one
+        took; '' where none is needed.
+        """
+        completion = self._completion
+        if completion is None or not completion.seconds:
+            return ''
+        takes = f'reasoning by cases takes {completion.seconds:.2g} s with each change'
+        if self._costly is None:
+            return f'{takes}, by {completion.cause()}'
+        return f'{takes} since there is {axiom_text(self._costly)}'
 
     @property
     def stale(self) -> bool:
@@ -852,7 +867,9 @@ class KnowledgeBase:
         budget = self._budget
         budget.begin(timeout, cancel, progress, memory, steps)
         try:
+            took_cases = self._completion is not None and self._completion.seconds > 0
             self._bring_up_to_date()
+            self._note_cost(changes, took_cases)
             self._told.settle()
             self._interrupted = False
             return self._consistent
@@ -875,6 +892,14 @@ class KnowledgeBase:
         self._snapshots.clear()
         self._watched.clear()
         self._told.unsettle(changes)
+
+    def _note_cost(self, changes: Unsettled, took_cases: bool) -> None:
+        """Note the axiom by which reasoning came to take cases."""
+        if self._completion is None or not self._completion.seconds:
+            self._costly = None
+        elif not took_cases and self._completion.seconds:
+            said = [one for one in changes.schema_added if not isinstance(one, Declaration)]
+            self._costly = said[0] if len(said) == 1 else None
 
     def revert(self) -> int:
         """Take back every change since the last `reason` that completed.

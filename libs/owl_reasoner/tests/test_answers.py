@@ -113,3 +113,28 @@ def test_a_number_beyond_all_doubles_is_compared() -> None:
     kb = KnowledgeBase('x:', [rule, ax.DataPropertyAssertion(V, one, number('9' * 400))])
     assert kb.reason()
     assert kb.instances(A) == {one}
+
+
+def test_what_makes_a_change_cost_a_search_is_named() -> None:
+    kb = KnowledgeBase('x:', [SubClassOf(A, B), ClassAssertion(A, one)])
+    kb.reason()
+    assert kb.cost == ''
+    union = SubClassOf(B, ex.ObjectUnionOf((C, 'x:D')))
+    kb.add(union)
+    kb.reason()
+    assert kb.cost.startswith('reasoning by cases takes ')
+    assert kb.cost.endswith('s with each change since there is x:B SubClassOf (x:C or x:D)')
+    kb.add(ClassAssertion(A, 'x:j'))
+    kb.reason()
+    assert 'since there is x:B SubClassOf' in kb.cost
+    assert 'by x:B SubClassOf' in at_once(kb).cost
+    kb.remove(union)
+    kb.reason()
+    assert kb.cost == ''
+
+
+def at_once(kb: KnowledgeBase) -> KnowledgeBase:
+    """Return the same, reasoned over at once."""
+    other = kb.copy()
+    other.reason()
+    return other

@@ -60,7 +60,7 @@ from owl_reasoner.owl.expressions import (
     Variable,
 )
 from owl_reasoner.owl.vocabulary import NOTHING, THING, XSD
-from owl_reasoner.reasoner.classification import Classification
+from owl_reasoner.reasoner.consequence_based.classification import Classification
 
 A, B, C, D, E = (f'x:{name}' for name in 'ABCDE')
 P, Q, R, S, T = (f'x:{name}' for name in 'pqrst')

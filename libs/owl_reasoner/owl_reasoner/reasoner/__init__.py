@@ -1,10 +1,10 @@
 """An incremental reasoner for OWL 2 DL with DL-safe SWRL rules.
 
 What it derives is sound. Axioms become Horn clauses (`translation`, `clauses`, `simplify`); what
-classes alone imply is completed (`classification`); the clauses run as compiled joins (`joins`,
+classes alone imply is completed (`consequence_based`); the clauses run as compiled joins (`joins`,
 `network`) in an incremental engine (`engine`, `cardinality`, `equality`, `difference`,
 `threshold_rules`) that explains what it holds (`proofs`, `explanation`). Values are compared by
-`datatypes` and `swrl_builtins`. What takes reasoning by cases is found by `cases` (`case_rules`,
-`case_search`) and added by `completion`; what is left out is reported by
+`datatypes` and `swrl_builtins`. What takes reasoning by cases is found by `hypertableau`
+and added by `horn_completeness`; what is left out is reported by
 `KnowledgeBase.unsupported`.
 """

@@ -127,6 +127,10 @@ class Budget:
             self._unlimited()
         self.stage, self.at_work = '', str
 
+    def now(self) -> float:
+        """Return the time of the clock, in seconds."""
+        return self._clock()
+
     def tick(self) -> None:
         """Count a step, and look at the limits now and then.
 

@@ -163,8 +163,7 @@ class AtMostCounter(_Counter):
         self.recheck: set[str] = set()
         if self.n == 1:
             gain = self._gain_value
-            turned = (lambda y, z: gain(z, y)) if self.inverse else gain
-            self.hook(self.prop.on_insert, turned)
+            self.hook(self.prop.on_insert, (lambda y, z: gain(z, y)) if self.inverse else gain)
         else:
             self.hook(self.prop.on_insert, self._subjects(self.gain))
         self.hook(self.prop.on_delete, self._subjects(self.lose))
@@ -222,7 +221,8 @@ class AtMostCounter(_Counter):
                 self._enqueue((self._nothing, z))
             return
         facts = self._label_fact(z) + self.facts(z, [first, other])
-        self._merge(*sorted((first, other)), self.origin, facts)
+        one, another = sorted((first, other))
+        self._merge(one, another, self.origin, facts)
 
     def _counts(self, y: Any) -> bool:
         if self.filler is not None:

@@ -16,7 +16,27 @@ from owl_reasoner.owl.axiom_text import axiom_text
 from owl_reasoner.owl.axioms import Axiom
 from owl_reasoner.owl.expressions import DatatypeRestriction, Literal
 from owl_reasoner.owl.vocabulary import OWL, XSD, is_anonymous
-from owl_reasoner.reasoner.case_model import (
+from owl_reasoner.reasoner.clauses import (
+    ComputedAtom,
+    Constant,
+    DifferentAtom,
+    SameAtom,
+    Term,
+)
+from owl_reasoner.reasoner.datatypes import Value, literal_of
+from owl_reasoner.reasoner.hypertableau.clauses import (
+    ANYBODY,
+    Asked,
+    FactAtom,
+    NamedAtom,
+    NamedRule,
+    OfChain,
+    OfConcept,
+    OfProp,
+    OfRange,
+    OfRole,
+)
+from owl_reasoner.reasoner.hypertableau.model import (
     Alternative,
     Apart,
     CaseModel,
@@ -30,26 +50,6 @@ from owl_reasoner.reasoner.case_model import (
     Valued,
     still_open,
 )
-from owl_reasoner.reasoner.case_rules import (
-    ANYBODY,
-    Asked,
-    FactAtom,
-    NamedAtom,
-    NamedRule,
-    OfChain,
-    OfConcept,
-    OfProp,
-    OfRange,
-    OfRole,
-)
-from owl_reasoner.reasoner.clauses import (
-    ComputedAtom,
-    Constant,
-    DifferentAtom,
-    SameAtom,
-    Term,
-)
-from owl_reasoner.reasoner.datatypes import Value, literal_of
 from owl_reasoner.reasoner.value_sets import NONE, ValueSet, point, value_set
 
 MOST_TRIED = 300

@@ -13,9 +13,9 @@ from contextlib import contextmanager
 from itertools import count
 from typing import Any, NamedTuple, TypeAlias
 
-from owl_reasoner.reasoner.case_rules import ANYBODY, FRESH, Asked, CaseRules
 from owl_reasoner.reasoner.clauses import StoppedError
 from owl_reasoner.reasoner.datatypes import Value
+from owl_reasoner.reasoner.hypertableau.clauses import ANYBODY, FRESH, Asked, CaseRules
 from owl_reasoner.reasoner.value_sets import ValueSet
 
 Choices: TypeAlias = int

@@ -1,4 +1,4 @@
-"""Answers that take reasoning by cases: what holds in every model (`case_search`).
+"""Answers that take reasoning by cases: what holds in every model (`search`).
 
 One model shows what may follow: a fact that it lacks does not. What holds in it without a choice
 follows; the rest is asked for one by one, by looking for a model without it. Every model that is
@@ -20,11 +20,11 @@ from owl_reasoner.owl.expressions import ClassExpression, Literal
 from owl_reasoner.owl.vocabulary import NOTHING, THING, TOP, TOP_LITERAL, local_name
 from owl_reasoner.reasoner.answers import Unknown
 from owl_reasoner.reasoner.budget import Budget
-from owl_reasoner.reasoner.case_model import Choices
-from owl_reasoner.reasoner.case_rules import ANYBODY, FRESH, CaseRules
-from owl_reasoner.reasoner.case_search import CaseSearch
 from owl_reasoner.reasoner.clauses import StoppedError, UnsupportedError, turned
 from owl_reasoner.reasoner.datatypes import literal_of, value_of
+from owl_reasoner.reasoner.hypertableau.clauses import ANYBODY, FRESH, CaseRules
+from owl_reasoner.reasoner.hypertableau.model import Choices
+from owl_reasoner.reasoner.hypertableau.search import CaseSearch
 from owl_reasoner.reasoner.property_chains import AnyRole
 from owl_reasoner.reasoner.translation import directed, inclusions
 from owl_reasoner.reasoner.value_sets import point

@@ -36,7 +36,7 @@ from owl_reasoner.reasoner.clauses import (
     closure,
     turned,
 )
-from owl_reasoner.reasoner.contexts import (
+from owl_reasoner.reasoner.consequence_based.contexts import (
     Context,
     Contexts,
     Role,

@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import combinations
 
-from owl_reasoner.reasoner.case_model import (
+from owl_reasoner.reasoner.datatypes import Value
+from owl_reasoner.reasoner.hypertableau.clauses import ValueCount
+from owl_reasoner.reasoner.hypertableau.model import (
     CaseModel,
     Choices,
     ClashError,
@@ -15,8 +17,6 @@ from owl_reasoner.reasoner.case_model import (
     Same,
     total,
 )
-from owl_reasoner.reasoner.case_rules import ValueCount
-from owl_reasoner.reasoner.datatypes import Value
 from owl_reasoner.reasoner.value_sets import point
 
 

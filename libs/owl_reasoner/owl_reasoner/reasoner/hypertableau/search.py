@@ -1,6 +1,6 @@
 """Searches a model by cases: the hypertableau calculus.
 
-A model (`case_model`) grows from named individuals: rules add concepts, related individuals and
+A model (`model`) grows from named individuals: rules add concepts, related individuals and
 values; where a rule has several heads, one is tried after the other, and a contradiction goes back
 to the last choice that took part in it. Unnamed individuals that look like an earlier one need no
 successors of their own (anywhere blocking), which ends the search. Where no role is used backwards,
@@ -17,8 +17,14 @@ from collections.abc import Callable, Iterable
 from itertools import combinations
 from typing import Any, NamedTuple, TypeAlias
 
-from owl_reasoner.reasoner.case_joins import CaseJoins
-from owl_reasoner.reasoner.case_model import (
+from owl_reasoner.reasoner.hypertableau.clauses import (
+    ANYBODY,
+    CaseRules,
+    Count,
+    EdgeRule,
+    Heads,
+)
+from owl_reasoner.reasoner.hypertableau.model import (
     Alternative,
     CaseModel,
     Choices,
@@ -29,14 +35,8 @@ from owl_reasoner.reasoner.case_model import (
     still_open,
     total,
 )
-from owl_reasoner.reasoner.case_rules import (
-    ANYBODY,
-    CaseRules,
-    Count,
-    EdgeRule,
-    Heads,
-)
-from owl_reasoner.reasoner.case_values import CaseValues
+from owl_reasoner.reasoner.hypertableau.rule_joins import CaseJoins
+from owl_reasoner.reasoner.hypertableau.values import CaseValues
 
 _Conditions: TypeAlias = 'tuple[frozenset[int], list[tuple[frozenset[int], frozenset[int]]]]'
 

@@ -1,4 +1,4 @@
-"""Reasoning by cases (`cases`) beside an engine: whether it is needed, and adding what it finds.
+"""Whether Horn clauses find all that follows, and reasoning by cases (`hypertableau`) where not.
 
 The engine leaves open whether two individuals are the same, who it is that must exist, and which
 value there is. Where a count, a rule or a key depends on it, all cases could have a consequence in
@@ -18,9 +18,6 @@ from owl_reasoner.owl.axiom_text import axiom_text
 from owl_reasoner.owl.axioms import Axiom, ClassAssertion, Rule
 from owl_reasoner.owl.vocabulary import local_name
 from owl_reasoner.reasoner.cardinality import AtMostCounter
-from owl_reasoner.reasoner.case_joins import MOST_TRIED, compared
-from owl_reasoner.reasoner.cases import CaseReasoner, entails
-from owl_reasoner.reasoner.classification import Classification
 from owl_reasoner.reasoner.clauses import (
     AtLeast,
     BodyAtom,
@@ -37,8 +34,11 @@ from owl_reasoner.reasoner.clauses import (
     closure,
     turned,
 )
+from owl_reasoner.reasoner.consequence_based.classification import Classification
 from owl_reasoner.reasoner.difference import clique
 from owl_reasoner.reasoner.engine import Engine
+from owl_reasoner.reasoner.hypertableau.entailment import CaseReasoner, entails
+from owl_reasoner.reasoner.hypertableau.rule_joins import MOST_TRIED, compared
 from owl_reasoner.reasoner.joins import compile_call
 from owl_reasoner.reasoner.normal_form import is_positive
 from owl_reasoner.reasoner.property_chains import chains_take_cases
@@ -57,6 +57,8 @@ class Completion:
         engine: Gets the facts that are missing.
         axioms: Everything that is asserted.
 
+    Attributes:
+        seconds: How long the last `run` reasoned by cases; 0 where it did not.
     """
 
     def __init__(
@@ -76,6 +78,7 @@ class Completion:
         self._classes_stopped = False
         # One sentence for each axiom that is not fully used; None where cases were not needed.
         self._left_out: tuple[str, ...] | None = None
+        self.seconds = 0.0
 
     @cached_property
     def _open(self) -> OpenCases:
@@ -92,7 +95,7 @@ class Completion:
     def run(self, axioms: Iterable[Axiom]) -> None:
         """Add what follows from everything that is asserted now."""
         engine = self._engine
-        self._left_out = None
+        self._left_out, self.seconds = None, 0.0
         if not engine.consistent or not self._is_wanted():
             self._forget_classes()
             return
@@ -101,6 +104,24 @@ class Completion:
             self._forget_classes()
             self._left_out = (*self._native, 'the assertions: too many for reasoning by cases')
             return
+        began = engine.budget.now()
+        self._run_cases(assertions)
+        self.seconds = engine.budget.now() - began
+
+    def cause(self) -> str:
+        """Return an axiom by which cases are needed, as text; 'the ontology' where several are."""
+        program = self._program
+        if self._native:
+            return self._native[0].rpartition(': ')[0]
+        clauses = [clause for clause in program.clauses if clause.body and _names(clause.head)]
+        origins = [clause.origin for clause in clauses]
+        origins += [most.origin for most in program.at_most]
+        origins += [existential.origin for existential in program.existentials]
+        origin = next((one for one in origins if one is not None), None)
+        return 'the ontology' if origin is None else axiom_text(origin)
+
+    def _run_cases(self, assertions: list[Axiom]) -> None:
+        engine = self._engine
         reasoner = CaseReasoner([*self._schema, *assertions], budget=engine.budget)
         if not reasoner.consistent():
             engine.take_from_cases(None)
