@@ -45,7 +45,8 @@ class MapKnowledge:
         self._node = node
         self._timeout = timeout
         self._positions = ServiceCaller(node, RoomPosition, 'ontology_map/room_position')
-        self._names = ServiceCaller(node, ReferenceName, 'ontology_map/reference_name')
+        # Not `reference_name`: that answers when somebody, perhaps this node, has told the place.
+        self._names = ServiceCaller(node, ReferenceName, 'ontology_map/built')
         self._connecting = threading.Lock()
         self._changed = threading.Condition()
         self._armor: ArmorClient | None = None

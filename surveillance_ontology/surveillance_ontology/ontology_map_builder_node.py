@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 import sys
+import time
 from collections.abc import Callable
 from typing import Any
 
@@ -18,7 +19,12 @@ from rclpy.event_handler import SubscriptionEventCallbacks
 
 from surveillance_interfaces.msg import FactChanges, OntologyMap
 from surveillance_interfaces.srv import AddRoom, ReferenceName, RemoveRoom, RoomPosition, SetDoor
-from surveillance_ontology.armor_client import CHANGES_QOS, CHANGES_TOPIC, ArmorClient
+from surveillance_ontology.armor_client import (
+    CHANGES_QOS,
+    CHANGES_TOPIC,
+    ArmorClient,
+    FactSubscription,
+)
 from surveillance_ontology.conversions import room_note_from_ros
 from surveillance_ontology.map_keeper import MapKeeper, Reports, Source
 from surveillance_ontology.patrol_ontology import PatrolOntology, checked_names
@@ -32,6 +38,8 @@ from surveillance_runtime.waiting import AwaitedEvent, AwaitedWork
 
 SECONDS_PER_ROOM = 0.005
 """By which the longest wait grows with the map."""
+PLACE_SECONDS = 2.0
+"""How long an answer waits for the place of the robot once the map is built, steady seconds."""
 APART = 0.5
 """Metres; whoever adds a room whose point is nearer than this to another's is told."""
 PATIENCE = 1.0
@@ -92,6 +100,15 @@ class OntologyMapBuilder(PatrolNode):
             CHANGES_QOS,
             event_callbacks=SubscriptionEventCallbacks(matched=lambda _status: self._look()),
         )
+        self._placed = FactSubscription(
+            self,
+            armor,
+            PatrolOntology(armor).robot_place_facts,
+            lambda _fact, _came: self._built.happen(),
+        )
+        self._built_at: float | None = None
+        self._late = self.create_timer(PLACE_SECONDS, self._on_late, clock=steady)
+        self._late.cancel()
         self._serve()
         self._look()
 
@@ -103,6 +120,7 @@ class OntologyMapBuilder(PatrolNode):
         group = ReentrantCallbackGroup()
         for kind, name, callback in (
             (ReferenceName, 'reference_name', self._on_reference_name),
+            (ReferenceName, 'built', self._on_built),
             (RoomPosition, 'room_position', self._on_room_position),
             (AddRoom, 'add_room', self._on_add_room),
             (RemoveRoom, 'remove_room', self._on_remove_room),
@@ -118,10 +136,35 @@ class OntologyMapBuilder(PatrolNode):
     def _look(self) -> None:
         self._work.put(self._keeper.ensure_built)
 
-    async def _on_reference_name(self, _request: Any, response: Any) -> Any:
+    async def _on_reference_name(self, request: Any, response: Any) -> Any:
+        """Answer once the map is built and the ontology has the robot's place."""
+        if not self._keeper.is_built:
+            self._built_at = None
+        await self._on_built(request, response)
+        if self._built_at is None:
+            self._built_at = time.monotonic()
+            self._late.reset()
+        await self._built.wait_for(self._is_answered)
+        return response
+
+    async def _on_built(self, _request: Any, response: Any) -> Any:
+        """Answer once the map is built, for who will tell where the robot is."""
         await self._built.wait_for(lambda: self._keeper.is_built)
         response.name = self._reference
         return response
+
+    def _is_answered(self) -> bool:
+        assert self._built_at is not None
+        return bool(self._placed.facts) or time.monotonic() >= self._built_at + PLACE_SECONDS
+
+    def _on_late(self) -> None:
+        self._late.cancel()
+        if not self._placed.facts:
+            self.get_logger().warn(
+                'ontology_map/reference_name is answered although the ontology has the robot in no '
+                f'place: nobody told it within {PLACE_SECONDS:g} s of the map'
+            )
+        self._built.happen()
 
     def _on_room_position(self, request: Any, response: Any) -> Any:
         place = self._keeper.place

@@ -17,6 +17,7 @@ from surveillance_interfaces.srv import (
     RoomPosition,
     SetDoor,
 )
+from surveillance_ontology import ontology_map_builder_node
 from surveillance_ontology.armor_client import (
     ArmorClient,
     ArmorServiceInternalError,
@@ -34,6 +35,12 @@ PLACE: dict[str, Any] = {
     'robot_room': 'E',
     'recharge_rooms': ['E'],
 }
+
+
+@pytest.fixture(autouse=True)
+def nobody_waits_for_a_robot(monkeypatch: pytest.MonkeyPatch) -> None:
+    """No robot tells here where it is."""
+    monkeypatch.setattr(ontology_map_builder_node, 'PLACE_SECONDS', 0.01)
 
 
 class Caller:
