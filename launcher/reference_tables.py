@@ -71,14 +71,16 @@ themselves; a test compares. The fields of the types, with units, stand in
 - A node that calls `ontology_map/reference_name` uses the ontology after that: it calls
   `armor_interface_srv` or `armor_interface_serialized_srv`, and some subscribe `fact_changes`. Only
   `initial_state` just waits for the map.
-- What a caller may rely on when a service has answered: `ontology_map/reference_name`: rooms, doors
-  and `isIn` of the robot are in the ontology (where nobody tells the place within 2 s of the map, it
-  answers all the same, and the log says so). `ontology_map/built`: rooms and doors are there, `isIn`
-  may come later. `start`: the same as `reference_name`, for the map from markers. `reason`: the
-  decision is on the topic `decision` within a second. `recharge`: charging has ended; the level says
-  how. `ontology_map/add_room`, `remove_room`, `set_door`: the ontology has the change. `stop`: the
-  base is held, or released, from the next command on. `robot_behavior/fsm/pause`: `paused` is
-  published, and no further state begins.
+- What a caller may rely on when a service has answered:
+  - `ontology_map/reference_name`: rooms, doors and `isIn` of the robot are in the ontology. Where
+    nobody tells the place within 2 s of the map it answers all the same, and the log says so.
+  - `ontology_map/built`: rooms and doors are there; `isIn` may come later.
+  - `start`: as `reference_name`, for the map from markers.
+  - `reason`: the decision is on the topic `decision` within a second.
+  - `recharge`: charging has ended; `battery_level` says how.
+  - `ontology_map/add_room`, `remove_room`, `set_door`: the ontology has the change.
+  - `stop`: the base is held, or released, from the next command on.
+  - `robot_behavior/fsm/pause`: `paused` is published, and no further state begins.
 - The viewers are `mission_view`, `mission_markers`, `mission_page` and `mission_recorder`. The
   recorder subscribes all topics.
 - `tf` and `tf_static` need tf2_msgs, which is not on PyPI. `simulator` publishes `/clock` unless
