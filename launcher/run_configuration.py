@@ -33,7 +33,6 @@ from surveillance_runtime.run_parameters import (
     page_entries,
     record_entries,
     run_layers,
-    simulator_entries,
 )
 
 ONTOLOGIES = 'ontologies'
@@ -99,7 +98,6 @@ def _merged(
         files=[*files, *(Path(file) for file in (more.files if more else ()))],
         options=[
             *_option_entries(run, folder),
-            *simulator_entries(run.simulator),
             *_unmonitored(config, run),
         ],
     )

@@ -43,7 +43,6 @@ from surveillance_runtime.run_parameters import (
     page_entries,
     record_entries,
     run_layers,
-    simulator_entries,
     write_parameters,
 )
 
@@ -91,7 +90,6 @@ def start_nodes(context: LaunchContext) -> list[Node]:
             files=[Path(given['params'])] if given['params'] else [],
             options=[
                 *mode_entries(mode, prompts=False),
-                *simulator_entries(given['simulator']),
                 *unmonitored_entries(robot, names),
                 *_traces(given, folder),
             ],

@@ -20,7 +20,6 @@ from surveillance_runtime.configuration import (
 )
 from surveillance_runtime.node_table import NODES, Node
 from surveillance_runtime.profile import ProfileFile, profile_layer
-from surveillance_runtime.run_options import NO_SIMULATOR
 
 BEHAVIOUR_NODE = 'robot_behavior'
 PAGE = 'mission_page'
@@ -114,12 +113,6 @@ def page_entries(
         yield for_node(PAGE, 'port', port, '--web-address')
     if origin is not None:
         yield for_node(PAGE, 'origin', origin, '--web-origin')
-
-
-def simulator_entries(simulator: str) -> Iterator[Entry]:
-    """Yield which simulation the simulator is."""
-    if simulator != NO_SIMULATOR:
-        yield for_node('simulator', 'physics', simulator, f'--simulator {simulator}')
 
 
 def for_node(node: str, name: str, value: object, origin: str) -> Entry:

@@ -32,7 +32,6 @@ from surveillance_runtime.place.rooms import PLACE_TABLES
 from surveillance_runtime.process import run_node
 from surveillance_runtime.profile.parameters import CommandSettings
 from surveillance_runtime.qos import STATE_QOS
-from surveillance_runtime.run_options import KINEMATIC, MUJOCO
 from surveillance_runtime.state_file import StateFile
 from surveillance_runtime.state_topics import StateSubscription
 from surveillance_simulation import conversions
@@ -74,13 +73,6 @@ class Simulator(PatrolNode):
         super().__init__('simulator', **node_options)
         seed = self.parameter('random_seed', 0, 'Seed of all noise: the same seed, the same run.')
         rate = self.declare_fields(ClockRateModel())
-        self.parameter(
-            'physics',
-            KINEMATIC,
-            'What moves the robot: kinematic, or mujoco, with wheels, friction and slip.',
-            choices=(KINEMATIC, MUJOCO),
-            read_only=True,
-        )
         try:
             world = World.from_parameters(_place_parameters(self))
         except PlaceError as error:

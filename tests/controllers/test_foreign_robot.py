@@ -154,7 +154,7 @@ def test_what_a_mission_waits_for_is_named_within_five_seconds(
     graph.until(lambda: told('/map: nobody publishes it'), timeout=20.0)
     assert time.monotonic() - begun < 8.0  # five, on a machine that does nothing else
     assert told('the nearest that is there is /office/map')
-    assert told('/front: nobody publishes it (sensor_msgs/LaserScan')
+    graph.until(lambda: told('/front: nobody publishes it (sensor_msgs/LaserScan'), timeout=10.0)
 
 
 COMMAND = Awaited('topics.command', '/cmd_vel', 'geometry_msgs/Twist', False, 'to drive')

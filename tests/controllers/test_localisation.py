@@ -10,7 +10,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from surveillance_controllers.geometry import Pose, Scan, composed, relative
+from surveillance_controllers.geometry import Pose, Scan, angle_between, composed, relative
 from surveillance_controllers.motion.localisation import Localiser
 from surveillance_runtime.place.occupancy_grid import Grid
 
@@ -171,3 +171,40 @@ def test_scans_that_tell_nothing_new_are_not_used(flat: Any) -> None:
     localiser.move((0, 0, 0))
     localiser.move((0.2, 0, 0))
     assert localiser.see(flat.scan((2.2, 1.5, 0.0)), now=0.65)
+
+
+def clutter(flat: Any, pose: Pose, seed: int, share: float = 0.15) -> Scan:
+    """Return a scan of which a share of the rays meet what the map does not have."""
+    seen, draw = flat.scan(pose), np.random.default_rng(seed)
+    blocked = draw.random(len(seen.ranges)) < share
+    return Scan(seen.angles, np.where(blocked, 0.7 * seen.ranges, seen.ranges), seen.range_max)
+
+
+def test_where_much_is_not_on_the_map_the_robot_looks_once_and_not_with_each_scan(
+    flat: Any,
+) -> None:
+    searches: list[int] = []
+    localiser = Localiser(flat.grid, (1.0, 0.8, 0.0), lambda: searches.append(1))
+    for step in range(80):
+        true = (1.0 + 0.03 * step, 0.8 + 0.3 * math.sin(0.1 * step), 0.02 * step)
+        localiser.move(true)
+        localiser.see(clutter(flat, true, step), now=0.3 * step)
+    assert error(localiser, true)[0] < 0.06
+    assert localiser.jumps == 0
+    assert len(searches) <= 8
+
+
+def test_a_slip_in_a_cluttered_room_is_mended_nearby_and_the_robot_is_not_turned_round(
+    flat: Any,
+) -> None:
+    localiser = Localiser(flat.grid, (1.0, 0.8, 0.0))
+    slipped = (0.0, 0.0, 0.0)
+    for step in range(60):
+        true = (1.0 + 0.03 * step, 0.8, 0.0)
+        if step % 15 == 14:
+            slipped = (slipped[0] + 0.05, slipped[1], slipped[2] + 0.25)
+        localiser.move(composed(true, slipped))
+        localiser.see(clutter(flat, true, step), now=0.3 * step)
+        assert abs(angle_between(localiser.pose[2], true[2])) < 0.4
+    assert error(localiser, true)[0] < 0.1
+    assert localiser.jumps == 0

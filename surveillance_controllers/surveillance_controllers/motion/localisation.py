@@ -7,14 +7,18 @@ signed distance to those edges (a likelihood field; Thrun, Burgard, Fox, "Probab
 where the scan says nothing, as along a corridor.
 
 How well a pose explains a scan is measured by casting the rays into the map: the part of them that
-go as far as they should. When that part drops, the robot doubts (it may have been pushed, carried,
-or slipped; or there only are obstacles that the map does not have) and looks for a better pose:
-near where it was, then everywhere, over a lattice of poses, the best of which are refined by the
-same correction and compared by their rays. A pose that is not clearly better is not taken.
+go as far as they should. How large that part usually is differs between places: all but one in
+ten rays of a drawn map, fewer in a furnished one. When it drops below what is usual here, the robot
+doubts (it may have been pushed, carried, or slipped; or there only are obstacles that the map does
+not have) and looks for a better pose: near where it was, then everywhere, over a lattice of poses,
+the best of which are refined by the same correction and compared by their rays. A pose nearby that
+looks the same way and is clearly better is taken at once: the robot was pushed, or slipped. Any
+other one is followed first: it becomes a rival.
 
-Rooms look alike. Poses that explained about as much as the one that was taken stay as rivals: they
-move with the odometry and are corrected by the same scans, until they explain less, or one of them
-wins.
+Rivals are other poses at which the robot may be. They move with the odometry and are corrected by
+the same scans, until they explain less, or one of them wins. Rooms look alike: so are poses that
+explained about as much as the one that was taken. Only what tells them apart counts, and only
+while the robot moves: a robot that stands sees the same again and again.
 """
 
 from __future__ import annotations
@@ -50,17 +54,28 @@ class LocalisationParameters:
         update_period: or this time, seconds; and always while the robot doubts.
         hit: A ray agrees with the map when it is off by at most this, metres.
         spread: Points further than about this from any edge lose their weight, metres.
-        doubt_below: The robot looks for a better pose when a smaller part of the rays agrees.
+        doubt_below: The robot looks for a better pose when a smaller part of the rays agrees,
+        doubt_drop: and less than is usual here by this much.
+        usual_rise: By this part of the difference the usual agreement rises with a scan;
+        usual_fall: by this part it falls.
         lost_below: It counts as lost when none is found and a smaller part than this agrees.
         sure_from: A pose near the last one that explains this part ends the search.
         better: A pose near the last one must explain this much more to be taken instead.
-        far_better: A pose far away must explain this much more, and win in several searches: that
-            somebody carried the robot there is unlikely, and rooms look alike.
-        far_wins: In so many, one after the other.
+        far_better: A pose far away must explain this much more to become a rival: that somebody
+            carried the robot there is unlikely.
+        same_way: A pose that is turned by more than this looks elsewhere, rad.
         alike: A pose that explains less than the one taken, by at most this, is a rival.
         most_rivals: At most so many are kept.
         rival_wins: A rival that explained so much more, summed over scans, is taken instead;
         rival_loses: one that explained so much less is forgotten.
+        forgotten: This part of the sum with each scan.
+        noise: Of two poses that explain a scan as well the one explains this much more by chance;
+            no more than that counts for nothing.
+        standing: Of a robot that stands this part of the difference counts,
+        standing_from: if it is at least this large.
+        nudge: A correction of more than this, metres or rad, may as well be that somebody put the
+            robot into a place that looks alike.
+        challenger: A challenger loses this much with each scan that the present pose explains.
         rounds: After so many searches without a winner the present pose is kept.
         doubt_time: How long scans are doubtful before it looks, seconds; one scan is enough when it
             would be lost.
@@ -74,22 +89,31 @@ class LocalisationParameters:
     """
 
     rays: int = 90
-    cast_rays: int = 45
+    cast_rays: int = 60
     update_distance: float = 0.15
     update_turn: float = 0.15
     update_period: float = 0.3
     hit: float = 0.15
     spread: float = 0.2
     doubt_below: float = 0.85
+    doubt_drop: float = 0.12
+    usual_rise: float = 0.05
+    usual_fall: float = 0.02
     lost_below: float = 0.55
     sure_from: float = 0.93
     better: float = 0.1
     far_better: float = 0.2
-    far_wins: int = 3
+    same_way: float = 0.8
     alike: float = 0.1
     most_rivals: int = 40
-    rival_wins: float = 0.3
+    rival_wins: float = 0.8
     rival_loses: float = 0.5
+    forgotten: float = 0.1
+    noise: float = 0.05
+    standing: float = 0.7
+    standing_from: float = 0.2
+    nudge: float = 0.2
+    challenger: float = 0.05
     rounds: int = 5
     doubt_time: float = 0.2
     lost_pause: float = 1.0
@@ -103,10 +127,18 @@ class LocalisationParameters:
 
 @dataclass
 class _Rival:
-    """Another pose at which the robot may be, and by how much it has explained more so far."""
+    """Another pose at which the robot may be.
+
+    Attributes:
+        pose: The pose.
+        lead: By how much it explained more, summed over scans that are slowly forgotten.
+        is_equal: Whether it was as likely as the present pose when that was taken; else it
+            challenges a pose that was followed all the time.
+    """
 
     pose: Pose
     lead: float = 0.0
+    is_equal: bool = True
 
 
 class Localiser:
@@ -139,7 +171,8 @@ class Localiser:
         self._odometry: Pose | None = None
         self._look_at: float | None = None
         self._tolerated = 1.0
-        self._rival: tuple[Pose, int] | None = None
+        self._usual = 1.0
+        self._shaken = False
         self._rounds = 0
         self._rivals: list[_Rival] = []
         self._moved = (0.0, 0.0)
@@ -183,6 +216,8 @@ class Localiser:
         self.lost = False
         self._look_at = None
         self._tolerated = 1.0
+        self._shaken = False
+        self._rounds = 0
         self._used_at = None
         self._rivals.clear()
 
@@ -217,6 +252,13 @@ class Localiser:
         moved, self._moved = self._moved, (0.0, 0.0)
         corrected = self._matched(self.pose, thin.points, moved)
         agreement = self.explained(corrected, thin.thinned(p.cast_rays))
+        if agreement < self._enough:
+            before = corrected
+            corrected, agreement = self._nudged(corrected, agreement, thin, moved)
+            way, turn = math.dist(before[:2], corrected[:2]), angle_between(before[2], corrected[2])
+            if way > p.nudge or abs(turn) > p.nudge:
+                # Somebody may have put it into another room that looks alike.
+                self._shaken = True
         winner = self._weighed(corrected, agreement, thin, moved)
         if winner is not None:
             self.jumps += 1
@@ -224,19 +266,47 @@ class Localiser:
         self._judge(corrected, agreement, thin, now)
         return True
 
+    def _nudged(
+        self, pose: Pose, agreement: float, thin: Scan, moved: tuple[float, float]
+    ) -> tuple[Pose, float]:
+        """Return a pose close by that explains more, as after a slip; else the same pose."""
+        rays = thin.thinned(self.parameters.cast_rays)
+        best = pose, agreement
+        for turn in (-0.3, -0.15, 0.0, 0.15, 0.3):
+            for dx, dy in ((0.0, 0.0), (0.25, 0.0), (-0.25, 0.0), (0.0, 0.25), (0.0, -0.25)):
+                start = composed(pose, (dx, dy, turn))
+                tried = self._matched(start, thin.points, (moved[0] + 0.3, moved[1] + 0.3))
+                explained = self.explained(tried, rays)
+                if explained > best[1] + 0.02 and self._can_stand(tried):
+                    best = tried, explained
+        return best
+
     def _weighed(
         self, present: Pose, agreement: float, thin: Scan, moved: tuple[float, float]
     ) -> tuple[Pose, float] | None:
         """Correct the rivals by a scan; return the one that wins over the present pose, if any."""
         p = self.parameters
         best: tuple[_Rival, float] | None = None
+        moves = moved[0] >= p.update_distance / 2 or moved[1] >= p.update_turn / 2
+        plausible = agreement >= self._enough
         for rival in self._rivals:
             rival.pose = self._matched(rival.pose, thin.points, moved)
             explained = self.explained(rival.pose, thin.thinned(p.cast_rays))
-            rival.lead += explained - agreement
+            more = explained - agreement
+            if moves:
+                rival.lead *= 1.0 - p.forgotten
+                rival.lead += more if abs(more) > p.noise else 0.0
+                if plausible and not rival.is_equal:
+                    rival.lead -= p.challenger
+            elif abs(more) >= p.standing_from:
+                rival.lead += p.standing * more - p.forgotten * rival.lead
             if not self._can_stand(rival.pose) or self._same(rival.pose, present):
                 rival.lead = -math.inf
-            elif rival.lead >= p.rival_wins and (best is None or rival.lead > best[0].lead):
+            elif (
+                (rival.is_equal or not plausible)
+                and rival.lead >= p.rival_wins
+                and (best is None or rival.lead > best[0].lead)
+            ):
                 best = rival, explained
         self._rivals = [each for each in self._rivals if each.lead > -p.rival_loses]
         if best is None:
@@ -266,28 +336,39 @@ class Localiser:
 
     def _judge(self, corrected: Pose, agreement: float, thin: Scan, now: float) -> None:
         p = self.parameters
-        if agreement >= p.doubt_below:
+        enough = self._enough
+        if agreement >= enough:
             self._tolerated = 1.0
-        if agreement >= min(p.doubt_below, self._tolerated - p.better):
+        if agreement >= max(p.lost_below, min(enough, self._tolerated - p.better)):
             self._settle(corrected, agreement)
+            if self._shaken and agreement >= enough:
+                # What fits again may be another place that looks alike.
+                self._shaken = False
+                self._before_search()
+                self._rivals = self._alike([(corrected, agreement), *self.search(thin)])
             return
         self.agreement = agreement
         if self._look_at is None:
             self._look_at = now + p.doubt_time
         if agreement < p.lost_below and not self.lost:
             # Next to nothing fits: that is no passer-by.
+            self._shaken = True
             self._look_at = min(self._look_at, now)
         if now < self._look_at - 1e-9:
+            return
+        if self._follows_better and self._rounds < p.rounds:
+            # The next scans decide.
+            self._rounds += 1
             return
         self._before_search()
         candidates = self.search(thin)
         found = candidates[0] if candidates else None
-        if found is not None and self._is_convincing(found, agreement):
+        if found is not None and self._is_near(found[0]) and self._is_better(found, agreement):
             self.jumps += 1
             self._settle(*found)
+            self._shaken = False
             self._rivals = self._alike(candidates)
-        elif self._rival is not None and self._rounds < p.rounds:
-            # Somewhere far away fits better: the next scans decide.
+        elif found is not None and self._follow(candidates, agreement) and self._rounds < p.rounds:
             self._rounds += 1
         elif agreement >= p.lost_below:
             # Nothing explains the scan better: what is seen is not on the map.
@@ -297,29 +378,61 @@ class Localiser:
             self.lost = True
             self._look_at = now + p.lost_pause
 
-    def _is_convincing(self, found: tuple[Pose, float], agreement: float) -> bool:
+    @property
+    def _enough(self) -> float:
+        """The part of the rays from which on the estimate is not doubted here."""
+        return min(self.parameters.doubt_below, self._usual - self.parameters.doubt_drop)
+
+    def _is_near(self, pose: Pose) -> bool:
+        """Tell whether a push or a slip may have brought the robot there."""
         p = self.parameters
-        pose, explained = found
-        if explained < p.lost_below or explained < agreement + p.better:
-            self._rival = None
+        turned = abs(angle_between(self.pose[2], pose[2]))
+        return math.dist(pose[:2], self.pose[:2]) <= p.near and turned <= p.same_way
+
+    def _is_better(self, found: tuple[Pose, float], agreement: float) -> bool:
+        p = self.parameters
+        return found[1] >= max(p.lost_below, agreement + p.better)
+
+    def _needed(self, pose: Pose) -> float:
+        """Return how much more a pose must explain to be followed."""
+        p = self.parameters
+        return p.better if math.dist(pose[:2], self.pose[:2]) <= p.near else p.far_better
+
+    @property
+    def _follows_better(self) -> bool:
+        """Whether a rival leads."""
+        return any(rival.lead > 0.0 for rival in self._rivals)
+
+    def _follow(self, candidates: list[tuple[Pose, float]], agreement: float) -> bool:
+        """Follow poses far away, or turned, that explain much more; tell whether there are any."""
+        p = self.parameters
+        better = [
+            explained
+            for pose, explained in candidates
+            if explained >= max(p.lost_below, agreement + self._needed(pose))
+        ]
+        if not better:
             return False
-        if math.dist(pose[:2], self.pose[:2]) <= p.near:
-            return True
-        if explained < agreement + p.far_better:
-            self._rival = None
-            return False
-        wins = 1
-        if self._rival is not None and math.dist(pose[:2], self._rival[0][:2]) <= p.near / 2:
-            wins = self._rival[1] + 1
-        self._rival = pose, wins
-        return wins >= p.far_wins
+        # With it those that look alike, wherever they are.
+        alike = [each for each in candidates if each[1] >= max(better) - p.alike / 2]
+        known = [rival.pose for rival in self._rivals]
+        for pose, explained in alike[: p.most_rivals]:
+            if not any(self._same(pose, other) for other in known):
+                known.append(pose)
+                self._rivals.append(_Rival(pose, (explained - agreement) / 3, is_equal=False))
+        return True
 
     def _settle(self, pose: Pose, agreement: float) -> None:
         self.pose, self.agreement = pose, agreement
         self.lost = False
         self._look_at = None
         self._rounds = 0
-        self._rival = None
+        p = self.parameters
+        rate = p.usual_rise if agreement > self._usual else p.usual_fall
+        if self._tolerated < 1.0:
+            # A search found nothing better: it is what the place is like.
+            rate = 0.2
+        self._usual += rate * (agreement - self._usual)
 
     def search(self, scan: Scan) -> list[tuple[Pose, float]]:
         """Look everywhere for poses that explain a scan.
@@ -355,8 +468,10 @@ class Localiser:
         return [_Rival(pose) for pose in taken[1 : p.most_rivals + 1]]
 
     def _worth(self, pose: Pose, explained: float) -> float:
-        # Among poses that explain a scan as well, the nearest one is the likeliest.
-        return explained - 0.003 * min(math.dist(pose[:2], self.pose[:2]), 20.0)
+        # Among poses that explain a scan as well, the nearest one is the likeliest, and the one
+        # that looks the same way: a robot that is pushed or slips seldom turns round.
+        turned = abs(angle_between(self.pose[2], pose[2]))
+        return explained - 0.003 * min(math.dist(pose[:2], self.pose[:2]), 20.0) - 0.02 * turned
 
     def explained(self, pose: Pose, scan: Scan) -> float:
         """Return the part of a scan's rays that go as far as they should from a pose, 0 to 1."""

@@ -101,7 +101,7 @@ class NavigationMotion:
         self._awaited: Callable[[], bool] = lambda: False
         self._on_step: Callable[[Pose], None] = lambda _pose: None
         self._pose_sent = float('-inf')
-        self._was_lost = False
+        self._was_lost = self._was_ambiguous = False
         self._jumps = 0
         self._planner = GoalCaller(node, ComputePath, 'compute_path')
         self._base = CommandPublisher(
@@ -393,6 +393,13 @@ class NavigationMotion:
             self._was_lost = navigator.lost
             if navigator.lost:
                 self._node.get_logger().warn('pose lost: the scans do not fit the map')
+        if navigator.ambiguous != self._was_ambiguous:
+            self._was_ambiguous = navigator.ambiguous
+            if navigator.ambiguous:
+                self._node.get_logger().info(
+                    'the robot may be in one of several places that look alike: which one is told '
+                    'once something tells them apart'
+                )
         if navigator.jumps != self._jumps:
             self._jumps = navigator.jumps
             x, y, _ = navigator.pose
