@@ -39,7 +39,7 @@ def swept(flat: Any, stamp: float, sweep: float) -> Scan:
 def test_a_late_scan_of_a_lidar_that_turns_tells_where_the_robot_is_now(
     flat: Any, late: float, sweep: float
 ) -> None:
-    localiser = Localiser(flat.grid, moving(0.0))
+    localiser = Localiser(flat.grid, moving(1.0))
     off, turned = [], []
     for step in range(10, 40):
         now = 0.1 * step
