@@ -18,6 +18,7 @@ import sys
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -286,10 +287,7 @@ def on_log(path: Path) -> None:
                 f'{core:.1%}',
             ]
         )
-    way = sum(
-        math.dist(a.odometry[:2], b.odometry[:2])
-        for a, b in zip(records, records[1:], strict=False)
-    )
+    way = sum(math.dist(a.odometry[:2], b.odometry[:2]) for a, b in pairwise(records))
     print_table(
         f'{path.name}: {len(records)} scans, {way:.0f} m by odometry; position error, m.',
         ('estimator', 'p50', 'p95', 'max', 'jumps', 'searches', 'of a core'),
