@@ -83,7 +83,8 @@ themselves; a test compares. The fields of the types, with units, stand in
   - `robot_behavior/fsm/pause`: `paused` is published, and no further state begins.
 - The viewers are `mission_view`, `mission_markers`, `mission_page` and `mission_recorder`. The
   recorder subscribes all topics.
-- `tf` and `tf_static` need tf2_msgs, which is not on PyPI. `simulator` publishes `/clock` unless
+- `tf` and `tf_static` need tf2_msgs, which is built with the interfaces where no ROS is installed.
+  `simulator` publishes `/clock` unless
   time runs at the machine's own rate.
 """
 _VIEWERS = frozenset(('mission_view', 'mission_markers', 'mission_page', 'mission_recorder'))
