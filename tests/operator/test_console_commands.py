@@ -132,7 +132,7 @@ def test_completion_knows_nodes_parameters_and_their_values() -> None:
     assert completions('PARAM set robot_behavior p') == ['policy']
     assert 'random_seed' in completions('param get robot_behavior ')
     assert 'random_seed' not in completions('param set robot_behavior ')
-    assert completions('param set robot_behavior policy h') == ['HCR', 'HPCC']
+    assert completions('param set robot_behavior policy o') == ['oldest']
     assert completions('param set nowhere ') == []
     assert 'oldest' in completions('policy ')
     assert completions('arm l') == ['left']

@@ -295,7 +295,6 @@ def test_light_can_be_changed_while_it_runs(graph: Any) -> None:
     ('parameters', 'message'),
     [
         (changed(doors__D=[3.0, 1.0, 0.0, 1.0]), 'simulator: doors.D: (3, 1) with width 1 m'),
-        (changed(walls={}), 'simulator: walls: empty'),
         (changed(marker_dictionary='DICT_X'), "simulator: marker dictionary 'DICT_X'"),
     ],
 )
