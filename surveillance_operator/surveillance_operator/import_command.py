@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
+from surveillance_operator.graph_import import SUFFIXES, is_rmf_graph, read_graph
 from surveillance_operator.map_command import facts
 from surveillance_runtime.command_line import EXIT_BAD_INPUT, CommandParser
 from surveillance_runtime.files import FileError, in_one_line, replace_text
@@ -29,7 +30,11 @@ def _parse(argv: Sequence[str] | None) -> argparse.Namespace:
         'draws it.',
     )
     parser.add_argument(
-        'map', type=Path, metavar='FILE', help="a map in map_server's format, or a picture"
+        'map',
+        type=Path,
+        metavar='FILE',
+        help="a map in map_server's format, a picture, or a graph of "
+        'patrolling_sim, Nav2 or Open-RMF',
     )
     parser.add_argument(
         '--out', type=Path, metavar='PLACE', help="the place's file (default: FILE_place.yaml here)"
@@ -68,6 +73,8 @@ def import_map(options: argparse.Namespace) -> list[str]:
         raise ValueError(f'--out {out}: expected a name that ends in .yaml')
     if out.exists() and not options.force:
         raise ValueError(f'{out}: is there already; expected another --out, or --force')
+    if options.map.suffix in SUFFIXES or is_rmf_graph(options.map):
+        return _import_graph(options, out)
     building = read_map(options.map, resolution=options.resolution)
     if options.labels is not None and options.labels.suffix.lower() != '.png':
         raise ValueError(f'--labels {options.labels}: expected a name that ends in .png')
@@ -89,6 +96,24 @@ def import_map(options: argparse.Namespace) -> list[str]:
         picture = out.with_name(out.stem + '_drawn.png')
     _draw(written, out, picture)
     return [f'{options.map}: {_found(proposal)}', *lines, f'place: {out}', f'drawn: {picture}']
+
+
+def _import_graph(options: argparse.Namespace, out: Path) -> list[str]:
+    parameters = read_graph(options.map)
+    if options.labels is not None or options.resolution is not None:
+        raise ValueError(
+            f'{options.map}: a graph has no pixels: expected neither --labels nor --resolution'
+        )
+    said = f'{_count(len(parameters["map"]), "room")} of a graph'
+    title = f'{said}\nWritten by: python3 launch.py import {options.map}'
+    text = format_place(parameters, title)
+    try:
+        replace_text(out, text)
+        written = read_place_file(out, radius=options.robot_radius)
+    except OSError as error:
+        raise FileError(in_one_line(error)) from None
+    _draw(written, out, out.with_suffix('.png'))
+    return [f'{options.map}: {said}', f'place: {out}', f'drawn: {out.with_suffix(".png")}']
 
 
 def place_text(

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
 
+from launcher.run import make_parser
+from surveillance_operator import map_command
 from surveillance_operator.import_command import main
 from surveillance_runtime.place import read_place_file
 from surveillance_runtime.place.occupancy_grid import draw
@@ -113,3 +116,71 @@ def test_a_picture_with_its_scale(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     hall(tmp_path)
     assert main(['hall.png', '--resolution', '0.05', '--out', 'place.yaml']) == 0
     assert read_place_file(tmp_path / 'place.yaml').plan.map is not None
+
+
+GRAPHS = {
+    'three.graph': '3 400 300 0.05 -1.0 2.0\n0 0 0 1 1 E 60\n'
+    '1 60 0 2 0 W 60 2 N 40\n2 60 40 1 1 S 40\n',
+    'three.geojson': (
+        '{"type": "FeatureCollection", "features": ['
+        '{"type": "Feature", "properties": {"id": 0}, "geometry": {"type": "Point", '
+        '"coordinates": [-1.0, 2.0]}}, {"type": "Feature", "properties": {"id": 1}, "geometry": '
+        '{"type": "Point", "coordinates": [2.0, 2.0]}}, {"type": "Feature", '
+        '"properties": {"id": 2}, '
+        '"geometry": {"type": "Point", "coordinates": [2.0, 4.0]}}, {"type": "Feature", '
+        '"properties": {"id": 3, "startid": 0, "endid": 1}, "geometry": {"type": '
+        '"MultiLineString", "coordinates": [[[0, 0], [1, 1]]]}}, {"type": "Feature", "properties": '
+        '{"id": 4, "startid": 2, "endid": 1}, "geometry": {"type": "MultiLineString", '
+        '"coordinates": []}}]}'
+    ),
+    'three.yaml': (
+        'building_name: b\nlevels:\n  L1:\n    lanes:\n    - [0, 1, {}]\n    - [1, 0, {}]\n'
+        '    - [1, 2, {}]\n    vertices:\n    - [-1.0, 2.0, {name: ""}]\n'
+        '    - [2.0, 2.0, {name: ""}]\n    - [2.0, 4.0, {name: lounge}]\n'
+    ),
+}
+
+
+@pytest.mark.parametrize('name', GRAPHS)
+def test_a_graph_of_another_program_is_a_place(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / name).write_text(GRAPHS[name])
+    assert main([name, '--out', 'place.yaml']) == 0
+    place = read_place_file(tmp_path / 'place.yaml').place
+    third = 'lounge' if name == 'three.yaml' else 'R3'
+    assert place.positions == {'R1': (-1, 2, 0), 'R2': (2, 2, 0), third: (2, 4, 0)}
+    assert set(map(frozenset, place.doors.values())) == {
+        frozenset({'R1', 'R2'}),
+        frozenset({'R2', third}),
+    }
+
+
+@pytest.mark.parametrize('name', GRAPHS)
+def test_a_damaged_graph_costs_one_line(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    name: str,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    for text in (GRAPHS[name][: len(GRAPHS[name]) * 2 // 3], '', 'levels: 3\n', '{}'):
+        (tmp_path / name).write_text(text)
+        assert main([name, '--out', 'place.yaml']) == 2
+        assert capsys.readouterr().err.count('\n') == 1
+
+
+def test_the_commands_of_the_page_about_your_building(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    text = (CONFIG.parent / 'docs' / 'your_building.md').read_text('utf-8')
+    commands = re.findall(r'^ +python3 launch\.py (.*)$', text, re.MULTILINE)
+    assert [words.split()[0] for words in commands] == ['import', 'map', '--mode']
+    monkeypatch.chdir(tmp_path)
+    mapped(tmp_path, 'seven_rooms').rename(tmp_path / 'building.yaml')
+    assert main(commands[0].split()[1:]) == 0
+    assert map_command.main(commands[1].split()[1:]) == 0
+    assert (tmp_path / 'place.png').exists()
+    options = make_parser().parse_args(commands[2].split())
+    assert (options.place, options.seconds) == (Path('place.yaml'), 60.0)

@@ -1,0 +1,139 @@
+"""Graphs of other programs as places: patrolling_sim's `.graph`, Nav2's route graph, Open-RMF's.
+
+A vertex becomes a room with its point, an edge, in whichever direction it leads, a door that joins
+two rooms and has no position. A name that the other program gave is kept where a room can have it.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from patrol_policy.graph import GraphError
+from patrol_policy.patrolling_sim import read_patrolling_sim
+from surveillance_runtime.files import FileError, read_file
+from surveillance_runtime.place.rooms import problem_in_name
+
+MOST_BYTES = 20_000_000
+SUFFIXES = ('.graph', '.geojson', '.json')
+Vertices = dict[str, tuple[str, float, float]]
+"""By their id: a name, which may be empty, and x and y in metres."""
+
+
+def read_graph(path: Path) -> dict[str, Any]:
+    """Return the parameters of the place that a graph file describes.
+
+    Args:
+        path: A `.graph` of patrolling_sim, a GeoJSON of Nav2's route server, or a navigation graph
+            of Open-RMF (YAML with `levels`, of which there is one).
+
+    Raises:
+        FileError: It cannot be read or is of none of these; one line.
+    """
+    try:
+        if path.suffix == '.graph':
+            vertices, edges = _patrolling_sim(path)
+        elif path.suffix in SUFFIXES:
+            vertices, edges = _route_graph(json.loads(read_file(path, MOST_BYTES)))
+        else:
+            vertices, edges = _rmf(yaml.safe_load(read_file(path, MOST_BYTES)))
+    except FileError:
+        raise
+    except GraphError as error:
+        raise FileError(str(error)) from None
+    except (ValueError, TypeError, KeyError, IndexError, AttributeError, yaml.YAMLError) as error:
+        said = f'{error!r}' if isinstance(error, KeyError) else str(error).splitlines()[0]
+        raise FileError(f'{path}: not the graph that was expected: {said}') from None
+    return _place(path, vertices, edges)
+
+
+def is_rmf_graph(path: Path) -> bool:
+    """Tell whether a YAML file is a navigation graph of Open-RMF."""
+    if path.suffix not in ('.yaml', '.yml'):
+        return False
+    try:
+        return re.search(rb'^levels:', read_file(path, MOST_BYTES), re.MULTILINE) is not None
+    except FileError:
+        return False
+
+
+def _patrolling_sim(path: Path) -> tuple[Vertices, list[tuple[str, str]]]:
+    legs = read_patrolling_sim(path).leg_seconds  # with all checks of the format
+    words = path.read_text('utf-8').split()
+    rest = sum(4 + 3 * len(ways) for ways in legs.values())
+    at = len(words) - rest
+    scale = float(words[3])
+    west, south = (float(words[4]), float(words[5])) if at == 6 else (0.0, 0.0)
+    vertices: Vertices = {}
+    for _ in legs:
+        name, x, y, ways = words[at], float(words[at + 1]), float(words[at + 2]), words[at + 3]
+        vertices[str(int(name))] = '', west + scale * x, south + scale * y
+        at += 4 + 3 * int(ways)
+    return vertices, [(first, other) for first, ways_ in legs.items() for other in ways_]
+
+
+def _route_graph(document: Any) -> tuple[Vertices, list[tuple[str, str]]]:
+    vertices: Vertices = {}
+    edges = []
+    for feature in document['features']:
+        properties, geometry = feature['properties'], feature['geometry']
+        if geometry['type'] == 'Point':
+            x, y = geometry['coordinates'][:2]
+            name = str((properties.get('metadata') or {}).get('name', ''))
+            vertices[str(properties['id'])] = name, float(x), float(y)
+        else:
+            edges.append((str(properties['startid']), str(properties['endid'])))
+    return vertices, edges
+
+
+def _rmf(document: Any) -> tuple[Vertices, list[tuple[str, str]]]:
+    levels = document['levels']
+    if len(levels) != 1:
+        raise ValueError(f'{len(levels)} levels ({", ".join(map(str, levels))}), expected one')
+    level = next(iter(levels.values()))
+    vertices: Vertices = {}
+    for index, (x, y, *more) in enumerate(level['vertices']):
+        if more and not isinstance(more[0], Mapping):
+            raise ValueError('a building in pixels, expected the navigation graph made of it')
+        name = str(more[0].get('name', '')) if more else ''
+        vertices[str(index)] = name, float(x), float(y)
+    return vertices, [(str(lane[0]), str(lane[1])) for lane in level['lanes']]
+
+
+def _place(path: Path, vertices: Vertices, edges: Iterable[tuple[str, str]]) -> dict[str, Any]:
+    if not vertices:
+        raise FileError(f'{path}: has no vertices, expected at least two')
+    names: dict[str, str] = {}
+    for index, (vertex, (name, x, y)) in enumerate(vertices.items(), start=1):
+        if not (math.isfinite(x) and math.isfinite(y)):
+            raise FileError(f'{path}: vertex {vertex} is at ({x}, {y}), expected finite metres')
+        usable = name and not problem_in_name('room', name) and name not in names.values()
+        names[vertex] = name if usable else f'R{index}'
+    if len(set(names.values())) < len(names):  # a name that looks like one of ours
+        names = {vertex: f'R{index}' for index, vertex in enumerate(vertices, start=1)}
+    rooms: dict[str, list[str]] = {name: [] for name in names.values()}
+    joined: set[frozenset[str]] = set()
+    for first, second in edges:
+        for end in (first, second):
+            if end not in names:
+                raise FileError(f'{path}: an edge leads to vertex {end}, which is not there')
+        pair = frozenset((first, second))
+        if len(pair) == 2 and pair not in joined:
+            joined.add(pair)
+            for end in (first, second):
+                rooms[names[end]].append(f'D{len(joined)}')
+    start = next(iter(rooms))
+    return {
+        'map': rooms,
+        'room_positions': {
+            names[v]: [round(x, 3), round(y, 3)] for v, (_, x, y) in vertices.items()
+        },
+        'robot_room': start,
+        'recharge_rooms': [start],
+    }
