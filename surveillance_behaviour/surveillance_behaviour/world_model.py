@@ -32,7 +32,7 @@ from patrol_policy.decision import (
 )
 from patrol_policy.graph import GraphError, PatrolGraph
 from patrol_policy.plan import LEG_CHANGE
-from patrol_policy.promises import Promise, promises, summary
+from patrol_policy.promises import Promise, promises, summary, verdicts
 from patrol_policy.world import Decision, PolicyMemory, World
 from state_machines import Interrupt
 from state_machines.exceptions import CallError
@@ -109,7 +109,7 @@ class WorldModel:
         self._warn = warn
         self._rules = rules or PatrolRules()
         self._tell = tell
-        self._told = ''
+        self._told: dict[str, str] = {}
         self._told_about: object = None
         self._announce = announce
         self._warned = False
@@ -285,10 +285,11 @@ class WorldModel:
         if about == self._told_about:
             return
         self._told_about = about
-        sentence = summary(self.promises(world))
-        if sentence != self._told:
-            self._told = sentence
-            self._tell(sentence)
+        found = self.promises(world)
+        told = verdicts(found)
+        if any(self._told.get(place, '') != verdict for place, verdict in told.items()):
+            self._told = {**self._told, **told}
+            self._tell(summary(found))
 
     def _check_rules(self, interrupt: Interrupt) -> None:
         """Say which class of the rules no place can ever be in."""

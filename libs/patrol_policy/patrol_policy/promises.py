@@ -23,6 +23,8 @@ from patrol_policy.plan import plan_of
 from patrol_policy.world import World
 
 WITHIN, LATER, NEVER, UNKNOWN = 'within', 'later', 'never', 'unknown'
+SLIGHTLY = 1.25
+"""What waits up to so many thresholds is late by little: drives are not that exact."""
 ROUNDING = 0.05
 """Seconds by which a wait may be above the threshold and counts as within it."""
 
@@ -140,8 +142,30 @@ def summary(found: Sequence[Promise]) -> str:
     if not found:
         return 'there are no places to visit'
     within = [each.place for each in found if each.verdict == WITHIN]
-    rest = [each.words for each in found if each.verdict != WITHIN]
-    if not rest:
+    slightly = [each for each in found if _slightly_later(each)]
+    rest = [each.words for each in found if each.verdict != WITHIN and each not in slightly]
+    if not rest and not slightly:
         return f'all {len(within)} places can be visited within their thresholds'
     kept = f'{len(within)} of {len(found)} places can be visited within their thresholds'
+    if slightly:
+        most = max(100.0 * (each.wait / each.threshold - 1.0) for each in slightly)
+        names = ', '.join(each.place for each in slightly)
+        rest = [f'{names} up to {most:.0f} % later than theirs', *rest]
     return f'{kept}; {"; ".join(rest)}'
+
+
+def verdicts(found: Sequence[Promise]) -> dict[str, str]:
+    """Return what a person is told again of when it changes: kept, later or never, by place.
+
+    What is late by so little that the next drive may turn it counts as kept; what is not known is
+    left out.
+    """
+    return {
+        each.place: WITHIN if _slightly_later(each) else each.verdict
+        for each in found
+        if each.verdict != UNKNOWN
+    }
+
+
+def _slightly_later(promise: Promise) -> bool:
+    return promise.verdict == LATER and promise.wait <= SLIGHTLY * promise.threshold
