@@ -98,7 +98,7 @@ def read_door(door: Segment, sensor: tuple[float, float], ends: Points) -> DoorR
     none = measured.fit(np.full(int(near.sum()), np.inf)), math.inf
     fits[DoorState.OPEN] += [none] * len(fits[DoorState.OPEN])
     # Each state is worth the mean over its angles, not the best of them: nearly every sweep fits
-    # some leaf that is seen along its edge. Neighbouring beams share errors: two thirds of them count.
+    # some leaf that is seen along its edge. Neighbouring beams share errors: two of three count.
     best = max(fit for state in DoorState for fit, _ in fits[state])
     worth = np.array(
         [np.mean([math.exp((fit - best) / 1.5) for fit, _ in fits[state]]) for state in DoorState]

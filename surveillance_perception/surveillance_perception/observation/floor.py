@@ -1,0 +1,233 @@
+"""What a lidar saw of a floor during one visit, and what differs from before.
+
+Each visit leaves three sets of cells: where beams ended, where they passed, and where both happened
+at different times, which is what moves. What stood in no visit before and is no wall of the map has
+appeared; what stood there and is passed through by beams now has gone. A thing that has gone here
+and appeared there in the same visit, of like size, has moved. What was not in view this time is
+neither: it was not seen.
+
+The grid is an occupancy grid of counts (Thrun, Burgard and Fox, Probabilistic Robotics, chapter 9),
+kept for each visit alone, so that an old look never outvotes a new one.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from surveillance_runtime.place.occupancy_grid import Grid
+
+Points = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+LEAST_ENDS = 2
+"""Beams that end in a cell that is taken for occupied: one may be a stray."""
+LEAST_PASSES = 2
+"""Beams that pass a cell that is taken for free."""
+NEAR_WALL = 0.12
+"""Ends so near to a wall of the map are the wall's, metres: noise and the error of the pose."""
+NEAR_THING = 0.15
+"""A thing so near to where one stood before is the same one, metres."""
+LEAST_EXTENT = 0.08
+"""A smaller cluster is no thing, metres."""
+SAME_SIZE = 1.6
+"""Extents of a thing that moved may differ by this factor: it is seen from another side."""
+_WITH_CORNERS = np.ones((3, 3), np.bool_)
+
+
+class Change(StrEnum):
+    """What became of a thing."""
+
+    APPEARED = 'appeared'
+    REMOVED = 'removed'
+    MOVED = 'moved'
+
+
+@dataclass(frozen=True)
+class ObjectChange:
+    """A thing that is new, gone, or elsewhere.
+
+    Attributes:
+        change: What became of it.
+        position: Its middle, map frame, metres; of one that moved, where it is now.
+        extent: Its longer side as far as seen, metres.
+        before: Where it stood before, of one that moved.
+        confidence: 0 to 1, from how many cells say so.
+    """
+
+    change: Change
+    position: tuple[float, float]
+    extent: float
+    confidence: float
+    before: tuple[float, float] | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class FloorView:
+    """What one visit saw.
+
+    Attributes:
+        grid: The map, whose cells these are.
+        occupied: Where something stood that is no wall of the map.
+        free: Where beams passed and none ended.
+        moving: Where beams passed and ended at different times.
+    """
+
+    grid: Grid
+    occupied: Mask
+    free: Mask
+    moving: Mask
+
+    @property
+    def seen(self) -> Mask:
+        """Every cell of which something is known."""
+        return np.asarray(self.occupied | self.free | self.moving)
+
+
+class FloorVisit:
+    """Gathers the sweeps of one visit.
+
+    Args:
+        grid: The map.
+        farthest: Beams are followed so far, metres; farther away they are too far apart.
+    """
+
+    def __init__(self, grid: Grid, farthest: float = 8.0) -> None:
+        self._grid = grid
+        self._farthest = farthest
+        shape = grid.cells.shape
+        self._ends = np.zeros(shape, np.uint16)
+        self._passes = np.zeros(shape, np.uint16)
+        # Since a pass followed an end, or an end a pass, in a later sweep.
+        self._last_end = np.zeros(shape, np.uint16)
+        self._changes = np.zeros(shape, np.uint8)
+        self._walls = ndimage.distance_transform_edt(~grid.occupied) * grid.resolution
+        self.sweeps = 0
+
+    def add(self, sensor: tuple[float, float], ends: Points, met: Mask) -> None:
+        """Take one sweep.
+
+        Args:
+            sensor: Where the lidar was, map frame, metres.
+            ends: Where beams ended, (n, 2), same frame.
+            met: Whether something was met there, (n,); False for a beam at its greatest range.
+        """
+        self.sweeps += 1
+        origin = np.asarray(sensor, float)
+        rays = ends - origin
+        lengths = np.linalg.norm(rays, axis=1)
+        good = np.isfinite(lengths) & (lengths > 1e-3)
+        rays, lengths, met = rays[good] / lengths[good, None], lengths[good], met[good]
+        ended = met & (lengths <= self._farthest)
+        hit = self._cells(origin + rays[ended] * lengths[ended, None])
+        # Every half cell along each beam, up to a cell and a half before its end.
+        side = self._grid.resolution
+        steps = np.arange(side / 2, self._farthest, side / 2)
+        until = np.minimum(lengths, self._farthest) - np.where(ended, 1.5 * side, 0.0)
+        beams, places = np.nonzero(steps[None, :] < until[:, None])
+        passed = self._cells(origin + rays[beams] * steps[places, None])
+        passed[hit] = False
+        self._passes += passed
+        self._ends += hit
+        was_end = self._last_end == self.sweeps - 1
+        self._changes += (passed & (self._ends > 0) & was_end & (self._last_end > 0)).astype(
+            np.uint8
+        )
+        self._last_end[hit] = self.sweeps
+
+    def view(self) -> FloorView:
+        """Return what was seen so far."""
+        no_wall = self._walls > NEAR_WALL
+        often = self._ends >= min(LEAST_ENDS, max(1, self.sweeps))
+        # A cell at a thing's edge is passed by some beams of every sweep; a moving thing leaves.
+        stays = self._ends >= 0.3 * (self._ends + self._passes)
+        occupied = no_wall & often & stays
+        moving = no_wall & (self._ends >= 1) & ~occupied & (self._passes > 3 * self._ends)
+        free = (self._passes >= LEAST_PASSES) & (self._ends == 0)
+        return FloorView(self._grid, occupied, free, moving)
+
+    def _cells(self, points: Points) -> Mask:
+        """Return which cells hold points."""
+        inside = np.zeros(self._grid.cells.shape, np.bool_)
+        found = self._grid.cells_of(points)
+        rows, columns = found[:, 0], found[:, 1]
+        good = (rows >= 0) & (columns >= 0) & (rows < inside.shape[0]) & (columns < inside.shape[1])
+        inside[rows[good], columns[good]] = True
+        return inside
+
+
+def changes(before: FloorView, now: FloorView) -> list[ObjectChange]:
+    """Return what differs between two visits, the largest first.
+
+    Args:
+        before: What is normal: what one visit saw, or what a person has called normal.
+        now: What was seen now.
+    """
+    grid = now.grid
+    reach = NEAR_THING / grid.resolution
+    stood = ndimage.distance_transform_edt(~before.occupied) <= reach
+    stands = ndimage.distance_transform_edt(~now.occupied) <= reach
+    # It must have been seen free before: of what was never in view nobody knows.
+    known_free = ndimage.binary_dilation(before.free, _WITH_CORNERS)
+    new = _things(grid, now.occupied & ~stood, known_free)
+    now_free = ndimage.binary_dilation(now.free, _WITH_CORNERS)
+    gone = _things(grid, before.occupied & ~stands, now_free)
+    found = []
+    for thing in gone:
+        to = min(
+            (each for each in new if _alike(thing, each)),
+            key=lambda each: math.dist(each.position, thing.position),
+            default=None,
+        )
+        if to is None:
+            found.append(
+                ObjectChange(Change.REMOVED, thing.position, thing.extent, thing.confidence)
+            )
+        else:
+            new.remove(to)
+            sure = min(thing.confidence, to.confidence)
+            found.append(ObjectChange(Change.MOVED, to.position, to.extent, sure, thing.position))
+    found += [
+        ObjectChange(Change.APPEARED, each.position, each.extent, each.confidence) for each in new
+    ]
+    return sorted(found, key=lambda each: -each.extent)
+
+
+@dataclass(frozen=True)
+class _Thing:
+    position: tuple[float, float]
+    extent: float
+    confidence: float
+
+
+def _alike(one: _Thing, other: _Thing) -> bool:
+    longer, shorter = sorted((one.extent, other.extent), reverse=True)
+    return longer <= SAME_SIZE * shorter + 0.1
+
+
+def _things(grid: Grid, cells: Mask, decided: Mask) -> list[_Thing]:
+    """Return clusters of cells, of which most were looked at in the other visit, too."""
+    joined = ndimage.binary_dilation(cells, _WITH_CORNERS, iterations=2)
+    labels, count = ndimage.label(joined, _WITH_CORNERS)
+    labels[~cells] = 0
+    found = []
+    for number, box in enumerate(ndimage.find_objects(labels, count), 1):
+        if box is None:
+            continue
+        inside = labels[box] == number
+        rows, columns = np.nonzero(inside)
+        extent = grid.resolution * max(np.ptp(rows) + 1, np.ptp(columns) + 1)
+        share = float(decided[box][inside].mean())
+        if extent < max(LEAST_EXTENT, 1.5 * grid.resolution) or len(rows) < 2 or share < 0.5:
+            continue
+        middle = grid.centre_of(
+            round(float(rows.mean())) + box[0].start, round(float(columns.mean())) + box[1].start
+        )
+        sure = share * (1.0 - math.exp(-len(rows) / 3.0))
+        found.append(_Thing(middle, float(extent), sure))
+    return found

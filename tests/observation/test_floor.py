@@ -1,0 +1,132 @@
+"""Things that appear, go and move, on real floor maps that nobody here drew."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from surveillance_perception.observation.floor import Change, FloorView, FloorVisit, changes
+from surveillance_runtime.place.occupancy_grid import Grid
+
+RESOLUTION = 0.05
+
+
+@pytest.fixture(scope='module')
+def office() -> Grid:
+    """Provide a hall of 12 by 8 metres with two pillars and a wall with a gap."""
+    cells = np.zeros((160, 240), np.int8)
+    cells[[0, 1, -1, -2], :] = 100
+    cells[:, [0, 1, -1, -2]] = 100
+    cells[40:44, 60:64] = cells[100:104, 160:164] = 100
+    cells[:110, 120:122] = 100
+    return Grid(cells, RESOLUTION)
+
+
+def sweep(
+    grid: Grid, things: list[tuple[float, float, float]], sensor: tuple[float, float], seed: int
+):
+    """Walk along beams in small steps until a wall or a round thing (x, y, radius) is met."""
+    generator = np.random.default_rng(seed)
+    angles = np.linspace(-math.pi, math.pi, 360, endpoint=False)
+    rays = np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    steps = np.arange(0.05, 8.0, 0.01)
+    points = np.asarray(sensor) + rays[:, None, :] * steps[None, :, None]
+    rows = np.clip(((points[..., 1]) / grid.resolution).astype(int), 0, grid.cells.shape[0] - 1)
+    columns = np.clip(((points[..., 0]) / grid.resolution).astype(int), 0, grid.cells.shape[1] - 1)
+    blocked = grid.occupied[rows, columns]
+    for x, y, radius in things:
+        blocked |= np.hypot(points[..., 0] - x, points[..., 1] - y) < radius
+    first = np.where(blocked.any(axis=1), blocked.argmax(axis=1), len(steps) - 1)
+    met = blocked.any(axis=1)
+    ranges = steps[first] + generator.normal(0, 0.02, len(first)) * met
+    return np.asarray(sensor) + rays * ranges[:, None], met
+
+
+def visit(grid: Grid, *looks: list[tuple[float, float, float]], seed: int = 0) -> FloorView:
+    """Drive past with one look after the other, each with what stands there at that time."""
+    gathered = FloorVisit(grid)
+    path = [(2.0, 4.0), (2.5, 4.2), (3.0, 4.4), (3.5, 4.6), (4.0, 4.8), (4.5, 5.0)]
+    for number, sensor in enumerate(path):
+        things = looks[number % len(looks)]
+        gathered.add(sensor, *sweep(grid, things, sensor, seed + number))
+    return gathered.view()
+
+
+BOX = (4.5, 2.5, 0.12)
+CHAIR = (2.5, 6.5, 0.2)
+
+
+def test_nothing_happens_in_an_office_that_stays_as_it_is(office):
+    before = visit(office, [CHAIR], seed=0)
+    for seed in range(10, 60, 10):
+        assert changes(before, visit(office, [CHAIR], seed=seed)) == []
+
+
+def test_what_appears_and_what_goes_is_found_where_it_is(office):
+    before, after = visit(office, [CHAIR]), visit(office, [CHAIR, BOX], seed=10)
+    (found,) = changes(before, after)
+    assert found.change == Change.APPEARED
+    assert math.dist(found.position, BOX[:2]) < 0.2
+    assert 0.1 < found.extent < 0.4
+    (gone,) = changes(after, before)
+    assert gone.change == Change.REMOVED
+    assert math.dist(gone.position, BOX[:2]) < 0.2
+
+
+def test_a_chair_that_was_moved_is_one_thing_with_two_places(office):
+    moved = (CHAIR[0] + 0.6, CHAIR[1], CHAIR[2])
+    (found,) = changes(visit(office, [CHAIR]), visit(office, [moved], seed=10))
+    assert found.change == Change.MOVED
+    assert found.before is not None
+    assert math.dist(found.position, moved[:2]) < 0.3
+    assert math.dist(found.before, CHAIR[:2]) < 0.3
+
+
+def test_what_was_hidden_is_neither_gone_nor_new(office):
+    behind = (4.5, 2.0, 0.12)
+    screen = (3.9, 3.0, 0.7)
+    before = visit(office, [behind])
+    found = changes(before, visit(office, [behind, screen], seed=10))
+    assert [each.change for each in found] == [Change.APPEARED], 'the screen alone'
+    # Beyond the wall nothing was ever in view.
+    far = (10.0, 2.0, 0.3)
+    assert changes(visit(office, []), visit(office, [far], seed=10)) == []
+
+
+def test_a_person_who_walks_through_is_no_thing(office):
+    walk = [[(3.0 + 0.4 * step, 3.0, 0.15)] for step in range(6)]
+    found = changes(visit(office, []), visit(office, *walk, seed=10))
+    assert [each for each in found if each.confidence > 0.6] == []
+
+
+MAPS = sorted((Path(__file__).resolve().parents[3] / 'shared' / 'maps').glob('*_scan.png'))
+
+
+@pytest.mark.skipif(not MAPS, reason='the shared maps are not there')
+@pytest.mark.parametrize('path', MAPS, ids=lambda path: path.stem)
+def test_on_real_floor_plans_a_barrel_is_found_and_nothing_else(path):
+    picture = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE)
+    assert picture is not None
+    grid = Grid(np.where(picture[::-1] > 250, 0, 100).astype(np.int8), 0.05)
+    free = cv2.distanceTransform((picture[::-1] > 250).astype(np.uint8), cv2.DIST_L2, 5)
+    row, column = np.unravel_index(int(free.argmax()), free.shape)
+    x, y = grid.centre_of(int(row), int(column))
+    room = min(2.0, 0.05 * float(free.max()))
+    barrel = (x + 0.6 * room, y, 0.15)
+
+    def look(things: list[tuple[float, float, float]], seed: int) -> FloorView:
+        gathered = FloorVisit(grid)
+        for number in range(5):
+            sensor = (x - 0.3 * room + 0.05 * number, y + 0.02 * number)
+            gathered.add(sensor, *sweep(grid, things, sensor, seed + number))
+        return gathered.view()
+
+    before = look([], 0)
+    assert changes(before, look([], 10)) == []
+    (found,) = changes(before, look([barrel], 20))
+    assert found.change == Change.APPEARED
+    assert math.dist(found.position, barrel[:2]) < 0.25

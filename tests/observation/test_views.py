@@ -1,0 +1,110 @@
+"""Views that change or do not, under other lights, on photographs that nobody here took."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from surveillance_perception.observation.views import Sight, sight_of, view_changes
+
+PHOTOS = sorted((Path(__file__).resolve().parents[3] / 'shared' / 'photos').glob('*.jpg'))[:12]
+needs_photos = pytest.mark.skipif(not PHOTOS, reason='the shared photographs are not there')
+
+
+def grey(path: Path) -> np.ndarray:
+    picture = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE)
+    assert picture is not None
+    return cv2.resize(picture, (640, round(640 * picture.shape[0] / picture.shape[1])))
+
+
+def lights(picture: np.ndarray, seed: int = 0) -> list[np.ndarray]:
+    """Return a picture under six lights, a little shaken and noisy."""
+    generator = np.random.default_rng(seed)
+    rows, columns = picture.shape
+    slope = np.linspace(0.6, 1.2, columns)[None, :]
+    lamp = np.exp(-(((np.arange(columns) - 0.3 * columns) / columns) ** 2) * 3)[None, :]
+    kinds = [
+        picture * 0.5,
+        picture * 0.8 + 40,
+        255 * (picture / 255.0) ** 1.6,
+        255 * (picture / 255.0) ** 0.7,
+        picture * slope,
+        picture * lamp,
+    ]
+    made = []
+    for kind in kinds:
+        angle, shift = generator.normal(0, 0.6), generator.normal(0, 3, 2)
+        matrix = cv2.getRotationMatrix2D((columns / 2, rows / 2), angle, 1.0)
+        matrix[:, 2] += shift
+        shaken = cv2.warpAffine(kind, matrix, (columns, rows), borderMode=cv2.BORDER_REFLECT)
+        noisy = shaken + generator.normal(0, 3, shaken.shape)
+        made.append(np.clip(noisy, 0, 255).astype(np.uint8))
+    return made
+
+
+@needs_photos
+def test_another_light_is_no_change():
+    false = told = 0
+    for path in PHOTOS:
+        reference = grey(path)
+        for picture in lights(reference):
+            found = view_changes(reference, picture)
+            told += found is not None
+            false += bool(found)
+    assert told >= 0.8 * 6 * len(PHOTOS)
+    assert false <= 0.02 * told
+
+
+@needs_photos
+def test_a_thing_of_one_percent_is_found_under_every_light():
+    thing = grey(PHOTOS[0])
+    found = tried = 0
+    for number, path in enumerate(PHOTOS[1:]):
+        reference = grey(path)
+        rows, columns = reference.shape
+        side = int(0.13 * np.sqrt(rows * columns))
+        generator = np.random.default_rng(number)
+        top, left = (
+            int(generator.integers(80, rows - 80 - side)),
+            int(generator.integers(80, columns - 80 - side)),
+        )
+        changed = reference.copy()
+        changed[top : top + side, left : left + side] = thing[100 : 100 + side, 200 : 200 + side]
+        for picture in lights(changed, number):
+            changes = view_changes(reference, picture)
+            if changes is None:
+                continue
+            tried += 1
+            found += any(
+                box[0] < left + side
+                and left < box[0] + box[2]
+                and box[1] < top + side
+                and top < box[1] + box[3]
+                for box in (change.box for change in changes)
+            )
+    assert tried > 30
+    assert found >= 0.8 * tried
+
+
+@needs_photos
+def test_another_view_is_not_compared():
+    for one, other in zip(PHOTOS, PHOTOS[3:], strict=False):
+        if one.name[:12] != other.name[:12]:
+            assert view_changes(grey(one), grey(other)) is None
+
+
+@needs_photos
+def test_darkness_and_a_covered_lens_are_told():
+    generator = np.random.default_rng(1)
+    for path in PHOTOS:
+        picture = grey(path)
+        assert sight_of(picture) == Sight.CLEAR
+        dark = np.clip(picture * 0.03 + generator.normal(4, 3, picture.shape), 0, 255).astype(
+            np.uint8
+        )
+        assert sight_of(dark) == Sight.DARK
+        cloth = cv2.GaussianBlur(picture, (0, 0), 60) * 0.3 + 60
+        assert sight_of(np.clip(cloth, 0, 255).astype(np.uint8)) == Sight.BLOCKED
