@@ -26,7 +26,7 @@ LEAST_INLIERS = 20
 LEAST_INLIER_SHARE = 0.25
 WINDOW = 15
 """Side of a compared window, pixels."""
-CORRELATED = 0.38
+CORRELATED = 0.45
 """Windows that correlate less show something else."""
 PLAIN = 5.0
 """Standard deviation of a window's grey below which it is plain."""
@@ -95,7 +95,9 @@ def view_changes(reference: Grey, picture: Grey) -> list[ViewChange] | None:
     size = (before.shape[1], before.shape[0])
     laid = cv2.warpPerspective(now, onto, size, flags=cv2.INTER_LINEAR)
     covered = cv2.warpPerspective(np.full(now.shape, 255, np.uint8), onto, size) == 255
-    covered = cv2.erode(covered.astype(np.uint8), np.ones((WINDOW, WINDOW))) > 0
+    # Not the rim: there a view that was shaken a little shows what the other one does not.
+    rim = np.ones((2 * WINDOW, 2 * WINDOW), np.uint8)
+    covered = cv2.erode(covered.astype(np.uint8), rim, borderValue=0) > 0
     differs, strength = _differences(before.astype(np.float32), np.asarray(laid, np.float32))
     mask = (differs & covered).astype(np.uint8)
     # Thin differences stand along edges that are a pixel off.
@@ -166,4 +168,6 @@ def _differences(before: Floats, now: Floats) -> tuple[npt.NDArray[np.bool_], Fl
     best = cv2.dilate(correlation.astype(np.float32), np.ones((5, 5)))
     textured = np.maximum(deviation, other) > 2 * PLAIN
     strength = np.clip(1.0 - np.asarray(best, np.float32), 0.0, 1.0)
-    return np.asarray(textured & (best < CORRELATED)), strength
+    # What is white or black through and through in one of them has lost what was there.
+    exposed = (np.minimum(first, second) > 8.0) & (np.maximum(first, second) < 247.0)
+    return np.asarray(textured & exposed & (best < CORRELATED)), strength
