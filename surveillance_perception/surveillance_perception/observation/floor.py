@@ -221,12 +221,13 @@ def _things(grid: Grid, cells: Mask, decided: Mask) -> list[_Thing]:
             continue
         inside = labels[box] == number
         rows, columns = np.nonzero(inside)
-        extent = grid.resolution * max(np.ptp(rows) + 1, np.ptp(columns) + 1)
+        extent = grid.resolution * float(max(np.ptp(rows) + 1, np.ptp(columns) + 1))
         share = float(decided[box][inside].mean())
         if extent < max(LEAST_EXTENT, 1.5 * grid.resolution) or len(rows) < 2 or share < 0.5:
             continue
+        bottom, left = (int(part.start) for part in box)
         middle = grid.centre_of(
-            round(float(rows.mean())) + box[0].start, round(float(columns.mean())) + box[1].start
+            round(float(rows.mean())) + bottom, round(float(columns.mean())) + left
         )
         sure = share * (1.0 - math.exp(-len(rows) / 3.0))
         found.append(_Thing(middle, float(extent), sure))

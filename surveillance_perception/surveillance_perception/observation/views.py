@@ -99,7 +99,7 @@ def view_changes(reference: Grey, picture: Grey) -> list[ViewChange] | None:
     rim = np.ones((2 * WINDOW, 2 * WINDOW), np.uint8)
     covered = cv2.erode(covered.astype(np.uint8), rim, borderValue=0) > 0
     differs, strength = _differences(before.astype(np.float32), np.asarray(laid, np.float32))
-    mask = (differs & covered).astype(np.uint8)
+    mask: npt.NDArray[Any] = (differs & covered).astype(np.uint8)
     # Thin differences stand along edges that are a pixel off.
     mask = cv2.morphologyEx(mask, cv2.MORPH_OPEN, np.ones((WINDOW // 2, WINDOW // 2)))
     mask = cv2.morphologyEx(mask, cv2.MORPH_CLOSE, np.ones((WINDOW, WINDOW)))
@@ -129,8 +129,8 @@ def _registration(before: Grey, now: Grey) -> npt.NDArray[Any] | None:
     # Evened out, so that a dim picture has features, too.
     even = cv2.createCLAHE(3.0, (8, 8))
     finder = cv2.ORB.create(1500, fastThreshold=7)
-    points, seen = finder.detectAndCompute(even.apply(before), None)  # type: ignore[call-overload]
-    others, found = finder.detectAndCompute(even.apply(now), None)  # type: ignore[call-overload]
+    points, seen = finder.detectAndCompute(even.apply(before), None)
+    others, found = finder.detectAndCompute(even.apply(now), None)
     if seen is None or found is None:
         return None
     matches = cv2.BFMatcher(cv2.NORM_HAMMING, crossCheck=True).match(found, seen)

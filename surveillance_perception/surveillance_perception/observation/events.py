@@ -1,0 +1,256 @@
+"""Events: sightings of the same thing over visits and robots, from the first one to its end.
+
+An event is open until a person acknowledges it, calls it normal or false, or it is over: what was
+seen is seen no more, in a look that would have shown it. The book is bounded: of what is over the
+least severe and oldest goes first; what is open stays.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import asdict, dataclass, replace
+from enum import StrEnum
+from typing import Any
+
+from surveillance_perception.observation.observations import Kind, Observation
+
+SAME_PLACE = 0.75
+"""Two sightings of one kind without a name are of one thing up to here, metres."""
+
+
+class EventState(StrEnum):
+    """How far an event is."""
+
+    OPEN = 'open'
+    ACKNOWLEDGED = 'acknowledged'
+    NORMAL = 'normal'
+    FALSE = 'false alarm'
+    OVER = 'over'
+
+
+@dataclass(frozen=True)
+class Event:
+    """What was seen once or more often.
+
+    Attributes:
+        number: Its number, from 1.
+        kind, seen, place, subject, position: As in its last observation; ``seen`` is the state.
+        severity: 0: of no rule; higher is worse.
+        rule: The rule in words that makes it matter; empty: none.
+        state: How far it is.
+        began, last: First and last sighting, seconds since 1970.
+        sightings: How many observations.
+        looks: In how many visits it was seen.
+        confidence: That at least one of its sightings was right.
+        robots: Who saw it.
+        evidence: Of the first and the last sighting.
+    """
+
+    number: int
+    kind: Kind
+    seen: str
+    place: str
+    subject: str
+    position: tuple[float, float] | None
+    severity: int
+    rule: str
+    state: EventState
+    began: float
+    last: float
+    sightings: int
+    looks: int
+    confidence: float
+    robots: tuple[str, ...]
+    evidence: tuple[str, ...]
+
+    def to_json(self) -> dict[str, Any]:
+        """Return it as plain values."""
+        return asdict(self)
+
+    @classmethod
+    def from_json(cls, values: Mapping[str, Any]) -> Event:
+        """Return what `to_json` gave.
+
+        Raises:
+            ValueError, KeyError, TypeError: It is something else.
+        """
+        given = dict(values)
+        place = given['position']
+        given['position'] = None if place is None else (float(place[0]), float(place[1]))
+        given['kind'], given['state'] = Kind(given['kind']), EventState(given['state'])
+        given['robots'], given['evidence'] = tuple(given['robots']), tuple(given['evidence'])
+        return cls(**given)
+
+
+class EventBook:
+    """All events, joined from observations.
+
+    Args:
+        most: How many are kept.
+        told: Called with each event that begins or changes its state.
+    """
+
+    def __init__(self, most: int = 2000, told: Callable[[Event], object] = lambda _: None) -> None:
+        self._most = most
+        self._told = told
+        self._events: dict[int, Event] = {}
+        self._normal: list[Observation] = []
+        self._next = 1
+        self._looks: dict[int, int] = {}
+
+    @property
+    def events(self) -> list[Event]:
+        """All events, the newest first."""
+        return sorted(self._events.values(), key=lambda each: -each.last)
+
+    def take(self, seen: Observation, *, severity: int, rule: str, look: int) -> Event | None:
+        """Join an observation to its event, or begin one.
+
+        Args:
+            seen: What was seen.
+            severity: What the rules make of it; 0: nothing, it only ends others.
+            rule: The rule in words.
+            look: The number of the look, so that two sightings of one look count once.
+
+        Returns:
+            The event; None where it is normal, or of no severity and of no event.
+        """
+        self._end_others(seen)
+        if any(_same(each, seen) for each in self._normal):
+            return None
+        event = self._event_of(seen)
+        if event is None:
+            if severity <= 0:
+                return None
+            evidence = (seen.evidence,) if seen.evidence else ()
+            event = Event(
+                self._next,
+                seen.kind,
+                seen.state,
+                seen.place,
+                seen.subject,
+                seen.position,
+                severity,
+                rule,
+                EventState.OPEN,
+                seen.stamp,
+                seen.stamp,
+                1,
+                1,
+                seen.confidence,
+                (seen.robot,),
+                evidence,
+            )
+            self._next += 1
+            self._looks[event.number] = look
+            self._keep(event)
+            return event
+        new_look = self._looks.get(event.number) != look
+        self._looks[event.number] = look
+        first = event.evidence[:1]
+        changed = replace(
+            event,
+            position=seen.position or event.position,
+            severity=max(event.severity, severity),
+            rule=rule or event.rule,
+            # It may come late, from a robot that was cut off.
+            began=min(event.began, seen.stamp),
+            last=max(event.last, seen.stamp),
+            sightings=event.sightings + 1,
+            looks=event.looks + new_look,
+            confidence=1.0 - (1.0 - event.confidence) * (1.0 - seen.confidence),
+            robots=tuple(dict.fromkeys((*event.robots, seen.robot))),
+            evidence=(*first, seen.evidence) if seen.evidence else event.evidence,
+        )
+        self._events[event.number] = changed
+        return changed
+
+    def answer(self, number: int, state: EventState) -> Event:
+        """Take a person's word: acknowledged, normal from now on, or a false alarm.
+
+        Raises:
+            KeyError: There is no such event.
+            ValueError: Only the robot's looks end an event.
+        """
+        if state in (EventState.OPEN, EventState.OVER):
+            raise ValueError(f'an event cannot be made {state} by hand')
+        event = replace(self._events[number], state=state)
+        if state == EventState.NORMAL:
+            self._normal.append(
+                Observation(event.kind, event.seen, event.place, event.subject, event.position)
+            )
+        self._keep(event)
+        return event
+
+    def false_rate(self, since: float) -> float:
+        """Return which part of the events since a time a person has called false."""
+        found = [each for each in self._events.values() if each.began >= since]
+        wrong = sum(each.state == EventState.FALSE for each in found)
+        return wrong / len(found) if found else 0.0
+
+    def to_json(self) -> dict[str, Any]:
+        """Return all as plain values, for `restore`."""
+        return {
+            'events': [each.to_json() for each in self._events.values()],
+            'normal': [each.to_json() for each in self._normal],
+            'next': self._next,
+        }
+
+    def restore(self, values: Mapping[str, Any]) -> None:
+        """Take what `to_json` gave, in place of all there is.
+
+        Raises:
+            ValueError, KeyError, TypeError: It is something else; nothing is changed then.
+        """
+        events = [Event.from_json(each) for each in values['events']]
+        normal = [Observation.from_json(each) for each in values['normal']]
+        following = int(values['next'])
+        self._events = {each.number: each for each in events}
+        self._normal, self._next = normal, following
+        self._looks = {}
+
+    def _keep(self, event: Event) -> None:
+        self._events[event.number] = event
+        self._told(event)
+        over = [each for each in self._events.values() if each.state != EventState.OPEN]
+        if len(self._events) > self._most and over:
+            del self._events[min(over, key=lambda each: (each.severity, each.last)).number]
+
+    def _going_on(self) -> Iterable[Event]:
+        return (
+            each
+            for each in self._events.values()
+            if each.state in (EventState.OPEN, EventState.ACKNOWLEDGED)
+        )
+
+    def _event_of(self, seen: Observation) -> Event | None:
+        found = [
+            each for each in self._going_on() if each.seen == seen.state and _alike(each, seen)
+        ]
+        return max(found, key=lambda each: each.last, default=None)
+
+    def _end_others(self, seen: Observation) -> None:
+        """End events of the same thing in another state: a door that is open is closed no more."""
+        for each in list(self._going_on()):
+            if each.seen != seen.state and _alike(each, seen) and seen.stamp > each.last:
+                self._keep(replace(each, state=EventState.OVER, last=seen.stamp))
+
+
+def _alike(event: Event, seen: Observation) -> bool:
+    """Tell whether an event and an observation are about one thing."""
+    if event.kind != seen.kind or event.subject != seen.subject:
+        return False
+    if event.subject:
+        return True
+    if event.position is None or seen.position is None:
+        return event.place == seen.place
+    return math.dist(event.position, seen.position) <= SAME_PLACE
+
+
+def _same(normal: Observation, seen: Observation) -> bool:
+    if normal.kind != seen.kind or normal.state != seen.state or normal.subject != seen.subject:
+        return False
+    if normal.position is None or seen.position is None:
+        return normal.place == seen.place
+    return math.dist(normal.position, seen.position) <= SAME_PLACE

@@ -1,0 +1,88 @@
+"""Sightings become events: joined, ended, acknowledged, normal; kept within bounds."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from surveillance_perception.observation.events import Event, EventBook, EventState
+from surveillance_perception.observation.observations import Kind, Observation
+
+
+def seen(kind=Kind.OBJECT, state='appeared', **more) -> Observation:
+    given = {'place': 'R1', 'position': (1.0, 2.0), 'confidence': 0.8, 'stamp': 100.0, **more}
+    return Observation(kind, state, **given)
+
+
+def take(book: EventBook, observation: Observation, severity: int = 2, look: int = 1):
+    return book.take(observation, severity=severity, rule='no boxes here', look=look)
+
+
+def test_sightings_of_one_thing_are_one_event():
+    told: list[Event] = []
+    book = EventBook(told=told.append)
+    take(book, seen(evidence='a.jpg'))
+    take(book, seen(position=(1.3, 2.2), stamp=101.0, evidence='b.jpg'))
+    event = take(book, seen(stamp=160.0, robot='robot2', evidence='c.jpg'), look=2)
+    assert event is not None
+    assert (event.sightings, event.looks, event.robots) == (3, 2, ('Robot1', 'robot2'))
+    assert event.evidence == ('a.jpg', 'c.jpg')
+    assert event.confidence == pytest.approx(1 - 0.2**3)
+    assert len(book.events) == len(told) == 1
+    take(book, seen(position=(4.0, 2.0)))
+    assert len(book.events) == 2
+
+
+def test_what_no_rule_cares_for_begins_nothing_and_ends_what_it_contradicts():
+    book = EventBook()
+    door = {'kind': Kind.DOOR, 'subject': 'D1', 'position': None}
+    take(book, seen(state='open', **door))
+    assert take(book, seen(state='ajar', stamp=50.0, **door), severity=0) is None
+    assert book.events[0].state == EventState.OPEN, 'what was seen before does not end it'
+    take(book, seen(state='closed', stamp=200.0, **door), severity=0)
+    assert [each.state for each in book.events] == [EventState.OVER]
+    assert book.events[0].last == 200.0
+
+
+def test_a_person_calls_it_normal_and_it_stays_so():
+    book = EventBook()
+    event = take(book, seen())
+    book.answer(event.number, EventState.NORMAL)
+    assert take(book, seen(stamp=900.0), look=2) is None
+    again = EventBook()
+    again.restore(json.loads(json.dumps(book.to_json())))
+    assert take(again, seen(stamp=950.0), look=3) is None
+    assert again.events == book.events
+    with pytest.raises(ValueError, match='by hand'):
+        book.answer(event.number, EventState.OVER)
+    with pytest.raises(KeyError):
+        book.answer(99, EventState.NORMAL)
+
+
+def test_false_alarms_are_counted():
+    book = EventBook()
+    for number in range(4):
+        event = take(book, seen(position=(3.0 * number, 0.0), stamp=float(number)))
+    book.answer(event.number, EventState.FALSE)
+    assert book.false_rate(0.0) == 0.25
+    assert book.false_rate(3.0) == 1.0
+
+
+def test_a_month_of_events_is_bounded_and_open_ones_stay():
+    book = EventBook(most=50)
+    for number in range(500):
+        event = take(book, seen(position=(2.0 * number, 0.0), stamp=float(number)), 1 + number % 3)
+        if number % 10:
+            book.answer(event.number, EventState.ACKNOWLEDGED)
+    assert len(book.events) <= 55
+    assert sum(each.state == EventState.OPEN for each in book.events) == 50
+
+
+def test_a_state_or_number_that_is_none_is_refused():
+    with pytest.raises(ValueError, match="door 'opn': expected one of open, closed, ajar"):
+        Observation(Kind.DOOR, 'opn', 'R1')
+    with pytest.raises(ValueError, match='finite'):
+        Observation(Kind.DOOR, 'open', 'R1', confidence=float('nan'))
+    observation = seen(evidence='a.jpg')
+    assert Observation.from_json(json.loads(json.dumps(observation.to_json()))) == observation
