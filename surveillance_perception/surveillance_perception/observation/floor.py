@@ -156,7 +156,8 @@ class FloorVisit:
         inside = np.zeros(self._grid.cells.shape, np.bool_)
         found = self._grid.cells_of(points)
         rows, columns = found[:, 0], found[:, 1]
-        good = (rows >= 0) & (columns >= 0) & (rows < inside.shape[0]) & (columns < inside.shape[1])
+        height, width = self._grid.cells.shape
+        good = (rows >= 0) & (columns >= 0) & (rows < height) & (columns < width)
         inside[rows[good], columns[good]] = True
         return inside
 
