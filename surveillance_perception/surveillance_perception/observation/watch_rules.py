@@ -1,0 +1,259 @@
+"""What a person wants to know of: checks and policies in a file `watch.yaml`.
+
+    rules:
+      - door: D1
+        is: closed
+        hours: daily 20:00-06:00
+        severity: alert
+      - person: nobody
+        places: [R1, R2, R3, R4]
+        hours: mon-fri 20:00-06:00
+        persistence: 2 looks
+      - marker: 14
+        is: here
+      - object: none
+        places: [C1]
+        severity: notice
+
+A rule says how something is to be; whatever is seen of it in another state, within its hours and
+for long enough, is an event of its severity. `words` says a rule back, so that a person can check
+it.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from datetime import datetime
+from enum import IntEnum
+from typing import Any
+
+from patrol_policy.hours import WeeklyHours
+from surveillance_perception.observation.observations import Kind, Observation
+from surveillance_runtime.suggestions import nearest
+
+
+class Level(IntEnum):
+    """How bad it is when a rule is broken."""
+
+    NOTICE = 1
+    WARNING = 2
+    ALERT = 3
+
+
+NORMAL: Mapping[Kind, tuple[str, ...]] = {
+    Kind.DOOR: ('open', 'closed', 'ajar'),
+    Kind.OBJECT: ('none',),
+    Kind.MARKER: ('here',),
+    Kind.PERSON: ('nobody',),
+    Kind.LIGHT: ('on', 'off'),
+    Kind.VIEW: ('clear',),
+    Kind.WAY: ('free',),
+}
+"""What a rule may ask for, by kind."""
+NAMED = (Kind.DOOR, Kind.MARKER)
+"""Kinds of things with names; of the others the rule's first line says how it is to be."""
+KEYS = ('is', 'places', 'hours', 'persistence', 'severity', 'confidence')
+ALWAYS = WeeklyHours.parse('daily 00:00-24:00')
+
+
+@dataclass(frozen=True)
+class WatchRule:
+    """How something is to be.
+
+    Attributes:
+        kind: What it is about.
+        subject: Which door or marker; empty: all.
+        wanted: How it is to be, of `NORMAL`.
+        places: Where; empty: everywhere.
+        hours: When.
+        looks: In how many looks it must have been seen otherwise.
+        seconds: For how long it must have been seen otherwise.
+        level: How bad it is otherwise.
+        confidence: Observations below it do not count.
+    """
+
+    kind: Kind
+    subject: str
+    wanted: str
+    places: tuple[str, ...] = ()
+    hours: WeeklyHours = ALWAYS
+    looks: int = 1
+    seconds: float = 0.0
+    level: Level = Level.ALERT
+    confidence: float = 0.6
+
+    def broken_by(self, seen: Observation, moment: datetime) -> bool:
+        """Tell whether an observation is otherwise than this rule wants, at a local time."""
+        if seen.kind != self.kind or (self.subject and seen.subject != self.subject):
+            return False
+        if self.places and seen.place not in self.places:
+            return False
+        if seen.confidence < self.confidence or seen.state == self.wanted:
+            return False
+        if self.kind == Kind.OBJECT and seen.state == 'removed' and self.wanted == 'none':
+            return False  # that something left is as the rule wants it
+        return self.hours.at(moment) == 'must'
+
+    def lasting(self, looks: int, seconds: float) -> bool:
+        """Tell whether what was seen in so many looks, over so long, counts."""
+        return looks >= self.looks and seconds >= self.seconds
+
+    def words(self) -> str:
+        """Say the rule back."""
+        where = f' in {_listed(self.places)}' if self.places else ''
+        when = 'always' if self.hours == ALWAYS else f'in the hours {self.hours.text}'
+        subject = f' {self.subject}' if self.subject else ''
+        wrong = {
+            Kind.DOOR: f'door{subject or "s"} not {self.wanted}',
+            Kind.OBJECT: 'anything that was not there before',
+            Kind.MARKER: f'marker{subject or "s"} not where it hangs',
+            Kind.PERSON: 'a person',
+            Kind.LIGHT: f'the light not {self.wanted}',
+            Kind.VIEW: 'a view that changed or is blocked',
+            Kind.WAY: 'a way that is not free',
+        }[self.kind]
+        lasting = ''
+        if self.looks > 1:
+            lasting = f', seen in {self.looks} looks'
+        elif self.seconds:
+            lasting = f', seen for {self.seconds:g} s'
+        return f'{when} {wrong}{where}{lasting} is {_article(self.level)} {self.level.name}'
+
+
+def rules_from(
+    entries: Any, places: Sequence[str] = (), doors: Sequence[str] = ()
+) -> list[WatchRule]:
+    """Return the rules of a file's list.
+
+    Args:
+        entries: As YAML reads it.
+        places: The places there are; empty: any name is taken.
+        doors: The doors there are, likewise.
+
+    Raises:
+        ValueError: One line: which rule, what was wrong, what was expected.
+    """
+    if not isinstance(entries, list):
+        raise ValueError('rules: expected a list')
+    return [_rule(number, entry, places, doors) for number, entry in enumerate(entries, 1)]
+
+
+def severity_of(
+    rules: Iterable[WatchRule], seen: Observation, moment: datetime
+) -> tuple[int, WatchRule | None]:
+    """Return the worst rule that an observation breaks, and its level; 0 and None where none is."""
+    broken = [each for each in rules if each.broken_by(seen, moment)]
+    worst = max(broken, key=lambda each: each.level, default=None)
+    return (0, None) if worst is None else (int(worst.level), worst)
+
+
+def _rule(number: int, entry: Any, places: Sequence[str], doors: Sequence[str]) -> WatchRule:
+    where = f'rules {number}'
+    if not isinstance(entry, Mapping):
+        raise ValueError(f"{where}: expected a mapping such as 'door: D1'")
+    kinds = [key for key in entry if key in list(Kind)]
+    unknown = [key for key in entry if key not in KEYS and key not in kinds]
+    if unknown:
+        known = nearest(str(unknown[0]), [*Kind, *KEYS])
+        raise ValueError(f'{where}: unknown key {str(unknown[0])!r}, expected {known}')
+    if len(kinds) != 1:
+        raise ValueError(f'{where}: expected one of {", ".join(Kind)}, got {len(kinds)} of them')
+    kind = Kind(kinds[0])
+    subject, wanted = _wanted(where, kind, entry)
+    if kind == Kind.DOOR and doors and subject and subject not in doors:
+        raise ValueError(
+            f'{where}: there is no door {subject!r}, expected {nearest(subject, doors)}'
+        )
+    looks, seconds = _persistence(where, entry.get('persistence', '1 look'))
+    return WatchRule(
+        kind,
+        subject,
+        wanted,
+        _places(where, entry.get('places', []), places),
+        _hours(where, entry.get('hours')),
+        looks,
+        seconds,
+        _level(where, entry.get('severity', 'alert')),
+        _confidence(where, entry.get('confidence', 0.6)),
+    )
+
+
+def _wanted(where: str, kind: Kind, entry: Mapping[str, Any]) -> tuple[str, str]:
+    value, wanted = str(entry[kind]), entry.get('is')
+    if kind in NAMED:
+        subject = '' if value in ('all', 'any', 'every') else value
+        wanted = (
+            str(wanted) if wanted is not None else NORMAL[kind][0] if len(NORMAL[kind]) == 1 else ''
+        )
+    else:
+        if wanted is not None:
+            raise ValueError(f"{where}: {kind} takes no 'is', expected '{kind}: {NORMAL[kind][0]}'")
+        # YAML reads on and off as truth values.
+        subject, wanted = '', {'True': 'on', 'False': 'off'}.get(value, value)
+    if wanted not in NORMAL[kind]:
+        key = f'{where}: {kind} {subject or ""}'.rstrip()
+        raise ValueError(f'{key}: got {wanted!r}, expected {nearest(str(wanted), NORMAL[kind])}')
+    return subject, wanted
+
+
+def _places(where: str, value: Any, known: Sequence[str]) -> tuple[str, ...]:
+    names = [value] if isinstance(value, str) else value
+    if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
+        raise ValueError(f'{where}: places: expected a list of names')
+    for name in names:
+        if known and name not in known:
+            raise ValueError(
+                f'{where}: there is no place {name!r}, expected {nearest(name, known)}'
+            )
+    return tuple(names)
+
+
+def _hours(where: str, value: Any) -> WeeklyHours:
+    if value is None:
+        return ALWAYS
+    text = str(value)
+    try:
+        # A time alone is meant daily.
+        return WeeklyHours.parse(f'daily {text}' if re.match(r'\d', text) else text)
+    except ValueError as error:
+        raise ValueError(f'{where}: hours: {error}') from None
+
+
+def _persistence(where: str, value: Any) -> tuple[int, float]:
+    match = re.fullmatch(r'(\d+(?:\.\d+)?) ?(looks?|visits?|s|seconds?)', str(value))
+    if match is None:
+        raise ValueError(
+            f"{where}: persistence: got {value!r}, expected such as '2 looks' or '5 s'"
+        )
+    number, unit = float(match[1]), match[2]
+    if unit.startswith(('look', 'visit')):
+        if number < 1 or number != int(number):
+            raise ValueError(f'{where}: persistence: got {value!r}, expected 1 look or more')
+        return int(number), 0.0
+    return 1, number
+
+
+def _level(where: str, value: Any) -> Level:
+    try:
+        return Level[str(value).upper()]
+    except KeyError:
+        names = [each.name.lower() for each in Level]
+        raise ValueError(
+            f'{where}: severity: got {value!r}, expected {nearest(str(value), names)}'
+        ) from None
+
+
+def _confidence(where: str, value: Any) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not 0 <= value <= 1:
+        raise ValueError(f'{where}: confidence: got {value!r}, expected a number from 0 to 1')
+    return float(value)
+
+
+def _listed(names: Sequence[str]) -> str:
+    return names[0] if len(names) == 1 else f'{", ".join(names[:-1])} or {names[-1]}'
+
+
+def _article(level: Level) -> str:
+    return 'an' if level.name[0] in 'AEIOU' else 'a'

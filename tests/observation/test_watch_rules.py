@@ -1,0 +1,91 @@
+"""What a person wants to know of, read from a file's list, said back, and applied."""
+
+from __future__ import annotations
+
+from datetime import datetime
+
+import pytest
+import yaml
+
+from surveillance_perception.observation.observations import Kind, Observation
+from surveillance_perception.observation.watch_rules import Level, rules_from, severity_of
+
+TEXT = """
+- door: D1
+  is: closed
+  hours: 20:00-06:00
+- person: nobody
+  places: [R1, R2]
+  hours: mon-fri 20:00-06:00
+  persistence: 2 looks
+- marker: 14
+- object: none
+  places: [C1]
+  severity: notice
+- light: off
+  hours: daily 22:00-05:00
+  severity: warning
+"""
+NIGHT, DAY = datetime(2026, 11, 26, 23, 0), datetime(2026, 11, 26, 12, 0)
+
+
+def level(seen: Observation, moment: datetime) -> int:
+    return severity_of(rules_from(yaml.safe_load(TEXT)), seen, moment)[0]
+
+
+def test_rules_are_said_back_in_words():
+    words = [rule.words() for rule in rules_from(yaml.safe_load(TEXT))]
+    assert words[0] == 'in the hours daily 20:00-06:00 door D1 not closed is an ALERT'
+    assert words[1] == (
+        'in the hours mon-fri 20:00-06:00 a person in R1 or R2, seen in 2 looks is an ALERT'
+    )
+    assert words[3] == 'always anything that was not there before in C1 is a NOTICE'
+    assert words[4] == 'in the hours daily 22:00-05:00 the light not off is a WARNING'
+
+
+def test_rules_hold_in_their_hours_and_places_and_for_what_is_sure():
+    door = Observation(Kind.DOOR, 'ajar', 'C1', 'D1')
+    assert (level(door, NIGHT), level(door, DAY)) == (Level.ALERT, 0)
+    assert level(Observation(Kind.DOOR, 'closed', 'C1', 'D1'), NIGHT) == 0
+    assert level(Observation(Kind.DOOR, 'open', 'C1', 'D2'), NIGHT) == 0
+    person = Observation(Kind.PERSON, 'seen', 'R1', confidence=0.9)
+    assert (level(person, NIGHT), level(person, DAY)) == (Level.ALERT, 0)
+    assert level(Observation(Kind.PERSON, 'seen', 'R1', confidence=0.3), NIGHT) == 0
+    assert level(Observation(Kind.PERSON, 'seen', 'E', confidence=0.9), NIGHT) == 0
+    assert level(Observation(Kind.OBJECT, 'appeared', 'C1'), DAY) == Level.NOTICE
+    assert level(Observation(Kind.OBJECT, 'removed', 'C1'), DAY) == 0
+    assert level(Observation(Kind.MARKER, 'missing', 'R1', '14'), DAY) == Level.ALERT
+    assert level(Observation(Kind.MARKER, 'here', 'R1', '14'), DAY) == 0
+
+
+def test_a_rule_waits_until_it_lasts():
+    policy = rules_from(yaml.safe_load(TEXT))[1]
+    assert not policy.lasting(looks=1, seconds=100.0)
+    assert policy.lasting(looks=2, seconds=0.0)
+
+
+@pytest.mark.parametrize(
+    ('text', 'wrong'),
+    [
+        ('door: D1', 'rules: expected a list'),
+        ('- D1', "rules 1: expected a mapping such as 'door: D1'"),
+        ('- dor: D1', "rules 1: unknown key 'dor', expected 'door'"),
+        ('- is: open', 'expected one of door, object'),
+        ('- door: D1\n  is: opn', "rules 1: door D1: got 'opn', expected 'open'"),
+        ('- door: D1', "rules 1: door D1: got '', expected one of open, closed, ajar"),
+        ('- door: D9\n  is: open', "there is no door 'D9'"),
+        ('- person: nobody\n  places: [R9]', "there is no place 'R9'"),
+        ('- person: nobody\n  hours: monday', "hours: 'monday' is no day"),
+        ('- person: nobody\n  severity: allert', "severity: got 'allert', expected 'alert'"),
+        ('- person: nobody\n  persistence: long', "expected such as '2 looks' or '5 s'"),
+        ('- person: nobody\n  persistence: 0 looks', 'expected 1 look or more'),
+        ('- person: nobody\n  confidence: sure', 'expected a number from 0 to 1'),
+        ('- person: nobody\n  is: nobody', "person takes no 'is'"),
+        ('- person: everybody', "got 'everybody', expected 'nobody'"),
+    ],
+)
+def test_mistakes_are_one_line_that_says_what_was_expected(text, wrong):
+    with pytest.raises(ValueError, match='rules') as caught:
+        rules_from(yaml.safe_load(text), places=('R1', 'R2'), doors=('D1', 'D2'))
+    assert wrong in str(caught.value)
+    assert '\n' not in str(caught.value)
