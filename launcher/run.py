@@ -32,6 +32,7 @@ from surveillance_runtime.run_options import (
 
 NOT_RECORDED = 'off'
 RECORDER, MARKERS, PAGE = 'mission_recorder', 'mission_markers', 'mission_page'
+OBSERVER = 'observer'
 _REMAP = re.compile(r'[~/\w]+:=[~/\w]+\Z', re.ASCII)
 _NAMESPACE = re.compile(r'/?[A-Za-z]\w*(/[A-Za-z]\w*)*\Z', re.ASCII)
 _DESCRIPTION = """\
@@ -234,6 +235,13 @@ class Run:
         metavar='GB',
         help='delete the oldest recordings when all together exceed this (default: %(default)g)',
     )
+    watch: Path | None = _option(
+        '--watch',
+        group=_TRACES,
+        type=Path,
+        metavar='FILE',
+        help=OPTIONS['watch'].help,
+    )
     fresh: bool = _switch('--fresh', 'begin a new run even if the last one was killed', _TRACES)
     web: bool = _switch('--web', OPTIONS['web'].help, _PAGE_GROUP)
     web_control: bool = _switch('--web-control', OPTIONS['web_control'].help, _PAGE_GROUP)
@@ -269,6 +277,13 @@ class Run:
                 read_place_file(self.place)
             except FileError as error:
                 raise ValueError(f'--map {error}') from None
+        if self.watch is not None:
+            from surveillance_perception.observation.watch_rules import read_watch_file
+
+            try:
+                read_watch_file(self.watch)
+            except FileError as error:
+                raise ValueError(f'--watch {error}') from None
         for text in self.remaps:
             if not _REMAP.match(text):
                 raise ValueError(f'--remap {text!r}: expected FROM:=TO like scan:=front/scan')
@@ -301,6 +316,8 @@ class Run:
         names = []
         if self.record != NOT_RECORDED and not self.only:
             names += [RECORDER, MARKERS]
+        if self.watch is not None:
+            names.append(OBSERVER)
         if self.has_page:
             names.append(PAGE)
         return tuple(node_table.find(name) for name in names)

@@ -33,6 +33,7 @@ from surveillance_runtime.run_parameters import (
     page_entries,
     record_entries,
     run_layers,
+    watch_entries,
 )
 
 ONTOLOGIES = 'ontologies'
@@ -141,6 +142,8 @@ def _observer_entries(run: Run, folder: Path) -> Iterator[Entry]:
     """Yield what the recorder and the page are told."""
     yield for_node(RECORDER, 'folder', str(folder / RECORDING), 'this run')
     yield for_node(RECORDER, 'keep', float(run.keep), '--keep')
+    if run.watch is not None:
+        yield from watch_entries(folder, run.watch)
     if run.has_page:
         yield from page_entries(
             folder, control=run.web_control, address=run.web_address, origin=run.web_origin

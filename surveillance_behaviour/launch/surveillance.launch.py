@@ -36,6 +36,7 @@ from surveillance_runtime.profile import (
 )
 from surveillance_runtime.run_options import OPTIONS, left_out
 from surveillance_runtime.run_parameters import (
+    OBSERVER,
     PAGE,
     for_node,
     full_name,
@@ -43,6 +44,7 @@ from surveillance_runtime.run_parameters import (
     page_entries,
     record_entries,
     run_layers,
+    watch_entries,
     write_parameters,
 )
 
@@ -145,6 +147,8 @@ def _observers(given: Mapping[str, str]) -> list[NodeOfTable]:
     names = [MARKERS]
     if given['record']:
         names.append(RECORDER)
+    if given['watch']:
+        names.append(OBSERVER)
     if _has_page(given):
         names.append(PAGE)
     return [find(name) for name in names]
@@ -157,6 +161,9 @@ def _traces(given: Mapping[str, str], folder: Path) -> Iterator[Entry]:
         kept.mkdir(parents=True, exist_ok=True)
         yield from record_entries(kept / RECORD)
         yield for_node(RECORDER, 'folder', str(kept / RECORDING), 'record')
+    if given['watch']:
+        kept = Path(given['record']) if given['record'] else folder
+        yield from watch_entries(kept, Path(given['watch']))
     if _has_page(given):
         yield from page_entries(
             folder,

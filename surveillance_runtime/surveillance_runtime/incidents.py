@@ -32,7 +32,7 @@ class Cause(NamedTuple):
     """What an incident is about.
 
     Attributes:
-        kind: `topic`, `door`, `place`, `station`, `node`, `person` or `robot`.
+        kind: `topic`, `door`, `place`, `station`, `node`, `person`, `event` or `robot`.
         name: Which one.
     """
 

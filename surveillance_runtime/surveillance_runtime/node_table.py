@@ -61,6 +61,7 @@ _PURPOSES = {
         'planner_controller': 'paths between points and to places',
         'motion_controller': 'follows a path with the base',
         'collision_monitor': 'lets no command through to the base that the lidar does not allow',
+        'observer': 'notices doors, things, markers and views that are not as they are to be',
     },
     'surveillance_operator': {
         CONSOLE: 'one prompt for a mission: answers, doors, rooms, why, go',

@@ -81,6 +81,11 @@ OPTIONS = {
             'remap', '', 'rename a topic, service or action of all nodes, as -r of ros2 run does'
         ),
         RunOption('record', '', 'folder for the files of runs'),
+        RunOption(
+            'watch',
+            '',
+            'rules of what a person wants to know of, watch.yaml; starts the observer',
+        ),
         RunOption('web', 'false', 'serve a live page; its address is printed', _SWITCH),
         RunOption(
             'web_control',

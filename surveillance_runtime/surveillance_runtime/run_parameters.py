@@ -23,6 +23,7 @@ from surveillance_runtime.profile import ProfileFile, profile_layer
 
 BEHAVIOUR_NODE = 'robot_behavior'
 PAGE = 'mission_page'
+OBSERVER = 'observer'
 PLACES = {'surveillance': 'seven_rooms.yaml', 'patrol': 'patrol_world.yaml'}
 
 
@@ -113,6 +114,19 @@ def page_entries(
         yield for_node(PAGE, 'port', port, '--web-address')
     if origin is not None:
         yield for_node(PAGE, 'origin', origin, '--web-origin')
+
+
+def watch_entries(folder: Path, file: Path) -> Iterator[Entry]:
+    """Yield what the observer is told: the rules, and where it keeps what it saw.
+
+    Args:
+        folder: Where the run writes.
+        file: The rules.
+    """
+    yield for_node(OBSERVER, 'watch_file', str(file.absolute()), '--watch')
+    kept = folder.resolve()
+    yield for_node(OBSERVER, 'state_file', str(kept / f'{OBSERVER}.json'), 'this run')
+    yield for_node(OBSERVER, 'evidence_folder', str(kept / 'evidence'), 'this run')
 
 
 def for_node(node: str, name: str, value: object, origin: str) -> Entry:

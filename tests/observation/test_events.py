@@ -6,6 +6,7 @@ import json
 
 import pytest
 
+from surveillance_perception.observation.answers import answered
 from surveillance_perception.observation.events import Event, EventBook, EventState
 from surveillance_perception.observation.observations import Kind, Observation
 
@@ -86,3 +87,32 @@ def test_a_state_or_number_that_is_none_is_refused():
         Observation(Kind.DOOR, 'open', 'R1', confidence=float('nan'))
     observation = seen(evidence='a.jpg')
     assert Observation.from_json(json.loads(json.dumps(observation.to_json()))) == observation
+
+
+def test_a_person_answers_with_one_line():
+    book = EventBook()
+    take(book, seen())
+    assert answered(book, 'events') == '1: object has appeared in R1 at 1.0, 2.0 (open)'
+    assert answered(book, 'acknowledge 1').endswith('is acknowledged')
+    assert answered(book, 'normal 1').endswith('is normal')
+    assert answered(book, 'events') == 'no event is open'
+    for line, wrong in (
+        ('norml 1', "got 'norml', expected 'normal'"),
+        ('', "got '', expected one of"),
+        ('normal', "an event's number"),
+        ('normal one', "an event's number"),
+        ('normal 7', 'there is no event 7, the newest are: 1'),
+    ):
+        with pytest.raises(ValueError, match=wrong):
+            answered(book, line)
+
+
+def test_what_was_called_false_is_not_told_again_while_it_is_seen():
+    book = EventBook()
+    event = take(book, seen())
+    book.answer(event.number, EventState.FALSE)
+    take(book, seen(stamp=200.0), look=2)
+    assert [each.state for each in book.events] == [EventState.FALSE]
+    book.end(event.number, 300.0)
+    take(book, seen(stamp=400.0), look=3)
+    assert {each.state for each in book.events} == {EventState.FALSE, EventState.OPEN}

@@ -3,12 +3,19 @@
 from __future__ import annotations
 
 from datetime import datetime
+from textwrap import indent
 
 import pytest
 import yaml
 
 from surveillance_perception.observation.observations import Kind, Observation
-from surveillance_perception.observation.watch_rules import Level, rules_from, severity_of
+from surveillance_perception.observation.watch_rules import (
+    Level,
+    read_watch_file,
+    rule_from,
+    severity_of,
+)
+from surveillance_runtime.files import FileError
 
 TEXT = """
 - door: D1
@@ -26,15 +33,16 @@ TEXT = """
   hours: daily 22:00-05:00
   severity: warning
 """
+RULES = [rule_from(each) for each in yaml.safe_load(TEXT)]
 NIGHT, DAY = datetime(2026, 11, 26, 23, 0), datetime(2026, 11, 26, 12, 0)
 
 
 def level(seen: Observation, moment: datetime) -> int:
-    return severity_of(rules_from(yaml.safe_load(TEXT)), seen, moment)[0]
+    return severity_of(RULES, seen, moment)[0]
 
 
 def test_rules_are_said_back_in_words():
-    words = [rule.words() for rule in rules_from(yaml.safe_load(TEXT))]
+    words = [rule.words() for rule in RULES]
     assert words[0] == 'in the hours daily 20:00-06:00 door D1 not closed is an ALERT'
     assert words[1] == (
         'in the hours mon-fri 20:00-06:00 a person in R1 or R2, seen in 2 looks is an ALERT'
@@ -59,7 +67,7 @@ def test_rules_hold_in_their_hours_and_places_and_for_what_is_sure():
 
 
 def test_a_rule_waits_until_it_lasts():
-    policy = rules_from(yaml.safe_load(TEXT))[1]
+    policy = RULES[1]
     assert not policy.lasting(looks=1, seconds=100.0)
     assert policy.lasting(looks=2, seconds=0.0)
 
@@ -67,25 +75,38 @@ def test_a_rule_waits_until_it_lasts():
 @pytest.mark.parametrize(
     ('text', 'wrong'),
     [
-        ('door: D1', 'rules: expected a list'),
-        ('- D1', "rules 1: expected a mapping such as 'door: D1'"),
-        ('- dor: D1', "rules 1: unknown key 'dor', expected 'door'"),
-        ('- is: open', 'expected one of door, object'),
-        ('- door: D1\n  is: opn', "rules 1: door D1: got 'opn', expected 'open'"),
-        ('- door: D1', "rules 1: door D1: got '', expected one of open, closed, ajar"),
-        ('- door: D9\n  is: open', "there is no door 'D9'"),
-        ('- person: nobody\n  places: [R9]', "there is no place 'R9'"),
-        ('- person: nobody\n  hours: monday', "hours: 'monday' is no day"),
-        ('- person: nobody\n  severity: allert', "severity: got 'allert', expected 'alert'"),
-        ('- person: nobody\n  persistence: long', "expected such as '2 looks' or '5 s'"),
-        ('- person: nobody\n  persistence: 0 looks', 'expected 1 look or more'),
-        ('- person: nobody\n  confidence: sure', 'expected a number from 0 to 1'),
-        ('- person: nobody\n  is: nobody', "person takes no 'is'"),
-        ('- person: everybody', "got 'everybody', expected 'nobody'"),
+        ('[D1]', "expected a mapping such as 'door: D1'"),
+        ('dor: D1', "unknown key 'dor', expected 'door'"),
+        ('is: open', 'expected one of door, object'),
+        ('door: D1\nis: opn', "door D1: got 'opn', expected 'open'"),
+        ('door: D1', "door D1: got '', expected one of open, closed, ajar"),
+        ('door: D9\nis: open', "there is no door 'D9'"),
+        ('person: nobody\nplaces: [R9]', "there is no place 'R9'"),
+        ('person: nobody\nhours: monday', "hours: 'monday' is no day"),
+        ('person: nobody\nseverity: allert', "severity: got 'allert', expected 'alert'"),
+        ('person: nobody\npersistence: long', "expected such as '2 looks' or '5 s'"),
+        ('person: nobody\npersistence: 0 looks', 'expected 1 look or more'),
+        ('person: nobody\nconfidence: sure', 'expected a number from 0 to 1'),
+        ('person: nobody\nis: nobody', "person takes no 'is'"),
+        ('person: everybody', "got 'everybody', expected 'nobody'"),
     ],
 )
-def test_mistakes_are_one_line_that_says_what_was_expected(text, wrong):
-    with pytest.raises(ValueError, match='rules') as caught:
-        rules_from(yaml.safe_load(text), places=('R1', 'R2'), doors=('D1', 'D2'))
+def test_mistakes_are_one_line_that_says_where_and_what_was_expected(tmp_path, text, wrong):
+    path = tmp_path / 'watch.yaml'
+    path.write_text('rules:\n  first: {door: D1, is: open}\n  odd:\n' + indent(text, '    '))
+    with pytest.raises(FileError, match=r'watch.yaml:\d: rules.odd') as caught:
+        read_watch_file(path, places=('R1', 'R2'), doors=('D1', 'D2'))
     assert wrong in str(caught.value)
     assert '\n' not in str(caught.value)
+
+
+def test_a_file_of_rules_is_read_in_order(tmp_path):
+    path = tmp_path / 'watch.yaml'
+    path.write_text('rules:\n  door: {door: D1, is: open}\n  lamp: {light: off}\n')
+    assert [(each.kind, each.wanted) for each in read_watch_file(path)] == [
+        (Kind.DOOR, 'open'),
+        (Kind.LIGHT, 'off'),
+    ]
+    path.write_text('rule:\n  door: {door: D1}\n')
+    with pytest.raises(FileError, match="expected a mapping 'rules'"):
+        read_watch_file(path)

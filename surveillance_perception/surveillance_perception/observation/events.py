@@ -64,6 +64,12 @@ class Event:
     robots: tuple[str, ...]
     evidence: tuple[str, ...]
 
+    def words(self) -> str:
+        """Return it in words, as '3: door D1 is ajar in C1'."""
+        seen = Observation(self.kind, self.seen, self.place, self.subject)
+        at = '' if self.position is None or self.subject else ' at {:.1f}, {:.1f}'
+        return f'{self.number}: {seen.words()}{at.format(*(self.position or ()))}'
+
     def to_json(self) -> dict[str, Any]:
         """Return it as plain values."""
         return asdict(self)
@@ -98,6 +104,7 @@ class EventBook:
         self._normal: list[Observation] = []
         self._next = 1
         self._looks: dict[int, int] = {}
+        self._quiet: set[int] = set()
 
     @property
     def events(self) -> list[Event]:
@@ -180,6 +187,21 @@ class EventBook:
             self._normal.append(
                 Observation(event.kind, event.seen, event.place, event.subject, event.position)
             )
+        if state == EventState.FALSE:
+            self._quiet.add(number)
+        self._keep(event)
+        return event
+
+    def end(self, number: int, stamp: float) -> Event | None:
+        """Take that a look would have shown what was seen, and did not; None where it was over.
+
+        Raises:
+            KeyError: There is no such event.
+        """
+        self._quiet.discard(number)
+        if (event := self._events[number]) not in self._going_on():
+            return None
+        event = replace(event, state=EventState.OVER, last=max(event.last, stamp))
         self._keep(event)
         return event
 
@@ -195,6 +217,7 @@ class EventBook:
             'events': [each.to_json() for each in self._events.values()],
             'normal': [each.to_json() for each in self._normal],
             'next': self._next,
+            'quiet': sorted(self._quiet),
         }
 
     def restore(self, values: Mapping[str, Any]) -> None:
@@ -206,16 +229,19 @@ class EventBook:
         events = [Event.from_json(each) for each in values['events']]
         normal = [Observation.from_json(each) for each in values['normal']]
         following = int(values['next'])
+        quiet = {int(each) for each in values.get('quiet', ())}
         self._events = {each.number: each for each in events}
         self._normal, self._next = normal, following
-        self._looks = {}
+        self._looks, self._quiet = {}, quiet
 
     def _keep(self, event: Event) -> None:
         self._events[event.number] = event
         self._told(event)
         over = [each for each in self._events.values() if each.state != EventState.OPEN]
         if len(self._events) > self._most and over:
-            del self._events[min(over, key=lambda each: (each.severity, each.last)).number]
+            least = min(over, key=lambda each: (each.severity, each.last)).number
+            del self._events[least]
+            self._quiet.discard(least)
 
     def _going_on(self) -> Iterable[Event]:
         return (
@@ -225,9 +251,10 @@ class EventBook:
         )
 
     def _event_of(self, seen: Observation) -> Event | None:
-        found = [
-            each for each in self._going_on() if each.seen == seen.state and _alike(each, seen)
-        ]
+        # What a person called false is not told again while it is seen.
+        quiet = [self._events[number] for number in self._quiet]
+        going_on = [*self._going_on(), *quiet]
+        found = [each for each in going_on if each.seen == seen.state and _alike(each, seen)]
         return max(found, key=lambda each: each.last, default=None)
 
     def _end_others(self, seen: Observation) -> None:
@@ -235,6 +262,10 @@ class EventBook:
         for each in list(self._going_on()):
             if each.seen != seen.state and _alike(each, seen) and seen.stamp > each.last:
                 self._keep(replace(each, state=EventState.OVER, last=seen.stamp))
+        for number in list(self._quiet):
+            each = self._events[number]
+            if each.seen != seen.state and _alike(each, seen) and seen.stamp > each.last:
+                self._quiet.discard(number)
 
 
 def _alike(event: Event, seen: Observation) -> bool:

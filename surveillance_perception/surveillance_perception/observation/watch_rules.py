@@ -1,17 +1,19 @@
 """What a person wants to know of: checks and policies in a file `watch.yaml`.
 
     rules:
-      - door: D1
+      front door at night:
+        door: D1
         is: closed
         hours: daily 20:00-06:00
         severity: alert
-      - person: nobody
+      nobody after work:
+        person: nobody
         places: [R1, R2, R3, R4]
         hours: mon-fri 20:00-06:00
         persistence: 2 looks
-      - marker: 14
-        is: here
-      - object: none
+      the marker of R1: {marker: 14}
+      free corridor:
+        object: none
         places: [C1]
         severity: notice
 
@@ -27,11 +29,13 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from enum import IntEnum
+from pathlib import Path
 from typing import Any
 
 from patrol_policy.hours import WeeklyHours
 from surveillance_perception.observation.observations import Kind, Observation
 from surveillance_runtime.suggestions import nearest
+from surveillance_runtime.yaml_file import read_yaml_file
 
 
 class Level(IntEnum):
@@ -122,22 +126,33 @@ class WatchRule:
         return f'{when} {wrong}{where}{lasting} is {_article(self.level)} {self.level.name}'
 
 
-def rules_from(
-    entries: Any, places: Sequence[str] = (), doors: Sequence[str] = ()
+def read_watch_file(
+    path: Path, places: Sequence[str] = (), doors: Sequence[str] = ()
 ) -> list[WatchRule]:
-    """Return the rules of a file's list.
+    """Read a person's rules.
 
     Args:
-        entries: As YAML reads it.
+        path: The file: a mapping `rules` from a name to the rule.
         places: The places there are; empty: any name is taken.
         doors: The doors there are, likewise.
 
     Raises:
-        ValueError: One line: which rule, what was wrong, what was expected.
+        FileError: One line: where, what was wrong, what was expected.
     """
-    if not isinstance(entries, list):
-        raise ValueError('rules: expected a list')
-    return [_rule(number, entry, places, doors) for number, entry in enumerate(entries, 1)]
+    file = read_yaml_file(path)
+    entries = file.values.get('rules')
+    if not isinstance(entries, Mapping) or not entries:
+        raise file.error((), "expected a mapping 'rules' from a name to its rule")
+    for key in file.values:
+        if key != 'rules':
+            raise file.error((key,), "unknown key, expected 'rules' alone")
+    rules = []
+    for name, entry in entries.items():
+        try:
+            rules.append(rule_from(entry, places, doors))
+        except ValueError as error:
+            raise file.error(('rules', name), str(error)) from None
+    return rules
 
 
 def severity_of(
@@ -149,38 +164,45 @@ def severity_of(
     return (0, None) if worst is None else (int(worst.level), worst)
 
 
-def _rule(number: int, entry: Any, places: Sequence[str], doors: Sequence[str]) -> WatchRule:
-    where = f'rules {number}'
+def rule_from(entry: Any, places: Sequence[str] = (), doors: Sequence[str] = ()) -> WatchRule:
+    """Return the rule that a mapping describes.
+
+    Args:
+        entry: As YAML reads it.
+        places: The places there are; empty: any name is taken.
+        doors: The doors there are, likewise.
+
+    Raises:
+        ValueError: What was wrong, and what was expected.
+    """
     if not isinstance(entry, Mapping):
-        raise ValueError(f"{where}: expected a mapping such as 'door: D1'")
+        raise ValueError("expected a mapping such as 'door: D1'")
     kinds = [key for key in entry if key in list(Kind)]
     unknown = [key for key in entry if key not in KEYS and key not in kinds]
     if unknown:
         known = nearest(str(unknown[0]), [*Kind, *KEYS])
-        raise ValueError(f'{where}: unknown key {str(unknown[0])!r}, expected {known}')
+        raise ValueError(f'unknown key {str(unknown[0])!r}, expected {known}')
     if len(kinds) != 1:
-        raise ValueError(f'{where}: expected one of {", ".join(Kind)}, got {len(kinds)} of them')
+        raise ValueError(f'expected one of {", ".join(Kind)}, got {len(kinds)} of them')
     kind = Kind(kinds[0])
-    subject, wanted = _wanted(where, kind, entry)
+    subject, wanted = _wanted(kind, entry)
     if kind == Kind.DOOR and doors and subject and subject not in doors:
-        raise ValueError(
-            f'{where}: there is no door {subject!r}, expected {nearest(subject, doors)}'
-        )
-    looks, seconds = _persistence(where, entry.get('persistence', '1 look'))
+        raise ValueError(f'there is no door {subject!r}, expected {nearest(subject, doors)}')
+    looks, seconds = _persistence(entry.get('persistence', '1 look'))
     return WatchRule(
         kind,
         subject,
         wanted,
-        _places(where, entry.get('places', []), places),
-        _hours(where, entry.get('hours')),
+        _places(entry.get('places', []), places),
+        _hours(entry.get('hours')),
         looks,
         seconds,
-        _level(where, entry.get('severity', 'alert')),
-        _confidence(where, entry.get('confidence', 0.6)),
+        _level(entry.get('severity', 'alert')),
+        _confidence(entry.get('confidence', 0.6)),
     )
 
 
-def _wanted(where: str, kind: Kind, entry: Mapping[str, Any]) -> tuple[str, str]:
+def _wanted(kind: Kind, entry: Mapping[str, Any]) -> tuple[str, str]:
     value, wanted = str(entry[kind]), entry.get('is')
     if kind in NAMED:
         subject = '' if value in ('all', 'any', 'every') else value
@@ -189,28 +211,26 @@ def _wanted(where: str, kind: Kind, entry: Mapping[str, Any]) -> tuple[str, str]
         )
     else:
         if wanted is not None:
-            raise ValueError(f"{where}: {kind} takes no 'is', expected '{kind}: {NORMAL[kind][0]}'")
+            raise ValueError(f"{kind} takes no 'is', expected '{kind}: {NORMAL[kind][0]}'")
         # YAML reads on and off as truth values.
         subject, wanted = '', {'True': 'on', 'False': 'off'}.get(value, value)
     if wanted not in NORMAL[kind]:
-        key = f'{where}: {kind} {subject or ""}'.rstrip()
+        key = f'{kind} {subject or ""}'.rstrip()
         raise ValueError(f'{key}: got {wanted!r}, expected {nearest(str(wanted), NORMAL[kind])}')
     return subject, wanted
 
 
-def _places(where: str, value: Any, known: Sequence[str]) -> tuple[str, ...]:
+def _places(value: Any, known: Sequence[str]) -> tuple[str, ...]:
     names = [value] if isinstance(value, str) else value
     if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
-        raise ValueError(f'{where}: places: expected a list of names')
+        raise ValueError('places: expected a list of names')
     for name in names:
         if known and name not in known:
-            raise ValueError(
-                f'{where}: there is no place {name!r}, expected {nearest(name, known)}'
-            )
+            raise ValueError(f'there is no place {name!r}, expected {nearest(name, known)}')
     return tuple(names)
 
 
-def _hours(where: str, value: Any) -> WeeklyHours:
+def _hours(value: Any) -> WeeklyHours:
     if value is None:
         return ALWAYS
     text = str(value)
@@ -218,36 +238,34 @@ def _hours(where: str, value: Any) -> WeeklyHours:
         # A time alone is meant daily.
         return WeeklyHours.parse(f'daily {text}' if re.match(r'\d', text) else text)
     except ValueError as error:
-        raise ValueError(f'{where}: hours: {error}') from None
+        raise ValueError(f'hours: {error}') from None
 
 
-def _persistence(where: str, value: Any) -> tuple[int, float]:
+def _persistence(value: Any) -> tuple[int, float]:
     match = re.fullmatch(r'(\d+(?:\.\d+)?) ?(looks?|visits?|s|seconds?)', str(value))
     if match is None:
-        raise ValueError(
-            f"{where}: persistence: got {value!r}, expected such as '2 looks' or '5 s'"
-        )
+        raise ValueError(f"persistence: got {value!r}, expected such as '2 looks' or '5 s'")
     number, unit = float(match[1]), match[2]
     if unit.startswith(('look', 'visit')):
         if number < 1 or number != int(number):
-            raise ValueError(f'{where}: persistence: got {value!r}, expected 1 look or more')
+            raise ValueError(f'persistence: got {value!r}, expected 1 look or more')
         return int(number), 0.0
     return 1, number
 
 
-def _level(where: str, value: Any) -> Level:
+def _level(value: Any) -> Level:
     try:
         return Level[str(value).upper()]
     except KeyError:
         names = [each.name.lower() for each in Level]
         raise ValueError(
-            f'{where}: severity: got {value!r}, expected {nearest(str(value), names)}'
+            f'severity: got {value!r}, expected {nearest(str(value), names)}'
         ) from None
 
 
-def _confidence(where: str, value: Any) -> float:
+def _confidence(value: Any) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float) or not 0 <= value <= 1:
-        raise ValueError(f'{where}: confidence: got {value!r}, expected a number from 0 to 1')
+        raise ValueError(f'confidence: got {value!r}, expected a number from 0 to 1')
     return float(value)
 
 
@@ -257,3 +275,11 @@ def _listed(names: Sequence[str]) -> str:
 
 def _article(level: Level) -> str:
     return 'an' if level.name[0] in 'AEIOU' else 'a'
+
+
+DEFAULT_RULES = (
+    rule_from({'object': 'none', 'severity': 'notice'}),
+    rule_from({'marker': 'all', 'severity': 'notice'}),
+    rule_from({'view': 'clear', 'severity': 'warning'}),
+)
+"""Where a person says nothing: changes are events, and nobody is called."""

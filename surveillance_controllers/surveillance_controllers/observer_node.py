@@ -1,0 +1,365 @@
+"""The `observer` node: what the robot notices as it goes about.
+
+Reads the lidars, `amcl_pose`, `robot_place`, `map`, the camera, `arm/markers` and
+`aruco_detector/detections`; publishes each observation on `observations` and all events on
+`events`, both as JSON; takes a person's answers on the service `observer/command`.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import queue
+import time
+from collections import deque
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from datetime import datetime
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+from geometry_msgs.msg import PoseWithCovarianceStamped
+from nav_msgs.msg import OccupancyGrid
+from rclpy.qos import QoSProfile
+from rclpy.serialization import deserialize_message
+from sensor_msgs.msg import Image, JointState, LaserScan
+from std_msgs.msg import String
+
+from state_machines.ros.waiting import reported
+from surveillance_controllers import conversions
+from surveillance_controllers.controller_parameters import door_segments, place_positions
+from surveillance_controllers.geometry import Scan
+from surveillance_controllers.motion.transforms import ScanReader
+from surveillance_interfaces.msg import MarkerDetectionArray, RobotPlace
+from surveillance_interfaces.srv import ConsoleCommand
+from surveillance_perception.conversions import image_from_ros
+from surveillance_perception.observation.answers import answered
+from surveillance_perception.observation.events import Event, EventBook, EventState
+from surveillance_perception.observation.evidence import EvidenceStore
+from surveillance_perception.observation.observations import Observation
+from surveillance_perception.observation.watch_rules import DEFAULT_RULES, read_watch_file
+from surveillance_perception.observation.watcher import Viewpoint, Watcher
+from surveillance_runtime.conversions import (
+    PlanarPose,
+    map_from,
+    pose_of_serialized,
+    seconds_of,
+    stamp_of_serialized,
+)
+from surveillance_runtime.files import FileError, KeptFile
+from surveillance_runtime.incidents import Severity
+from surveillance_runtime.node import PatrolNode
+from surveillance_runtime.parameters import ParameterError, parameter
+from surveillance_runtime.process import run_node
+from surveillance_runtime.profile.parameters import declared_frames
+from surveillance_runtime.qos import SENSOR_QOS
+from surveillance_runtime.robot_base import robot_radius
+from surveillance_runtime.state_topics import OwnedTopic, StateSubscription
+
+SAME_TIME = 0.02
+"""A pose belongs to the scan whose stamp is so near, seconds."""
+ASSESS_PERIOD, PICTURE_PERIOD, KEEP_PERIOD = 2.0, 2.0, 20.0
+"""Seconds of real time between two comparisons, pictures, and writings of the state."""
+MOST_WAITING = 20
+"""What comes while so much waits for the worker is left out."""
+MOST_CELLS = 25_000_000
+MOST_PIXELS = 20_000_000
+STILL = 0.02
+"""The camera stands where neither metres nor radians change by more between two messages."""
+MOST_TOLD = 200
+"""So many events are published, the newest."""
+
+
+@dataclass(frozen=True)
+class ObserverSettings:
+    """What is watched and what is kept."""
+
+    watch_file: str = parameter(
+        '', 'The rules of what matters, watch.yaml; empty: changes are noted, nobody is called.'
+    )
+    state_file: str = parameter(
+        '', 'File that keeps events and what is normal over a restart; empty: nothing is kept.'
+    )
+    evidence_folder: str = parameter(
+        '', 'Folder for pictures of what was seen; empty: no picture is kept.'
+    )
+    evidence_megabytes: float = parameter(
+        300.0, 'What all pictures may take; the least severe and oldest go first.', 1.0, 100_000.0
+    )
+    radius: float = robot_radius()
+    camera: bool = parameter(True, 'Whether pictures are looked at.')
+
+
+class Observer(PatrolNode):
+    """Notices; all work is done on one thread of its own.
+
+    Attributes:
+        sweeps: How many sweeps of the lidars were compared.
+    """
+
+    def __init__(self, **node_options: Any) -> None:
+        super().__init__('observer', **node_options)
+        self._settings = self.declare_fields(ObserverSettings())
+        frames = declared_frames(self, 'base')
+        self._lidar = ScanReader(self, self._settings.radius, frames.base)
+        self._doors, places = door_segments(self), place_positions(self)
+        self._observations = self.create_publisher(String, 'observations', QoSProfile(depth=100))
+        self._events = OwnedTopic(self, String, 'events')
+        self._said = ''
+        self.sweeps = 0
+        self._told: dict[int, EventState] = {}
+        self._book = EventBook(told=self._on_event)
+        self._watcher = Watcher(
+            self._rules(tuple(places)),
+            self._book,
+            local=datetime.fromtimestamp,
+            tell=self._on_observation,
+            alert=self._on_alert,
+            doors=self._doors,
+            store=self._store(),
+            robot=self.get_namespace().strip('/') or 'Robot1',
+        )
+        self._kept = KeptFile(self._settings.state_file, 'starting without it')
+        self._complain(self._kept.read(self._watcher.restore))
+        for rule in self._watcher.rules:
+            self.get_logger().info(f'watching: {rule.words()}')
+        self._scans: deque[tuple[float, Scan]] = deque(maxlen=10)
+        self._poses: deque[tuple[float, PlanarPose]] = deque(maxlen=5)
+        self._pose: PlanarPose | None = None
+        self._joints: tuple[float, ...] = ()
+        self._moved_at = -math.inf
+        self._seen_markers: frozenset[int] | None = None
+        self._next_picture = 0.0
+        self._work: queue.Queue[Callable[[], object] | None] = queue.Queue()
+        self._lidar.subscribe(self._on_scan)
+        StateSubscription(self, OccupancyGrid, 'map', self._on_map)
+        StateSubscription(self, RobotPlace, 'robot_place', self._on_place)
+        StateSubscription(self, PoseWithCovarianceStamped, 'amcl_pose', self._on_pose, raw=True)
+        self.create_subscription(MarkerDetectionArray, 'arm/markers', self._on_markers, 10)
+        if self._settings.camera:
+            self.create_subscription(
+                MarkerDetectionArray, 'aruco_detector/detections', self._on_detections, 10
+            )
+            self.create_subscription(JointState, 'joint_states', self._on_joints, SENSOR_QOS)
+            # Raw: most pictures are not looked at.
+            self.create_subscription(
+                Image, 'camera/rgb/image_raw', self._on_image, SENSOR_QOS, raw=True
+            )
+        self.create_service(ConsoleCommand, 'observer/command', self._on_command)
+        self.create_timer(ASSESS_PERIOD, lambda: self._later(self._assess))
+        self.create_timer(KEEP_PERIOD, lambda: self._later(self._keep))
+        self._publish_events()
+        self.spawn(self._watch, 'observer')
+
+    def on_stop(self) -> None:
+        """End the worker, which writes the state first."""
+        self._work.put(self._keep)
+        self._work.put(None)
+
+    def _rules(self, places: Sequence[str]) -> Any:
+        if not self._settings.watch_file:
+            return DEFAULT_RULES
+        try:
+            return read_watch_file(Path(self._settings.watch_file), places, tuple(self._doors))
+        except FileError as error:
+            raise ParameterError(f'observer: {error}') from None
+
+    def _store(self) -> EvidenceStore | None:
+        folder = self._settings.evidence_folder
+        if not folder:
+            return None
+        try:
+            return EvidenceStore(Path(folder), round(1e6 * self._settings.evidence_megabytes))
+        except OSError as error:
+            self._complain(f'evidence_folder {folder}: {error.strerror}; no picture is kept')
+            return None
+
+    def _complain(self, problem: str) -> None:
+        if problem:
+            self.get_logger().warn(problem)
+
+    # --- in the executor's thread ---
+
+    def _now(self) -> float:
+        return float(self.get_clock().now().nanoseconds / 1e9)
+
+    def _later(self, work: Callable[[], object]) -> None:
+        if self._work.qsize() < MOST_WAITING:
+            self._work.put(work)
+
+    def _on_map(self, message: OccupancyGrid) -> None:
+        with conversions.refusing(self, 'map'):
+            grid = map_from(message, MOST_CELLS)
+            self._work.put(lambda: self._watcher.use_map(grid))
+
+    def _on_place(self, message: RobotPlace) -> None:
+        place, stamp = message.place, self._now()
+        self._work.put(lambda: self._watcher.arrive(place, stamp))
+
+    def _on_scan(self, topic: str, message: LaserScan) -> None:
+        with conversions.refusing(self, topic):
+            scan = self._lidar.read(message, topic)
+            self._scans.append((seconds_of(message.header.stamp), scan))
+            self._pair()
+
+    def _on_pose(self, serialized: bytes) -> None:
+        with conversions.refusing(self, 'amcl_pose'):
+            pose = pose_of_serialized(serialized)
+            stamp = stamp_of_serialized(serialized)
+            if self._pose is None or not _is_near(pose, self._pose):
+                self._moved_at = time.monotonic()
+            self._pose = pose
+            self._poses.append((stamp, pose))
+            self._pair()
+
+    def _pair(self) -> None:
+        """Look at the scans whose pose is known; either may come first."""
+        for measured, scan in list(self._scans):
+            for stamp, pose in self._poses:
+                if abs(measured - stamp) <= SAME_TIME:
+                    self._scans.remove((measured, scan))
+                    self._see(pose, scan)
+                    break
+
+    def _see(self, pose: PlanarPose, scan: Scan) -> None:
+        sensor, ends, met = _on_the_map(pose, scan)
+        stamp = self._now()
+
+        def compare() -> None:
+            self._watcher.sweep(sensor, ends, met, stamp)
+            self.sweeps += 1
+            self.health.figure('sweeps', self.sweeps)
+
+        self._later(compare)
+
+    def _on_joints(self, message: JointState) -> None:
+        joints = tuple(message.position)
+        if not _is_near(joints, self._joints):
+            self._moved_at = time.monotonic()
+        self._joints = joints
+
+    def _on_detections(self, message: MarkerDetectionArray) -> None:
+        self._seen_markers = frozenset(int(each.id) for each in message.detections)
+
+    def _on_markers(self, message: MarkerDetectionArray) -> None:
+        stamp = self._now()
+        for each in message.detections:
+            at = each.pose.position
+            where = float(at.x), float(at.y), float(at.z)
+            if all(map(math.isfinite, where)):
+                number = int(each.id)
+                self._later(partial(self._watcher.marker, number, where, stamp))
+
+    def _on_image(self, serialized: bytes) -> None:
+        now = time.monotonic()
+        if now < self._next_picture:
+            return
+        self._next_picture = now + PICTURE_PERIOD
+        viewpoint: Viewpoint | None = None
+        if self._pose is not None and now - self._moved_at > PICTURE_PERIOD:
+            viewpoint = (*self._pose, *self._joints)
+        stamp, markers = self._now(), self._seen_markers
+        self._later(lambda: self._look(serialized, viewpoint, stamp, markers))
+
+    async def _on_command(self, request: Any, response: Any) -> Any:
+        def take() -> str:
+            answer = answered(self._book, request.line)
+            self._publish_events()
+            return answer
+
+        # The worker alone touches the events.
+        future, work = reported(self, take)
+        self._work.put(work)
+        try:
+            response.answer = await future
+            response.accepted = True
+        except ValueError as error:
+            response.answer = str(error)
+        return response
+
+    # --- in the worker ---
+
+    def _watch(self) -> None:
+        while (work := self._work.get()) is not None:
+            try:
+                work()
+            except Exception as error:
+                # Whatever it was, it was this message's: the next one may be good.
+                self.get_logger().error(
+                    f'{type(error).__name__}: {error}', throttle_duration_sec=10.0
+                )
+
+    def _look(
+        self,
+        serialized: bytes,
+        viewpoint: Viewpoint | None,
+        stamp: float,
+        markers: frozenset[int] | None,
+    ) -> None:
+        image = image_from_ros(deserialize_message(serialized, Image), MOST_PIXELS)
+        grey = image if image.ndim == 2 else cv2.cvtColor(image, cv2.COLOR_BGR2GRAY)
+        self._watcher.picture(np.asarray(grey, np.uint8), viewpoint, stamp, markers)
+
+    def _assess(self) -> None:
+        self._watcher.assess(self._now())
+        self._publish_events()
+
+    def _keep(self) -> None:
+        if self._kept:
+            self._complain(self._kept.write(self._watcher.state()))
+
+    def _on_observation(self, seen: Observation) -> None:
+        self._observations.publish(String(data=json.dumps(seen.to_json())))
+
+    def _on_event(self, event: Event) -> None:
+        """Log each beginning and end."""
+        if self._told.get(event.number) != event.state:
+            self._told[event.number] = event.state
+            self.get_logger().info(f'event {event.words()}')
+        if event.state != EventState.OPEN:
+            self.incidents.end(_cause(event), f'{event.words()}')
+
+    def _on_alert(self, event: Event) -> None:
+        self.incidents.begin(_cause(event), f'{event.words()} ({event.rule})', Severity.ALARM)
+
+    def _publish_events(self) -> None:
+        text = json.dumps([each.to_json() for each in self._book.events[:MOST_TOLD]])
+        if text != self._said:
+            self._said = text
+            self._events.publish(String(data=text))
+
+
+def _cause(event: Event) -> tuple[str, str]:
+    return 'event', str(event.number)
+
+
+def _is_near(one: Sequence[float], other: Sequence[float]) -> bool:
+    return len(one) == len(other) and all(
+        abs(a - b) <= STILL for a, b in zip(one, other, strict=True)
+    )
+
+
+def _on_the_map(pose: PlanarPose, scan: Scan) -> tuple[tuple[float, float], np.ndarray, np.ndarray]:
+    """Return where a lidar was, where its beams ended (n, 2), and which of them met something."""
+    x, y, yaw = pose
+    mount_x, mount_y, mount_yaw = scan.mount
+    cosine, sine = math.cos(yaw), math.sin(yaw)
+    sensor = x + cosine * mount_x - sine * mount_y, y + sine * mount_x + cosine * mount_y
+    told = ~np.isnan(scan.ranges)
+    ranges = np.minimum(scan.ranges[told], scan.range_max)
+    met = scan.ranges[told] < scan.range_max
+    angles = scan.angles[told] + mount_yaw + yaw
+    ends = np.stack([np.cos(angles), np.sin(angles)], axis=1) * ranges[:, None] + sensor
+    return sensor, ends, met
+
+
+def main(args: Sequence[str] | None = None) -> int:
+    """Run the node."""
+    return run_node(Observer, args)
+
+
+if __name__ == '__main__':
+    raise SystemExit(main())

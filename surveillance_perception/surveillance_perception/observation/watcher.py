@@ -1,0 +1,438 @@
+"""What a robot notices as it goes about: sweeps and pictures in, observations and events out.
+
+The floor is compared with what is normal, which the first look at each part of it decides; doors
+are read over several sweeps; a picture is compared with the first one of the same viewpoint. The
+rules say what of it matters. A thing must be seen in two assessments before it is told.
+"""
+
+from __future__ import annotations
+
+import base64
+import math
+import zlib
+from collections import deque
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from datetime import datetime
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surveillance_perception.observation.doors import Segment, read_door
+from surveillance_perception.observation.events import Event, EventBook, EventState
+from surveillance_perception.observation.evidence import EvidenceStore, sweep_picture
+from surveillance_perception.observation.floor import (
+    Change,
+    FloorView,
+    FloorVisit,
+    ObjectChange,
+    changes,
+)
+from surveillance_perception.observation.observations import Kind, Observation
+from surveillance_perception.observation.views import Grey, Sight, sight_of, view_changes
+from surveillance_perception.observation.watch_rules import Level, WatchRule, severity_of
+from surveillance_runtime.place.occupancy_grid import Grid
+
+Points = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+Viewpoint = tuple[float, ...]
+
+DOOR_RANGE = 6.0
+"""Doors are read from here on, metres: farther away too few beams meet them."""
+READINGS = 5
+"""A door's state is that of most of so many readings, of which `AGREEING` must agree."""
+AGREEING = 4
+FEWEST_SWEEPS = 5
+SAME_THING = 0.4
+"""Two assessments mean one thing up to here, metres."""
+SEEN_AGAIN = 10.0
+"""What goes on is told again after this time, seconds."""
+AGREED_PICTURES = 3
+"""A dark or covered view, and a marker that is missing, must be so in so many pictures."""
+SAME_VIEW = (0.15, 0.15, 0.1)
+"""Viewpoints are the same within this: x, y in metres, any angle in radians."""
+MOST_VIEWS = 100
+MARKER_MOVED = 0.3
+"""A marker seen so far from where it hung hangs elsewhere, metres."""
+
+
+@dataclass
+class _Door:
+    segment: Segment
+    readings: deque[tuple[str, float]] = field(default_factory=lambda: deque(maxlen=READINGS))
+    told: str = ''
+    told_at: float = -math.inf
+
+
+@dataclass
+class _View:
+    viewpoint: Viewpoint
+    picture: Grey
+    stamp: float
+    markers: frozenset[int] = frozenset()
+    absent: dict[int, int] = field(default_factory=dict)
+
+
+class Watcher:
+    """Notices, by the rules of a person.
+
+    Args:
+        rules: What matters.
+        book: Joins what was seen to events.
+        local: Returns the local time of a stamp.
+        tell: Called with each observation.
+        alert: Called with each event of level ALERT that lasts as long as its rule wants.
+        doors: The doors' openings by name, map frame, metres.
+        markers: Where markers hang by id, map frame, metres; those that are not in it are learned.
+        store: Keeps pictures; None: nothing is kept.
+        robot: Whose observations they are.
+    """
+
+    def __init__(
+        self,
+        rules: Sequence[WatchRule],
+        book: EventBook,
+        *,
+        local: Callable[[float], datetime],
+        tell: Callable[[Observation], object] = lambda _: None,
+        alert: Callable[[Event], object] = lambda _: None,
+        doors: Mapping[str, Segment] | None = None,
+        markers: Mapping[int, tuple[float, float, float]] | None = None,
+        store: EvidenceStore | None = None,
+        robot: str = 'Robot1',
+    ) -> None:
+        self.rules = tuple(rules)
+        self.book = book
+        self._local, self._tell, self._alert = local, tell, alert
+        self._doors = {name: _Door(segment) for name, segment in (doors or {}).items()}
+        self._known_markers = bool(markers)
+        self._markers = dict(markers or {})
+        self._store = store
+        self._robot = robot
+        self._place = ''
+        self._look = 0
+        self._grid: Grid | None = None
+        self._visit: FloorVisit | None = None
+        self._normal: FloorView | None = None
+        self._kept: Mapping[str, Any] = {}
+        self._candidates: list[ObjectChange] = []
+        self._told: dict[tuple[str, ...], float] = {}
+        self._last: tuple[tuple[float, float], Points] = ((0.0, 0.0), np.zeros((0, 2)))
+        self._views: list[_View] = []
+        self._sights: deque[Sight] = deque(maxlen=AGREED_PICTURES)
+        self._sight: Sight | None = None
+
+    # --- the floor and its doors ---
+
+    def use_map(self, grid: Grid) -> None:
+        """Take the map; what was normal on another one is forgotten."""
+        if self._grid is not None and _same_map(self._grid, grid):
+            return
+        self._grid = grid
+        self._visit, self._normal, self._candidates = None, None, []
+        if self._kept:
+            self._normal = _unpacked(self._kept, grid)
+
+    def arrive(self, place: str, stamp: float) -> None:
+        """Take that the robot is in a place; the visit of another one ends."""
+        if place == self._place:
+            return
+        self.assess(stamp)
+        self._learn()
+        self._place = place
+        self._look += 1
+        self._visit = None
+        self._candidates = []
+        self._told = {}
+        for door in self._doors.values():
+            door.readings.clear()
+
+    def sweep(self, sensor: tuple[float, float], ends: Points, met: Mask, stamp: float) -> None:
+        """Take a sweep of the lidar.
+
+        Args:
+            sensor: Where it was, map frame, metres.
+            ends: Where beams ended, (n, 2), same frame.
+            met: Whether something was met there, (n,).
+            stamp: Seconds since 1970.
+        """
+        self._last = sensor, ends[met]
+        if self._grid is not None:
+            if self._visit is None:
+                self._visit = FloorVisit(self._grid)
+            self._visit.add(sensor, ends, met)
+        for name, door in self._doors.items():
+            x1, y1, x2, y2 = door.segment
+            middle = (x1 + x2) / 2, (y1 + y2) / 2
+            if math.dist(middle, sensor) > DOOR_RANGE:
+                continue
+            reading = read_door(door.segment, sensor, ends)
+            if reading is not None:
+                door.readings.append((str(reading.state), reading.confidence))
+                self._judge(name, door, middle, stamp)
+
+    def _judge(self, name: str, door: _Door, middle: tuple[float, float], stamp: float) -> None:
+        states = [state for state, _ in door.readings]
+        state = max(set(states), key=states.count)
+        if states.count(state) < AGREEING:
+            return
+        if state == door.told and stamp - door.told_at < SEEN_AGAIN:
+            return
+        sure = float(np.mean([sure for each, sure in door.readings if each == state]))
+        door.told, door.told_at = state, stamp
+        self._take(Observation(Kind.DOOR, state, self._place, name, middle, sure, stamp))
+
+    def assess(self, stamp: float) -> None:
+        """Compare what this visit saw so far with what is normal."""
+        if self._visit is None or self._visit.sweeps < FEWEST_SWEEPS or self._normal is None:
+            return
+        now = self._visit.view()
+        found = [each for each in changes(self._normal, now) if not self._at_door(each.position)]
+        for each in found:
+            if not any(
+                before.change == each.change
+                and math.dist(before.position, each.position) < SAME_THING
+                for before in self._candidates
+            ):
+                continue
+            observation = Observation(
+                Kind.OBJECT,
+                str(each.change),
+                self._place,
+                position=each.position,
+                confidence=each.confidence,
+                stamp=stamp,
+                compared_with='' if each.before is None else '{:.2f} {:.2f}'.format(*each.before),
+            )
+            if self._is_due(observation):
+                self._take(observation)
+        self._candidates = found
+        self._end_gone(now, found, stamp)
+
+    def _end_gone(self, now: FloorView, found: Sequence[ObjectChange], stamp: float) -> None:
+        """End the events of things whose spot was in view, and is as before."""
+        for event in self.book.events:
+            if event.kind != Kind.OBJECT or event.position is None or event.state in _ENDED:
+                continue
+            if any(math.dist(each.position, event.position) < 2 * SAME_THING for each in found):
+                continue
+            shown = now.occupied if event.seen == Change.REMOVED else now.free
+            if bool(now.grid.at(shown, *event.position)):
+                self.book.end(event.number, stamp)
+
+    def _learn(self) -> None:
+        """Take what was in view for the first time as normal."""
+        if self._visit is None or self._visit.sweeps < FEWEST_SWEEPS:
+            return
+        now = self._visit.view()
+        if self._normal is None:
+            self._normal = now
+            return
+        new = ~self._normal.seen
+        self._normal = replace(
+            self._normal,
+            occupied=self._normal.occupied | (now.occupied & new),
+            free=self._normal.free | (now.free & new),
+            moving=np.zeros_like(now.moving),
+        )
+
+    def _at_door(self, point: tuple[float, float]) -> bool:
+        """Tell whether a door's leaf may be at a point."""
+        for door in self._doors.values():
+            first, second = door.segment[:2], door.segment[2:]
+            reach = math.dist(first, second) + 0.15
+            if min(math.dist(first, point), math.dist(second, point)) < reach:
+                return True
+        return False
+
+    # --- the camera ---
+
+    def picture(
+        self, grey: Grey, viewpoint: Viewpoint | None, stamp: float, markers: frozenset[int] | None
+    ) -> None:
+        """Take a picture.
+
+        Args:
+            grey: (rows, columns) of bytes.
+            viewpoint: Where the camera is: x, y in metres, then angles in radians; None while it
+                moves.
+            stamp: Seconds since 1970.
+            markers: The ids seen in it; None: nobody looked for markers.
+        """
+        self._sights.append(sight_of(grey))
+        settled = len(self._sights) == AGREED_PICTURES and len(set(self._sights)) == 1
+        sight = self._sights[-1]
+        if settled and sight != self._sight:
+            self._sight = sight
+            light = 'off' if sight == Sight.DARK else 'on'
+            if sight != Sight.BLOCKED:
+                self._take(Observation(Kind.LIGHT, light, self._place, stamp=stamp), grey)
+            if sight != Sight.DARK:
+                view = 'blocked' if sight == Sight.BLOCKED else 'clear'
+                self._take(Observation(Kind.VIEW, view, self._place, stamp=stamp), grey)
+        if viewpoint is None or sight != Sight.CLEAR:
+            return
+        known = next((each for each in self._views if _same_view(each.viewpoint, viewpoint)), None)
+        if known is None:
+            self._views = [
+                *self._views[-MOST_VIEWS + 1 :],
+                _View(viewpoint, grey, stamp, markers or frozenset()),
+            ]
+            return
+        if markers is not None:
+            self._miss(known, markers, viewpoint, stamp, grey)
+        for change in (view_changes(known.picture, grey) or [])[:1]:
+            observation = Observation(
+                Kind.VIEW,
+                'changed',
+                self._place,
+                position=(viewpoint[0], viewpoint[1]),
+                confidence=change.confidence,
+                stamp=stamp,
+                compared_with=f'{known.stamp:.0f}',
+            )
+            if self._is_due(observation):
+                self._take(observation, grey)
+
+    def _miss(
+        self, view: _View, seen: frozenset[int], viewpoint: Viewpoint, stamp: float, grey: Grey
+    ) -> None:
+        """Tell of markers that are in a view's reference, and in several pictures now are not."""
+        view.markers |= seen
+        for marker in seen:
+            view.absent.pop(marker, None)
+        for marker in view.markers - seen:
+            view.absent[marker] = view.absent.get(marker, 0) + 1
+            if view.absent[marker] == AGREED_PICTURES:
+                where = viewpoint[0], viewpoint[1]
+                self._take(
+                    Observation(
+                        Kind.MARKER, 'missing', self._place, str(marker), where, 0.9, stamp
+                    ),
+                    grey,
+                )
+
+    def marker(self, number: int, position: tuple[float, float, float], stamp: float) -> None:
+        """Take where a marker hangs, from several pictures; map frame, metres."""
+        hung = self._markers.get(number)
+        where = position[0], position[1]
+        if hung is None:
+            self._markers[number] = position
+            if not self._known_markers:
+                return
+            state = 'unknown'
+        else:
+            state = 'moved' if math.dist(hung, position) > MARKER_MOVED else 'here'
+        seen = Observation(Kind.MARKER, state, self._place, str(number), where, 0.95, stamp)
+        if self._is_due(seen):
+            self._take(seen)
+
+    # --- what is made of it ---
+
+    def _is_due(self, seen: Observation) -> bool:
+        """Tell whether a thing was not told of a moment ago."""
+        cell = [] if seen.position is None else [str(round(each)) for each in seen.position]
+        key = (seen.kind, seen.state, seen.subject, *cell)
+        if seen.stamp - self._told.get(key, -math.inf) < SEEN_AGAIN:
+            return False
+        self._told[key] = seen.stamp
+        return True
+
+    def _take(self, seen: Observation, picture: NDArray[np.uint8] | None = None) -> None:
+        severity, rule = severity_of(self.rules, seen, self._local(seen.stamp))
+        evidence = ''
+        if self._store is not None and severity:
+            if picture is None and seen.position is not None and self._grid is not None:
+                picture = sweep_picture(self._grid, seen.position, *self._last)
+            if picture is not None:
+                what = f'{seen.kind}-{seen.subject or seen.place}-{seen.state}'
+                evidence = self._store.keep(picture, what, severity, seen.stamp)
+        seen = replace(seen, robot=self._robot, evidence=evidence)
+        self._tell(seen)
+        words = '' if rule is None else rule.words()
+        event = self.book.take(seen, severity=severity, rule=words, look=self._look)
+        if event is None or rule is None or event.state != EventState.OPEN:
+            return
+        lasts = rule.lasting(event.looks, event.last - event.began)
+        if event.severity >= Level.ALERT and lasts:
+            self._alert(event)
+
+    # --- over restarts ---
+
+    def state(self) -> dict[str, Any]:
+        """Return what must not be forgotten, for `restore`: events, and what is normal."""
+        self._learn()
+        normal = self._kept if self._normal is None else _packed(self._normal)
+        hung = {str(number): list(each) for number, each in self._markers.items()}
+        return {'book': self.book.to_json(), 'normal': normal, 'look': self._look, 'markers': hung}
+
+    def restore(self, kept: Mapping[str, Any]) -> None:
+        """Take what `state` gave.
+
+        Raises:
+            ValueError, KeyError, TypeError: It is something else.
+        """
+        look, normal = int(kept['look']), dict(kept['normal'])
+        hung = {int(number): _point(each) for number, each in kept['markers'].items()}
+        self.book.restore(kept['book'])
+        self._look, self._kept = look, normal
+        self._markers = {**hung, **self._markers} if self._known_markers else hung
+        if self._grid is not None and normal:
+            self._normal = _unpacked(normal, self._grid)
+
+
+_ENDED = (EventState.OVER, EventState.NORMAL)
+
+
+def _point(values: Sequence[float]) -> tuple[float, float, float]:
+    x, y, z = values
+    return float(x), float(y), float(z)
+
+
+def _same_map(one: Grid, other: Grid) -> bool:
+    return (
+        one.resolution == other.resolution
+        and one.origin == other.origin
+        and np.array_equal(one.cells, other.cells)
+    )
+
+
+def _same_view(one: Viewpoint, other: Viewpoint) -> bool:
+    if len(one) != len(other):
+        return False
+    near = math.dist(one[:2], other[:2]) <= SAME_VIEW[0]
+    turned = (abs(math.remainder(a - b, math.tau)) for a, b in zip(one[2:], other[2:], strict=True))
+    return near and all(each <= SAME_VIEW[2] for each in turned)
+
+
+def _packed(view: FloorView) -> dict[str, Any]:
+    def text(mask: Mask) -> str:
+        return base64.b64encode(zlib.compress(np.packbits(mask).tobytes(), 6)).decode()
+
+    grid = view.grid
+    return {
+        'shape': list(grid.cells.shape),
+        'resolution': grid.resolution,
+        'origin': list(grid.origin),
+        'occupied': text(view.occupied),
+        'free': text(view.free),
+    }
+
+
+def _unpacked(values: Mapping[str, Any], grid: Grid) -> FloorView | None:
+    """Return what is normal on a map; None where it was on another one."""
+    if (list(values['shape']), values['resolution'], list(values['origin'])) != (
+        list(grid.cells.shape),
+        grid.resolution,
+        list(grid.origin),
+    ):
+        return None
+
+    def mask(text: str) -> Mask:
+        data = np.frombuffer(zlib.decompress(base64.b64decode(text)), np.uint8)
+        cells = np.unpackbits(data, count=grid.cells.size).reshape(grid.cells.shape)
+        return np.asarray(cells, np.bool_)
+
+    occupied, free = mask(values['occupied']), mask(values['free'])
+    return FloorView(grid, occupied, free, np.zeros_like(free))

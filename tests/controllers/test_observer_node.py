@@ -1,0 +1,105 @@
+"""The observer among real publishers: a box that appears is an event, an incident and an answer."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+from geometry_msgs.msg import PoseWithCovarianceStamped
+from nav_msgs.msg import OccupancyGrid
+from sensor_msgs.msg import LaserScan
+from std_msgs.msg import String
+
+from state_machines import Interrupt
+from state_machines.ros import ServiceCaller
+from surveillance_controllers.observer_node import Observer
+from surveillance_interfaces.msg import RobotPlace
+from surveillance_interfaces.srv import ConsoleCommand
+from surveillance_runtime.incidents import Cause
+from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
+
+WATCH = 'rules:\n  nothing new:\n    object: none\n    places: [R1]\n'
+HERE = (3.0, 2.5)
+
+
+def ranges(box: tuple[float, float, float] | None) -> list[float]:
+    """Return what a lidar in a room of 6 by 5 metres measures, with a round thing in it."""
+    found = []
+    for angle in np.linspace(-math.pi, math.pi, 360, endpoint=False):
+        rays = np.arange(0.05, 8.0, 0.02)
+        x, y = HERE[0] + rays * math.cos(angle), HERE[1] + rays * math.sin(angle)
+        blocked = (x < 0.1) | (x > 5.9) | (y < 0.1) | (y > 4.9)
+        if box is not None:
+            blocked |= np.hypot(x - box[0], y - box[1]) < box[2]
+        found.append(float(rays[blocked.argmax()]))
+    return found
+
+
+def test_a_box_is_told_with_a_picture_and_a_person_calls_it_normal(graph, tmp_path: Path):
+    (tmp_path / 'watch.yaml').write_text(WATCH)
+    parameters = {
+        'watch_file': str(tmp_path / 'watch.yaml'),
+        'evidence_folder': str(tmp_path / 'evidence'),
+        'state_file': str(tmp_path / 'observer.json'),
+    }
+    node = graph.add(
+        Observer,
+        parameters,
+    )
+    make = graph.node.create_publisher
+    maps, places = make(OccupancyGrid, 'map', STATE_QOS), make(RobotPlace, 'robot_place', STATE_QOS)
+    poses = make(PoseWithCovarianceStamped, 'amcl_pose', STATE_QOS)
+    scans = make(LaserScan, 'scan', SENSOR_QOS)
+    events = graph.listen(String, 'events', STATE_QOS)
+    grid = OccupancyGrid()
+    cells = np.zeros((100, 120), np.int8)
+    cells[[0, 1, -1, -2], :] = 100
+    cells[:, [0, 1, -1, -2]] = 100
+    grid.info.width, grid.info.height, grid.info.resolution = 120, 100, 0.05
+    grid.info.origin.orientation.w = 1.0
+    grid.data = cells.ravel().tolist()
+    maps.publish(grid)
+    graph.until(lambda: scans.get_subscription_count() and poses.get_subscription_count())
+
+    def look(place: str, box: tuple[float, float, float] | None, done) -> None:
+        places.publish(RobotPlace(place=place))
+        measured, number = ranges(box), 0
+
+        def step() -> bool:
+            nonlocal number
+            number += 1
+            stamp = graph.node.get_clock().now().to_msg()
+            scan = LaserScan(angle_min=-math.pi, angle_increment=math.tau / 360, range_max=8.0)
+            scan.header.stamp, scan.ranges = stamp, measured
+            scans.publish(scan)
+            pose = PoseWithCovarianceStamped()
+            pose.header.stamp, pose.header.frame_id = stamp, 'map'
+            pose.pose.pose.position.x, pose.pose.pose.position.y = HERE
+            pose.pose.pose.orientation.w = 1.0
+            poses.publish(pose)
+            return bool(done(number))
+
+        graph.until(step)
+
+    look('R1', None, lambda number: node.sweeps >= 8)
+    look('R2', None, lambda number: node.sweeps >= 12)
+    look('R1', (1.5, 1.5, 0.2), lambda number: events and 'appeared' in events[-1].data)
+    (event,) = json.loads(events[-1].data)
+    assert (event['kind'], event['seen'], event['place']) == ('object', 'appeared', 'R1')
+    assert math.dist(event['position'], (1.5, 1.5)) < 0.25
+    assert (tmp_path / 'evidence' / event['evidence'][0]).stat().st_size > 1000
+    assert Cause('event', '1') in node.incidents.open()
+
+    caller = ServiceCaller(graph.node, ConsoleCommand, 'observer/command')
+    answer = caller.call(ConsoleCommand.Request(line='norml 1'), 20.0, Interrupt())
+    assert (answer.accepted, answer.answer) == (False, "got 'norml', expected 'normal'")
+    answer = caller.call(ConsoleCommand.Request(line='normal 1'), 20.0, Interrupt())
+    assert answer.accepted
+    assert 'is normal' in answer.answer
+    graph.until(lambda: not node.incidents.open())
+    graph.until(lambda: json.loads(events[-1].data)[0]['state'] == 'normal')
+    graph.remove(node)
+    kept = json.loads((tmp_path / 'observer.json').read_text())
+    assert kept['book']['events'][0]['state'] == 'normal'

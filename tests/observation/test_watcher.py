@@ -1,0 +1,198 @@
+"""From sweeps and pictures to events, over visits and restarts; the room is a drawn one."""
+
+from __future__ import annotations
+
+import json
+import math
+from datetime import UTC, datetime
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+import yaml
+
+from surveillance_perception.observation.events import EventBook, EventState
+from surveillance_perception.observation.evidence import EvidenceStore
+from surveillance_perception.observation.observations import Kind, Observation
+from surveillance_perception.observation.watch_rules import rule_from
+from surveillance_perception.observation.watcher import Watcher
+from surveillance_runtime.place.occupancy_grid import Grid
+
+RULES = """
+- object: none
+- door: D1
+  is: closed
+  persistence: 2 looks
+- marker: all
+- view: clear
+  severity: warning
+"""
+DOOR = (6.0, 2.0, 6.0, 3.0)
+
+
+def room() -> Grid:
+    """Two rooms of 6 by 5 metres with a doorway between them."""
+    cells = np.zeros((100, 240), np.int8)
+    cells[[0, 1, -1, -2], :] = 100
+    cells[:, [0, 1, -1, -2]] = 100
+    cells[:40, 119:121] = cells[60:, 119:121] = 100
+    return Grid(cells, 0.05)
+
+
+def beams(
+    grid: Grid, sensor: tuple[float, float], boxes=(), shut: bool = False, seed: int = 1
+) -> tuple[np.ndarray, np.ndarray]:
+    """Walk along beams until a wall, a round thing (x, y, radius) or the shut door is met."""
+    angles = np.linspace(-math.pi, math.pi, 360, endpoint=False)
+    rays = np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    steps = np.arange(0.05, 8.0, 0.01)
+    points = np.asarray(sensor) + rays[:, None, :] * steps[None, :, None]
+    cells = grid.cells_of(points.reshape(-1, 2))
+    inside = grid.contains(cells)
+    cells[~inside] = 0
+    blocked = (grid.occupied[cells[:, 0], cells[:, 1]] | ~inside).reshape(points.shape[:2])
+    for x, y, radius in boxes:
+        blocked |= np.hypot(points[..., 0] - x, points[..., 1] - y) < radius
+    if shut:
+        across = np.abs(points[..., 0] - DOOR[0]) < 0.03
+        blocked |= across & (points[..., 1] > DOOR[1]) & (points[..., 1] < DOOR[3])
+    met = blocked.any(axis=1)
+    lengths = np.where(met, steps[blocked.argmax(axis=1)], 8.0)
+    lengths += np.random.default_rng(seed).normal(0.0, 0.01, len(lengths)) * met
+    return np.asarray(sensor) + rays * lengths[:, None], met
+
+
+class Round:
+    """A watcher in the room, and what it told."""
+
+    def __init__(self, store: EvidenceStore | None = None) -> None:
+        self.told: list[Observation] = []
+        self.alerts: list[int] = []
+        self.book = EventBook()
+        self.time = 1_000_000.0
+        self.watcher = Watcher(
+            [rule_from(each) for each in yaml.safe_load(RULES)],
+            self.book,
+            local=lambda stamp: datetime.fromtimestamp(stamp, UTC),
+            tell=self.told.append,
+            alert=lambda event: self.alerts.append(event.number),
+            doors={'D1': DOOR},
+            store=store,
+        )
+        self.watcher.use_map(room())
+
+    def visit(self, place: str, at: tuple[float, float], boxes=(), shut: bool = True) -> None:
+        self.watcher.arrive(place, self.time)
+        for number in range(12):
+            self.time += 1.0
+            self.watcher.sweep(at, *beams(room(), at, boxes, shut, seed=number), self.time)
+            if number % 4 == 3:
+                self.watcher.assess(self.time)
+        self.watcher.arrive('', self.time)
+
+
+HERE = (3.0, 2.5)
+
+
+def test_nothing_happens_and_nothing_is_told():
+    watch = Round()
+    for _ in range(4):
+        watch.visit('R1', HERE)
+        watch.visit('R2', (9.0, 2.5))
+    assert {each.kind for each in watch.told} <= {Kind.DOOR}
+    assert not watch.book.events
+    assert not watch.alerts
+
+
+def test_a_box_that_appears_is_an_event_with_a_picture_until_it_is_gone(tmp_path: Path):
+    watch = Round(EvidenceStore(tmp_path))
+    watch.visit('R1', HERE)
+    watch.visit('R1', HERE, boxes=[(1.5, 1.5, 0.15)])
+    (event,) = watch.book.events
+    assert (event.kind, event.seen, event.place) == (Kind.OBJECT, 'appeared', 'R1')
+    assert math.dist(event.position, (1.5, 1.5)) < 0.2
+    assert watch.alerts
+    picture = cv2.imread(str(tmp_path / event.evidence[0]))
+    assert picture.shape == (360, 360, 3)
+    watch.visit('R2', (9.0, 2.5))
+    assert watch.book.events[0].state == EventState.OPEN, 'its spot was not in view'
+    watch.visit('R1', HERE)
+    assert [each.state for each in watch.book.events] == [EventState.OVER]
+
+
+def test_a_door_must_be_open_in_two_looks_by_its_rule():
+    watch = Round()
+    watch.visit('R1', HERE)
+    assert not watch.book.events
+    watch.visit('R1', HERE, shut=False)
+    assert [(each.subject, each.seen) for each in watch.book.events] == [('D1', 'open')]
+    assert not watch.alerts
+    watch.visit('R1', HERE, shut=False)
+    assert watch.alerts
+    watch.visit('R1', HERE)
+    assert [each.state for each in watch.book.events] == [EventState.OVER]
+
+
+@pytest.mark.parametrize('answer', [EventState.NORMAL, EventState.FALSE, EventState.ACKNOWLEDGED])
+def test_what_a_person_has_answered_is_not_told_again_while_it_is_seen(answer: EventState):
+    watch = Round()
+    watch.visit('R1', HERE)
+    box = [(1.5, 1.5, 0.15)]
+    watch.visit('R1', HERE, boxes=box)
+    watch.book.answer(watch.book.events[0].number, answer)
+    watch.alerts.clear()
+    again = Round()
+    again.watcher.restore(json.loads(json.dumps(watch.watcher.state())))
+    again.time = watch.time + 1000.0
+    again.visit('R1', HERE, boxes=box)
+    assert not again.alerts
+    assert [each.state for each in again.book.events] == [answer]
+
+
+def test_what_is_normal_outlives_a_restart():
+    watch = Round()
+    watch.visit('R1', HERE)
+    again = Round()
+    again.watcher.restore(json.loads(json.dumps(watch.watcher.state())))
+    again.visit('R1', HERE, boxes=[(1.5, 1.5, 0.15)])
+    assert again.alerts
+
+
+def test_markers_move_and_go_missing_only_where_their_spot_was_in_view():
+    watch = Round()
+    grey = np.random.default_rng(3).integers(0, 255, (60, 80), np.uint8)
+    picture = cv2.resize(grey, (320, 240))
+    view, other = (1.0, 1.0, 0.5), (1.0, 1.0, 2.5)
+    watch.watcher.marker(14, (2.0, 0.0, 1.0), 1.0)
+    watch.watcher.picture(picture, view, 1.0, frozenset({14}))
+    for number in range(5):
+        watch.watcher.picture(picture, other, 10.0 + number, frozenset())
+    assert not watch.book.events
+    for number in range(3):
+        watch.watcher.picture(picture, view, 20.0 + number, frozenset())
+    assert [(each.subject, each.seen) for each in watch.book.events] == [('14', 'missing')]
+    watch.watcher.marker(14, (2.0, 0.5, 1.0), 60.0)
+    assert {each.seen for each in watch.book.events if each.state == EventState.OPEN} == {'moved'}
+
+
+def test_a_covered_camera_is_told_once():
+    watch = Round()
+    for number in range(9):
+        watch.watcher.picture(np.full((240, 320), 90, np.uint8), None, float(number), None)
+    assert [(each.kind, each.state) for each in watch.told if each.kind == Kind.VIEW] == [
+        (Kind.VIEW, 'blocked')
+    ]
+
+
+def test_evidence_keeps_the_most_severe_and_newest_within_its_bound(tmp_path: Path):
+    store = EvidenceStore(tmp_path, most_bytes=40_000)
+    noise = np.random.default_rng(1).integers(0, 255, (100, 100), np.uint8)
+    severe = store.keep(noise, 'door D1/open', 3, 1.0)
+    names = [store.keep(noise, 'box', 1, float(stamp)) for stamp in range(2, 20)]
+    left = {each.name for each in tmp_path.iterdir()}
+    assert severe in left
+    assert names[-1] in left
+    assert names[0] not in left
+    assert sum(each.stat().st_size for each in tmp_path.iterdir()) <= 40_000
+    assert EvidenceStore(tmp_path).total == store.total
