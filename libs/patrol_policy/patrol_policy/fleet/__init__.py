@@ -1,0 +1,40 @@
+"""Several robots on one map without a leader: each computes the same shares from the same facts.
+
+- `partition`: groups of places and how many robots each has, a function of the map and the number;
+- `assignment`: `choose(graph, robots, name, now)`, what one robot does next, and why;
+- `docks`: slots at the docks that do not overlap;
+- `simulation`: a fleet in simulated time.
+"""
+
+from __future__ import annotations
+
+from patrol_policy.fleet.assignment import (
+    Assignment,
+    FleetChoice,
+    FleetError,
+    FleetRobot,
+    FleetSettings,
+    Share,
+    assign,
+    choose,
+)
+from patrol_policy.fleet.docks import ChargeNeed, DockSlot, dock_slots
+from patrol_policy.fleet.partition import FleetPlan, Group, exact_wait, fleet_plan
+
+__all__ = [
+    'Assignment',
+    'ChargeNeed',
+    'DockSlot',
+    'FleetChoice',
+    'FleetError',
+    'FleetPlan',
+    'FleetRobot',
+    'FleetSettings',
+    'Group',
+    'Share',
+    'assign',
+    'choose',
+    'dock_slots',
+    'exact_wait',
+    'fleet_plan',
+]

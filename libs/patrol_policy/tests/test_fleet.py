@@ -1,0 +1,200 @@
+"""Several robots share a map: what each does follows from what all publish."""
+
+from __future__ import annotations
+
+import itertools
+import random
+from dataclasses import replace
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from patrol_policy.fleet import (
+    ChargeNeed,
+    FleetError,
+    FleetRobot,
+    FleetSettings,
+    Share,
+    assign,
+    choose,
+    dock_slots,
+    exact_wait,
+    fleet_plan,
+)
+from patrol_policy.fleet.simulation import FleetBattery, FleetPatrol, Outage
+from patrol_policy.graph import PatrolGraph, graph_of_places
+
+from .worlds import seven_rooms
+
+
+def far_wings(places: int = 4) -> PatrolGraph:
+    """Return two wings of places 2 s apart with a way of 100 s between them."""
+    lefts = {'A': 0.0, 'B': 106.0}
+    points = {f'{w}{n}': (x + 2.0 * n, 0.0) for w, x in lefts.items() for n in range(places)}
+    ways: dict[str, list[str]] = {name: [] for name in points}
+    for one, other in itertools.pairwise(points):
+        ways[one].append(other)
+        ways[other].append(one)
+    return graph_of_places(ways, points)
+
+
+def ring(places: int) -> PatrolGraph:
+    names = [f'P{number:02}' for number in range(places)]
+    return PatrolGraph(
+        {
+            name: {names[(number + 1) % places]: 10.0, names[number - 1]: 10.0}
+            for number, name in enumerate(names)
+        }
+    )
+
+
+def fleet(*places: str, now: float = 0.0) -> list[FleetRobot]:
+    return [FleetRobot(f'robot{n + 1}', place, heard_at=now) for n, place in enumerate(places)]
+
+
+def random_map(seed: int, places: int) -> PatrolGraph:
+    draw = random.Random(seed)
+    points = {f'P{n}': (draw.uniform(0, 50), draw.uniform(0, 50)) for n in range(places)}
+    pairs = [(n, draw.randrange(n)) for n in range(1, places)]
+    pairs += [tuple(draw.sample(range(places), 2)) for _ in range(places // 3)]  # type: ignore[misc]
+    ways: dict[str, set[str]] = {name: set() for name in points}
+    for one, other in pairs:
+        ways[f'P{one}'].add(f'P{other}')
+        ways[f'P{other}'].add(f'P{one}')
+    return graph_of_places(ways, points, exploration_seconds=1.0)
+
+
+@given(st.integers(0, 10_000), st.integers(2, 7), st.integers(1, 5))
+def test_a_plan_has_each_place_once_and_keeps_between_the_optimum_and_one_tour(
+    seed: int, places: int, robots: int
+) -> None:
+    graph = random_map(seed, places)
+    plan = fleet_plan(graph, robots)
+    assert sorted(stop for group in plan.groups for stop in group.stops) == sorted(graph.places)
+    assert sum(group.robots for group in plan.groups) == robots
+    assert plan.wait <= graph.tour.length / robots + 1e-6
+    assert plan.wait >= exact_wait(graph, robots) - 1e-6
+
+
+def test_far_wings_get_robots_of_their_own() -> None:
+    plan = fleet_plan(far_wings(), 2)
+    assert {frozenset(group.stops) for group in plan.groups} == {
+        frozenset({'A0', 'A1', 'A2', 'A3'}),
+        frozenset({'B0', 'B1', 'B2', 'B3'}),
+    }
+    assert plan.wait == pytest.approx(12.0) == exact_wait(far_wings(), 2)
+
+
+def test_the_order_of_the_facts_does_not_matter_and_shares_do_not_overlap() -> None:
+    graph, robots = ring(12), fleet('P00', 'P00', 'P03', 'P07')
+    shares = assign(graph, robots, 0.0).shares
+    assert assign(graph, robots[::-1], 0.0).shares == shares
+    assert len({share.stop for share in shares.values()}) == len(robots)
+
+
+def test_robots_that_start_together_spread_and_reach_the_plan() -> None:
+    graph = ring(12)
+    run = FleetPatrol(graph, dict.fromkeys(('robot1', 'robot2', 'robot3'), 'P00'))
+    run.until(1000.0)
+    assert run.longest(400.0) == pytest.approx(40.0)
+
+
+def test_a_lost_robots_places_are_visited_and_it_gets_a_share_again() -> None:
+    graph = far_wings()
+    starts = {'robot1': 'A0', 'robot2': 'B0'}
+    run = FleetPatrol(graph, starts, outages=[Outage('robot2', 200.0, 900.0)])
+    run.until(900.0)
+    after = [(at, place) for at, robot, place in run.visits if robot == 'robot1' and at > 200.0]
+    assert {'B0', 'B1', 'B2', 'B3'} <= {place for _, place in after}
+    reasons = [choice.reason for at, _, choice in run.decisions if at > 210.0]
+    assert any('is mine: robot2 was last heard at 00:03' in reason for reason in reasons)
+    run.until(2000.0)
+    assert run.longest(1500.0) == pytest.approx(fleet_plan(graph, 2).wait)
+
+
+def test_a_silent_robot_loses_its_share_with_the_next_decision() -> None:
+    settings = FleetSettings(silent_after=10.0)
+    robots = fleet('A0', 'B0', now=100.0)
+    silent = replace(robots[1], heard_at=89.0)
+    assert set(assign(far_wings(), robots, 100.0, settings).shares) == {'robot1', 'robot2'}
+    assignment = assign(far_wings(), [robots[0], silent], 100.0, settings)
+    assert set(assignment.shares) == {'robot1'}
+    assert len(assignment.shares['robot1'].tour) == 8
+
+
+def test_a_reason_names_the_robot_that_is_charging() -> None:
+    graph = far_wings()
+    shares = assign(graph, fleet('A0', 'B0', now=60.0), 60.0).shares
+    robots = [replace(robot, share=shares[robot.name]) for robot in fleet('A0', 'B0', now=60.0)]
+    robots[1] = replace(robots[1], charging_until=50_700.0)
+    robots[0] = replace(robots[0], place='A3')
+    found = []
+    for _ in range(8):
+        choice = choose(graph, robots, 'robot1', 60.0)
+        found.append(choice.reason)
+        robots[0] = replace(robots[0], place=choice.place, share=choice.share)
+    assert 'B0 is mine: robot2 is charging until 14:05' in found
+
+
+def test_who_has_a_share_keeps_it_when_another_one_joins() -> None:
+    graph = ring(12)
+    robots = fleet('P02', 'P08')
+    tour = fleet_plan(graph, 2).groups[0].stops
+    robots = [replace(robot, share=Share(tour, robot.place)) for robot in robots]
+    shares = assign(graph, [*robots, FleetRobot('robot3', 'P05')], 0.0).shares
+    assert [shares[robot.name] for robot in robots] == [robot.share for robot in robots]
+    assert shares['robot3'].tour == tour
+
+
+def test_two_that_took_the_same_share_part_again() -> None:
+    graph = far_wings()
+    tour = next(g.stops for g in fleet_plan(graph, 2).groups if 'A0' in g.stops)
+    robots = [replace(robot, share=Share(tour, 'A0')) for robot in fleet('A0', 'A1')]
+    shares = assign(graph, robots, 0.0).shares
+    assert shares['robot1'].tour == tour
+    assert 'B0' in shares['robot2'].tour
+
+
+needs_of_robots = st.lists(st.tuples(st.floats(0, 1000), st.floats(1, 100)), max_size=8)
+
+
+@given(needs_of_robots, st.integers(1, 3))
+def test_slots_at_a_dock_do_not_overlap(wanted: list[tuple[float, float]], docks: int) -> None:
+    needs = [ChargeNeed(f'robot{n}', *want) for n, want in enumerate(wanted)]
+    slots = sorted(
+        dock_slots(needs, [f'dock{n}' for n in range(docks)], 0.0).values(),
+        key=lambda slot: (slot.dock, slot.begin),
+    )
+    assert len(slots) == len(needs)
+    for before, after in itertools.pairwise(slots):
+        assert before.dock != after.dock or before.end <= after.begin + 1e-6
+    for need in needs:
+        slot = next(slot for slot in slots if slot.robot == need.robot)
+        assert slot.begin <= need.latest + slot.late + 1e-6
+
+
+def test_robots_that_would_charge_together_charge_one_after_another() -> None:
+    run = FleetPatrol(
+        seven_rooms(),
+        {'robot1': 'E', 'robot2': 'R1', 'robot3': 'R4'},
+        settings=FleetSettings(docks=('E',)),
+        battery=FleetBattery(run_seconds=600.0, charge_seconds=120.0),
+    )
+    run.until(5000.0)
+    assert run.strandings == 0
+    assert {robot for robot, *_ in run.charges} == {'robot1', 'robot2', 'robot3'}
+    times = sorted((begin, end) for _, _, begin, end in run.charges)
+    assert all(end <= begin + 1e-6 for (_, end), (begin, _) in itertools.pairwise(times))
+
+
+def test_what_does_not_fit_is_named() -> None:
+    graph = ring(4)
+    with pytest.raises(FleetError, match='robot9 is not in the fleet, expected one of robot1'):
+        choose(graph, fleet('P00'), 'robot9', 0.0)
+    with pytest.raises(FleetError, match='robot1 is at X, which is not a place of the map'):
+        assign(graph, fleet('X'), 0.0)
+    with pytest.raises(FleetError, match='robot1 stands twice'):
+        assign(graph, fleet('P00') * 2, 0.0)
+    with pytest.raises(ValueError, match='a plan for 0 robots: expected at least 1'):
+        fleet_plan(graph, 0)
