@@ -133,6 +133,16 @@ GOOD = """\
         ('B: [D1]', 'B: [D1', 'not valid YAML'),
         ('B: [D1]', 'B: &x [D1]\n      C: *x', ':6: not valid YAML: an alias'),
         ('    robot_room: A', '    map.A: [D1]', ":7: duplicate key 'map.A'"),
+        (
+            'recharge_rooms: [B]',
+            'recharge_rooms: [B, A]',
+            ":8: recharge_rooms: room 'A' has no station: expected [B], one room",
+        ),
+        (
+            '    recharge_rooms: [B]',
+            '    recharge_rooms: [B, A]\n    station: [2.0, 3.0, 0.0]',
+            ":8: recharge_rooms: room 'A' has no station: expected [B], one room",
+        ),
     ],
 )
 def test_errors_of_a_file_name_the_line(tmp_path: Path, old: str, new: str, words: str) -> None:

@@ -100,7 +100,7 @@ class FloorPlan:
         marker_size: Side of a marker's black square, metres.
         marker_dictionary: OpenCV's name of the markers' dictionary.
         station: Pose of the charging station, metres and rad; where the file names none, the point
-            of the first room with one.
+            of the recharge room.
         map: The map that the file refers to.
     """
 
@@ -298,6 +298,13 @@ def _row(value: object, columns: Sequence[str], *where: str) -> list[float]:
 
 
 def _station(value: object, place: Place) -> Pose:
+    for room in place.recharge_rooms[1:]:
+        # `station` is the pose of one; at the point of any other room nothing charges the robot.
+        raise PlaceError(
+            ('recharge_rooms',),
+            f"room '{room}' has no station: expected [{place.recharge_rooms[0]}], one room, "
+            'as a place has one station',
+        )
     if not value and not isinstance(value, int | float | str):  # a node's parameter is [] then
         x, y, _ = place.positions[next(iter(place.recharge_rooms), place.start)]
         return x, y, 0.0
