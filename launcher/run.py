@@ -312,7 +312,10 @@ class Run:
         return (node_table.find(node_table.CONSOLE), *chosen) if asks else chosen
 
     def observers(self) -> tuple[node_table.Node, ...]:
-        """Return the nodes that only look on; they start last. `only` starts no other ones."""
+        """Return the nodes that only look on; they start last.
+
+        With `only` nothing is recorded; what was asked for by its own option starts.
+        """
         names = []
         if self.record != NOT_RECORDED and not self.only:
             names += [RECORDER, MARKERS]

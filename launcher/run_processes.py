@@ -9,7 +9,7 @@ from pathlib import Path
 
 from launcher.environment import interpreter
 from launcher.log_merge import ROS_FORMAT
-from launcher.run import MARKERS, PAGE, RECORDER, Run
+from launcher.run import MARKERS, RECORDER, Run
 from launcher.supervisor import Program
 from surveillance_runtime import node_table
 from surveillance_runtime.discovery import LAST_DOMAIN, launched_nodes
@@ -127,8 +127,9 @@ def programs_of(
             )
             for node in nodes
         ]
-    # What only listens shares a process; the page, which strangers talk to, has its own.
-    for together in ((RECORDER, MARKERS), (PAGE,)):
-        if members := [node for node in observers if node.name in together]:
-            programs.append(program(members))
+    # What only records shares a process. Every other one has its own: strangers talk to the page,
+    # and pictures keep what compares them busy.
+    if members := [node for node in observers if node.name in (RECORDER, MARKERS)]:
+        programs.append(program(members))
+    programs += [program([node]) for node in observers if node.name not in (RECORDER, MARKERS)]
     return programs

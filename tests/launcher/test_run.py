@@ -32,7 +32,7 @@ from launcher.run_mission import (
     watch_command,
     what_to_look_at,
 )
-from launcher.run_processes import command, node_environ, ros_arguments
+from launcher.run_processes import command, node_environ, programs_of, ros_arguments
 from surveillance_behaviour.mission.mission_log import MissionRecord
 from surveillance_runtime import discovery
 from surveillance_runtime.command_line import page_address
@@ -375,3 +375,17 @@ def test_the_pages_token_is_no_parameter_that_a_peer_could_ask_for(tmp_path):
     settings = merged.resolve('mission_page', '/mission_page')
     assert 'token' not in settings
     assert settings['token_file'].value == str(tmp_path / 'page_token')
+
+
+@pytest.mark.parametrize('composed', [False, True])
+def test_everything_that_only_looks_on_gets_a_process(tmp_path, composed):
+    watch = tmp_path / 'watch.yaml'
+    run = Run(web=True, watch=watch, record=str(tmp_path), composed=composed)
+    nodes, observers = run.nodes(), run.observers()
+    files = {node.name: tmp_path / node.name for node in (*nodes, *observers)}
+    started = ' '.join(
+        word for each in programs_of(run, nodes, observers, files, {}) for word in each.command
+    )
+    assert {'observer', 'mission_page', 'mission_recorder'} <= {node.name for node in observers}
+    for node in observers:
+        assert started.count(f'{node.name}={node.module}:{node.class_name}') == 1, node.name
