@@ -33,12 +33,10 @@ from pathlib import Path
 import yaml
 
 ROOT = Path(__file__).resolve().parents[1]
-for package in ('behaviour', 'fsm', 'ontology', 'runtime'):
-    sys.path.insert(0, str(ROOT / f'surveillance_{package}'))
+sys.path.insert(0, str(ROOT))
 
-from literature_policies import LITERATURE
-from tables import table
-
+from benchmarks.literature_policies import LITERATURE
+from benchmarks.tables import table
 from patrol_policy.bounds import charge_bound, rule_bound
 from patrol_policy.decision import Rules
 from patrol_policy.graph import (
@@ -163,7 +161,7 @@ def patrol(
         threshold,
         place.start,
         battery,
-        random.Random(SEED),
+        generator=random.Random(SEED),
     )
     for _ in run.until(hours * 3600.0):
         pass

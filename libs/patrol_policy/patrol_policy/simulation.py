@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import random
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import KW_ONLY, dataclass, field
 
 from patrol_policy.battery import Battery, BatteryLimits, ChargeCurve, Draw
 from patrol_policy.decision import QUIET, RECHARGE, URGENT, DecisionSettings, Rules, decide
@@ -89,6 +89,7 @@ class Patrol:
     threshold: float
     station: str
     battery: SimulatedBattery | None = None
+    _: KW_ONLY  # by name alone: the list grows
     own_thresholds: Mapping[str, float] = field(default_factory=dict)
     calendar: Calendar = NO_CALENDAR
     stations: tuple[str, ...] = ()
