@@ -33,6 +33,7 @@ from surveillance_runtime.run_parameters import (
     page_entries,
     record_entries,
     run_layers,
+    simulator_entries,
     watch_entries,
 )
 
@@ -129,6 +130,7 @@ def _folders_of(folder: Path) -> Iterator[Entry]:
 
 def _option_entries(run: Run, folder: Path | None) -> Iterator[Entry]:
     """Yield what the options say as parameters, for the nodes that they concern."""
+    yield from simulator_entries(run.simulator)
     if folder is not None:
         yield from record_entries(folder / RECORD)
         yield from _observer_entries(run, folder)

@@ -44,6 +44,7 @@ from surveillance_runtime.run_parameters import (
     page_entries,
     record_entries,
     run_layers,
+    simulator_entries,
     watch_entries,
     write_parameters,
 )
@@ -92,6 +93,7 @@ def start_nodes(context: LaunchContext) -> list[Node]:
             files=[Path(given['params'])] if given['params'] else [],
             options=[
                 *mode_entries(mode, prompts=False),
+                *simulator_entries(given['simulator']),
                 *unmonitored_entries(robot, names),
                 *_traces(given, folder),
             ],

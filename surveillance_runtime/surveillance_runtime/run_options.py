@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from surveillance_runtime import node_table
 
 BUILT_IN_ROBOT = 'built_in'
-KINEMATIC, NO_SIMULATOR = 'kinematic', 'none'
-SIMULATORS = (KINEMATIC, NO_SIMULATOR)
+KINEMATIC, MUJOCO, NO_SIMULATOR = 'kinematic', 'mujoco', 'none'
+SIMULATORS = (KINEMATIC, MUJOCO, NO_SIMULATOR)
 
 
 @dataclass(frozen=True)
@@ -63,7 +63,8 @@ OPTIONS = {
             'simulator',
             KINEMATIC,
             'what simulates the robot in mode SIMULATED: kinematic, which may run faster than real '
-            'time; none: another program',
+            'time; mujoco: physics, wheels that slip (needs the package mujoco); none: another '
+            'program',
             SIMULATORS,
         ),
         RunOption(

@@ -20,6 +20,7 @@ from surveillance_runtime.configuration import (
 )
 from surveillance_runtime.node_table import NODES, Node
 from surveillance_runtime.profile import ProfileFile, profile_layer
+from surveillance_runtime.run_options import MUJOCO
 
 BEHAVIOUR_NODE = 'robot_behavior'
 PAGE = 'mission_page'
@@ -83,6 +84,12 @@ def mode_entries(mode: str, *, prompts: bool) -> Iterator[Entry]:
         if node.has_modes:
             yield for_node(node.name, 'execution_mode', mode, f'--mode {mode}')
             yield for_node(node.name, 'console', prompts, f'--mode {mode}')
+
+
+def simulator_entries(simulator: str) -> Iterator[Entry]:
+    """Yield what the simulator is told where the run asks for another one than the usual."""
+    if simulator == MUJOCO:
+        yield for_node('simulator', 'engine', MUJOCO, f'--simulator {MUJOCO}')
 
 
 def record_entries(record: Path) -> Iterator[Entry]:

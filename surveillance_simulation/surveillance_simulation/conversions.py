@@ -73,9 +73,21 @@ def transform_to_ros(pose: PlanePose, frame: str, child: str, stamp: Time) -> Tr
 
 
 def scan_to_ros(
-    ranges: npt.NDArray[np.float32], lidar: LidarModel, frame: str, stamp: Time
+    ranges: npt.NDArray[np.floating],
+    lidar: LidarModel,
+    frame: str,
+    stamp: Time,
+    duration: float = 0.0,
 ) -> LaserScan:
-    """Convert distances (rays,) in metres to a message."""
+    """Convert distances (rays,) in metres to a message.
+
+    Args:
+        ranges: The distances.
+        lidar: What measured them.
+        frame: Where that sits.
+        stamp: The time of the first ray.
+        duration: From the first ray to the first of the next turn, seconds.
+    """
     increment = 2.0 * math.pi / lidar.rays
     message = LaserScan(
         header=Header(frame_id=frame, stamp=stamp),
@@ -84,6 +96,8 @@ def scan_to_ros(
         angle_increment=increment,
         range_min=lidar.range_min,
         range_max=lidar.range_max,
+        time_increment=duration / lidar.rays,
+        scan_time=duration,
     )
     message.ranges.frombytes(ranges.astype(np.float32).tobytes())
     return message

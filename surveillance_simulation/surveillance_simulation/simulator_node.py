@@ -45,6 +45,7 @@ from surveillance_simulation.clock_rate import (
 from surveillance_simulation.feeds.camera_feed import CameraFeed
 from surveillance_simulation.feeds.fault_services import FaultServices
 from surveillance_simulation.feeds.sensor_feed import SensorFeed
+from surveillance_simulation.physics.model import PhysicsModel
 from surveillance_simulation.robot.base import BaseModel
 from surveillance_simulation.robot.lidar import LidarModel
 from surveillance_simulation.robot.robot import Robot
@@ -78,13 +79,27 @@ class Simulator(PatrolNode):
         except PlaceError as error:
             raise ParameterError(f'simulator: {error}') from None
         model = self.declare_fields(PeopleModel(), prefix='people.')
-        self.robot = Robot(
-            world,
-            self.declare_fields(BaseModel(), prefix='base.'),
-            self.declare_fields(LidarModel(), prefix='lidar.'),
-            rng=np.random.default_rng(seed),
-            people=People(world.plan, model, np.random.default_rng(seed)) if model.count else None,
+        engine = self.parameter(
+            'engine',
+            'kinematic',
+            'What moves the robot: kinematic, exact and fast; mujoco, physics with friction and '
+            'slip (needs the package mujoco).',
+            choices=('kinematic', 'mujoco'),
+            read_only=True,
         )
+        physics = self.declare_fields(PhysicsModel(), prefix='physics.')
+        people = People(world.plan, model, np.random.default_rng(seed)) if model.count else None
+        try:
+            self.robot = Robot(
+                world,
+                self.declare_fields(BaseModel(), prefix='base.'),
+                self.declare_fields(LidarModel(), prefix='lidar.'),
+                rng=np.random.default_rng(seed),
+                people=people,
+                physics=physics if engine == 'mujoco' else None,
+            )
+        except ImportError as error:
+            raise ParameterError(f'simulator: engine {error}') from None
         kept = self.parameter(
             'state_file',
             '',

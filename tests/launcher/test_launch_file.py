@@ -161,6 +161,8 @@ def test_its_arguments_are_options_of_launch_py(start, tmp_path):
     by_name = {node.name: settings(node) for node in nodes}
     assert by_name['collision_monitor']['robot.command_type'] == 'TwistStamped'
     assert 'simulator' not in [node.name for node in start(simulator='none')]
+    in_physics = {node.name: settings(node) for node in start(simulator='mujoco')}
+    assert in_physics['simulator']['engine'] == 'mujoco'
     with pytest.raises(FileError, match=r"--robot 'turtlebot3_burgr'.*'turtlebot3_burger'"):
         start(robot='turtlebot3_burgr')
 

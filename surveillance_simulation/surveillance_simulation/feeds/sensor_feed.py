@@ -14,6 +14,7 @@ from sensor_msgs.msg import JointState, LaserScan
 from std_msgs.msg import UInt32
 
 from surveillance_interfaces.msg import DoorStates
+from surveillance_runtime.conversions import nanoseconds_of
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.parameters import parameter
 from surveillance_runtime.place import occupancy_grid
@@ -60,6 +61,12 @@ def _lidars_of(node: PatrolNode, frames: Frames) -> list[tuple[str, str, Pose]]:
         )
         for i, topic in enumerate(lidars.scans)
     ]
+
+
+def _earlier(stamp: Time, seconds: float) -> Time:
+    """Return the time that lies before another by some seconds; never less than 0."""
+    nanoseconds = max(nanoseconds_of(stamp) - round(1e9 * seconds), 0)
+    return Time(sec=nanoseconds // 10**9, nanosec=nanoseconds % 10**9)
 
 
 class SensorFeed:
@@ -112,8 +119,14 @@ class SensorFeed:
             self._tf.publish(TFMessage(transforms=[transform]))
         for publisher, frame, mount in self._scans:
             if publisher.get_subscription_count():
-                ranges = self._robot.scan(mount)
-                publisher.publish(conversions.scan_to_ros(ranges, self._robot.lidar, frame, stamp))
+                sweep = self._robot.measure(mount)
+                if sweep is not None:
+                    begun = _earlier(stamp, sweep.age)
+                    publisher.publish(
+                        conversions.scan_to_ros(
+                            sweep.ranges, self._robot.lidar, frame, begun, sweep.duration
+                        )
+                    )
         if self._joints.get_subscription_count():
             arm, now = self._robot.arm, self._robot.time
             self._joints.publish(

@@ -50,6 +50,33 @@ class BaseModel:
     )
 
 
+def bounded(model: BaseModel, speed: float, turn_speed: float) -> tuple[float, float]:
+    """Return a wanted velocity within the base's limits, m/s and rad/s; what is not finite is 0."""
+    wanted_speed = speed if math.isfinite(speed) else 0.0
+    wanted_turn = turn_speed if math.isfinite(turn_speed) else 0.0
+    limit, turn_limit = model.speed, model.turn_speed
+    return min(max(wanted_speed, -limit), limit), min(max(wanted_turn, -turn_limit), turn_limit)
+
+
+def following(
+    model: BaseModel, velocity: tuple[float, float], wanted: tuple[float, float], dt: float
+) -> tuple[float, float]:
+    """Return the velocity after `dt` seconds, m/s and rad/s, within the limits of acceleration.
+
+    The base brakes at most to a stand, then speeds up the other way.
+    """
+    (speed, turn_speed), (wanted_speed, wanted_turn) = velocity, wanted
+    turn_change = model.turn_acceleration * dt
+    turn = turn_speed + min(max(wanted_turn - turn_speed, -turn_change), turn_change)
+    faster = wanted_speed * speed >= 0.0 and abs(wanted_speed) > abs(speed)
+    if faster:
+        change = min(abs(wanted_speed - speed), model.acceleration * dt)
+        return speed + math.copysign(change, wanted_speed), turn
+    goal = wanted_speed if wanted_speed * speed > 0.0 else 0.0
+    change = min(abs(goal - speed), model.deceleration * dt)
+    return speed + math.copysign(change, goal - speed), turn
+
+
 class Base:
     """The robot's base in a world.
 
@@ -88,13 +115,7 @@ class Base:
 
     def command(self, speed: float, turn_speed: float) -> None:
         """Set the wanted velocity: m/s forwards, rad/s anticlockwise; anything not finite is 0."""
-        wanted_speed = speed if math.isfinite(speed) else 0.0
-        wanted_turn = turn_speed if math.isfinite(turn_speed) else 0.0
-        limit, turn_limit = self.model.speed, self.model.turn_speed
-        self._wanted = (
-            min(max(wanted_speed, -limit), limit),
-            min(max(wanted_turn, -turn_limit), turn_limit),
-        )
+        self._wanted = bounded(self.model, speed, turn_speed)
         self._since_command = 0.0
 
     def step(self, dt: float) -> None:
@@ -104,10 +125,9 @@ class Base:
             self._wanted = (0.0, 0.0)
         if not self.is_moving:
             return
-        wanted_speed, wanted_turn = self._wanted
-        turn_change = self.model.turn_acceleration * dt
-        self.speed = self._speed_after(dt, wanted_speed)
-        self.turn_speed += min(max(wanted_turn - self.turn_speed, -turn_change), turn_change)
+        self.speed, self.turn_speed = following(
+            self.model, (self.speed, self.turn_speed), self._wanted, dt
+        )
         distance, turn = self.speed * dt, self.turn_speed * dt
         reached = self._free_part(distance, turn)
         if reached < 1.0:
@@ -117,24 +137,15 @@ class Base:
             self.speed = 0.0
         elif distance:
             self._touching = False
-        self.pose = _moved(self.pose, distance * reached, turn * reached)
+        self.pose = moved(self.pose, distance * reached, turn * reached)
         if reached < 1.0:
             # A disc that is stopped can still turn on the spot.
             x, y, yaw = self.pose
-            self.pose = (x, y, _wrapped(yaw + turn * (1.0 - reached)))
+            self.pose = (x, y, wrapped(yaw + turn * (1.0 - reached)))
             distance *= reached
         self._sure -= abs(distance)
         self.travelled += abs(distance)
         self._count(distance, turn)
-
-    def _speed_after(self, dt: float, wanted: float) -> float:
-        """Return the speed after `dt` seconds: it brakes at most to a stand, then speeds up."""
-        speed, model = self.speed, self.model
-        faster = wanted * speed >= 0.0 and abs(wanted) > abs(speed)
-        if faster:
-            return speed + math.copysign(min(abs(wanted - speed), model.acceleration * dt), wanted)
-        goal = wanted if wanted * speed > 0.0 else 0.0
-        return speed + math.copysign(min(abs(goal - speed), model.deceleration * dt), goal - speed)
 
     @property
     def is_moving(self) -> bool:
@@ -165,7 +176,7 @@ class Base:
                 break
             gone = piece
         share = gone / pieces
-        self.pose = (x + share * dx, y + share * dy, _wrapped(yaw + dyaw))
+        self.pose = (x + share * dx, y + share * dy, wrapped(yaw + dyaw))
         self.speed = self.turn_speed = 0.0
         self._wanted = (0.0, 0.0)
         self._sure = 0.0
@@ -177,7 +188,7 @@ class Base:
         self.odometry = (
             x + dx * math.cos(yaw) - dy * math.sin(yaw),
             y + dx * math.sin(yaw) + dy * math.cos(yaw),
-            _wrapped(yaw + dyaw),
+            wrapped(yaw + dyaw),
         )
 
     def _free_part(self, distance: float, turn: float) -> float:
@@ -191,7 +202,7 @@ class Base:
         if abs(distance) <= before - _CONTACT:
             self._sure = before - _CONTACT
             return 1.0
-        after = self._gap(_moved(self.pose, distance, turn))
+        after = self._gap(moved(self.pose, distance, turn))
         # Something was put onto the robot: any way that leads out of it is free.
         if after > _CONTACT or after > before:
             return 1.0
@@ -200,7 +211,7 @@ class Base:
         low, high = 0.0, 1.0
         for _ in range(12):
             middle = (low + high) / 2
-            gap = self._gap(_moved(self.pose, distance * middle, turn * middle))
+            gap = self._gap(moved(self.pose, distance * middle, turn * middle))
             if gap > _CONTACT:
                 low = middle
             else:
@@ -214,10 +225,10 @@ class Base:
         if self._rng is not None:
             distance += self._rng.normal(0.0, self.model.distance_error * math.sqrt(abs(distance)))
             turn += self._rng.normal(0.0, self.model.turn_error * math.sqrt(abs(turn)))
-        self.odometry = _moved(self.odometry, distance, turn)
+        self.odometry = moved(self.odometry, distance, turn)
 
 
-def _moved(pose: Pose, distance: float, turn: float) -> Pose:
+def moved(pose: Pose, distance: float, turn: float) -> Pose:
     """Return the pose after an arc of this length and turn."""
     x, y, yaw = pose
     # The chord of an arc is sinc(turn / 2) times as long and points half way between the ends.
@@ -226,9 +237,10 @@ def _moved(pose: Pose, distance: float, turn: float) -> Pose:
     return (
         x + chord * math.cos(yaw + half),
         y + chord * math.sin(yaw + half),
-        _wrapped(yaw + turn),
+        wrapped(yaw + turn),
     )
 
 
-def _wrapped(angle: float) -> float:
+def wrapped(angle: float) -> float:
+    """Return an angle between -pi and pi, rad."""
     return math.remainder(angle, 2.0 * math.pi)

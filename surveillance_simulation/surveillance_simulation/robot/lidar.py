@@ -44,6 +44,21 @@ class LidarModel:
         return steps - math.pi
 
 
+@dataclass(frozen=True, eq=False)
+class Sweep:
+    """One turn of a lidar as it is told.
+
+    Attributes:
+        ranges: How far each ray went, shape (rays,), metres.
+        age: The first ray was measured so long ago, seconds.
+        duration: From the first ray to the first of the next turn, seconds; 0: all at once.
+    """
+
+    ranges: npt.NDArray[np.floating]
+    age: float
+    duration: float
+
+
 def scan(
     world: World, pose: Pose, model: LidarModel, rng: np.random.Generator | None = None
 ) -> npt.NDArray[np.float32]:

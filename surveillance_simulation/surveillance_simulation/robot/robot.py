@@ -10,9 +10,12 @@ import numpy.typing as npt
 
 from surveillance_runtime.place.floor_plan import Pose
 from surveillance_runtime.robot_arm import ARM, Arm, Array
+from surveillance_simulation.physics.base import PhysicsBase
+from surveillance_simulation.physics.model import PhysicsModel
+from surveillance_simulation.physics.sweeping_lidar import SweepingLidar
 from surveillance_simulation.robot.arm_motion import ArmMotion
 from surveillance_simulation.robot.base import Base, BaseModel
-from surveillance_simulation.robot.lidar import LidarModel, scan
+from surveillance_simulation.robot.lidar import LidarModel, Sweep, scan
 from surveillance_simulation.world.people import People
 from surveillance_simulation.world.world import World
 
@@ -40,11 +43,22 @@ class Robot:
         arm: Arm = ARM,
         rng: np.random.Generator | None = None,
         people: People | None = None,
+        physics: PhysicsModel | None = None,
     ) -> None:
-        """Put the robot at its start; without `rng` its sensors have no errors."""
+        """Put the robot at its start; without `rng` its sensors have no errors.
+
+        Raises:
+            ImportError: There is a `physics`, and MuJoCo, which computes it, is not installed.
+        """
         self.world = world
-        self.base = Base(world, world.plan.start, base_model, rng)
         self.lidar = lidar or LidarModel()
+        self.base: Base | PhysicsBase
+        self._sweeping: SweepingLidar | None = None
+        if physics is None:
+            self.base = Base(world, world.plan.start, base_model, rng)
+        else:
+            self.base = PhysicsBase(world, world.plan.start, base_model, physics)
+            self._sweeping = SweepingLidar(self.base, self.lidar, rng)
         self.arm = ArmMotion(arm)
         self.time = 0.0
         self._rng = rng
@@ -101,8 +115,16 @@ class Robot:
         self.time = time
         return True
 
+    def measure(self, mount: Pose = (0.0, 0.0, 0.0)) -> Sweep | None:
+        """Return what a lidar tells now; None where its turn is not complete."""
+        if self._sweeping is not None:
+            return self._sweeping.measure(mount)
+        return Sweep(self.scan(mount), 0.0, 0.0)
+
     def scan(self, mount: Pose = (0.0, 0.0, 0.0)) -> npt.NDArray[np.float32]:
         """Return the distances of a lidar that sits on the robot somewhere, see `lidar.scan`."""
+        if isinstance(self.base, PhysicsBase):
+            return self.base.rays(mount, self.lidar.angles, self.lidar.range_max).astype(np.float32)
         x, y, yaw = self.base.pose
         dx, dy, turn = mount
         cos, sin = math.cos(yaw), math.sin(yaw)
