@@ -464,6 +464,17 @@ def test_class_questions_do_not_search_the_individuals_again() -> None:
     assert set(cases.hierarchy(classes, lambda *_: False)) == {(cls, D) for cls in classes}
 
 
+def test_classes_below_unions_that_meet_again_are_compared_in_few_models() -> None:
+    axioms: list[Axiom] = []
+    for i in range(40):
+        axioms.append(SubClassOf(f'x:A{i}', ex.ObjectUnionOf((f'x:B{i}', f'x:C{i}'))))
+        axioms += [SubClassOf(f'x:{kind}{i}', f'x:A{i + 1}') for kind in 'BC']
+    kb = KnowledgeBase('x:', axioms)
+    assert kb.reason(steps=40_000)  # A model for each pair of classes takes ten times as many.
+    assert kb.subclasses('x:A40') == {f'x:{kind}{i}' for kind in 'ABC' for i in range(40)}
+    assert kb.superclasses('x:A38') == {'x:A39', 'x:A40'}
+
+
 def test_individuals_that_only_classes_name_exist() -> None:
     assert not reasoned(SubClassOf(ex.ObjectOneOf((i,)), NOTHING), ClassAssertion(A, j)).consistent
     assert not reasoned(SubClassOf(THING, ex.ObjectComplementOf(ex.ObjectOneOf((i,))))).consistent

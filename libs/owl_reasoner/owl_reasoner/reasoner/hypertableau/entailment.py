@@ -88,7 +88,7 @@ class CaseReasoner:
         self._base = self._search.mark()
         self._consistent: bool | None = None
         # Whether the search has the model that `consistent` found, and the steps it took.
-        self._has_model, self._cost = False, 0
+        self._has_model, self._cost, self._settled = False, 0, 0
         # The steps from each state of what accepts a property's chains.
         self._automata: dict[str, dict[int, list[tuple[int | None, int]]]] = {}
 
@@ -153,16 +153,28 @@ class CaseReasoner:
             self._cost = self._search.model.steps - before
         return self._consistent
 
-    def _is_possible(self, state: Callable[[], None], search: CaseSearch | None = None) -> bool:
-        """Tell whether what `state` says holds in some model, left in the tables."""
+    def _is_possible(
+        self, state: Callable[[], None], search: CaseSearch | None = None, settled: bool = False
+    ) -> bool:
+        """Tell whether what `state` says holds in some model, left in the tables.
+
+        With `settled`, remember the state before the first choice and the steps that were taken.
+        """
         search = search or self._search
+        before = search.model.steps
         try:
             if not search.attempt(state):
                 return False
+            if settled:
+                if not search.settle():
+                    return False
+                self._settled = search.mark()
             found = search.solve()
         except StoppedError:
             self.stopped = True
             return True
+        if settled:
+            self._cost = search.model.steps - before
         self.gaps.update(search.gaps)
         return found
 
@@ -386,9 +398,11 @@ class CaseReasoner:
                 self._budget.at_work = partial(_question_text, question)
                 if not models.may_be(*question):
                     continue
-                if self._is_possible(partial(models.state, *question), search):
+                if self._is_possible(partial(models.state, *question), search, settled=True):
                     models.look(*question)
-                    if apart and model and sum(1 for _ in search.model.alive()) < _MOST_KEPT:
+                    is_complete = self._look_at_other(question, models, search)
+                    few = sum(1 for _ in search.model.alive()) < _MOST_KEPT
+                    if apart and model and few and is_complete:
                         search.hold()
                         start = search.mark()
                 elif search.depends:
@@ -398,6 +412,32 @@ class CaseReasoner:
                 search.undo(start)
             search.undo(base)
 
+    def _look_at_other(
+        self, question: tuple[str, ...], models: _ClassModels, search: CaseSearch
+    ) -> bool:
+        """Learn from a second model of a class, which chooses otherwise wherever it can.
+
+        It rules out most of what the first one has by choice. Without it each of these classes
+        takes a model of its own, which makes the comparison of n classes cost n * n models.
+
+        Returns:
+            Whether the search was left with a whole model.
+        """
+        if len(question) > 1 or self.stopped or not models.is_open(*question):
+            return True
+        search.differ_from_model()
+        search.undo(self._settled)
+        try:
+            with search.model.at_most(1000 + 3 * self._cost):
+                if not search.solve():
+                    return False
+        except StoppedError:
+            return False
+        finally:
+            search.forget_models()
+        models.look_at_all()
+        return True
+
 
 class _ClassModels:
     """What models of classes, one after the other, say of which class may be below which."""
@@ -405,8 +445,11 @@ class _ClassModels:
     def __init__(self, rules: CaseRules, search: CaseSearch) -> None:
         self._rules, self._search, self._somebody = rules, search, 0
         self.certain: list[tuple[str, str]] = []
-        self._common: dict[str, set[str]] = {}
+        # Sets of named classes as bits: thousands of sets of hundreds of classes are intersected.
+        self._bits: dict[str, int] = {}
+        self._common: dict[str, int] = {}
         self._above: dict[str, set[str]] = {}
+        self._looked_at_all = False
 
     def state(self, cls: str, without: str = '') -> None:
         """State that somebody is in a class and not in another one."""
@@ -419,16 +462,10 @@ class _ClassModels:
 
     def look(self, cls: str, without: str = '') -> None:
         """Learn from the model that was found."""
-        rules, model, blocked = self._rules, self._search.model, self._search.blocked
-        for y in model.alive():
-            if y in blocked:
-                continue
-            names = {rules.names[concept] for concept in model.labels[y]} - {''}
-            for name in (THING, *names):
-                shared = self._common.get(name)
-                self._common[name] = names if shared is None else shared & names
+        self.look_at_all()
         if without:
             return
+        rules, model = self._rules, self._search.model
         found, merged = model.find(self._somebody)
         labels = {} if found is None else model.labels[found]
         above = {rules.names[one]: choices | merged for one, choices in labels.items()}
@@ -437,13 +474,47 @@ class _ClassModels:
         ]
         self._above[cls] = {sup for sup, choices in above.items() if choices} - {'', cls}
 
+    def look_at_all(self) -> None:
+        """Learn from everybody in the model: who is in a class is in all that is above it.
+
+        Individuals that were there before the question are looked at once: later they are the
+        same, or have more classes.
+        """
+        asked, _ = self._search.model.find(self._somebody)
+        names, model, blocked = self._rules.names, self._search.model, self._search.blocked
+        bits, common = self._bits, self._common
+        for y in model.alive():
+            is_old = y < self._somebody and y != asked
+            if y in blocked or (is_old and self._looked_at_all):
+                continue
+            there = [name for concept in model.labels[y] if (name := names[concept])]
+            mask = 0
+            for name in there:
+                bit = bits.get(name)
+                if bit is None:
+                    bit = bits[name] = 1 << len(bits)
+                mask |= bit
+            for name in (THING, *there):
+                common[name] = common.get(name, mask) & mask
+        self._looked_at_all = True
+
     def may_be(self, cls: str, sup: str = '') -> bool:
         """Tell whether every member of the class was a member of the other one so far."""
-        return not sup or sup in self._common[cls]
+        return not sup or bool(self._common[cls] & self._bits[sup])
+
+    def is_open(self, cls: str) -> bool:
+        """Tell whether the class may be below another one that its model chose."""
+        common, bits = self._common[cls], self._bits
+        return any(common & bits[sup] for sup in self._above[cls])
 
     def possible(self) -> list[tuple[str, str]]:
         """Return the pairs of classes, one above the other in the class's model by choice."""
-        return [(cls, sup) for cls, above in self._above.items() for sup in sorted(above)]
+        return [
+            (cls, sup)
+            for cls, above in self._above.items()
+            for sup in sorted(above)
+            if self.may_be(cls, sup)
+        ]
 
 
 def _question_text(question: tuple[str, ...]) -> str:

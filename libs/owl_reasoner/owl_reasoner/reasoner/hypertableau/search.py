@@ -129,11 +129,14 @@ class CaseSearch:
     def differ_from_model(self) -> None:
         """Have later models choose what the present one does not, where they can.
 
-        What named individuals are in both does not depend on the choices that differ.
+        What named individuals are in both does not depend on the choices that differ. Choices that
+        are held stay as they are.
         """
-        for choice in self._stack:
+        for choice in self._stack[self._held :]:
             chosen = choice.alternatives[choice.place]
             self._avoided.add((type(chosen), chosen))
+        if self._held:
+            return
         model = self.model
         for x in model.alive():
             if model.names[x]:
