@@ -5,6 +5,9 @@ and the base, which listens to `cmd_vel_monitored`. A command is slowed down so 
 brake before the nearest thing on its arc; without a fresh scan, or without a fresh command, the
 robot stands. As a process of its own it also stops a robot whose controller hangs.
 
+Keep-out zones stand in the way as walls do, and in slow zones the speed is theirs, as long as
+somebody tells where the robot is (`amcl_pose`).
+
 A person stops the robot with the service `stop`: from then on it stands, whoever commands it, over
 restarts of this node too, until a person releases it. The topic `stopped` tells of it.
 """
@@ -17,13 +20,14 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from geometry_msgs.msg import Twist
+from geometry_msgs.msg import PoseWithCovarianceStamped, Twist
 from sensor_msgs.msg import LaserScan
 from std_msgs.msg import Bool
 from std_srvs.srv import SetBool
 
 from surveillance_controllers import conversions
-from surveillance_controllers.geometry import Points, Scan
+from surveillance_controllers.controller_parameters import place_zones
+from surveillance_controllers.geometry import Points, Pose, Scan, composed
 from surveillance_controllers.motion.command_publisher import STANDSTILL, CommandPublisher
 from surveillance_controllers.motion.holding import STOPPED
 from surveillance_controllers.motion.path_following import (
@@ -33,15 +37,17 @@ from surveillance_controllers.motion.path_following import (
     speed_to_stop,
 )
 from surveillance_controllers.motion.transforms import ScanReader
+from surveillance_runtime.conversions import pose_of_serialized, stamp_of_serialized
 from surveillance_runtime.graph_check import endpoints_of
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.parameters import parameter
+from surveillance_runtime.place.zones import Zones
 from surveillance_runtime.process import run_node
 from surveillance_runtime.profile.check_up import Awaited, findings
 from surveillance_runtime.profile.parameters import declared_frames
 from surveillance_runtime.robot_base import robot_deceleration, robot_radius
 from surveillance_runtime.state_file import StateFile
-from surveillance_runtime.state_topics import OwnedTopic
+from surveillance_runtime.state_topics import OwnedTopic, StateSubscription
 
 STOP_CAUSE = ('person', 'stop')
 MONITORED = 'cmd_vel_monitored'
@@ -49,6 +55,8 @@ MONITORED = 'cmd_vel_monitored'
 BASE_CAUSE = ('robot', 'base')
 UNGUARDED_AFTER = 4.0
 """A base that does not listen is told of after this time, seconds."""
+LONGEST_GUESS = 0.5
+"""A pose is carried on by the velocity for at most this time, seconds."""
 LATENCY = 0.15
 """Time between seeing and braking, seconds: a period of the lidar and a half."""
 
@@ -84,6 +92,17 @@ class MonitorSettings:
         return abs(speed) * LATENCY + speed**2 / (2.0 * self.deceleration)
 
 
+def within_limit(wanted: Velocity, pose: Pose, zones: Zones, settings: MonitorSettings) -> Velocity:
+    """Return a velocity on the same arc with the speed that slow zones allow at a pose."""
+    x, y, yaw = pose
+    ahead = yaw if wanted.speed >= 0.0 else yaw + math.pi
+    limit = zones.speed_limit((x, y, ahead), settings.deceleration / 2)
+    if abs(wanted.speed) <= limit:
+        return wanted
+    share = limit / abs(wanted.speed)
+    return Velocity(wanted.speed * share, wanted.turn * share)
+
+
 def allowed(wanted: Velocity, seen: Points, settings: MonitorSettings) -> Velocity:
     """Return the velocity nearest to a wanted one, on the same arc, from which the robot can still
     brake.
@@ -111,6 +130,8 @@ class CollisionMonitor(PatrolNode):
         super().__init__('collision_monitor', **node_options)
         self._settings = self.declare_fields(MonitorSettings())
         frames = declared_frames(self, 'base')
+        self._zones = place_zones(self)
+        self._pose: tuple[Pose, float] | None = None
         self._lidar = ScanReader(self, self._settings.radius, frames.base)
         self._wanted = Velocity()
         self._seen: dict[str, Scan] = {}
@@ -130,6 +151,14 @@ class CollisionMonitor(PatrolNode):
         )
         self.create_subscription(Twist, 'cmd_vel', self._on_command, 1)
         self._lidar.subscribe(self._on_scan)
+        StateSubscription(
+            self,
+            PoseWithCovarianceStamped,
+            'amcl_pose',
+            self._on_pose,
+            raw=True,
+            stamp=stamp_of_serialized,
+        )
         self.create_service(SetBool, 'stop', self._on_stop)
         self._tell_stop()
         self.create_timer(UNGUARDED_AFTER, self._look_for_base)
@@ -142,6 +171,24 @@ class CollisionMonitor(PatrolNode):
         self._wanted = Velocity(speed, turn)
         self._base.hear('cmd_vel')
         self._base.command(self._allowed())
+
+    def _on_pose(self, serialized: bytes) -> None:
+        with conversions.refusing(self, 'amcl_pose'):
+            self._pose = pose_of_serialized(serialized), self._ros_time()
+
+    def _ros_time(self) -> float:
+        return float(self.get_clock().now().nanoseconds) / 1e9
+
+    def _pose_now(self) -> Pose | None:
+        """Return where the robot is, as far as it went since its pose was told."""
+        if self._pose is None:
+            return None
+        pose, told = self._pose
+        passed = min(max(self._ros_time() - told, 0.0), LONGEST_GUESS)
+        going = self._base.wanted
+        half = going.turn * passed / 2
+        way = going.speed * passed
+        return composed(pose, (way * math.cos(half), way * math.sin(half), 2 * half))
 
     def _on_scan(self, topic: str, message: LaserScan) -> None:
         with conversions.refusing(self, topic):
@@ -194,6 +241,10 @@ class CollisionMonitor(PatrolNode):
         far = self._settings.reach + self._settings.way_to_stand(velocity.speed)
         # Most of the time nothing is so near that the arc must be looked at.
         near = [scan.points for scan in self._seen.values() if _nearest(scan) <= far]
+        if (self._zones.keep_out or self._zones.slow) and (pose := self._pose_now()):
+            velocity = within_limit(velocity, pose, self._zones, self._settings)
+            edges = self._zones.edges_near(pose, far)
+            near += [edges] if len(edges) else []
         if near:
             velocity = allowed(velocity, np.concatenate(near), self._settings)
         held_back = abs(velocity.speed) < 0.5 * abs(self._wanted.speed)

@@ -15,6 +15,8 @@ from surveillance_runtime import parameter_checks
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.parameters import ParameterError, converted, parameter
 from surveillance_runtime.place.floor_plan import Door, Segment
+from surveillance_runtime.place.rooms import ZONE_TABLES, PlaceError
+from surveillance_runtime.place.zones import Zones, zones_from
 
 EXECUTION_MODES = ('MANUAL', 'RANDOM', 'SIMULATED', 'ROBOT')
 DRIVING_MODES = ('SIMULATED', 'ROBOT')
@@ -233,6 +235,18 @@ def door_segments(node: PatrolNode) -> dict[str, Segment]:
             )
         segments[name] = Door(name, *values).segment
     return segments
+
+
+def place_zones(node: PatrolNode) -> Zones:
+    """Declare and read the zones of the place.
+
+    Raises:
+        ParameterError: A zone is none.
+    """
+    try:
+        return zones_from({table: node.parameters_under(table) for table in ZONE_TABLES})
+    except PlaceError as error:
+        raise ParameterError(f'parameter {error}') from None
 
 
 def place_positions(node: PatrolNode) -> dict[str, Points]:

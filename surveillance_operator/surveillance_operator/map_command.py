@@ -16,6 +16,7 @@ from surveillance_runtime.command_line import EXIT_BAD_INPUT, CommandParser
 from surveillance_runtime.files import RECORD, FileError
 from surveillance_runtime.place import Place, PlaceError, read_place_file
 from surveillance_runtime.place.drawing import Run, draw_place
+from surveillance_runtime.place.filter_masks import write_filter_masks
 from surveillance_runtime.place.floor_plan import FloorPlan
 from surveillance_simulation.world.textures import marker_panel
 
@@ -50,6 +51,9 @@ def graph_over_doors(plan: FloorPlan) -> PatrolGraph:
 def facts(plan: FloorPlan) -> str:
     """Return what there is to say about a place in one line."""
     parts = [_count(len(plan.place.rooms), 'place'), _count(len(plan.place.doors), 'door')]
+    zones = len(plan.zones.keep_out) + len(plan.zones.slow)
+    if zones:
+        parts.append(_count(zones, 'zone'))
     if plan.markers:
         parts.append(_count(len(plan.markers), 'marker'))
     tour = graph_over_doors(plan).tour
@@ -158,6 +162,12 @@ def _parse(argv: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument(
         '-o', '--output', type=Path, metavar='PNG', help='the picture (default: FILE.png here)'
     )
+    parser.add_argument(
+        '--nav2-masks',
+        type=Path,
+        metavar='FOLDER',
+        help="write the place's zones as masks of Nav2's costmap filters",
+    )
     return parser.parse_args(argv)
 
 
@@ -193,7 +203,15 @@ def _draw(options: argparse.Namespace) -> list[str]:
         picture.save(output)
     except OSError as error:
         raise ValueError(f'{output}: {error.strerror or error}') from None
-    return [*lines, f'drawn: {output}']
+    lines.append(f'drawn: {output}')
+    if options.nav2_masks is not None:
+        if not (plan.zones.keep_out or plan.zones.slow):
+            raise ValueError(
+                f'{options.place}: has no zones: expected keep_out_zones or slow_zones'
+            )
+        written = write_filter_masks(plan, options.nav2_masks)
+        lines += [f'written: {path}' for path in written]
+    return lines
 
 
 def main(argv: Sequence[str] | None = None) -> int:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from geometry_msgs.msg import Twist
+from geometry_msgs.msg import PoseWithCovarianceStamped, Twist
 from sensor_msgs.msg import LaserScan
 
 from surveillance_controllers import collision_monitor_node
@@ -17,7 +17,7 @@ from surveillance_controllers.collision_monitor_node import (
     allowed,
 )
 from surveillance_controllers.motion.path_following import Velocity
-from surveillance_runtime.qos import SENSOR_QOS
+from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
 
 ROBOT = MonitorSettings(radius=0.25, margin=0.05, deceleration=0.8)
 
@@ -124,3 +124,33 @@ def test_two_lidars_on_one_topic_are_told_of_once(graph: Any) -> None:
     graph.until(warnings)
     assert len(warnings()) == 1
     assert "the frames 'front' and 'back' share the topic" in warnings()[0]
+
+
+def test_no_command_enters_a_keep_out_zone_or_is_fast_in_a_slow_one(graph: Any) -> None:
+    graph.add(
+        CollisionMonitor,
+        {
+            'keep_out_zones.Z': [2.0, -1.0, 3.0, -1.0, 3.0, 1.0, 2.0, 1.0],
+            'slow_zones.S': [0.2, -3.0, -1.0, -1.0, -1.0, -1.0, 1.0, -3.0, 1.0],
+        },
+    )
+    told = graph.listen(Twist, 'cmd_vel_monitored', 1)
+    commands = graph.node.create_publisher(Twist, 'cmd_vel', 1)
+    scans = graph.node.create_publisher(LaserScan, 'scan', SENSOR_QOS)
+    poses = graph.node.create_publisher(PoseWithCovarianceStamped, 'amcl_pose', STATE_QOS)
+    command = Twist()
+    command.linear.x = 0.5
+
+    def at(x: float) -> float:
+        pose = PoseWithCovarianceStamped()
+        pose.header.stamp = graph.node.get_clock().now().to_msg()
+        pose.pose.pose.position.x, pose.pose.pose.orientation.w = x, 1.0
+        poses.publish(pose)
+        scans.publish(LaserScan(angle_min=-0.2, angle_increment=0.02, range_max=8.0, ranges=[5.0]))
+        commands.publish(command)
+        return told[-1].linear.x if told else math.nan
+
+    graph.until(lambda: at(0.0) == 0.5)
+    graph.until(lambda: at(1.74) < 0.1)
+    graph.until(lambda: at(-2.0) == pytest.approx(0.2))
+    graph.until(lambda: at(0.0) == 0.5)

@@ -18,6 +18,7 @@ from surveillance_controllers.planning.grid_planning import (
     PlanningParameters,
 )
 from surveillance_runtime.place.occupancy_grid import Grid, distance_to, drawn_lines, with_walls
+from surveillance_runtime.place.zones import zones_from
 
 RESOLUTION = 0.05
 ROBOT = PlanningParameters(radius=0.2)
@@ -265,3 +266,37 @@ def test_what_comes_and_goes_leaves_the_costs_as_a_fresh_planner_has_them(flat: 
     planner.set_closed({})
     planner.set_obstacles([])
     np.testing.assert_allclose(planner.cost, untouched, atol=1e-5)
+
+
+def test_a_way_goes_round_a_keep_out_zone_and_out_of_it() -> None:
+    grid = Grid(np.zeros((80, 160), np.int8), RESOLUTION)
+    zones = zones_from({'keep_out_zones': {'Z': [3.5, 1, 4.5, 1, 4.5, 4, 3.5, 4]}})
+    zone = zones.keep_out['Z']
+    planner = GridPlanner(grid, ROBOT, zones=zones)
+    path = planner.plan((1, 3), (7, 3))
+    samples = geometry.equally_spaced(path, 0.05)
+    assert min(zone.distance(point) for point in samples.tolist()) >= ROBOT.radius
+    with pytest.raises(NoPathError, match='lies in the keep-out zone Z'):
+        planner.plan((1, 3), (4, 2))
+    with pytest.raises(NoPathError, match=r'is 0\.1. m from the keep-out zone Z'):
+        planner.plan((1, 3), (3.36, 2))
+    # Who is in it is let out by a short way, which is not barred by the zone itself.
+    out = planner.plan((3.7, 2.5), (7, 3))
+    inside = zone.contains(geometry.equally_spaced(out, 0.02)).sum() * 0.02
+    assert inside < 1.2
+    # Whole across: no way leads past it.
+    wide = zones_from({'keep_out_zones': {'Z': [3.5, -1, 4.5, -1, 4.5, 5, 3.5, 5]}})
+    with pytest.raises(NoPathError, match='the keep-out zone Z is in the way'):
+        GridPlanner(grid, ROBOT, zones=wide).plan((1, 3), (7, 3))
+
+
+def test_a_way_round_a_slow_zone_is_taken_where_it_is_faster() -> None:
+    grid = Grid(np.zeros((100, 160), np.int8), RESOLUTION)
+
+    def through(speed: float) -> float:
+        zones = zones_from({'slow_zones': {'Z': [speed, 3, 1, 5, 1, 5, 4, 3, 4]}})
+        path = GridPlanner(grid, ROBOT, zones=zones).plan((1, 2.5), (7, 2.5))
+        return 0.05 * zones.slow['Z'].contains(geometry.equally_spaced(path, 0.05)).sum()
+
+    assert through(0.5) == pytest.approx(2.0, abs=0.1)
+    assert through(0.1) < 0.2, 'a corner at most'

@@ -19,6 +19,7 @@ from surveillance_controllers.planning.door_watch import DoorWatch
 from surveillance_controllers.planning.grid_planning import NoPathError
 from surveillance_controllers.planning.map_planner import route
 from surveillance_runtime.place.floor_plan import Door
+from surveillance_runtime.place.zones import zones_from
 
 
 @pytest.fixture
@@ -318,3 +319,33 @@ def test_a_door_whose_room_was_taken_from_the_map_is_not_closed_by_that(graph: A
     assert doors.closed({'D1': {'C', 'R'}, 'D2': {'C'}, 'D3': {'E'}}) == {'D2'}, 'E is still there'
     assert doors.closed({'D1': {'C'}, 'D2': {'C', 'E'}}) == set(), 'R is not'
     assert doors.closed({}) == set(), 'nothing is known'
+
+
+def test_a_drive_obeys_zones(flat: Any) -> None:
+    """The straight way is barred, and the way round leads through a slow zone."""
+    zones = zones_from(
+        {
+            'keep_out_zones': {'Z': [2.2, 1.0, 2.6, 1.0, 2.6, 2.0, 2.2, 2.0]},
+            'slow_zones': {'S': [0.15, 0.0, 0.0, 1.6, 0.0, 1.6, 3.0, 0.0, 3.0]},
+        }
+    )
+    navigator = Navigator({'D1': flat.DOOR}, zones=zones)
+    navigator.set_positions(flat.POSITIONS)
+    navigator.set_map(flat.grid)
+    true = (0.6, 1.5, 0.0)
+    navigator.move(true)
+    navigator.task = Drive([[0.6, 1.5], [5.5, 1.5]])
+    fastest = 0.0
+    for step in range(200):
+        velocity = navigator.see(flat.scan(true), 0.1 * step)
+        assert velocity is not None
+        if true[0] < 1.55:
+            assert velocity.speed <= 0.16
+        fastest = max(fastest, velocity.speed)
+        if navigator.task.state is not State.DRIVING:
+            break
+        true = composed(true, (velocity.speed * 0.1, 0.0, velocity.turn * 0.1))
+        navigator.move(true)
+    assert fastest > 0.2, 'outside it drives on faster'
+    assert navigator.task.state is State.WAITING, 'the zone stands in the way'
+    assert 2.2 - true[0] >= 0.22

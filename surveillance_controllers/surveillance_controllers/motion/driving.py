@@ -146,6 +146,7 @@ class Drive:
         *,
         movers: Sequence[Mover] = (),
         lost: bool = False,
+        limit: float = math.inf,
     ) -> Velocity:
         """Decide the velocity for the next moment.
 
@@ -155,9 +156,11 @@ class Drive:
             seen: What the lidar sees, robot's frame, shape (n, 2), metres.
             movers: What moves, robot's frame.
             lost: The pose is not to be trusted; the robot stands still and looks.
+            limit: Top speed here, m/s.
         """
         dt = 0.0 if self._now is None else max(0.0, now - self._now)
         self._now = now
+        self._follower.limit = limit
         turned, moved = self._motion(pose)
         if movers:
             self._moved_at = now

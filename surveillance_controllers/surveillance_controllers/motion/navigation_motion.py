@@ -28,6 +28,7 @@ from surveillance_controllers.controller_parameters import (
     NavigationSettings,
     door_segments,
     place_positions,
+    place_zones,
 )
 from surveillance_controllers.geometry import Points, Pose, Scan, point_of
 from surveillance_controllers.map_knowledge import MapKnowledge
@@ -92,7 +93,9 @@ class NavigationMotion:
         self._settings = node.declare_fields(NavigationSettings(), mode='SIMULATED and ROBOT')
         self._frames = declared_frames(node, 'map', 'odom', 'base', 'transform_tolerance')
         self._lidar = ScanReader(node, self._robot.radius, self._frames.base)
-        self._navigator = navigator or Navigator(door_segments(node), guesses=[settings.station])
+        self._navigator = navigator or Navigator(
+            door_segments(node), guesses=[settings.station], zones=place_zones(node)
+        )
         self._navigator.before_search = self._stand_for_search
         self._stands_for_search = False
         self._lock = threading.RLock()

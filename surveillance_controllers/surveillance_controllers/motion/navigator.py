@@ -23,6 +23,7 @@ from surveillance_controllers.motion.place_regions import PlaceMap
 from surveillance_controllers.motion.tracking import Mover, Tracker
 from surveillance_runtime.place.floor_plan import Segment
 from surveillance_runtime.place.occupancy_grid import Grid, with_walls
+from surveillance_runtime.place.zones import NO_ZONES, Zones
 
 SETTLE_SECONDS = 0.2
 """A place counts once the robot has been in it for this long, so that a doorway does not
@@ -38,6 +39,10 @@ OTHER_LIDAR = 0.5
 """What another lidar saw counts for so long, seconds."""
 MOVER_REACH = 3.5
 """Who moves within this distance is driven around, metres."""
+ZONE_REACH = 2.0
+"""Keep-out zones within this distance are looked at, metres."""
+SLOWING = 0.5
+"""With which the robot slows down before a slow zone, m/s^2; less than its acceleration."""
 MOVER_GAP = 0.15
 """Nearer than this to what the map has, a point belongs to nothing that moves, metres."""
 
@@ -48,6 +53,7 @@ class Navigator:
     Args:
         doors: All doors by name, as segments; they divide the map into places.
         guesses: Where the robot may be at first, beside where its odometry says.
+        zones: Where the robot is not to drive, or slowly.
 
     Attributes:
         task: What is carried out at the moment.
@@ -62,7 +68,9 @@ class Navigator:
         self,
         doors: Mapping[str, Segment] | None = None,
         guesses: Iterable[Pose] = (),
+        zones: Zones = NO_ZONES,
     ) -> None:
+        self._zones = zones
         self._doors = dict(doors or {})
         self._closed: frozenset[str] = frozenset()
         self._guesses = tuple(guesses)
@@ -224,12 +232,15 @@ class Navigator:
         if self.stands:
             return None if self.task is None else Velocity()
         if isinstance(self.task, Drive):
+            # A keep-out zone stands in the way as a wall does that the lidar sees.
+            edges = self._zones.edges_near(pose, ZONE_REACH)
             return self.task.step(
                 now - self._stood,
                 pose,
-                seen,
+                np.concatenate([seen, edges]) if len(edges) else seen,
                 movers=self._movers_near(pose),
                 lost=self._localiser.lost,
+                limit=self._zones.speed_limit(pose, SLOWING),
             )
         if isinstance(self.task, Spin):
             return self.task.step(pose[2])

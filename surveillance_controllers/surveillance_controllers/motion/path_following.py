@@ -100,6 +100,7 @@ class PathFollower:
     Attributes:
         path: Its points that are not all the same, shape (m, 2), metres.
         progress: Way along the path done so far, metres.
+        limit: Top speed for the moment, m/s, where that is less than the robot's.
     """
 
     def __init__(self, path: ArrayLike, parameters: DriveParameters | None = None) -> None:
@@ -111,6 +112,7 @@ class PathFollower:
         self._steps = np.diff(self.path, axis=0)
         self._lengths = np.diff(self._along)
         self.progress = 0.0
+        self.limit = math.inf
         self._velocity = Velocity()
         self._acceleration = 0.0
 
@@ -142,6 +144,7 @@ class PathFollower:
         curvature = 2 * math.sin(side) / distance
         wanted = min(
             p.speed,
+            self.limit,
             math.sqrt(2 * p.acceleration * max(remaining, 0.0)),
             max(remaining / p.settle, p.creep),
         )
@@ -150,7 +153,7 @@ class PathFollower:
         beside = _nearest(seen) - p.radius
         if beside < p.caution:
             wanted *= max(beside, 0.0) / p.caution
-        wanted = max(wanted, min(p.creep, remaining / max(dt, 1e-6)))
+        wanted = max(wanted, min(p.creep, self.limit, remaining / max(dt, 1e-6)))
         safe = self._safe_speed(seen, curvature, math.inf)
         blocked = safe < 0.02
         speed = min(self._sped(min(wanted, safe), dt), safe)
@@ -192,7 +195,7 @@ class PathFollower:
         cos, sin = math.cos(pose[2]), math.sin(pose[2])
         wanted = choose(way @ np.array([[cos, -sin], [sin, cos]]), self._velocity)
         turn = self._ramped(self._velocity.turn, wanted.turn, p.turn_acceleration * dt)
-        speed = self._sped(wanted.speed, dt)
+        speed = self._sped(min(max(wanted.speed, -self.limit), self.limit), dt)
         return self._guide(self._safely(speed, turn, seen), turn, False, off_path, dt)
 
     def _at(self, along: Points) -> Points:

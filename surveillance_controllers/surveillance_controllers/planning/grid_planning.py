@@ -5,14 +5,15 @@ not free. Among them, cells near obstacles cost more, so that a path keeps to th
 passage where there is room. `grid_search` finds the cheapest way over the eight neighbours.
 Straight shortcuts that are no dearer replace the steps of the grid, and corners are rounded as far
 as the free space allows. A door or an obstacle that comes or goes changes the costs near it alone.
-What may leave costs more than a usual way round, and does not block.
+What may leave costs more than a usual way round, and does not block. A keep-out zone is as a wall;
+in a slow zone a way costs as much more as it takes longer.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 import cv2
@@ -25,11 +26,20 @@ from surveillance_controllers.geometry import Points
 from surveillance_controllers.planning.grid_search import Cell, GridSearch
 from surveillance_runtime.parameters import parameter
 from surveillance_runtime.place.floor_plan import Segment
-from surveillance_runtime.place.occupancy_grid import Grid, distance_to, points_on, with_walls
+from surveillance_runtime.place.occupancy_grid import (
+    Grid,
+    distance_to,
+    points_on,
+    with_walls,
+    zone_cells,
+)
+from surveillance_runtime.place.zones import NO_ZONES, Zones
 from surveillance_runtime.robot_base import robot_radius
 
 Lines = Mapping[str, Segment]
 
+_DEAREST = 20.0
+"""No slow zone makes a way dearer than this many times."""
 _BLOCKED = 1e4
 """Cost of a blocked cell in the search for what blocks; more than any detour."""
 
@@ -52,6 +62,7 @@ class PlanningParameters:
         waiting: How many times what an open cell costs one does that somebody blocks who may leave;
             past a person these are about as many metres of a way round.
         corner: Longest part of a straight line that rounding a corner may take, metres.
+        cruise: Speed outside of slow zones, with which ways through them are compared, m/s.
     """
 
     radius: float = robot_radius()
@@ -62,6 +73,7 @@ class PlanningParameters:
     goal_shift: float = 1.0
     waiting: float = 100.0
     corner: float = 0.5
+    cruise: float = 0.6
 
 
 @dataclass
@@ -72,11 +84,13 @@ class GridPlanner:
         grid: The map.
         parameters: The robot's size, margins and costs.
         doors: All doors, open or closed: a goal is not moved through one.
+        zones: Where the robot is not to drive, or slowly.
     """
 
     grid: Grid
     parameters: PlanningParameters = field(default_factory=PlanningParameters)
     doors: Lines = field(default_factory=dict)
+    zones: Zones = NO_ZONES
     _closed: Lines = field(default_factory=dict, init=False)
     _staying: Points = field(default_factory=lambda: np.zeros((0, 2)), init=False)
     _leaving: Points = field(default_factory=lambda: np.zeros((0, 2)), init=False)
@@ -85,7 +99,14 @@ class GridPlanner:
 
     def __post_init__(self) -> None:
         p, shape = self.parameters, self.grid.cells.shape
-        self._static = self._distance(~self.grid.free)
+        # From walls alone, and from keep-out zones, too.
+        self._walls = self._static = self._distance(~self.grid.free)
+        if self.zones.keep_out:
+            barred = ~self.grid.free
+            for zone in self.zones.keep_out.values():
+                barred |= zone_cells(self.grid, zone)
+            self._static = self._distance(barred)
+        self._slower = self._times_longer()
         self._reach = math.ceil((p.radius + p.margin + p.comfort) / self.grid.resolution) + 1
         # From what stays, and from everything.
         self._firm, self._clearance = self._static.copy(), self._static.copy()
@@ -154,6 +175,10 @@ class GridPlanner:
         """
         begin: Points = np.asarray(start, dtype=float)[:2]
         end: Points = np.asarray(goal, dtype=float)[:2]
+        if barred := self.zones.barred(end):
+            raise NoPathError(f'the goal {_shown(end)} lies in the keep-out zone {barred.name}')
+        if barred := self.zones.barred(begin):
+            return self._leaving_zone(barred.name).plan(begin, end)
         wanted = self._cell('the goal', end)
         start_cell = self._free_cell_near(begin)
         goal_cell = wanted if self._open[wanted] else self._cell_beside(end, wanted, start_cell)
@@ -170,6 +195,30 @@ class GridPlanner:
         path[-1] = end
         path = self._rounded(self._shortened(path))
         return path if np.array_equal(path[0], begin) else np.vstack([begin, path])
+
+    def _leaving_zone(self, name: str) -> GridPlanner:
+        """Return a planner for a robot in a keep-out zone: it drives out, at a high price."""
+        zones = self.zones
+        out = replace(zones.keep_out[name], speed=self.parameters.cruise / _DEAREST)
+        others = {each: zone for each, zone in zones.keep_out.items() if each != name}
+        leaving = Zones(others, {**zones.slow, name: out})
+        planner = GridPlanner(self.grid, self.parameters, self.doors, leaving)
+        planner.set_closed(self._closed)
+        stay = np.arange(len(self._staying) + len(self._leaving)) < len(self._staying)
+        planner.set_obstacles(np.concatenate([self._staying, self._leaving]), stay)
+        return planner
+
+    def _times_longer(self) -> NDArray[np.float32] | None:
+        """Return how many times longer each cell takes; None where nothing is slow."""
+        if not self.zones.slow:
+            return None
+        longer = np.ones(self.grid.cells.shape, np.float32)
+        for zone in self.zones.slow.values():
+            assert zone.speed is not None
+            times = min(max(self.parameters.cruise / zone.speed, 1.0), _DEAREST)
+            cells = zone_cells(self.grid, zone)
+            longer[cells] = np.maximum(longer[cells], np.float32(times))
+        return longer
 
     def _distance(self, mask: NDArray[np.bool_]) -> NDArray[np.float32]:
         # From a cell's centre to the edge of the nearest cell that is not free.
@@ -229,6 +278,8 @@ class GridPlanner:
         passable, waiting = priced(self._firm)
         blocked = np.where(passable, np.float32(p.waiting) * waiting, np.float32(-1))
         self._cost[window] = np.where(self._open[window], price, blocked)
+        if self._slower is not None:
+            self._cost[window] *= np.where(blocked > 0, self._slower[window], np.float32(1))
 
     def _divide(self) -> None:
         free = (self._cost > 0).astype(np.uint8)
@@ -301,7 +352,7 @@ class GridPlanner:
             return 'lies where the map is unknown'
         needed = self.parameters.radius + self.parameters.margin
         near = f'{max(0.0, float(self._clearance[row, column])):.2f} m from '
-        if self._static[row, column] < needed:
+        if self._walls[row, column] < needed:
             what = 'a wall'
         else:
             what = self._nearest_extra(point)
@@ -309,6 +360,10 @@ class GridPlanner:
 
     def _nearest_extra(self, point: Points) -> str:
         gaps = {
+            f'the keep-out zone {name}': zone.distance((float(point[0]), float(point[1])))
+            for name, zone in self.zones.keep_out.items()
+        }
+        gaps |= {
             f'the closed door {name}': float(
                 np.hypot(*(geometry.equally_spaced(_ends(line), 0.05) - point).T).min()
             )
@@ -324,7 +379,7 @@ class GridPlanner:
         """Name what lies on the path that would be taken if doors and obstacles were not there."""
         needed = np.float32(self.parameters.radius + self.parameters.margin)
         cost = np.where(self._cost > 0, self._cost, np.float32(_BLOCKED))
-        cost = np.where(self._static >= needed, cost, np.float32(-1))
+        cost = np.where(self._walls >= needed, cost, np.float32(-1))
         search = MCP_Geometric(cost)
         try:
             search.find_costs([start], [goal])

@@ -17,7 +17,7 @@ from sensor_msgs.msg import PointCloud2
 from state_machines import Interrupt
 from state_machines.ros import GoalAbortedError, GoalRun
 from surveillance_controllers import conversions
-from surveillance_controllers.controller_parameters import door_segments
+from surveillance_controllers.controller_parameters import door_segments, place_zones
 from surveillance_controllers.geometry import Points, Pose, point_of
 from surveillance_controllers.map_knowledge import MapKnowledge
 from surveillance_controllers.planning.door_watch import DoorWatch
@@ -53,6 +53,7 @@ class NavigationPlanning:
             PlanningParameters(), prefix='planning.', mode='SIMULATED and ROBOT'
         )
         self._segments = door_segments(node)
+        self._zones = place_zones(node)
         self._doors = DoorWatch(node, self._segments, knowledge, peer_timeout)
         self._lock = threading.Lock()
         self._has_map = Interrupt()
@@ -120,7 +121,7 @@ class NavigationPlanning:
     def _on_map(self, message: OccupancyGrid) -> None:
         with conversions.refusing(self._node, 'map'):
             grid = conversions.grid_from(message)
-            planner = GridPlanner(grid, self._parameters, self._segments)
+            planner = GridPlanner(grid, self._parameters, self._segments, self._zones)
             with self._lock:
                 self._planner = planner
             self._has_map.set()

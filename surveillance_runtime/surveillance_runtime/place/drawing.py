@@ -27,6 +27,7 @@ _ROOM, _CORRIDOR, _HOME = '#f6ecd9', '#e3ebf3', '#dff0dc'
 _WALL, _LEAF, _ALARM = '#3a4350', '#b08a57', '#c0392b'
 _GRAPH, _SIGN, _SIGN_HOME = '#7fa3c7', '#2c5d8f', '#2f8a4c'
 _DRIVEN, _PLANNED, _CALM, _LATE = '#14717f', '#8a7fb8', '#fdf9f0', '#f2b287'
+_BARRED, _SLOW = '#c0392b', '#d08a1d'
 _LONGEST_SIDE = 1180.0
 _PANEL = 250
 _WIDEST_NAME = 100.0
@@ -79,6 +80,7 @@ def draw_place(plan: FloorPlan, title: str, facts: str, run: Run | None = None) 
     picture.floors(run)
     if run is None:
         picture.graph()
+    picture.zones()
     picture.walls()
     picture.doors()
     picture.markers()
@@ -141,6 +143,18 @@ class _Picture:
         if name in self._place.recharge_rooms:
             return _HOME
         return _CORRIDOR if len(self._place.rooms[name]) > 1 else _ROOM
+
+    def zones(self) -> None:
+        zones = self._plan.zones
+        for zone in (*zones.slow.values(), *zones.keep_out.values()):
+            colour = _BARRED if zone.speed is None else _SLOW
+            self._canvas.tint(zone.corners, colour, 0.22)
+            outline = [*zone.corners, zone.corners[0]]
+            self._canvas.line(outline, colour, max(1.5, self._canvas.scale / 30), dash=(7, 4))
+            name = zone.name if zone.speed is None else f'{zone.name}: {zone.speed:g} m/s'
+            corner = max(zone.corners, key=lambda each: each[1] - each[0])
+            x, y = self._canvas.at(corner)
+            self._canvas.text((x + 5, y + 4), name, self._size * 0.8, colour)
 
     def walls(self) -> None:
         if self._plan.map is not None:
@@ -307,6 +321,13 @@ class _Picture:
             if run.failures:
                 self._cross(x + 6, y)
                 x += self._word(x + 20, y, 'failure') + 40
+        for zones, colour, text in (
+            (self._plan.zones.keep_out, _BARRED, 'keep out'),
+            (self._plan.zones.slow, _SLOW, 'slow'),
+        ):
+            if zones:
+                self._stroke(x, y, colour, dashed=True)
+                x += self._word(x + 28, y, text) + 46
         if self._plan.markers:
             canvas.box(x, y - 6, x + 12, y + 6, _INK)
             canvas.box(x + 3.5, y - 2.5, x + 8.5, y + 2.5, _PAPER)
@@ -408,6 +429,14 @@ class Canvas:
     def polygon(self, outline: Iterable[Sequence[float]], colour: str) -> None:
         """Fill a polygon given in metres."""
         self._draw.polygon([self._fine(self.at(point)) for point in outline], fill=colour)
+
+    def tint(self, outline: Iterable[Sequence[float]], colour: str, opacity: float) -> None:
+        """Fill a polygon given in metres so that what is below shows through."""
+        mask = Image.new('L', self._image.size)
+        corners = [self._fine(self.at(point)) for point in outline]
+        ImageDraw.Draw(mask).polygon(corners, fill=round(255 * opacity))
+        paint = Image.new('RGB', self._image.size, ImageColor.getrgb(colour))
+        self._image.paste(paint, mask=mask)
 
     def box(self, left: float, top: float, right: float, bottom: float, colour: str) -> None:
         """Fill a rectangle given in points."""

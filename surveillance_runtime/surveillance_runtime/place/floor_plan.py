@@ -17,6 +17,7 @@ import numpy as np
 
 from surveillance_runtime.files import FileError
 from surveillance_runtime.place.rooms import Place, PlaceError, place_from
+from surveillance_runtime.place.zones import NO_ZONES, Zones, zones_from
 
 if TYPE_CHECKING:
     from surveillance_runtime.place.occupancy_map import OccupancyMap
@@ -102,6 +103,7 @@ class FloorPlan:
         station: Pose of the charging station, metres and rad; where the file names none, the point
             of the recharge room.
         map: The map that the file refers to.
+        zones: Where the robot never drives, and where it drives slowly.
     """
 
     place: Place
@@ -112,6 +114,7 @@ class FloorPlan:
     marker_dictionary: str
     station: Pose
     map: OccupancyMap | None = None
+    zones: Zones = NO_ZONES
 
     @classmethod
     def from_parameters(cls, parameters: Mapping[str, Any]) -> FloorPlan:
@@ -153,6 +156,7 @@ class FloorPlan:
             ),
             station=_station(parameters.get('station'), place),
             map=_map_of(parameters),
+            zones=zones_from(parameters),
         )
         plan._check()
         return plan
@@ -209,6 +213,7 @@ class FloorPlan:
         for name in self.doors.keys() - self.place.doors.keys():
             raise PlaceError(('doors', name), 'leads into no place: expected it in the map')
         self._check_markers()
+        self._check_zones()
 
     def _check_markers(self) -> None:
         if self.marker_size <= 0:
@@ -219,6 +224,16 @@ class FloorPlan:
                 raise PlaceError(
                     ('markers', name),
                     f'height {marker.z:g} m: expected 0 to {WALL_HEIGHT:g} m, as high as the walls',
+                )
+
+    def _check_zones(self) -> None:
+        points: list[tuple[tuple[str, ...], Pose]] = [(('station',), self.station)]
+        points += [(('room_positions', room), at) for room, at in self.place.positions.items()]
+        for where, (x, y, _) in points:
+            if zone := self.zones.barred((x, y)):
+                raise PlaceError(
+                    where,
+                    f'({x:g}, {y:g}) lies in the keep-out zone {zone.name}: expected it outside',
                 )
 
     def walls_of(self, door: Door) -> list[Wall]:

@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from surveillance_runtime.place import boxes
 from surveillance_runtime.place.floor_plan import WALL_THICKNESS, FloorPlan, Point
+from surveillance_runtime.place.zones import Zone
 
 FREE = 0
 OCCUPIED = 100
@@ -196,6 +197,20 @@ def drawn_lines(grid: Grid, lines: ArrayLike) -> NDArray[np.bool_]:
         cells = cells[grid.contains(cells)]
         mask[cells[:, 0], cells[:, 1]] = True
     return mask
+
+
+def zone_cells(grid: Grid, zone: Zone) -> NDArray[np.bool_]:
+    """Return the cells of a zone: those whose centre lies inside, and those on its edge."""
+    corners = [*zone.corners, zone.corners[0]]
+    cells = drawn_lines(grid, [(*start, *end) for start, end in pairwise(corners)])
+    west, south, east, north = zone.box
+    bottom, left = np.maximum(grid.cell_of(west, south), 0)
+    top, right = np.maximum(np.add(grid.cell_of(east, north), 1), 0)
+    window = cells[bottom:top, left:right]
+    if window.size:
+        inside = np.argwhere(np.ones_like(window)) + np.array([bottom, left])
+        window |= zone.contains(grid.centres_of(inside)).reshape(window.shape)
+    return cells
 
 
 def with_walls(grid: Grid, lines: ArrayLike) -> Grid:

@@ -12,7 +12,14 @@ import numpy as np
 import numpy.typing as npt
 
 from surveillance_runtime.place.floor_plan import WALL_THICKNESS, FloorPlan
-from surveillance_runtime.place.occupancy_grid import UNKNOWN, distance_to, draw, regions, walled
+from surveillance_runtime.place.occupancy_grid import (
+    UNKNOWN,
+    distance_to,
+    draw,
+    regions,
+    walled,
+    zone_cells,
+)
 from surveillance_runtime.place.rooms import PlaceError
 
 _LARGE = 1.0
@@ -179,7 +186,10 @@ def check_passable(plan: FloorPlan, radius: float) -> None:
     if not plan.is_enclosed:
         return
     grid = draw(plan)
-    clearance = distance_to(~grid.free if plan.map is not None else grid.occupied, grid.resolution)
+    solid = ~grid.free if plan.map is not None else grid.occupied
+    for zone in plan.zones.keep_out.values():
+        solid |= zone_cells(grid, zone)
+    clearance = distance_to(solid, grid.resolution)
     # A cell's centre may be half a cell farther from the wall than the wall's own surface.
     fits = (clearance > radius - grid.resolution / 2).astype(np.uint8)
     pieces = cv2.connectedComponents(fits, connectivity=8)[1]
@@ -191,13 +201,14 @@ def check_passable(plan: FloorPlan, radius: float) -> None:
         if not piece_at(x, y):
             raise PlaceError(
                 ('room_positions', room),
-                f'({x:g}, {y:g}) lies closer than {radius:g} m to a wall: '
+                f'({x:g}, {y:g}) lies closer than {radius:g} m to {_what_bars(plan)}: '
                 'expected room for the robot',
             )
     for name, door in plan.doors.items():
         if not piece_at(door.x, door.y):
             raise PlaceError(
-                ('doors', name), f'a wall stands in it: expected {door.width:g} m free'
+                ('doors', name),
+                f'{_what_bars(plan)} stands in it: expected {door.width:g} m free',
             )
     start = piece_at(*plan.start[:2])
     for room, (x, y, _) in plan.place.positions.items():
@@ -205,5 +216,9 @@ def check_passable(plan: FloorPlan, radius: float) -> None:
             raise PlaceError(
                 ('room_positions', room),
                 f'a robot of {2 * radius:g} m cannot drive there from {plan.place.start}: '
-                'expected no wall in the way',
+                f'expected no {_what_bars(plan)[2:]} in the way',
             )
+
+
+def _what_bars(plan: FloorPlan) -> str:
+    return 'a wall or a keep-out zone' if plan.zones.keep_out else 'a wall'

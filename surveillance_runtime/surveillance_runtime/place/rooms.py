@@ -17,14 +17,15 @@ from surveillance_runtime.suggestions import nearest
 from surveillance_runtime.yaml_file import KeyPath
 
 PLACE_KEYS = ('map', 'room_positions', 'robot_room', 'recharge_rooms')
+ZONE_TABLES = ('keep_out_zones', 'slow_zones')
 GEOMETRY_KEYS = (
-    *('walls', 'doors', 'markers', 'marker_size', 'marker_dictionary', 'station'),
+    *('walls', 'doors', 'markers', 'marker_size', 'marker_dictionary', 'station', *ZONE_TABLES),
     *('map_file', 'map_file_resolution', 'map_file_origin'),
 )
 PATROL_TABLES = ('thresholds', 'exploration', 'hours')
 PATROL_KEYS = (*PATROL_TABLES, 'keep_out', 'quiet_hours', 'time_zone')
-PLACE_TABLES = ('map', 'room_positions', 'walls', 'doors', 'markers', *PATROL_TABLES)
-"""Those that hold an entry for each room, wall, door or marker: `map.R1`, `map.R2`, ..."""
+PLACE_TABLES = ('map', 'room_positions', 'walls', 'doors', 'markers', *ZONE_TABLES, *PATROL_TABLES)
+"""Those that hold an entry for each room, wall, door, marker or zone: `map.R1`, `map.R2`, ..."""
 _NAME = re.compile(r'[A-Za-z_][A-Za-z0-9_-]*\Z')
 
 Position = tuple[float, float, float]
