@@ -27,7 +27,7 @@ import time
 from collections.abc import Callable, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
@@ -165,7 +165,10 @@ def _service_rows(label: str, store: Any, rounds: int, *, worlds: bool = False) 
     ontology.build(read_place_file(PLACE).place, str(DATA / 'surveillance.owl'), IRI, 2_000_000_000)
     ontology.record_place('E', 2_000_000_000)
     corridors = f'SELECT ?x WHERE {{ ?x a <{IRI}#CORRIDOR> }}'
-    calls = {'one visit (7 directives)': Visit(client), **single_calls(client)}
+    calls: dict[str, Callable[[], Any]] = {
+        'one visit (7 directives)': Visit(client),
+        **single_calls(client),
+    }
     taken = medians(calls, rounds)
     taken |= medians({'QUERY SPARQL, repeated': lambda: client.query.sparql(corridors)}, 50)
     service.close()
@@ -188,7 +191,7 @@ class MappedVisit:
         """Go to a neighbour, and ask what a decision asks."""
         ask, patrol = self._client.request, self._patrol
         _, come, _ = patrol.step()
-        is_in, now, visited = come
+        is_in, now, visited = cast(tuple[Any, Any, Any], come)
         seen, time_now = visited.literal.lexical, now.literal.lexical
         answer = self._client.batch(
             [

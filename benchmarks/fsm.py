@@ -214,7 +214,7 @@ def run_transitions_library(count: int) -> Callable[[], object]:
     def work() -> None:
         while model.left:
             model.left -= 1
-            model.next()
+            model.next()  # type: ignore[attr-defined]
 
     return work
 

@@ -83,7 +83,7 @@ def _idle_ways(
     leaving = legs.row == here
     first[legs.col[leaving]] = weights[leaving]
     backwards = csr_array((weights, (legs.col, legs.row)), shape=legs.shape)
-    return first, dijkstra(backwards, indices=goal)
+    return first, dijkstra(backwards, indices=goal)  # type: ignore[call-overload]
 
 
 def cycle(world: World, allowed: Sequence[str], energy: Energy | None = None) -> Scores:

@@ -122,7 +122,11 @@ def main() -> int:
         missed: set[str] = set()
         for camera in cameras:
             report = InitialScan().run(
-                camera, camera.report, lambda camera=camera: camera.now, str, lambda: False
+                camera,
+                camera.report,
+                lambda camera=camera: camera.now,
+                lambda words: None,
+                lambda: False,
             )
             missed |= report.missing.keys()
         slowest = max(cameras, key=lambda camera: camera.now)

@@ -137,7 +137,13 @@ def rendered(samples: int) -> Iterator[Shown]:
         for distance, degrees in ((7, 0), (8, 30), (5, 60), (2, 75), (3, 80)):
             shown = [panel(distance, degrees, generator)]
             yield scene(shown, indoors(generator), SHARP, generator), shown
-        for change in ({'blur': 2.4}, {'motion': 8.0}, {'noise': 40.0}, {'light': 0.04}):
+        changes: tuple[dict[str, Any], ...] = (
+            {'blur': 2.4},
+            {'motion': 8.0},
+            {'noise': 40.0},
+            {'light': 0.04},
+        )
+        for change in changes:
             shown = [panel(3, 30, generator)]
             yield scene(shown, indoors(generator), replace(SHARP, **change), generator), shown
         for light in LIGHTS:

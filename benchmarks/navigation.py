@@ -127,7 +127,7 @@ def planning(*, quick: bool) -> None:
             peer = f'{median_ms(lambda f=free, a=first, b=last: _networkx(f, a, b), 0.0):.0f}'
         reference = '-'
         if side <= 500:
-            best = _optimum(free, first, last) * grid.resolution
+            best = _optimum(free, first, last) * grid.resolution  # type: ignore[arg-type]
             reference = f'{best:.2f}'
         bare_length = geometry.length(grid.centres_of(np.array(search())))
         rows.append(

@@ -110,9 +110,9 @@ class Patrol:
                 yield ObjectPropertyAssertion(named('hasDoor'), place, door)
             yield self._visit(place)
         yield DifferentIndividuals(frozenset(self.doors))
-        doors = frozenset(door for doors in self.doors.values() for door in doors)
-        if len(doors) > 1:
-            yield DifferentIndividuals(doors)
+        all_doors = frozenset(door for doors in self.doors.values() for door in doors)
+        if len(all_doors) > 1:
+            yield DifferentIndividuals(all_doors)
         yield self._is_in()
         yield self._now()
         yield DataPropertyAssertion(named('urgencyThreshold'), self.robot, seconds(self.threshold))

@@ -329,7 +329,7 @@ def print_photos(folder: Path | None, every: int) -> None:
 def _found_in(photographs: Sequence[Photograph]) -> list[str]:
     """Return how many markers each detector found, all together found, and what else we did."""
     found, union, others = Counter[str](), 0, Counter[str]()
-    seconds = Counter[str]()
+    seconds: dict[str, float] = defaultdict(float)
     for photograph in photographs:
         seen: dict[str, set[int]] = {}
         for name in PHOTO_DETECTORS:
@@ -390,7 +390,8 @@ def print_poses(count: int) -> None:
             else pose.position
         ),
     }
-    far, none, seconds = (Counter[str]() for _ in range(3))
+    far, none = Counter[str](), Counter[str]()
+    seconds: dict[str, float] = defaultdict(float)
     generator = np.random.default_rng(41)
     for _ in range(count):
         shown = Panel(

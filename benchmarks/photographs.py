@@ -130,9 +130,9 @@ def _linear(gain: float, offset: float) -> Callable[[Photograph], Photograph]:
     return lambda photo: photo.painted(lambda image: gain * image.astype(float) + offset)
 
 
-def _compressed(image: Image) -> npt.ArrayLike:
+def _compressed(image: Image) -> Image:
     packed = cv2.imencode('.jpg', image, (cv2.IMWRITE_JPEG_QUALITY, 30))[1]
-    return cv2.imdecode(packed, cv2.IMREAD_COLOR)
+    return np.asarray(cv2.imdecode(packed, cv2.IMREAD_COLOR), np.uint8)
 
 
 def _noisy(image: Image) -> npt.ArrayLike:

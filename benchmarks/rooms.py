@@ -18,6 +18,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -129,10 +130,10 @@ def main() -> int:
     methods: dict[str, Callable[[Image, float], Labels]] = {'watershed': peer, 'ours': ours}
     results: dict[tuple[str, str, str], list[tuple[float, ...]]] = {}
     for name in names[:3] if options.quick else names:
-        drawn = cv2.imread(str(options.folder / (name + TRUTH)), cv2.IMREAD_GRAYSCALE)
+        drawn: Any = cv2.imread(str(options.folder / (name + TRUTH)), cv2.IMREAD_GRAYSCALE)
         truth = true_rooms(drawn)
         for kind, ending in (('empty', '.png'), ('furnished', '_furnitures.png')):
-            image = cv2.imread(str(options.folder / (name + ending)), cv2.IMREAD_GRAYSCALE)
+            image: Any = cv2.imread(str(options.folder / (name + ending)), cv2.IMREAD_GRAYSCALE)
             for variant, side, other, true in variants(image, truth, options.turned):
                 for method, find in methods.items():
                     begin = time.perf_counter()

@@ -121,7 +121,7 @@ def holds(value: Any, depth: int = 3) -> bool:
     if isinstance(value, dict):
         return any(holds(item, depth - 1) for item in list(value.values())[:50])
     if type(value).__module__.startswith(('surveillance_', 'rcl_interfaces')):
-        names = getattr(value, '__dataclass_fields__', None) or getattr(value, '__slots__', ())
+        names: Any = getattr(value, '__dataclass_fields__', None) or getattr(value, '__slots__', ())
         if 0 < len(names) <= MOST_FIELDS:
             return any(holds(getattr(value, name, None), depth - 1) for name in names)
     return False

@@ -280,8 +280,20 @@ def _lint(argv: list[str]) -> int:
     _enter(['lint'], extras=('test', 'lint'))
     import subprocess
 
+    tests = ['mypy', '--config-file', 'tests/mypy.ini']
+    # Each library's tests are modules of the same names: they are checked by themselves.
+    libraries = [
+        [str(each.relative_to(CHECKOUT) / part) for part in ('tests', 'examples')]
+        for each in sorted((CHECKOUT / 'libs').iterdir())
+    ]
     code = 0
-    for words in (['ruff', 'check'], ['ruff', 'format', '--check'], ['mypy']):
+    for words in (
+        ['ruff', 'check'],
+        ['ruff', 'format', '--check'],
+        ['mypy'],
+        [*tests, 'tests', 'benchmarks', 'examples', 'docs'],
+        *([*tests, *folders] for folders in libraries),
+    ):
         print('+', *words, flush=True)
         done = subprocess.run([sys.executable, '-m', *words], cwd=CHECKOUT, check=False)
         code = code or done.returncode

@@ -182,11 +182,11 @@ class MissionActions:
 
     def set_threshold(self, seconds: str) -> str:
         """Set after how long a place is URGENT, seconds."""
-        return self.set_parameter(BEHAVIOUR, 'urgency_threshold', str(seconds))
+        return self.set_parameter(BEHAVIOUR, 'urgency_threshold', seconds)
 
     def set_policy(self, policy: str) -> str:
         """Set how a place is chosen among those that the rules allow."""
-        return self.set_parameter(BEHAVIOUR, 'policy', str(policy))
+        return self.set_parameter(BEHAVIOUR, 'policy', policy)
 
     def parameters(self, node: str) -> dict[str, Any]:
         """Return the values that a node's parameters have now, by name."""

@@ -72,7 +72,7 @@ def test_a_robot_pushed_off_its_station_goes_back_to_it_at_once(machine: str) ->
     charging = {'surveillance': 'PERFORM_ROOM_TASKS', 'patrol': 'RechargeRoutine'}[machine]
 
     def push() -> None:
-        states = run.machine[charging].get_active_states()
+        states = run.machine[charging].get_active_states()  # type: ignore[attr-defined]
         if not pushed and states in (['RECHARGE_TASK'], ['Recharge']) and world.level > 50.0:
             pushed.append(world.clock.time)
             world.push('C1')

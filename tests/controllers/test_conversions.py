@@ -64,7 +64,7 @@ def test_clouds_come_back(points: list[tuple[float, float]]) -> None:
     cloud = cloud_from_points(array, stays=stays)
     assert cloud.width == len(points)
     assert points_from_cloud(cloud) == pytest.approx(array, abs=1e-4)
-    assert np.array_equal(values_from_cloud(cloud, 'stays'), stays)
+    assert np.array_equal(values_from_cloud(cloud, 'stays'), stays)  # type: ignore[arg-type]
     assert values_from_cloud(cloud, 'intensity') is None
 
 

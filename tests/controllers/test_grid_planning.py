@@ -234,7 +234,7 @@ def test_distances_and_lines_on_a_grid() -> None:
     assert distance[40, 1] == pytest.approx(RESOLUTION)
     assert np.isinf(distance_to(np.zeros((3, 3), bool), 1.0)).all()
     line = drawn_lines(grid, [(1, 1, 2, 1.6)])
-    assert line.any(axis=0)[20:40].all()
+    assert line.any(axis=0)[20:40].all()  # type: ignore[index]
     assert grid.interpolated(distance, grid.centres_of([(40, 1)])) == pytest.approx(RESOLUTION)
 
 

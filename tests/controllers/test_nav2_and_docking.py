@@ -103,8 +103,9 @@ def nav2(graph: Any, recorder: Any = None, flat: Any = None) -> nav2_motion.Nav2
     settings: Any = SimpleNamespace(peer_timeout=1.0)
     knowledge: Any = Knowledge({} if flat is None else flat.POSITIONS)
     doors = {} if flat is None else {'doors.D': [4.05, 1.5, np.pi / 2, 1.0]}
+    taken: Any = recorder or Recorder()
     node = graph.add(PatrolNode, doors, name='motion_controller')
-    return nav2_motion.Nav2Motion(node, knowledge, recorder or Recorder(), settings)
+    return nav2_motion.Nav2Motion(node, knowledge, taken, settings)
 
 
 def at(x: float, y: float) -> Any:

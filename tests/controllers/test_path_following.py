@@ -81,7 +81,7 @@ def test_any_path_is_followed_to_its_end_within_its_corridor(path: np.ndarray, y
 
 
 def test_a_straight_path_is_driven_straight_and_mostly_at_top_speed() -> None:
-    poses, velocities, arrived = follow(np.array([[0.0, 0], [6, 0]]), (0, 0, 0))
+    poses, velocities, arrived = follow(np.array([[0.0, 0.0], [6.0, 0.0]]), (0, 0, 0))
     assert arrived
     assert max(abs(y) for _, y, _ in poses) < 1e-6
     assert len(poses) * PERIOD < 6 / ROBOT.speed + 4
@@ -95,7 +95,7 @@ def test_a_path_of_one_point_where_the_robot_stands_is_done_at_once() -> None:
 @pytest.mark.parametrize('distance', [0.8, 1.5, 3.0])
 @pytest.mark.parametrize('lag', [0, 2])
 def test_the_robot_stops_before_what_it_sees(distance: float, lag: int) -> None:
-    follower = PathFollower([[0.0, 0], [6, 0]], ROBOT)
+    follower = PathFollower([[0.0, 0.0], [6.0, 0.0]], ROBOT)
     pose = (0.0, 0.0, 0.0)
     waiting = [Velocity()] * lag
     wall = np.stack([np.full(41, distance), np.linspace(-1, 1, 41)], axis=1)
@@ -113,7 +113,7 @@ def test_the_robot_stops_before_what_it_sees(distance: float, lag: int) -> None:
 
 def at_top_speed() -> PathFollower:
     """Return a follower of a straight path that has come up to speed, at (3, 0)."""
-    follower, pose = PathFollower([[0.0, 0], [6, 0]], ROBOT), (0.0, 0.0, 0.0)
+    follower, pose = PathFollower([[0.0, 0.0], [6.0, 0.0]], ROBOT), (0.0, 0.0, 0.0)
     while pose[0] < 3.0:
         pose = moved(pose, follower.step(pose, NOTHING, PERIOD).velocity)
     return follower
@@ -139,7 +139,7 @@ def test_a_robot_that_halts_before_a_wall_does_not_do_so_gently() -> None:
 def test_what_is_beside_the_way_does_not_stop_the_robot() -> None:
     beside = np.array([[x, side * 0.3] for x in np.arange(-1, 3, 0.05) for side in (-1, 1)])
     assert room_ahead(beside, 0.0, ROBOT.radius + ROBOT.margin, 2.0) == 2.0
-    follower = PathFollower([[0.0, 0], [2, 0]], ROBOT)
+    follower = PathFollower([[0.0, 0.0], [2.0, 0.0]], ROBOT)
     assert not follower.step((0, 0, 0), beside, PERIOD).blocked
 
 

@@ -8,5 +8,5 @@ from pathlib import Path
 from launcher import cli
 
 cli.RUNS = Path(sys.argv[1])
-cli._enter = lambda argv: None
+cli._enter = lambda argv, extras=(): None
 sys.exit(cli.main(sys.argv[2:]))

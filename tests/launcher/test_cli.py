@@ -42,6 +42,7 @@ from tests.launcher.conftest import ROOT
     ],
 )
 def test_a_wrong_command_line_is_one_line_and_exit_code_2(arguments, wrong, capsys):
+    code: object
     try:
         code = main(arguments)
     except SystemExit as ended:

@@ -62,7 +62,7 @@ class Configured:
 @pytest.fixture
 def start(monkeypatch, tmp_path):
     """Return what runs the launch file with some arguments and gives the nodes it starts."""
-    stand_ins = {
+    stand_ins: dict[str, dict[str, Any]] = {
         'launch': {'LaunchContext': dict, 'LaunchDescription': list},
         'launch.actions': {
             'DeclareLaunchArgument': Argument,

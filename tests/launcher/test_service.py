@@ -22,7 +22,7 @@ MISSION = str(Path(__file__).with_name('mission_process.py'))
 def test_the_unit_runs_the_command_line_that_was_asked_for():
     text = unit_text(Path('/home/a b/50%'), ['--mode', 'RANDOM', '--alarm', 'mail $ME \\t'], 4096)
     parser = configparser.RawConfigParser(strict=False)
-    parser.optionxform = str
+    parser.optionxform = str  # type: ignore[assignment]
     parser.read_string(text)
     service = parser['Service']
     assert service['ExecStart'].endswith(

@@ -201,7 +201,7 @@ def simulated_time(graph: Any, monkeypatch: pytest.MonkeyPatch) -> Iterator[Simu
         told = _ToldOf(ended_by, lambda: driver.fell_asleep(self.now() + seconds, ended_by))
         in_time = False
         try:
-            in_time = sleep(self, seconds, told)
+            in_time = sleep(self, seconds, told)  # type: ignore[arg-type]
             return in_time
         finally:
             driver.woke_up(in_time=in_time)

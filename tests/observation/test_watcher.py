@@ -57,7 +57,7 @@ def beams(
     if shut:
         across = np.abs(points[..., 0] - DOOR[0]) < 0.03
         blocked |= across & (points[..., 1] > DOOR[1]) & (points[..., 1] < DOOR[3])
-    met = blocked.any(axis=1)
+    met = np.asarray(blocked.any(axis=1))
     lengths = np.where(met, steps[blocked.argmax(axis=1)], 8.0)
     lengths += np.random.default_rng(seed).normal(0.0, 0.01, len(lengths)) * met
     return np.asarray(sensor) + rays * lengths[:, None], met
@@ -111,6 +111,7 @@ def test_a_box_that_appears_is_an_event_with_a_picture_until_it_is_gone(tmp_path
     watch.visit('R1', HERE, boxes=[(1.5, 1.5, 0.15)])
     (event,) = watch.book.events
     assert (event.kind, event.seen, event.place) == (Kind.OBJECT, 'appeared', 'R1')
+    assert event.position is not None
     assert math.dist(event.position, (1.5, 1.5)) < 0.2
     assert watch.alerts
     picture = cv2.imread(str(tmp_path / event.evidence[0]))

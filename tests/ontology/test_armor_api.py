@@ -201,7 +201,7 @@ class Answers(InProcessTransport):
         self.sent: list[DirectiveRequest] = []
         self._answer = answer
 
-    def call(self, request: DirectiveRequest) -> DirectiveResponse:
+    def call(self, request: Any) -> DirectiveResponse:
         self.sent.append(request)
         if isinstance(self._answer, Exception):
             raise self._answer

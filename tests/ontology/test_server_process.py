@@ -34,7 +34,7 @@ def test_a_killed_server_comes_back_with_what_it_answered_and_clients_go_on(
         server.send_signal(signal.SIGKILL)
         server.wait()
         server = start(tmp_path / 'store')
-        armor.transport.timeout = 1.0
+        armor.transport.timeout = 1.0  # type: ignore[attr-defined]
 
         def reached() -> list[str] | None:
             try:

@@ -46,7 +46,7 @@ def write(folder: Path, words: list[str], **limits: Any) -> BagWriter:
 
 def read(folder: Path) -> list[str]:
     with AnyReader([folder], default_typestore=get_typestore(Stores.ROS2_JAZZY)) as reader:
-        return [reader.deserialize(data, c.msgtype).data for c, _, data in reader.messages()]
+        return [reader.deserialize(data, c.msgtype).data for c, _, data in reader.messages()]  # type: ignore[attr-defined]
 
 
 def test_rosbags_and_mcap_read_what_was_written(tmp_path: Path) -> None:

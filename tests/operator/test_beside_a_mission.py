@@ -70,9 +70,9 @@ def terminal(mission_domain: int, tmp_path: Path) -> Iterator[Open]:
 def test_arm_and_battery_are_set_from_the_terminal_of_mode_manual(
     terminal: Open, tmp_path: Path
 ) -> None:
-    words = ('--mode', 'MANUAL', '--behaviour', 'patrol', '--namespace', 'manual')
+    words = ['--mode', 'MANUAL', '--behaviour', 'patrol', '--namespace', 'manual']
     nodes = ('console', 'simulator', 'arm_controller', 'battery_controller')
-    words += ('--composed', '--only', ','.join(nodes), '--record', str(tmp_path))
+    words += ['--composed', '--only', ','.join(nodes), '--record', str(tmp_path)]
     manual = terminal(*words, columns=120, rows=60)
     manual.until(*(f'{name:<18} | ready' for name in nodes))
     manual.type('arm up\r')

@@ -32,7 +32,8 @@ class Scripted:
 
 
 def said(line: str, actions: Any = None) -> list[Answer]:
-    return answer(line, actions or Scripted(), lambda: 'because')
+    taken: Any = actions or Scripted()
+    return answer(line, taken, lambda: 'because')
 
 
 @pytest.mark.parametrize(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -59,7 +60,7 @@ def test_the_seven_rooms_are_found_again(
     pairs = {frozenset(rooms[side] for side in sides) for sides in true.place.doors.values()}
     assert {frozenset(sides) for sides in found.place.doors.values()} == pairs
     assert [door.width for door in found.doors.values()] == pytest.approx([1.2] * 7, abs=0.2)
-    labels = cv2.imread(str(tmp_path / 'rooms.png'), cv2.IMREAD_UNCHANGED)
+    labels: Any = cv2.imread(str(tmp_path / 'rooms.png'), cv2.IMREAD_UNCHANGED)
     assert labels.shape == found.map.cells.shape
     assert set(np.unique(labels)) == set(range(8))
 
@@ -83,7 +84,7 @@ def test_the_end_of_what_is_known_is_no_wall(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     path = hall(tmp_path)
-    pixels = cv2.imread(str(tmp_path / 'hall.png'), cv2.IMREAD_GRAYSCALE)
+    pixels: Any = cv2.imread(str(tmp_path / 'hall.png'), cv2.IMREAD_GRAYSCALE)
     pixels[70:109, 30:70] = 205
     cv2.imwrite(str(tmp_path / 'hall.png'), pixels)
     assert main([str(path), '--out', 'place.yaml']) == 0

@@ -60,7 +60,7 @@ def test_it_draws_a_place_and_says_what_it_is(
     assert capsys.readouterr().out.splitlines() == [f'{file}: {facts}', f'drawn: {output}']
     with Image.open(output) as picture:
         assert min(picture.size) > 400
-        assert len(picture.getcolors(picture.size[0] * picture.size[1])) > 20
+        assert len(picture.getcolors(picture.size[0] * picture.size[1]) or ()) > 20
 
 
 def test_the_tour_of_a_place_is_measured_over_the_doors() -> None:
@@ -89,10 +89,10 @@ def test_the_names_of_places_end_before_their_bars(
 ) -> None:
     names = {'R1': 'Kitchen', 'R2': 'The_store_beside_the_stairs_of_the_first_floor'}
     texts = {path: path.read_text() for path in (CONFIG / 'seven_rooms.yaml', record)}
-    for path, text in texts.items():
-        for name, new in names.items():
-            text = re.sub(rf'\b{name}\b', new, text)
-        (tmp_path / f'new_{path.name}').write_text(text)
+    for path, renamed in texts.items():
+        for name, new_name in names.items():
+            renamed = re.sub(rf'\b{name}\b', new_name, renamed)
+        (tmp_path / f'new_{path.name}').write_text(renamed)
     ends, begins = [], []
     write, fill = Canvas.text, Canvas.box
 

@@ -149,7 +149,7 @@ def test_a_person_approves_and_sets_the_autonomy(graph: Any, actions: MissionAct
 def test_a_parameter_is_set_or_the_reason_told(graph: Any, actions: MissionActions) -> None:
     results = [SetParametersResult(successful=True)]
     asked = serve(graph, SetParameters, 'robot_behavior/set_parameters', results=results)
-    assert actions.set_threshold(90) == 'urgency_threshold of robot_behavior is 90'
+    assert actions.set_threshold('90') == 'urgency_threshold of robot_behavior is 90'
     assert asked[0].parameters[0].value.integer_value == 90
     results[0] = SetParametersResult(successful=False, reason='not now')
     with pytest.raises(ValueError, match='not now'):

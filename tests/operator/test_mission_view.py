@@ -59,8 +59,12 @@ def whole() -> Snapshot:
 
 
 def shown(snapshot: Snapshot, width: int = 100, height: int = 30, colours: bool = False) -> str:
-    system = 'truecolor' if colours else None
-    console = Console(width=width, height=height, color_system=system, force_terminal=colours)
+    console = Console(
+        width=width,
+        height=height,
+        color_system='truecolor' if colours else None,
+        force_terminal=colours,
+    )
     with console.capture() as capture:
         console.print(MissionView(snapshot), end='')
     return capture.get()

@@ -237,7 +237,9 @@ def test_no_link_leads_below_the_header(hub: Hub, viewer: Viewer) -> None:
 def test_a_long_report_leaves_the_names_of_nodes_their_room(hub: Hub, viewer: Viewer) -> None:
     names = ('aruco_detector', 'ontology_map_builder')
     long = Health(0, 'waiting for the arm to rest', ())
-    hub.show(replace(STATES['begins'], nodes=dict.fromkeys(names), health={names[0]: long}))
+    hub.show(
+        replace(STATES['begins'], nodes=dict.fromkeys(names, frozenset()), health={names[0]: long})
+    )
     viewer.size(*PHONE)
     viewer.until(lambda: 'waiting' in viewer.text('#nodes'))
     script = 'return [...document.querySelectorAll("#nodes th b")].map((b) => '

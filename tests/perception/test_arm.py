@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import threading
+from typing import Any
 
 import numpy as np
 import pytest
@@ -176,6 +177,7 @@ def test_driver_returns_when_the_arm_rests_at_its_goal():
     assert arm.rests[-1] is False
     arm.run(arm.sent[-1][1].duration + 0.3)
     assert done() is None
+    assert arm.driver.positions is not None
     assert np.allclose(arm.driver.positions, goal, atol=0.01)
     assert arm.rests[-1] is True
 
@@ -241,4 +243,5 @@ def test_reports_of_other_joints_are_not_taken():
     assert arm.driver.positions is None
     names = ['wheel_left', *reversed(ARM.names)]
     arm.driver.report(names, [9.0, 5.0, 4.0, 3.0, 2.0, 1.0], [])
-    assert arm.driver.positions.tolist() == [1.0, 2.0, 3.0, 4.0, 5.0]
+    positions: Any = arm.driver.positions
+    assert positions.tolist() == [1.0, 2.0, 3.0, 4.0, 5.0]

@@ -201,6 +201,7 @@ def test_pose_of_exact_corners_is_exact(distance, turn, roll, offset):
     truth = corners_in_camera(panel, CAMERA)
     # the marker's frame: x right, y up, z out of the paper, towards the camera
     seen = np.array([[-0.1, 0.1, 0], [0.1, 0.1, 0], [0.1, -0.1, 0], [-0.1, -0.1, 0]])
+    assert pose is not None
     assert np.allclose(seen @ pose.rotation.T + pose.position, truth, atol=2e-3 * distance)
     assert pose.reprojection_error < 0.05
     assert pose.rotation[2, 2] < 0

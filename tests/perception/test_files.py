@@ -154,13 +154,13 @@ def test_folder_is_played_in_order_of_names(tmp_path, image):
 
 def test_video_file_is_played_at_its_own_rate(tmp_path):
     path = tmp_path / 'video.avi'
-    writer = cv2.VideoWriter(str(path), cv2.VideoWriter_fourcc(*'MJPG'), 12.5, (64, 48))
+    writer = cv2.VideoWriter(str(path), cv2.VideoWriter_fourcc(*'MJPG'), 12.5, (64, 48))  # type: ignore[attr-defined]
     for level in (0, 100, 200):
         writer.write(np.full((48, 64, 3), level, np.uint8))
     writer.release()
     source = open_source(str(path))
     assert source.rate == pytest.approx(12.5)
-    assert [round(float(np.mean(each)), -1) for each in source.frames] == [0, 100, 200]
+    assert [round(float(np.mean(each)), -1) for each in source.frames] == [0, 100, 200]  # type: ignore[arg-type]
     source.frames.close()
 
 

@@ -60,6 +60,7 @@ def test_the_machine_that_came_from_smach_runs_on_a_plain_node(graph):
 
 def test_the_reference_is_current():
     spec = importlib.util.spec_from_file_location('fsm_reference', DOCS / 'fsm_reference.py')
+    assert spec is not None
     script = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(script)
     current = (DOCS / 'fsm_reference.md').read_text(encoding='utf-8')

@@ -7,6 +7,7 @@ import itertools
 import threading
 import time
 from types import SimpleNamespace
+from typing import Any
 
 import pytest
 from action_msgs.msg import GoalStatus
@@ -36,7 +37,7 @@ from .ros_servers import ScriptedActionServer, Stubborn
 
 def in_thread(work):
     """Run work on a thread; returns a function that waits for it and gives or raises its end."""
-    outcome = []
+    outcome: list[tuple[Any, Exception | None]] = []
 
     def body():
         try:

@@ -278,7 +278,7 @@ def test_a_disk_that_does_not_answer_keeps_neither_readers_nor_the_collector(
         return hanging() if path.name == 'map.owl' else exists(path)
 
     exists = Path.exists
-    words = ('SAVE', 'map.owl')
+    words: tuple[str, ...] = ('SAVE', 'map.owl')
     if step == 'looked for':
         monkeypatch.setattr(Path, 'exists', looked_for)
     elif step == 'written':

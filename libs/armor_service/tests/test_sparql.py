@@ -8,6 +8,7 @@ import socket
 import subprocess
 import threading
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -300,27 +301,24 @@ def test_a_graph_that_is_kept_up_to_date_is_the_one_that_a_new_process_gets(
     rooms = ['R1', 'R2', 'R3', 'C1', 'NEW']
     for step in range(80):
         here, there, value = seed.choice(rooms), seed.choice(rooms), str(seed.randrange(3))
-        seed.choice(
-            [
-                lambda h=here, v=value: change.replace_one_dataprop_b2_ind('size', h, 'INT', v),
-                lambda h=here, v=value: change.add_dataprop_to_ind('size', h, 'LONG', v),
-                lambda h=here, v=value: change.remove_dataprop_from_ind('size', h, 'LONG', v),
-                lambda h=here, t=there: change.add_objectprop_to_ind('near', h, t),
-                lambda h=here, t=there: change.remove_objectprop_from_ind('near', h, t),
-                lambda h=here: change.add_ind_to_class(h, 'ODD'),
-                lambda h=here: change.remove_ind_from_class(h, 'ODD'),
-                lambda h=here, t=there: change.add_objectprop_to_ind('isIn', h, t),
-                lambda h=here, s=step: change.remove_ind(h) if s % 10 == 9 else None,
-                lambda v=value: change.add_class(f'CLASS_{v}'),
-                lambda v=value: change.remove_class(f'CLASS_{v}'),
-                lambda v=value: change.add_class(f'CLASS_{v}', 'ODD'),
-                lambda v=value: change.add_class('ODD', f'CLASS_{v}'),
-                lambda v=value: checked(
-                    client.call('REMOVE', 'CLASS', 'CLASS', [f'CLASS_{v}', 'ODD'])
-                ),
-                lambda: client.utils.sync_buffered_reasoner(),
-            ]
-        )()
+        changes: list[Callable[[], Any]] = [
+            lambda h=here, v=value: change.replace_one_dataprop_b2_ind('size', h, 'INT', v),
+            lambda h=here, v=value: change.add_dataprop_to_ind('size', h, 'LONG', v),
+            lambda h=here, v=value: change.remove_dataprop_from_ind('size', h, 'LONG', v),
+            lambda h=here, t=there: change.add_objectprop_to_ind('near', h, t),
+            lambda h=here, t=there: change.remove_objectprop_from_ind('near', h, t),
+            lambda h=here: change.add_ind_to_class(h, 'ODD'),
+            lambda h=here: change.remove_ind_from_class(h, 'ODD'),
+            lambda h=here, t=there: change.add_objectprop_to_ind('isIn', h, t),
+            lambda h=here, s=step: change.remove_ind(h) if s % 10 == 9 else None,
+            lambda v=value: change.add_class(f'CLASS_{v}'),
+            lambda v=value: change.remove_class(f'CLASS_{v}'),
+            lambda v=value: change.add_class(f'CLASS_{v}', 'ODD'),
+            lambda v=value: change.add_class('ODD', f'CLASS_{v}'),
+            lambda v=value: checked(client.call('REMOVE', 'CLASS', 'CLASS', [f'CLASS_{v}', 'ODD'])),
+            lambda: client.utils.sync_buffered_reasoner(),
+        ]
+        seed.choice(changes)()
         kept = graph_of(client)
         service.sparql.note('map', None)
         assert kept == graph_of(client), step

@@ -21,6 +21,7 @@ MODELS = {
 def test_rays_of_pixels_project_back_onto_them(model):
     camera = CameraModel(640, 480, K, np.array(MODELS[model]), model)
     rays = camera.rays(PIXELS)
+    assert rays is not None
     project = cv2.fisheye.projectPoints if model == 'equidistant' else cv2.projectPoints
     points = np.column_stack([rays, np.ones(4)]).reshape(-1, 1, 3)
     again = project(points, np.zeros(3), np.zeros(3), K, camera.distortion)[0].reshape(-1, 2)
@@ -31,6 +32,8 @@ def test_equidistant_is_no_plumb_bob():
     numbers = np.array([0.1, 0.01, 0.0, 0.0])
     fisheye = CameraModel(640, 480, K, numbers, 'equidistant').rays(PIXELS)
     plumb_bob = CameraModel(640, 480, K, numbers, 'plumb_bob').rays(PIXELS)
+    assert fisheye is not None
+    assert plumb_bob is not None
     assert np.abs(fisheye - plumb_bob).max() > 0.01
 
 
@@ -128,6 +131,7 @@ def test_pixels_beyond_where_the_polynomial_turns_back_have_no_ray(model, number
         pixel = project(ray, np.zeros(3), np.zeros(3), K, np.array(numbers))[0].reshape(1, 2)
         found = camera.rays(pixel)
         if degrees < turns_back - 3.0:
+            assert found is not None
             assert np.degrees(np.arctan(found[0, 0])) == pytest.approx(degrees, abs=0.2)
         elif found is not None:
             # such a pixel is also what a ray on the near side shows

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import tracemalloc
+from typing import Any
 
 import cv2
 import numpy as np
@@ -337,7 +338,8 @@ def test_drawn_outline_on_bright_paper_is_no_marker_in_a_reflection():
         )
         cv2.polylines(image, [corners], True, 20, 3, cv2.LINE_AA)
         compressed = cv2.imencode('.jpg', image, [cv2.IMWRITE_JPEG_QUALITY, 60])[1]
-        assert not detector.detect(cv2.imdecode(compressed, cv2.IMREAD_GRAYSCALE))
+        unpacked: Any = cv2.imdecode(compressed, cv2.IMREAD_GRAYSCALE)
+        assert not detector.detect(unpacked)
 
 
 def test_white_field_of_six_megapixels_in_a_dark_frame_overflows_nothing():

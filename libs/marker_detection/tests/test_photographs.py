@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -29,7 +30,8 @@ def test_markers_that_two_detectors_agree_on_are_found_and_no_wrong_one():
     for entry in json.loads((FOLDER / 'markers.json').read_text()):
         detector = MarkerDetector(DetectorSettings(entry['dictionary']))
         seen = {}
-        for each in detector.detect(cv2.imread(str(FOLDER / entry['file']))):
+        image: Any = cv2.imread(str(FOLDER / entry['file']))
+        for each in detector.detect(image):
             seen.setdefault(each.marker_id, []).append(each.corners.mean(axis=0))
         for marker in entry['markers']:
             middles = seen.get(marker['id'], [])

@@ -30,7 +30,7 @@ with onto:
     class CheapDrug(Drug):
         """A definition: what costs at most 1 a tablet."""
 
-        equivalent_to = [Drug & (price_per_tablet <= 1.0)]
+        equivalent_to = [Drug & (price_per_tablet <= 1.0)]  # type: ignore[operator]
 
     rule = Imp()
     rule.set_as_rule(

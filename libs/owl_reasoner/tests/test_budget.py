@@ -94,7 +94,7 @@ def test_a_reasoning_ends_and_leaves_what_was_before(
 ) -> None:
     kb = KnowledgeBase('x:', axioms, clock=ticking())
     assert kb.reason()
-    before = set(kb.facts())
+    before: set[Axiom] = set(kb.facts())
     assert kb.add(change)
     asked = count()
     limits: dict[str, Any] = {

@@ -452,7 +452,7 @@ def test_class_questions_do_not_search_the_individuals_again() -> None:
     # Each of 60 individuals is a choice; 40 classes are asked for on one model of them.
     choices = [ClassAssertion(ex.ObjectUnionOf((A, B)), f'x:n{n}') for n in range(60)]
     classes = [f'x:K{n}' for n in range(40)]
-    axioms = [SubClassOf(cls, ex.ObjectHasValue(P, i)) for cls in classes]
+    axioms: list[Axiom] = [SubClassOf(cls, ex.ObjectHasValue(P, i)) for cls in classes]
     axioms.append(SubClassOf(ex.ObjectSomeValuesFrom(P, C), D))
     reasoner = CaseReasoner([*choices, *axioms, ClassAssertion(C, i)], most_steps=2_000)
     found = set(reasoner.hierarchy(classes, lambda *_: False))

@@ -50,7 +50,7 @@ class Shop:
                 pass
 
             class Cheap(Drug):
-                equivalent_to = [Drug & (each <= 1.0)]
+                equivalent_to = [Drug & (each <= 1.0)]  # type: ignore[operator]
 
             class Contained(Thing):
                 equivalent_to = [beside.some(Drug)]

@@ -70,8 +70,8 @@ def drawn(rng: random.Random, depth: int) -> DataRange:
         return DatatypeRestriction(kind, ((XSD + rng.choice(FACETS), bound),))
     if choice == 3:
         return DataComplementOf(drawn(rng, depth - 1))
-    kind = DataUnionOf if choice == 6 else DataIntersectionOf
-    return kind((drawn(rng, depth - 1), drawn(rng, depth - 1)))
+    joined = DataUnionOf if choice == 6 else DataIntersectionOf
+    return joined((drawn(rng, depth - 1), drawn(rng, depth - 1)))
 
 
 def of_length(datatype: str, facet: str, length: int) -> DataRange:

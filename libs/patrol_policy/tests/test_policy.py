@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 import random
+from collections.abc import Mapping
 
 import numpy as np
 import pytest
@@ -26,6 +27,7 @@ from .worlds import graphs, seven_rooms, world
 def test_every_policy_scores_every_candidate(name: str, now: float) -> None:
     policy = make_policy(name)
     scores = policy(world(now=now), ('E', 'R1', 'R2'))
+    assert isinstance(scores, Mapping)
     assert set(scores) == {'E', 'R1', 'R2'}
     assert all(math.isfinite(score.value) and score.words for score in scores.values())
     assert all(score.target in seven_rooms().index for score in scores.values())

@@ -389,7 +389,7 @@ def test_a_container_that_ends_by_itself_while_an_interrupt_comes_is_not_repeate
     with inner:
         fsm.StateMachine.add('END', ending)
     if kind == 'sequential':
-        root = fsm.StateMachine(['done'])
+        root: fsm.StateMachine | fsm.Concurrence = fsm.StateMachine(['done'])
         root.add_state('INNER', inner)
     else:
         root = fsm.Concurrence(['done'], 'done')
@@ -500,7 +500,7 @@ def test_a_state_that_the_first_end_stopped_is_not_resumed_after_an_interrupt():
     concurrence.set_clock(clock := FakeClock())
     concurrence.add_interrupt('STOP', stop)
     ended = threading.Event()
-    waiter.service_preempt = lambda: (ended.wait(60.0), fsm.State.service_preempt(waiter))
+    waiter.service_preempt = lambda: (ended.wait(60.0), fsm.State.service_preempt(waiter))  # type: ignore[assignment]
     run = Background(concurrence)
     began(waiter)
     clock.until_sleeping(2)
@@ -517,7 +517,7 @@ def test_a_state_that_the_first_end_stopped_is_not_resumed_after_an_interrupt():
 def test_a_state_that_served_the_stop_is_not_stopped_again_when_another_one_ends():
     first, work, clean, last, slow = Waiter(1.0), Waiter(), Waiter(5.0), Waiter(), Waiter()
     cleaning, alone = threading.Event(), threading.Event()
-    slow.service_preempt = lambda: (cleaning.wait(60.0), fsm.State.service_preempt(slow))
+    slow.service_preempt = lambda: (cleaning.wait(60.0), fsm.State.service_preempt(slow))  # type: ignore[assignment]
     machine = fsm.StateMachine(['done', 'preempted'])
     with machine:
         fsm.StateMachine.add('WORK', work, {'preempted': 'CLEAN'})

@@ -295,7 +295,7 @@ def test_a_machine_whose_execution_could_not_begin_runs_when_the_fault_is_gone(m
     machine = fsm.StateMachine(['done'])
     with machine:
         fsm.StateMachine.add('ONLY', Answer('done'))
-    machine.set_clock(None)
+    machine.set_clock(None)  # type: ignore[arg-type]
     with pytest.raises(AttributeError, match='now'):
         machine.execute()
     machine.set_clock(fsm.WallClock())

@@ -225,7 +225,7 @@ def test_an_iterator_goes_on_with_the_same_item(clock):
 
         def execute(self, ud):
             seen.append(ud.place)
-            self._fsm_clock, waiter._fsm_clock = clock, clock
+            self._fsm_clock = waiter._fsm_clock = clock  # type: ignore[attr-defined]
             waiter.begun.release()
             if self.wait(1.0):
                 return 'done'

@@ -89,7 +89,7 @@ class Unshowable:
     def __repr__(self):
         raise RuntimeError('not today')
 
-    __hash__ = None
+    __hash__ = None  # type: ignore[assignment]
 
 
 def test_an_error_that_cannot_be_shown_is_still_told_where_it_came_from():
