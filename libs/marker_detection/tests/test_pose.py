@@ -90,6 +90,16 @@ def test_marker_seen_straight_from_the_front_has_a_pose(distance):
     assert pose.position == pytest.approx([0.0, 0.0, distance], abs=1e-3)
 
 
+@pytest.mark.parametrize('distance', [1.0, 4.0, 7.0])
+@pytest.mark.parametrize('turn', [-0.7, -0.5, 0.1, 0.5, 1.0])
+def test_marker_that_hangs_upright_before_a_level_camera_is_not_mirrored(distance, turn):
+    panel = Panel(0, distance, turn)
+    pose = pose_of(corners_in_image(panel, CAMERA), panel.size, CAMERA)
+    corners = np.array([[-0.1, 0.1, 0], [0.1, 0.1, 0], [0.1, -0.1, 0], [-0.1, -0.1, 0]])
+    seen = corners @ pose.rotation.T + pose.position
+    assert np.allclose(seen, corners_in_camera(panel, CAMERA), atol=1e-4)
+
+
 def test_corners_that_are_no_square_within_a_pixel_have_no_pose():
     corners = corners_in_image(Panel(0, 2.0, turn=0.5), CAMERA)
     corners[0] += (6.0, 5.0)
