@@ -15,7 +15,7 @@ import logging
 import math
 import sys
 from collections import Counter
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -25,7 +25,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent))
 
 from localisation import Amcl, print_table
 
-from surveillance_controllers.geometry import Pose, Scan, composed, relative
+from surveillance_controllers.geometry import Points, Pose, Scan, composed, relative
 from surveillance_controllers.motion.driving import Drive, State
 from surveillance_controllers.motion.navigator import Navigator
 from surveillance_controllers.motion.odometry import OdometryBuffer
@@ -99,7 +99,7 @@ def patrol(robot: Robot, seconds: float, seed: int) -> Outcome:
             outcome.errors.append(math.dist(navigator.pose[:2], robot.base.pose[:2]))
             outcome.sure.append(not (navigator.lost or navigator.ambiguous))
 
-    def path_to(goal: tuple[float, float]) -> object:
+    def path_to(goal: tuple[float, float]) -> Points:
         assert navigator.pose is not None
         planner.set_obstacles(navigator.obstacles, navigator.obstacles_stay)
         return planner.plan(navigator.pose[:2], goal)
@@ -152,14 +152,14 @@ def main() -> int:
     logging.disable()
     seconds = 120.0 if options.quick else options.seconds
     file = ROOT / 'config' / f'{options.place}.yaml'
-    bad = {'wheel_errors': (0.05, -0.05), 'friction': 0.3}
-    off = {'lidar_offset': (0.03, 0.02, 0.03)}
+    bad = PhysicsModel(wheel_errors=(0.05, -0.05), friction=0.3)
+    off = replace(bad, lidar_offset=(0.03, 0.02, 0.03))
     runs: tuple[tuple[str, PhysicsModel | None, float], ...] = (
         ('kinematic', None, 0.01),
         ('kinematic, noise 0.03', None, 0.03),
         ('MuJoCo', PhysicsModel(), 0.01),
-        ('MuJoCo, wheels +-5 %, mu 0.3, noise 0.03', PhysicsModel(**bad), 0.03),
-        ('the same, lidar off by 3 cm, 0.03 rad', PhysicsModel(**bad, **off), 0.03),
+        ('MuJoCo, wheels +-5 %, mu 0.3, noise 0.03', bad, 0.03),
+        ('the same, lidar off by 3 cm, 0.03 rad', off, 0.03),
     )
     rows = []
     for name, physics, noise in runs:
