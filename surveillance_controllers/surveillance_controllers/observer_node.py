@@ -22,7 +22,7 @@ from typing import Any
 import cv2
 import numpy as np
 from geometry_msgs.msg import PoseWithCovarianceStamped
-from nav_msgs.msg import OccupancyGrid
+from nav_msgs.msg import OccupancyGrid, Odometry
 from rclpy.qos import QoSProfile
 from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import Image, JointState, LaserScan
@@ -31,17 +31,21 @@ from std_msgs.msg import String
 from state_machines.ros.waiting import reported
 from surveillance_controllers import conversions
 from surveillance_controllers.controller_parameters import door_segments, place_positions
-from surveillance_controllers.geometry import Scan
+from surveillance_controllers.geometry import Scan, composed, relative
+from surveillance_controllers.motion.place_regions import PlaceMap
 from surveillance_controllers.motion.transforms import ScanReader
 from surveillance_interfaces.msg import MarkerDetectionArray, RobotPlace
 from surveillance_interfaces.srv import ConsoleCommand
+from surveillance_ontology.patrol_ontology import ROBOT
 from surveillance_perception.conversions import image_from_ros
+from surveillance_perception.marker_registry import read_registry
 from surveillance_perception.observation.answers import answered
 from surveillance_perception.observation.events import Event, EventBook, EventState
 from surveillance_perception.observation.evidence import EvidenceStore
 from surveillance_perception.observation.observations import Observation
+from surveillance_perception.observation.reference_views import ReferenceViews, Viewpoint
 from surveillance_perception.observation.watch_rules import DEFAULT_RULES, read_watch_file
-from surveillance_perception.observation.watcher import Viewpoint, Watcher
+from surveillance_perception.observation.watcher import Watcher
 from surveillance_runtime.conversions import (
     PlanarPose,
     map_from,
@@ -89,6 +93,10 @@ class ObserverSettings:
     evidence_megabytes: float = parameter(
         300.0, 'What all pictures may take; the least severe and oldest go first.', 1.0, 100_000.0
     )
+    markers_file: str = parameter(
+        '',
+        'What markers stand for: any other one is unknown; empty: each that is seen is known.',
+    )
     radius: float = robot_radius()
     camera: bool = parameter(True, 'Whether pictures are looked at.')
 
@@ -103,9 +111,12 @@ class Observer(PatrolNode):
     def __init__(self, **node_options: Any) -> None:
         super().__init__('observer', **node_options)
         self._settings = self.declare_fields(ObserverSettings())
-        frames = declared_frames(self, 'base')
+        frames = declared_frames(self, 'base', 'map')
+        self._map_frame = frames.map
         self._lidar = ScanReader(self, self._settings.radius, frames.base)
         self._doors, places = door_segments(self), place_positions(self)
+        self._places = PlaceMap(self._doors.values())
+        self._places.set_positions(places)
         self._observations = self.create_publisher(String, 'observations', QoSProfile(depth=100))
         self._events = OwnedTopic(self, String, 'events')
         self._said = ''
@@ -118,9 +129,12 @@ class Observer(PatrolNode):
             local=datetime.fromtimestamp,
             tell=self._on_observation,
             alert=self._on_alert,
+            robot=self.get_namespace().strip('/') or ROBOT,
             doors=self._doors,
+            markers=self._known_markers(),
+            place_of=self._places.place_at,
             store=self._store(),
-            robot=self.get_namespace().strip('/') or 'Robot1',
+            views=self._views(),
         )
         self._kept = KeptFile(self._settings.state_file, 'starting without it')
         self._complain(self._kept.read(self._watcher.restore))
@@ -129,6 +143,8 @@ class Observer(PatrolNode):
         self._scans: deque[tuple[float, Scan]] = deque(maxlen=10)
         self._poses: deque[tuple[float, PlanarPose]] = deque(maxlen=5)
         self._pose: PlanarPose | None = None
+        self._odometry: deque[tuple[float, PlanarPose]] = deque(maxlen=50)
+        self._odom_in_map: PlanarPose | None = None
         self._joints: tuple[float, ...] = ()
         self._moved_at = -math.inf
         self._seen_markers: frozenset[int] | None = None
@@ -139,6 +155,7 @@ class Observer(PatrolNode):
         StateSubscription(self, RobotPlace, 'robot_place', self._on_place)
         StateSubscription(self, PoseWithCovarianceStamped, 'amcl_pose', self._on_pose, raw=True)
         self.create_subscription(MarkerDetectionArray, 'arm/markers', self._on_markers, 10)
+        self.create_subscription(Odometry, 'odom', self._on_odometry, SENSOR_QOS, raw=True)
         if self._settings.camera:
             self.create_subscription(
                 MarkerDetectionArray, 'aruco_detector/detections', self._on_detections, 10
@@ -167,6 +184,19 @@ class Observer(PatrolNode):
         except FileError as error:
             raise ParameterError(f'observer: {error}') from None
 
+    def _known_markers(self) -> dict[int, tuple[float, float, float] | None]:
+        if not self._settings.markers_file:
+            return {}
+        try:
+            known = read_registry(Path(self._settings.markers_file))
+        except FileError as error:
+            raise ParameterError(f'observer: {error}') from None
+        return {number: each.hangs_at for number, each in known.items()}
+
+    def _views(self) -> ReferenceViews:
+        file = Path(self._settings.state_file).expanduser()
+        return ReferenceViews(file.with_suffix('.views') if self._settings.state_file else None)
+
     def _store(self) -> EvidenceStore | None:
         folder = self._settings.evidence_folder
         if not folder:
@@ -193,7 +223,12 @@ class Observer(PatrolNode):
     def _on_map(self, message: OccupancyGrid) -> None:
         with conversions.refusing(self, 'map'):
             grid = map_from(message, MOST_CELLS)
-            self._work.put(lambda: self._watcher.use_map(grid))
+
+            def use() -> None:
+                self._places.set_map(grid)
+                self._watcher.use_map(grid)
+
+            self._work.put(use)
 
     def _on_place(self, message: RobotPlace) -> None:
         place, stamp = message.place, self._now()
@@ -213,7 +248,16 @@ class Observer(PatrolNode):
                 self._moved_at = time.monotonic()
             self._pose = pose
             self._poses.append((stamp, pose))
+            for measured, odometry in self._odometry:
+                if abs(measured - stamp) <= SAME_TIME:
+                    # map <- odom = (map <- base) (base <- odom)
+                    self._odom_in_map = composed(pose, relative(odometry, (0.0, 0.0, 0.0)))
             self._pair()
+
+    def _on_odometry(self, serialized: bytes) -> None:
+        with conversions.refusing(self, 'odom'):
+            pose = pose_of_serialized(serialized, texts=1)
+            self._odometry.append((stamp_of_serialized(serialized), pose))
 
     def _pair(self) -> None:
         """Look at the scans whose pose is known; either may come first."""
@@ -245,11 +289,14 @@ class Observer(PatrolNode):
         self._seen_markers = frozenset(int(each.id) for each in message.detections)
 
     def _on_markers(self, message: MarkerDetectionArray) -> None:
-        stamp = self._now()
+        stamp, frame = self._now(), message.header.frame_id.removeprefix('/')
+        # They are told in the frame of the odometry, which drifts against the map.
+        to_map = (0.0, 0.0, 0.0) if frame == self._map_frame else self._odom_in_map
         for each in message.detections:
             at = each.pose.position
-            where = float(at.x), float(at.y), float(at.z)
-            if all(map(math.isfinite, where)):
+            if to_map is not None and all(map(math.isfinite, (at.x, at.y, at.z))):
+                x, y, _ = composed(to_map, (float(at.x), float(at.y), 0.0))
+                where = float(x), float(y), float(at.z)
                 number = int(each.id)
                 self._later(partial(self._watcher.marker, number, where, stamp))
 
@@ -266,7 +313,7 @@ class Observer(PatrolNode):
 
     async def _on_command(self, request: Any, response: Any) -> Any:
         def take() -> str:
-            answer = answered(self._book, request.line)
+            answer = answered(self._book, request.line, self._watcher.answer)
             self._publish_events()
             return answer
 

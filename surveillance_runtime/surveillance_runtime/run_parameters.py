@@ -65,7 +65,10 @@ def run_layers(
     if behaviour == 'patrol':
         # The place's file is for the simulator: the robot learns its map from the markers.
         origin = '--behaviour patrol'
-        layers.append(Layer(origin, (Entry('/**', 'map_source', 'markers', origin),)))
+        entries = [Entry('/**', 'map_source', 'markers', origin)]
+        if (markers := config / 'markers.yaml').is_file():
+            entries.append(for_node(OBSERVER, 'markers_file', str(markers.resolve()), origin))
+        layers.append(Layer(origin, tuple(entries)))
         asked.append(for_node(BEHAVIOUR_NODE, 'behaviour', behaviour, origin))
     layers.append(Layer('this run', tuple(chosen)))
     layers += [file_layer(path.absolute()) for path in files]

@@ -12,7 +12,14 @@ from surveillance_perception.observation.observations import Kind, Observation
 
 
 def seen(kind=Kind.OBJECT, state='appeared', **more) -> Observation:
-    given = {'place': 'R1', 'position': (1.0, 2.0), 'confidence': 0.8, 'stamp': 100.0, **more}
+    given = {
+        'place': 'R1',
+        'position': (1.0, 2.0),
+        'confidence': 0.8,
+        'stamp': 100.0,
+        'robot': 'Robot1',
+        **more,
+    }
     return Observation(kind, state, **given)
 
 

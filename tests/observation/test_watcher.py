@@ -15,6 +15,7 @@ import yaml
 from surveillance_perception.observation.events import EventBook, EventState
 from surveillance_perception.observation.evidence import EvidenceStore
 from surveillance_perception.observation.observations import Kind, Observation
+from surveillance_perception.observation.reference_views import ReferenceViews
 from surveillance_perception.observation.watch_rules import rule_from
 from surveillance_perception.observation.watcher import Watcher
 from surveillance_runtime.place.occupancy_grid import Grid
@@ -66,7 +67,9 @@ def beams(
 class Round:
     """A watcher in the room, and what it told."""
 
-    def __init__(self, store: EvidenceStore | None = None) -> None:
+    def __init__(
+        self, store: EvidenceStore | None = None, views: Path | None = None, markers=None
+    ) -> None:
         self.told: list[Observation] = []
         self.alerts: list[int] = []
         self.book = EventBook()
@@ -75,10 +78,14 @@ class Round:
             [rule_from(each) for each in yaml.safe_load(RULES)],
             self.book,
             local=lambda stamp: datetime.fromtimestamp(stamp, UTC),
+            robot='Robot1',
             tell=self.told.append,
             alert=lambda event: self.alerts.append(event.number),
             doors={'D1': DOOR},
             store=store,
+            views=ReferenceViews(views),
+            markers=markers,
+            place_of=lambda point: 'R1' if point[0] < DOOR[0] else 'R2',
         )
         self.watcher.use_map(room())
 
@@ -158,6 +165,57 @@ def test_what_is_normal_outlives_a_restart():
     again.watcher.restore(json.loads(json.dumps(watch.watcher.state())))
     again.visit('R1', HERE, boxes=[(1.5, 1.5, 0.15)])
     assert again.alerts
+
+
+def test_a_box_beside_a_door_is_told_and_the_leaf_is_not():
+    watch = Round()
+    watch.visit('R1', HERE)
+    # A leaf of 1 m that stands open at a right angle: thin, from the hinge outwards.
+    leaf = [(DOOR[0] - along, DOOR[1], 0.03) for along in np.arange(0.0, 1.0, 0.02)]
+    watch.visit('R1', HERE, boxes=leaf)
+    assert not [each for each in watch.book.events if each.kind == Kind.OBJECT]
+    watch.visit('R1', HERE, boxes=[(5.3, 1.6, 0.2)])
+    assert [each.seen for each in watch.book.events if each.kind == Kind.OBJECT] == ['appeared']
+
+
+def test_a_box_seen_through_a_doorway_is_in_the_room_it_lies_in():
+    watch = Round()
+    watch.visit('R1', (4.0, 2.5), shut=False)
+    watch.visit('R1', (4.0, 2.5), boxes=[(8.0, 2.5, 0.2)], shut=False)
+    assert [each.place for each in watch.book.events if each.kind == Kind.OBJECT] == ['R2']
+
+
+def texture(seed: int = 3) -> np.ndarray:
+    return cv2.resize(np.random.default_rng(seed).integers(0, 255, (60, 80), np.uint8), (640, 480))
+
+
+def test_a_view_is_compared_over_a_restart_and_learned_anew_when_a_person_says_so(tmp_path: Path):
+    watch = Round(views=tmp_path / 'views')
+    view = (1.0, 1.0, 0.5)
+    other = texture()
+    other[150:330, 200:400] = texture(9)[150:330, 200:400]
+    watch.watcher.picture(texture(), view, 1.0, None)
+    kept = json.loads(json.dumps(watch.watcher.state()))
+    again = Round(views=tmp_path / 'views')
+    again.watcher.restore(kept)
+    again.watcher.picture(other, view, 100.0, None)
+    (event,) = again.book.events
+    assert (event.kind, event.seen) == (Kind.VIEW, 'changed')
+    assert again.watcher.answer(event.number, EventState.NORMAL).state == EventState.NORMAL
+    for number in range(3):
+        again.watcher.picture(other, view, 200.0 + 20.0 * number, None)
+    assert [each.state for each in again.book.events] == [EventState.NORMAL]
+    again.watcher.picture(texture(), view, 300.0, None)
+    assert [each.state for each in again.book.events][:1] == [EventState.OPEN]
+
+
+def test_a_marker_that_no_file_knows_is_unknown():
+    watch = Round(markers={14: None})
+    watch.watcher.marker(14, (2.0, 0.0, 1.0), 1.0)
+    watch.watcher.marker(77, (8.0, 0.0, 1.0), 2.0)
+    assert [(each.subject, each.seen, each.place) for each in watch.book.events] == [
+        ('77', 'unknown', 'R2')
+    ]
 
 
 def test_markers_move_and_go_missing_only_where_their_spot_was_in_view():

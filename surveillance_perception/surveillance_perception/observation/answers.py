@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from surveillance_perception.observation.events import EventBook, EventState
+from collections.abc import Callable
+
+from surveillance_perception.observation.events import Event, EventBook, EventState
 from surveillance_runtime.suggestions import nearest
 
 ANSWERS = {
@@ -13,12 +15,15 @@ ANSWERS = {
 MOST_LISTED = 20
 
 
-def answered(book: EventBook, line: str) -> str:
+def answered(
+    book: EventBook, line: str, answer: Callable[[int, EventState], Event] | None = None
+) -> str:
     """Take an answer, and return what was done.
 
     Args:
         book: The events.
         line: The answer and the event's number; or `events`, which lists the open ones.
+        answer: Takes the answer; None: the book itself.
 
     Raises:
         ValueError: What was wrong, and what was expected.
@@ -38,7 +43,7 @@ def answered(book: EventBook, line: str) -> str:
         raise ValueError(f"expected an event's number, such as '{words[0]} 3'")
     number = int(words[1])
     try:
-        event = book.answer(number, ANSWERS[words[0]])
+        event = (answer or book.answer)(number, ANSWERS[words[0]])
     except KeyError:
         known = ', '.join(str(each.number) for each in book.events[:5]) or 'none'
         raise ValueError(f'there is no event {number}, the newest are: {known}') from None

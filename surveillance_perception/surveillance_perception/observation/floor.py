@@ -13,7 +13,7 @@ kept for each visit alone, so that an old look never outvotes a new one.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
 import numpy as np
@@ -37,6 +37,8 @@ LEAST_EXTENT = 0.08
 """A smaller cluster is no thing, metres."""
 SAME_SIZE = 1.6
 """Extents of a thing that moved may differ by this factor: it is seen from another side."""
+LEAF_SLACK = 0.13
+"""How far from the line of a door's leaf its cells may lie, metres: a cell, noise, its depth."""
 _WITH_CORNERS = np.ones((3, 3), np.bool_)
 
 
@@ -58,6 +60,7 @@ class ObjectChange:
         extent: Its longer side as far as seen, metres.
         before: Where it stood before, of one that moved.
         confidence: 0 to 1, from how many cells say so.
+        points: The middles of its cells as far as seen, (n, 2), map frame, metres.
     """
 
     change: Change
@@ -65,6 +68,7 @@ class ObjectChange:
     extent: float
     confidence: float
     before: tuple[float, float] | None = None
+    points: Points = field(default_factory=lambda: np.zeros((0, 2)), compare=False, repr=False)
 
 
 @dataclass(frozen=True, eq=False)
@@ -186,17 +190,35 @@ def changes(before: FloorView, now: FloorView) -> list[ObjectChange]:
             default=None,
         )
         if to is None:
-            found.append(
-                ObjectChange(Change.REMOVED, thing.position, thing.extent, thing.confidence)
-            )
+            found.append(_changed(Change.REMOVED, thing))
         else:
             new.remove(to)
             sure = min(thing.confidence, to.confidence)
-            found.append(ObjectChange(Change.MOVED, to.position, to.extent, sure, thing.position))
-    found += [
-        ObjectChange(Change.APPEARED, each.position, each.extent, each.confidence) for each in new
-    ]
+            found.append(
+                replace(_changed(Change.MOVED, to), confidence=sure, before=thing.position)
+            )
+    found += [_changed(Change.APPEARED, each) for each in new]
     return sorted(found, key=lambda each: -each.extent)
+
+
+def is_leaf(points: Points, hinge: tuple[float, float], width: float) -> bool:
+    """Tell whether a thing may be the leaf of a door, that swings about its hinge.
+
+    Args:
+        points: What was seen of the thing, (n, 2), metres.
+        hinge: One of the door's jambs, metres.
+        width: Of the leaf, metres.
+    """
+    if not len(points):
+        return False
+    offsets = np.asarray(points, float) - np.asarray(hinge, float)
+    distances = np.linalg.norm(offsets, axis=1)
+    if distances.max() > width + LEAF_SLACK:
+        return False
+    # A leaf is a line from its hinge outwards, as deep as a cell or two.
+    tip = offsets[int(distances.argmax())] / max(float(distances.max()), 1e-9)
+    beside = np.abs(offsets[:, 0] * tip[1] - offsets[:, 1] * tip[0])
+    return bool(beside.max() <= LEAF_SLACK)
 
 
 @dataclass(frozen=True)
@@ -204,6 +226,11 @@ class _Thing:
     position: tuple[float, float]
     extent: float
     confidence: float
+    points: Points = field(compare=False)
+
+
+def _changed(change: Change, thing: _Thing) -> ObjectChange:
+    return ObjectChange(change, thing.position, thing.extent, thing.confidence, points=thing.points)
 
 
 def _alike(one: _Thing, other: _Thing) -> bool:
@@ -231,5 +258,11 @@ def _things(grid: Grid, cells: Mask, decided: Mask) -> list[_Thing]:
             round(float(rows.mean())) + bottom, round(float(columns.mean())) + left
         )
         sure = share * (1.0 - math.exp(-len(rows) / 3.0))
-        found.append(_Thing(middle, float(extent), sure))
+        points = np.array(
+            [
+                grid.centre_of(row + bottom, column + left)
+                for row, column in zip(rows.tolist(), columns.tolist(), strict=True)
+            ]
+        )
+        found.append(_Thing(middle, float(extent), sure, points))
     return found

@@ -63,7 +63,7 @@ class Observation:
     position: tuple[float, float] | None = None
     confidence: float = 1.0
     stamp: float = 0.0
-    robot: str = 'Robot1'
+    robot: str = ''
     evidence: str = ''
     compared_with: str = ''
 

@@ -28,15 +28,20 @@ from surveillance_perception.observation.floor import (
     FloorVisit,
     ObjectChange,
     changes,
+    is_leaf,
 )
 from surveillance_perception.observation.observations import Kind, Observation
+from surveillance_perception.observation.reference_views import (
+    ReferenceView,
+    ReferenceViews,
+    Viewpoint,
+)
 from surveillance_perception.observation.views import Grey, Sight, sight_of, view_changes
 from surveillance_perception.observation.watch_rules import Level, WatchRule, severity_of
 from surveillance_runtime.place.occupancy_grid import Grid
 
 Points = NDArray[np.float64]
 Mask = NDArray[np.bool_]
-Viewpoint = tuple[float, ...]
 
 DOOR_RANGE = 6.0
 """Doors are read from here on, metres: farther away too few beams meet them."""
@@ -50,9 +55,6 @@ SEEN_AGAIN = 10.0
 """What goes on is told again after this time, seconds."""
 AGREED_PICTURES = 3
 """A dark or covered view, and a marker that is missing, must be so in so many pictures."""
-SAME_VIEW = (0.15, 0.15, 0.1)
-"""Viewpoints are the same within this: x, y in metres, any angle in radians."""
-MOST_VIEWS = 100
 MARKER_MOVED = 0.3
 """A marker seen so far from where it hung hangs elsewhere, metres."""
 
@@ -65,15 +67,6 @@ class _Door:
     told_at: float = -math.inf
 
 
-@dataclass
-class _View:
-    viewpoint: Viewpoint
-    picture: Grey
-    stamp: float
-    markers: frozenset[int] = frozenset()
-    absent: dict[int, int] = field(default_factory=dict)
-
-
 class Watcher:
     """Notices, by the rules of a person.
 
@@ -84,9 +77,12 @@ class Watcher:
         tell: Called with each observation.
         alert: Called with each event of level ALERT that lasts as long as its rule wants.
         doors: The doors' openings by name, map frame, metres.
-        markers: Where markers hang by id, map frame, metres; those that are not in it are learned.
-        store: Keeps pictures; None: nothing is kept.
         robot: Whose observations they are.
+        markers: The ids that hang here, and where, map frame, metres; None: that is learned. Empty:
+            all that is seen is known.
+        place_of: Returns the place that a point of the map lies in; None: in none.
+        store: Keeps pictures; None: nothing is kept.
+        views: How each viewpoint looks normally.
     """
 
     def __init__(
@@ -95,19 +91,24 @@ class Watcher:
         book: EventBook,
         *,
         local: Callable[[float], datetime],
+        robot: str,
         tell: Callable[[Observation], object] = lambda _: None,
         alert: Callable[[Event], object] = lambda _: None,
         doors: Mapping[str, Segment] | None = None,
-        markers: Mapping[int, tuple[float, float, float]] | None = None,
+        markers: Mapping[int, tuple[float, float, float] | None] | None = None,
+        place_of: Callable[[tuple[float, float]], str | None] = lambda _: None,
         store: EvidenceStore | None = None,
-        robot: str = 'Robot1',
+        views: ReferenceViews | None = None,
     ) -> None:
         self.rules = tuple(rules)
         self.book = book
         self._local, self._tell, self._alert = local, tell, alert
         self._doors = {name: _Door(segment) for name, segment in (doors or {}).items()}
-        self._known_markers = bool(markers)
-        self._markers = dict(markers or {})
+        self._known_markers = frozenset(markers or ())
+        self._markers = {
+            number: where for number, where in (markers or {}).items() if where is not None
+        }
+        self._place_of = place_of
         self._store = store
         self._robot = robot
         self._place = ''
@@ -119,7 +120,7 @@ class Watcher:
         self._candidates: list[ObjectChange] = []
         self._told: dict[tuple[str, ...], float] = {}
         self._last: tuple[tuple[float, float], Points] = ((0.0, 0.0), np.zeros((0, 2)))
-        self._views: list[_View] = []
+        self._views = views or ReferenceViews()
         self._sights: deque[Sight] = deque(maxlen=AGREED_PICTURES)
         self._sight: Sight | None = None
 
@@ -188,7 +189,7 @@ class Watcher:
         if self._visit is None or self._visit.sweeps < FEWEST_SWEEPS or self._normal is None:
             return
         now = self._visit.view()
-        found = [each for each in changes(self._normal, now) if not self._at_door(each.position)]
+        found = [each for each in changes(self._normal, now) if not self._at_door(each)]
         for each in found:
             if not any(
                 before.change == each.change
@@ -199,7 +200,8 @@ class Watcher:
             observation = Observation(
                 Kind.OBJECT,
                 str(each.change),
-                self._place,
+                # A thing seen through a doorway is where it lies.
+                self._place_of(each.position) or self._place,
                 position=each.position,
                 confidence=each.confidence,
                 stamp=stamp,
@@ -237,13 +239,13 @@ class Watcher:
             moving=np.zeros_like(now.moving),
         )
 
-    def _at_door(self, point: tuple[float, float]) -> bool:
-        """Tell whether a door's leaf may be at a point."""
+    def _at_door(self, thing: ObjectChange) -> bool:
+        """Tell whether a thing may be a door's leaf, which is the door's own matter."""
         for door in self._doors.values():
-            first, second = door.segment[:2], door.segment[2:]
-            reach = math.dist(first, second) + 0.15
-            if min(math.dist(first, point), math.dist(second, point)) < reach:
-                return True
+            width = math.dist(door.segment[:2], door.segment[2:])
+            for hinge in (door.segment[:2], door.segment[2:]):
+                if is_leaf(thing.points, hinge, width):
+                    return True
         return False
 
     # --- the camera ---
@@ -273,12 +275,9 @@ class Watcher:
                 self._take(Observation(Kind.VIEW, view, self._place, stamp=stamp), grey)
         if viewpoint is None or sight != Sight.CLEAR:
             return
-        known = next((each for each in self._views if _same_view(each.viewpoint, viewpoint)), None)
+        known = self._views.at(viewpoint)
         if known is None:
-            self._views = [
-                *self._views[-MOST_VIEWS + 1 :],
-                _View(viewpoint, grey, stamp, markers or frozenset()),
-            ]
+            self._views.add(viewpoint, grey, stamp, markers or ())
             return
         if markers is not None:
             self._miss(known, markers, viewpoint, stamp, grey)
@@ -287,7 +286,8 @@ class Watcher:
                 Kind.VIEW,
                 'changed',
                 self._place,
-                position=(viewpoint[0], viewpoint[1]),
+                known.name,
+                (viewpoint[0], viewpoint[1]),
                 confidence=change.confidence,
                 stamp=stamp,
                 compared_with=f'{known.stamp:.0f}',
@@ -296,7 +296,12 @@ class Watcher:
                 self._take(observation, grey)
 
     def _miss(
-        self, view: _View, seen: frozenset[int], viewpoint: Viewpoint, stamp: float, grey: Grey
+        self,
+        view: ReferenceView,
+        seen: frozenset[int],
+        viewpoint: Viewpoint,
+        stamp: float,
+        grey: Grey,
     ) -> None:
         """Tell of markers that are in a view's reference, and in several pictures now are not."""
         view.markers |= seen
@@ -318,15 +323,27 @@ class Watcher:
         hung = self._markers.get(number)
         where = position[0], position[1]
         if hung is None:
-            self._markers[number] = position
-            if not self._known_markers:
+            if not self._known_markers or number in self._known_markers:
+                self._markers[number] = position
                 return
             state = 'unknown'
         else:
             state = 'moved' if math.dist(hung, position) > MARKER_MOVED else 'here'
-        seen = Observation(Kind.MARKER, state, self._place, str(number), where, 0.95, stamp)
+        place = self._place_of(where) or self._place
+        seen = Observation(Kind.MARKER, state, place, str(number), where, 0.95, stamp)
         if self._is_due(seen):
             self._take(seen)
+
+    def answer(self, number: int, state: EventState) -> Event:
+        """Take a person's word about an event; a view that is normal now is learned anew.
+
+        Raises:
+            KeyError, ValueError: See `EventBook.answer`.
+        """
+        event = self.book.answer(number, state)
+        if state == EventState.NORMAL and event.kind == Kind.VIEW and event.subject:
+            self._views.forget(event.subject)
+        return event
 
     # --- what is made of it ---
 
@@ -365,7 +382,13 @@ class Watcher:
         self._learn()
         normal = self._kept if self._normal is None else _packed(self._normal)
         hung = {str(number): list(each) for number, each in self._markers.items()}
-        return {'book': self.book.to_json(), 'normal': normal, 'look': self._look, 'markers': hung}
+        return {
+            'book': self.book.to_json(),
+            'normal': normal,
+            'look': self._look,
+            'markers': hung,
+            'views': self._views.to_json(),
+        }
 
     def restore(self, kept: Mapping[str, Any]) -> None:
         """Take what `state` gave.
@@ -375,6 +398,7 @@ class Watcher:
         """
         look, normal = int(kept['look']), dict(kept['normal'])
         hung = {int(number): _point(each) for number, each in kept['markers'].items()}
+        self._views.restore(kept.get('views', {'views': [], 'next': 1}))
         self.book.restore(kept['book'])
         self._look, self._kept = look, normal
         self._markers = {**hung, **self._markers} if self._known_markers else hung
@@ -396,14 +420,6 @@ def _same_map(one: Grid, other: Grid) -> bool:
         and one.origin == other.origin
         and np.array_equal(one.cells, other.cells)
     )
-
-
-def _same_view(one: Viewpoint, other: Viewpoint) -> bool:
-    if len(one) != len(other):
-        return False
-    near = math.dist(one[:2], other[:2]) <= SAME_VIEW[0]
-    turned = (abs(math.remainder(a - b, math.tau)) for a, b in zip(one[2:], other[2:], strict=True))
-    return near and all(each <= SAME_VIEW[2] for each in turned)
 
 
 def _packed(view: FloorView) -> dict[str, Any]:

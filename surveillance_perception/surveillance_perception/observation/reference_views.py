@@ -1,0 +1,135 @@
+"""How each viewpoint looks normally: pictures by where the camera was, that outlive a restart."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+
+from surveillance_perception.observation.views import WIDTH, Grey
+
+Viewpoint = tuple[float, ...]
+"""x and y in metres, then yaw and the arm's joints in radians."""
+SAME_VIEW = (0.15, 0.1)
+"""Viewpoints are the same within this: x and y in metres, any angle in radians."""
+MOST_VIEWS = 100
+
+
+@dataclass
+class ReferenceView:
+    """One viewpoint.
+
+    Attributes:
+        name: Names it in observations, `v1`, and its file.
+        viewpoint: Where the camera was.
+        picture: What it showed, at most `WIDTH` wide.
+        stamp: When, seconds since 1970.
+        markers: The ids seen from it.
+        absent: In how many pictures in a row each of them was not seen.
+    """
+
+    name: str
+    viewpoint: Viewpoint
+    picture: Grey
+    stamp: float
+    markers: frozenset[int] = frozenset()
+    absent: dict[int, int] = field(default_factory=dict)
+
+
+class ReferenceViews:
+    """The views, of which the oldest goes when there are too many.
+
+    Args:
+        folder: Where their pictures are kept; None: they are lost with the process.
+    """
+
+    def __init__(self, folder: Path | None = None) -> None:
+        self._folder = folder
+        self._views: list[ReferenceView] = []
+        self._next = 1
+
+    def at(self, viewpoint: Viewpoint) -> ReferenceView | None:
+        """Return the view from a viewpoint, if there is one."""
+        return next((each for each in self._views if _same(each.viewpoint, viewpoint)), None)
+
+    def add(
+        self, viewpoint: Viewpoint, picture: Grey, stamp: float, markers: Iterable[int] = ()
+    ) -> ReferenceView:
+        """Take a picture as how this viewpoint looks normally."""
+        if picture.shape[1] > WIDTH:
+            size = WIDTH, max(1, round(picture.shape[0] * WIDTH / picture.shape[1]))
+            picture = np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_AREA), np.uint8)
+        view = ReferenceView(f'v{self._next}', viewpoint, picture, stamp, frozenset(markers))
+        self._next += 1
+        for old in self._views[: len(self._views) + 1 - MOST_VIEWS]:
+            self.forget(old.name)
+        self._views.append(view)
+        if self._folder is not None:
+            good, data = cv2.imencode('.png', picture)
+            try:
+                self._folder.mkdir(parents=True, exist_ok=True)
+                self._path(self._folder, view.name).write_bytes(data.tobytes() if good else b'')
+            except OSError:
+                pass  # the disk is full: after a restart this viewpoint is seen anew
+        return view
+
+    def forget(self, name: str) -> None:
+        """Drop a view: the next picture from there is how it looks normally."""
+        self._views = [each for each in self._views if each.name != name]
+        if self._folder is not None:
+            self._path(self._folder, name).unlink(missing_ok=True)
+
+    def to_json(self) -> dict[str, Any]:
+        """Return all but the pictures as plain values, for `restore`."""
+        views = [
+            {
+                'name': each.name,
+                'viewpoint': list(each.viewpoint),
+                'stamp': each.stamp,
+                'markers': sorted(each.markers),
+            }
+            for each in self._views
+        ]
+        return {'views': views, 'next': self._next}
+
+    def restore(self, values: Mapping[str, Any]) -> None:
+        """Take what `to_json` gave; a view whose picture is gone is left out.
+
+        Raises:
+            ValueError, KeyError, TypeError: It is something else; nothing is changed then.
+        """
+        found = []
+        for each in values['views']:
+            name = str(each['name'])
+            if not name.isalnum():
+                raise ValueError(f'a view is called {name!r}')
+            picture = self._read(name)
+            if picture is not None:
+                viewpoint = tuple(map(float, each['viewpoint']))
+                markers = frozenset(map(int, each['markers']))
+                found.append(ReferenceView(name, viewpoint, picture, float(each['stamp']), markers))
+        following = int(values['next'])
+        self._views, self._next = found, following
+
+    def _read(self, name: str) -> Grey | None:
+        if self._folder is None or not (path := self._path(self._folder, name)).is_file():
+            return None
+        picture = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE)
+        return None if picture is None else np.asarray(picture, np.uint8)
+
+    @staticmethod
+    def _path(folder: Path, name: str) -> Path:
+        return folder / f'{name}.png'
+
+
+def _same(one: Viewpoint, other: Viewpoint) -> bool:
+    if len(one) != len(other):
+        return False
+    near = math.dist(one[:2], other[:2]) <= SAME_VIEW[0]
+    turned = (abs(math.remainder(a - b, math.tau)) for a, b in zip(one[2:], other[2:], strict=True))
+    return near and all(each <= SAME_VIEW[1] for each in turned)
