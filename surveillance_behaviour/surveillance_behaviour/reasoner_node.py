@@ -74,6 +74,7 @@ class Reasoner(PatrolNode):
             'mission_status',
             self._on_status,
             stamp=lambda told: seconds_of(told.stamp),
+            owner=BEHAVIOUR_NODE,
         )
         self._owner = f'{self.get_namespace().rstrip("/")}/{BEHAVIOUR_NODE}'
         self.create_subscription(ParameterEvent, '/parameter_events', self._on_parameters, 1000)

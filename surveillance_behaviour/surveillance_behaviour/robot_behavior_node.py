@@ -104,6 +104,7 @@ class RobotBehavior(PatrolNode):
             lambda m: battery.set_charging(charging_from(m)),
             stamp=lambda told: seconds_of(told.header.stamp),
             qos=SENSOR_QOS,
+            owner='battery_controller',
         )
         self._machine_thread = self.spawn(self._run, name='machine')
 

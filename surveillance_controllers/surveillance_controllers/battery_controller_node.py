@@ -217,7 +217,9 @@ class RobotBattery:
             self._timeout = settings.driver.timeout
             self._topic = str(node.resolve_topic_name('battery_state'))
             # As a driver publishes: its messages are not kept, and may get lost.
-            node.create_subscription(BatteryState, 'battery_state', self._on_driver, SENSOR_QOS)
+            StateSubscription(
+                node, BatteryState, 'battery_state', self._on_driver, each=True, qos=SENSOR_QOS
+            )
         else:
             # On a real robot the topic is a driver's, even where nobody reads it.
             node.get_logger().warn(
@@ -230,6 +232,7 @@ class RobotBattery:
             self._on_pose,
             raw=True,
             stamp=stamp_of_serialized,
+            owner='motion_controller',
         )
         node.create_subscription(JointTrajectory, 'arm/joint_trajectory', self._on_trajectory, 1)
         node.create_subscription(Float32, 'battery_drain', self._on_drain, 10)

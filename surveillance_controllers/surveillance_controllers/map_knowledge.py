@@ -61,6 +61,7 @@ class MapKnowledge:
             'robot_place',
             self._on_robot_place,
             stamp=lambda told: seconds_of(told.header.stamp),
+            owner='motion_controller',
         )
 
     def assume(self, positions: Mapping[str, Points]) -> None:

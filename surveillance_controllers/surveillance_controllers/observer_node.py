@@ -151,9 +151,12 @@ class Observer(PatrolNode):
         self._next_picture = 0.0
         self._work: queue.Queue[Callable[[], object] | None] = queue.Queue()
         self._lidar.subscribe(self._on_scan)
-        StateSubscription(self, OccupancyGrid, 'map', self._on_map)
-        StateSubscription(self, RobotPlace, 'robot_place', self._on_place)
-        StateSubscription(self, PoseWithCovarianceStamped, 'amcl_pose', self._on_pose, raw=True)
+        StateSubscription(self, OccupancyGrid, 'map', self._on_map, owner='simulator')
+        owner = 'motion_controller'
+        StateSubscription(self, RobotPlace, 'robot_place', self._on_place, owner=owner)
+        StateSubscription(
+            self, PoseWithCovarianceStamped, 'amcl_pose', self._on_pose, raw=True, owner=owner
+        )
         self.create_subscription(MarkerDetectionArray, 'arm/markers', self._on_markers, 10)
         self.create_subscription(Odometry, 'odom', self._on_odometry, SENSOR_QOS, raw=True)
         if self._settings.camera:

@@ -97,7 +97,7 @@ class ArucoDetector(PatrolNode):
         self.create_subscription(
             CameraInfo, 'camera/rgb/camera_info', self._on_camera_info, SENSOR_QOS
         )
-        StateSubscription(self, Bool, 'arm/at_rest', self._on_rest)
+        StateSubscription(self, Bool, 'arm/at_rest', self._on_rest, owner='arm_controller')
         self.create_timer(REPORT_PERIOD, self._report)
         self.spawn(self._work, 'marker detection')
 

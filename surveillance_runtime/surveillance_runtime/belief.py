@@ -1,70 +1,114 @@
-"""Which of several publishers of a state topic a reader believes.
+"""Which of several publishers of a topic a reader believes.
 
-Each publisher numbers its messages, and its middleware tells the number with each one. Messages
-whose numbers go on from the last one that was believed are of the same publisher. Any other message
-is of somebody else, or of an owner that was started again, and waits: as long as the publisher that
-is believed speaks, what waits is dropped; when that stays silent, what waits is believed.
+The middleware tells with each message which publisher it is from. The first publisher that is heard
+is believed as long as it is in the graph. What another one says waits: it is dropped when its
+sender leaves, and believed when the publisher that is believed has left, or was replaced by a
+publisher of the same node (one that was started again; the graph keeps its predecessor for a while
+when that was killed). Where the owner's node is known by name, its publisher is believed whoever
+spoke first.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
-REACH = 50
-"""A number that is larger by more than this goes not on from the last one."""
 SILENT = 1.5
 """An owner that repeats its state each second and says nothing for this long is gone, seconds."""
-PATIENCE = 0.3
-"""How long another publisher's message waits for the word of an owner that was silent, seconds:
-one that repeats nothing still answers."""
-LONGEST = 2.0
-"""How long it waits at most, seconds."""
-UNKNOWN = 2**64 - 1
-"""The number that a middleware gives which numbers nothing."""
+PATIENCE = 0.1
+"""Seconds between two looks at the graph while the message of another publisher waits."""
 
 
 class Belief:
     """The state that a reader believes, as bytes.
 
+    Args:
+        graph: Returns the node of each publisher that is in the graph now, by identity; asked only
+            where somebody else than the publisher that is believed speaks.
+        owner: Full name of the node that owns the topic where it runs; empty: any may.
+        only: Believe nobody else.
+
     Attributes:
         value: What is believed; None: nothing came yet.
         due: When `settle` is to be called, seconds; None: nothing waits.
+        rivals: Nodes of other publishers that spoke and are still there.
+        node: The node that is believed, as the last look at the graph showed it; empty: not known.
     """
 
-    def __init__(self) -> None:
+    def __init__(
+        self,
+        graph: Callable[[], Mapping[bytes, str]],
+        owner: str = '',
+        only: bool = False,
+    ) -> None:
         self.value: bytes | None = None
         self.due: float | None = None
-        self._number = 0
-        self._heard = 0.0
-        self._held: tuple[bytes, int] = b'', 0
+        self.rivals: tuple[str, ...] = ()
+        self.node = ''
+        self._graph = graph
+        self._owner = owner
+        self._only = only
+        self._publisher = b''
+        self._heard = float('-inf')
+        self._held: dict[bytes, bytes] = {}
 
-    def hear(self, value: bytes, number: int, now: float, alone: Callable[[], bool]) -> bool:
+    def hear(self, value: bytes, publisher: bytes, now: float) -> bool:
         """Take a message; return whether it is believed at once.
 
         Args:
             value: The message.
-            number: The number that its publisher gave it.
+            publisher: Identity of its publisher; empty where the middleware does not tell.
             now: Steady time, seconds.
-            alone: Whether there is one publisher only; asked where the number alone does not tell.
         """
-        first = self.value is None
-        follows = self._number < number <= self._number + REACH
-        if first or follows or ((number > self._number or number == UNKNOWN) and alone()):
-            self._believe(value, number, now)
+        if self.value is not None and publisher == self._publisher:
+            self._believe(value, publisher, now)
             return True
+        if self.value is None and self._may_begin(publisher):
+            self._believe(value, publisher, now)
+            return True
+        self._held.pop(publisher, None)
+        self._held[publisher] = value  # the last one is the newest
         if self.due is None:
-            gone = now - self._heard > SILENT
-            self.due = now + (PATIENCE if gone else LONGEST)
-        self._held = value, number
+            self.due = now + PATIENCE
         return False
 
+    def _may_begin(self, publisher: bytes) -> bool:
+        """Return whether the first message that comes is believed at once."""
+        if not self._owner:
+            return True
+        nodes = self._graph()
+        if nodes.get(publisher) == self._owner:
+            return True
+        # Somebody else, while the owner is not there, nor anybody who could be the owner.
+        known = publisher in nodes and '' not in nodes.values()
+        return known and not self._only and self._owner not in nodes.values()
+
     def settle(self, now: float) -> bool:
-        """Believe what has waited long enough; return whether there was such a message."""
+        """Look whether one that waits is believed by now; return whether there was such a one."""
         if self.due is None or now < self.due:
             return False
-        self._believe(*self._held, now)
-        return True
+        nodes = self._graph()
+        heir = self._heir(nodes, now)
+        if heir is not None:
+            self._believe(self._held.pop(heir), heir, now)
+        self._held = {each: value for each, value in self._held.items() if each in nodes}
+        self.rivals = tuple(sorted({nodes[each] or 'a nameless node' for each in self._held}))
+        self.node = nodes.get(self._publisher, '')
+        self.due = now + PATIENCE if self._held else None
+        return heir is not None
 
-    def _believe(self, value: bytes, number: int, now: float) -> None:
-        self.value, self._number, self._heard = value, number, now
-        self.due = None
+    def _heir(self, nodes: Mapping[bytes, str], now: float) -> bytes | None:
+        """Return the publisher that takes the place of the one that is believed, if any."""
+        newest = [*reversed(self._held)]
+        believed = nodes.get(self._publisher) if self.value is not None else None
+        owned = self._only or self._owner in nodes.values()
+        if self._owner and believed != self._owner and owned:
+            return next((each for each in newest if nodes.get(each) == self._owner), None)
+        if believed is None:
+            # Whoever is still there before one that has left, too.
+            return next((each for each in newest if each in nodes), next(iter(newest), None))
+        if now - self._heard <= SILENT:
+            return None
+        return next((each for each in newest if nodes.get(each) == believed != ''), None)
+
+    def _believe(self, value: bytes, publisher: bytes, now: float) -> None:
+        self.value, self._publisher, self._heard = value, publisher, now

@@ -34,6 +34,8 @@ from rclpy.task import Task
 from rclpy.utilities import timeout_sec_to_nsec
 from rclpy.waitable import NumberOfEntities
 
+from surveillance_runtime.message_source import SourceTaker
+
 _MOST_LISTS = 30
 """Wait lists that are kept: one for each set of callback groups that coroutines held at once."""
 _EVERYTHING_PERIOD = 0.01
@@ -155,9 +157,10 @@ class PatrolExecutor(SingleThreadedExecutor):
         self._everything_due = self._choice_due = 0.0
         self._lately_called: set[Any] = set()
         self._changed = True
+        self._sources: SourceTaker | None = None
         self._take: dict[str, Callable[[Any], Any]] = {
             'timer': _call_timer,
-            'subscription': _call_subscription,
+            'subscription': self._take_subscription,
             'guard_condition': self._take_guard_condition,
             'client': self._take_client,
             'service': self._take_service,
@@ -304,9 +307,33 @@ class PatrolExecutor(SingleThreadedExecutor):
                         if entity is not None:
                             entity.callback_group.ending_execution(entity)
 
+    def _take_subscription(self, subscription: Subscription) -> Any:
+        """Take a message and hand it over; return what the callback left to await, if anything.
+
+        A serialized message comes with the identity of its publisher.
+        """
+        only_message = subscription._callback_type is Subscription.CallbackType.MessageOnly
+        try:
+            handle = subscription.handle
+            with handle:
+                if subscription.raw and not only_message:
+                    if self._sources is None:
+                        self._sources = SourceTaker()
+                    taken = self._sources.take(handle)
+                else:
+                    taken = handle.take_message(subscription.msg_type, subscription.raw)
+        except _rclpy.InvalidHandle:
+            return None
+        if taken is None:
+            return None
+        return _coroutine(subscription.callback(*(taken[:1] if only_message else taken)))
+
     def shutdown(self, timeout_sec: float | None = None) -> bool:
         """Stop, and close the coroutines that wait. Nobody may spin any more."""
         self._close_wait_lists()
+        if self._sources is not None:
+            self._sources.close()
+            self._sources = None
         for task in (*self._new_tasks, *self._waiting):
             task.cancel()
         return bool(super().shutdown(timeout_sec))
@@ -320,20 +347,6 @@ def _call_timer(timer: Any) -> Any:
     except _rclpy.InvalidHandle:
         return None
     return _coroutine(timer.callback())
-
-
-def _call_subscription(subscription: Subscription) -> Any:
-    """Take a message and hand it over; return what the callback left to await, if anything."""
-    try:
-        with subscription.handle:
-            taken = subscription.handle.take_message(subscription.msg_type, subscription.raw)
-    except _rclpy.InvalidHandle:
-        return None
-    if taken is None:
-        return None
-    if subscription._callback_type is Subscription.CallbackType.MessageOnly:
-        taken = taken[:1]
-    return _coroutine(subscription.callback(*taken))
 
 
 def _coroutine(returned: Any) -> Any:

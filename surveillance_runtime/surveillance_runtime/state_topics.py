@@ -3,7 +3,8 @@
 The owner (`OwnedTopic`) publishes each change, repeats its state about each second, answers every
 foreign value with its own, and tells of a second publisher in an incident with that node's name.
 A reader (`StateSubscription`) takes a new state once, refuses stamps ahead of its clock, and
-believes the owner: see `belief`.
+believes the owner: see `belief`. Where the owner is another program
+(map_server, a driver), which tells of nobody, the reader tells of a second publisher.
 """
 
 from __future__ import annotations
@@ -19,8 +20,10 @@ from rclpy.qos import QoSProfile
 from rclpy.serialization import deserialize_message, serialize_message
 from rclpy.timer import Timer
 
-from surveillance_runtime.belief import UNKNOWN, Belief
+from surveillance_runtime.belief import Belief
+from surveillance_runtime.message_source import SOURCE
 from surveillance_runtime.node import PatrolNode
+from surveillance_runtime.node_table import RUN_NODES
 from surveillance_runtime.qos import STATE_QOS
 
 M = TypeVar('M')
@@ -34,6 +37,25 @@ REMEMBERED = 32
 """Of how many of its last messages an owner knows that they are its own."""
 FOREIGN_FOR = 10.0
 """How long the last foreign value counts as going on, seconds."""
+ANSWER_PERIOD = 0.05
+"""An owner answers no faster, seconds: two owners would answer each other for ever."""
+UNNUMBERED = 0
+"""The number of a message that the middleware did not number."""
+NAMELESS = '_NODE_NAME_UNKNOWN_'
+"""What the graph calls a node that it knows only endpoints of."""
+
+
+def publishers_of(node: PatrolNode, topic: str) -> dict[bytes, str]:
+    """Return the full names of the nodes that publish a topic, by the identity of the publisher.
+
+    Args:
+        node: Who asks.
+        topic: Full name of the topic.
+    """
+    return {
+        bytes(end.endpoint_gid): f'{end.node_namespace.rstrip("/")}/{end.node_name}'
+        for end in node.get_publishers_info_by_topic(topic)
+    }
 
 
 class OwnedTopic(Generic[M]):
@@ -60,6 +82,8 @@ class OwnedTopic(Generic[M]):
         self._own: deque[tuple[int, bytes]] = deque(maxlen=REMEMBERED)
         self._others: tuple[str, ...] = ()
         self._foreign_at = -FOREIGN_FOR
+        self._answered_at = -ANSWER_PERIOD
+        self._owes_answer = False
         self._told = ''
         node.create_subscription(kind, name, self._on_heard, STATE_QOS, raw=True)
         steady = Clock(clock_type=ClockType.STEADY_TIME)
@@ -82,21 +106,24 @@ class OwnedTopic(Generic[M]):
         with self._lock:
             # A state that has just changed need not be said twice within a moment.
             old = time.monotonic() - self._said_at >= REPEAT / 2
-            if self._repeats and self._said is not None and old:
+            if self._said is not None and (self._owes_answer or (self._repeats and old)):
+                self._owes_answer = False
                 self._say(self._said)
         self._look_for_others()
 
     def _on_heard(self, heard: bytes, info: dict[str, Any]) -> None:
-        number = info['publication_sequence_number'] or UNKNOWN
+        number = info['publication_sequence_number']
         with self._lock:
-            if any(heard == state and (number in (count, UNKNOWN)) for count, state in self._own):
+            if any(heard == state and number in (count, UNNUMBERED) for count, state in self._own):
                 return
             foreign = deserialize_message(heard, self._kind)
             own = None if self._said is None else deserialize_message(self._said, self._kind)
             if own == foreign:
                 return
-            self._foreign_at = time.monotonic()
-            if self._said is not None:
+            now = self._foreign_at = time.monotonic()
+            self._owes_answer = now - self._answered_at < ANSWER_PERIOD
+            if self._said is not None and not self._owes_answer:
+                self._answered_at = now
                 self._say(self._said)
         self._look_for_others()
 
@@ -126,10 +153,7 @@ class OwnedTopic(Generic[M]):
 
     def _other_names(self) -> tuple[str, ...]:
         """Return the nodes that publish the topic beside this one."""
-        names = sorted(
-            f'{end.node_namespace.rstrip("/")}/{end.node_name}'
-            for end in self._node.get_publishers_info_by_topic(self._publisher.topic_name)
-        )
+        names = sorted(publishers_of(self._node, self._publisher.topic_name).values())
         own = self._node.get_fully_qualified_name()
         if own in names:
             names.remove(own)
@@ -137,7 +161,7 @@ class OwnedTopic(Generic[M]):
 
 
 class StateSubscription(Generic[M]):
-    """What a node believes of a state topic that another one owns.
+    """What a node believes of a topic that another one owns: a state, or a sensor's stream.
 
     Args:
         node: The node that reads.
@@ -146,8 +170,10 @@ class StateSubscription(Generic[M]):
         take: Called with each new state, in the executor's thread.
         raw: Give `take` the bytes of a message.
         stamp: Returns the stamp of what `take` is given, seconds; None: it has none.
-        each: Give every message of the owner, also one that repeats the state.
+        each: Give every message of the owner, also one that repeats the state, as of a stream.
         qos: How it is heard, where the owner may be another program.
+        owner: The node that owns the topic where it runs; empty: not known.
+        only: Whether nobody else may, also where that node does not run.
     """
 
     def __init__(
@@ -161,37 +187,38 @@ class StateSubscription(Generic[M]):
         stamp: Callable[[Any], float] | None = None,
         each: bool = False,
         qos: QoSProfile = STATE_QOS,
+        owner: str = '',
+        only: bool = False,
     ) -> None:
-        self._node = node
-        self._kind = kind
-        self._name = name
         self._take = take
         self._raw = raw
         self._stamp = stamp
         self._each = each
-        self._belief = Belief()
-        self._timer: Timer | None = None
-        self._steady = Clock(clock_type=ClockType.STEADY_TIME)
         simulated = bool(node.get_parameter('use_sim_time').value)
         self._ahead = AHEAD_SIMULATED if simulated else AHEAD
+        self._node = node
+        self._kind = kind
+        self._name = name
+        if owner:
+            owner = f'{node.get_namespace().rstrip("/")}/{owner}'
+        self._belief = Belief(self._publishers, owner, only)
+        self._told = ''
+        self._timer: Timer | None = None
+        self._steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._subscription = node.create_subscription(kind, name, self._on_heard, qos, raw=True)
 
+    def _publishers(self) -> dict[bytes, str]:
+        found = publishers_of(self._node, self._subscription.topic_name)
+        return {each: '' if NAMELESS in name else name for each, name in found.items()}
+
     def _on_heard(self, heard: bytes, info: dict[str, Any]) -> None:
-        number = info['publication_sequence_number'] or UNKNOWN
-        if self._is_ahead(heard):
+        if self._is_refused(heard):
             return
         before = self._belief.value
-        if self._belief.hear(heard, number, time.monotonic(), self._alone):
-            if self._each or heard != before:
-                self._give(heard)
+        if self._belief.hear(heard, info.get(SOURCE, b''), time.monotonic()):
+            self._believed(heard, before)
         elif (due := self._belief.due) is not None:
             self._wake_at(due)
-
-    def _alone(self) -> bool:
-        return int(self._node.count_publishers(self._name)) <= 1
-
-    def _give(self, heard: bytes) -> None:
-        self._take(heard if self._raw else deserialize_message(heard, self._kind))
 
     def _wake_at(self, due: float) -> None:
         period = max(1, int(1e9 * (due - time.monotonic())))
@@ -206,14 +233,31 @@ class StateSubscription(Generic[M]):
         self._timer.cancel()
         before = self._belief.value
         if self._belief.settle(time.monotonic()):
-            heard = self._belief.value
-            assert heard is not None
-            if self._each or heard != before:
-                self._give(heard)
-        elif (due := self._belief.due) is not None:
+            assert self._belief.value is not None
+            self._believed(self._belief.value, before)
+        self._tell_of_rivals()
+        if (due := self._belief.due) is not None:
             self._wake_at(due)
 
-    def _is_ahead(self, heard: bytes) -> bool:
+    def _tell_of_rivals(self) -> None:
+        """Tell who else publishes the topic, where its owner is no node of the robot's own."""
+        rivals, owner = ', '.join(self._belief.rivals), self._belief.node
+        text = ''
+        if rivals and owner and owner.rpartition('/')[2] not in RUN_NODES:
+            text = f'{self._name} is published by {rivals}, too: {owner} is believed'
+        if text == self._told:
+            return
+        self._told = text
+        if text:
+            self._node.incidents.begin(('topic', self._name), text)
+        else:
+            self._node.incidents.end(('topic', self._name))
+
+    def _believed(self, heard: bytes, before: bytes | None) -> None:
+        if self._each or heard != before:
+            self._take(heard if self._raw else deserialize_message(heard, self._kind))
+
+    def _is_refused(self, heard: bytes) -> bool:
         """Refuse a stamp that no clock has reached yet."""
         if self._stamp is None or heard == self._belief.value:
             return False

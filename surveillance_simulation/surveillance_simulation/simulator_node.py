@@ -134,11 +134,26 @@ class Simulator(PatrolNode):
         self.create_subscription(
             TwistStamped if stamped else Twist, 'cmd_vel_monitored', self._on_monitored, 1
         )
-        StateSubscription(self, PoseWithCovarianceStamped, 'amcl_pose', self._on_estimate, raw=True)
+        motion = 'motion_controller'
+        StateSubscription(
+            self,
+            PoseWithCovarianceStamped,
+            'amcl_pose',
+            self._on_estimate,
+            raw=True,
+            owner=motion,
+        )
         # The same word twice is two waits.
-        StateSubscription(self, Time, 'mission_waits_until', self._on_mission_waits, each=True)
-        StateSubscription(self, RobotPlace, 'robot_place', self._on_place)
-        StateSubscription(self, Time, 'robot_place_written', self._on_place_written)
+        StateSubscription(
+            self,
+            Time,
+            'mission_waits_until',
+            self._on_mission_waits,
+            each=True,
+            owner='robot_behavior',
+        )
+        StateSubscription(self, RobotPlace, 'robot_place', self._on_place, owner=motion)
+        StateSubscription(self, Time, 'robot_place_written', self._on_place_written, owner=motion)
         for action in (*PLANNING, *DRIVING):
             self.create_subscription(
                 GoalStatusArray,
@@ -147,7 +162,7 @@ class Simulator(PatrolNode):
                 STATE_QOS,
             )
         self.create_subscription(JointTrajectory, 'arm/joint_trajectory', self._on_trajectory, 1)
-        StateSubscription(self, Bool, 'arm/at_rest', self._on_arm_rest)
+        StateSubscription(self, Bool, 'arm/at_rest', self._on_arm_rest, owner='arm_controller')
         self.create_subscription(
             MarkerDetectionArray, 'aruco_detector/detections', self._on_detections, 10
         )

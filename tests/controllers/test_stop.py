@@ -74,7 +74,8 @@ def test_a_robot_that_is_held_stands_and_then_ends_its_leg(
     topic: str,
 ) -> None:
     graph = world.graph
-    hold = OwnedTopic(graph.node, Bool, topic)
+    owner = {'stopped': 'collision_monitor', 'paused': 'robot_behavior'}[topic]
+    hold = OwnedTopic(graph.add(PatrolNode, name=owner), Bool, topic)
     path = world.compute((10.0, 8.0)).result.path
     ends: list[Any] = []
     begun = world.position

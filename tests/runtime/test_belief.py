@@ -1,4 +1,4 @@
-"""Which publisher of a state topic a reader believes."""
+"""Which publisher of a topic a reader believes."""
 
 from __future__ import annotations
 
@@ -6,86 +6,135 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from surveillance_runtime.belief import LONGEST, PATIENCE, UNKNOWN, Belief
+from surveillance_runtime.belief import PATIENCE, SILENT, Belief
+
+OWNER, OTHER, AGAIN = b'1', b'2', b'3'
 
 
-def yes() -> bool:
-    return True
+class World:
+    """A graph, and a reader that looks when it is to."""
+
+    def __init__(self, owner: str = '', only: bool = False) -> None:
+        self.nodes: dict[bytes, str] = {}
+        self.now = 0.0
+        self.belief = Belief(lambda: self.nodes, owner, only)
+
+    def wait(self, seconds: float) -> None:
+        end = self.now + seconds
+        while self.belief.due is not None and self.belief.due <= end:
+            self.now = self.belief.due
+            self.belief.settle(self.now)
+        self.now = end
+
+    def say(self, publisher: bytes, value: bytes) -> bytes | None:
+        self.belief.hear(value, publisher, self.now)
+        return self.belief.value
 
 
-def no() -> bool:
-    return False
+def test_the_first_publisher_is_believed_as_long_as_it_is_there() -> None:
+    world = World()
+    world.nodes = {OWNER: '/map_server', OTHER: '/stranger'}
+    assert world.say(OWNER, b'a') == b'a'
+    assert world.say(OTHER, b'x') == b'a'
+    world.wait(60.0)
+    assert world.belief.value == b'a'
+    assert world.belief.rivals == ('/stranger',)
+    assert world.say(OWNER, b'b') == b'b'
+    del world.nodes[OWNER]
+    world.wait(2 * PATIENCE)
+    assert world.belief.value == b'x'
+    assert world.belief.rivals == ()
 
 
-def test_the_first_publisher_is_believed_at_once() -> None:
-    belief = Belief()
-    assert belief.hear(b'a', 7, 0.0, yes)
-    assert belief.hear(b'b', 8, 0.1, yes)
-    assert belief.value == b'b'
+def test_a_message_goes_with_its_sender() -> None:
+    world = World()
+    world.nodes = {OWNER: '/map_server', OTHER: '/stranger'}
+    world.say(OWNER, b'a')
+    world.say(OTHER, b'x')
+    del world.nodes[OTHER]
+    world.wait(1.0)
+    del world.nodes[OWNER]
+    world.wait(60.0)
+    assert world.belief.value == b'a'
 
 
-@pytest.mark.parametrize('number', [1, 40, 5000])
-def test_a_foreign_message_is_dropped_when_the_owner_answers(number: int) -> None:
-    belief = Belief()
-    belief.hear(b'owner', 57, 0.0, no)
-    assert not belief.hear(b'foreign', number, 0.5, no)
-    assert belief.hear(b'owner', 58, 0.51, no)
-    assert not belief.settle(10.0)
-    assert belief.value == b'owner'
+def test_an_owner_that_was_killed_and_started_again_is_believed() -> None:
+    """The graph still has the dead one."""
+    world = World()
+    world.nodes = {OWNER: '/battery', AGAIN: '/battery', OTHER: '/stranger'}
+    world.say(OWNER, b'a')
+    world.say(AGAIN, b'b')
+    world.say(OTHER, b'x')
+    world.wait(SILENT / 2)
+    assert world.belief.value == b'a'
+    world.wait(SILENT)
+    assert world.belief.value == b'b'
 
 
-def test_an_owner_that_was_started_again_is_believed_soon() -> None:
-    belief = Belief()
-    belief.hear(b'before', 57, 0.0, yes)
-    assert not belief.hear(b'after', 1, 4.0, yes)
-    assert belief.due == 4.0 + PATIENCE
-    assert belief.settle(4.0 + PATIENCE)
-    assert belief.value == b'after'
-    assert belief.hear(b'later', 2, 5.0, yes)
+def test_a_namesake_is_not_believed_while_the_owner_speaks() -> None:
+    world = World()
+    world.nodes = {OWNER: '/battery', AGAIN: '/battery'}
+    world.say(OWNER, b'a')
+    for _ in range(20):
+        world.say(AGAIN, b'x')
+        world.wait(1.0)
+        assert world.say(OWNER, b'a') == b'a'
 
 
-def test_messages_that_got_lost_are_no_other_publisher() -> None:
-    belief = Belief()
-    belief.hear(b'a', 1, 0.0, yes)
-    assert belief.hear(b'b', 4000, 0.1, yes)
+def test_the_owner_by_name_is_believed_whoever_spoke_first() -> None:
+    world = World('/battery')
+    world.nodes = {OTHER: '/stranger'}
+    assert world.say(OTHER, b'x') == b'x'
+    world.nodes[OWNER] = '/battery'
+    world.say(OWNER, b'a')
+    world.wait(2 * PATIENCE)
+    assert world.belief.value == b'a'
+    world.say(OTHER, b'y')
+    world.wait(2 * PATIENCE)
+    assert world.belief.value == b'a'
 
 
-def test_a_middleware_that_numbers_nothing_is_believed_while_there_is_one_publisher() -> None:
-    belief = Belief()
-    belief.hear(b'a', UNKNOWN, 0.0, yes)
-    assert belief.hear(b'b', UNKNOWN, 0.1, yes)
-    assert not belief.hear(b'c', UNKNOWN, 0.2, no)
+@pytest.mark.parametrize('leaves', [False, True])
+def test_where_only_the_owner_may_speak_nobody_else_is_believed(leaves: bool) -> None:
+    world = World('/monitor', only=True)
+    world.nodes = {OTHER: '/stranger'}
+    assert world.say(OTHER, b'x') is None
+    if leaves:
+        world.nodes = {}
+    world.wait(5.0)
+    assert world.belief.value is None
+    world.nodes[OWNER] = '/monitor'
+    assert world.say(OWNER, b'a') == b'a'
+
+
+def test_one_of_whom_the_graph_knows_nothing_yet_waits_for_a_moment() -> None:
+    world = World('/battery')
+    assert world.say(OWNER, b'a') is None
+    world.nodes = {OWNER: '/battery'}
+    world.wait(2 * PATIENCE)
+    assert world.belief.value == b'a'
 
 
 @given(
     st.lists(
-        st.tuples(st.floats(0.0, 3.0), st.integers(1, 400), st.booleans()), min_size=1, max_size=30
+        st.tuples(st.floats(0.0, 3.0), st.sampled_from([OTHER, AGAIN, b'4', b'']), st.booleans()),
+        min_size=1,
+        max_size=30,
     ),
-    st.integers(1, 300),
+    st.booleans(),
 )
-def test_the_owners_word_wins_within_two_seconds(
-    foreign: list[tuple[float, int, bool]], count: int
+def test_the_owners_word_wins_whatever_others_say(
+    foreign: list[tuple[float, bytes, bool]], named: bool
 ) -> None:
-    """Whatever others publish: an owner that answers each and repeats itself is believed."""
-    belief, now = Belief(), 0.0
-    belief.hear(b'owner', count, now, no)
-    for gap, number, alone in foreign:
-        # The owner's repetitions until then.
-        for step in range(int(gap)):
-            count += 1
-            belief.settle(now + step + 1)
-            belief.hear(b'owner', count, now + step + 1, no)
-        now += gap
-        belief.settle(now)
-        belief.hear(b'foreign', number, now, yes if alone else no)
-        count += 1
-        belief.settle(now)
-        belief.hear(b'owner', count, now, no)
-    end = now + LONGEST
-    while now < end:
-        now += 0.5
-        belief.settle(now)
-        count += 1
-        belief.hear(b'owner', count, now, no)
-    belief.settle(now)
-    assert belief.value == b'owner'
+    """Also one that repeats nothing, as map_server."""
+    world = World('/owner' if named else '')
+    world.nodes = {OWNER: '/owner'}
+    world.say(OWNER, b'owner')
+    for gap, publisher, leaves in foreign:
+        world.wait(gap)
+        world.nodes[publisher] = '/stranger'
+        assert world.say(publisher, b'foreign') == b'owner'
+        if leaves:
+            del world.nodes[publisher]
+    world.wait(10.0)
+    assert world.belief.value == b'owner'

@@ -148,6 +148,7 @@ def ros_ontology(node: PatrolNode, deadlines: Deadlines) -> ArmorKnowledge:
         'robot_place',
         lambda told: whereabouts.note(told.place, nanoseconds_of(told.header.stamp)),
         stamp=lambda told: seconds_of(told.header.stamp),
+        owner='motion_controller',
     )
     return ArmorKnowledge(
         node.get_name(),
@@ -162,8 +163,11 @@ def ros_ontology(node: PatrolNode, deadlines: Deadlines) -> ArmorKnowledge:
 
 def hear_battery(node: PatrolNode, battery: BatteryMonitor) -> None:
     """Have a monitor follow the topics ``battery_level`` and ``battery_low``."""
-    StateSubscription(node, UInt8, 'battery_level', lambda m: battery.set_level(float(m.data)))
-    StateSubscription(node, Bool, 'battery_low', lambda m: battery.set_low(m.data))
+    owner = 'battery_controller'
+    StateSubscription(
+        node, UInt8, 'battery_level', lambda m: battery.set_level(float(m.data)), owner=owner
+    )
+    StateSubscription(node, Bool, 'battery_low', lambda m: battery.set_low(m.data), owner=owner)
 
 
 class RosPlaces:

@@ -44,6 +44,7 @@ class PurposeFeed:
         deadlines: Deadlines,
         elapsed: Callable[[], float],
     ) -> None:
+        self._node = node
         self._mission = mission
         self._machine = machine
         self._announcer = announcer
@@ -54,10 +55,18 @@ class PurposeFeed:
         self._stopped = False
         self._watch = PurposeWatch(node.incidents, self._explained)
         StateSubscription(
-            node, PoseWithCovarianceStamped, 'amcl_pose', self._on_pose, raw=True, each=True
+            node,
+            PoseWithCovarianceStamped,
+            'amcl_pose',
+            self._on_pose,
+            raw=True,
+            each=True,
+            owner='motion_controller',
         )
-        StateSubscription(node, DoorStates, 'door_states', self._on_doors)
-        StateSubscription(node, Bool, 'stopped', self._on_stopped)
+        StateSubscription(node, DoorStates, 'door_states', self._on_doors, owner='simulator')
+        StateSubscription(
+            node, Bool, 'stopped', self._on_stopped, owner='collision_monitor', only=True
+        )
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         node.create_timer(PERIOD, self._look, clock=steady)
 
@@ -102,7 +111,8 @@ class PurposeFeed:
             return settings.choice.exploration_seconds
         if any(part in name for part in ('MOV', 'POINTING', 'CONTROLLING', 'RETURN', 'GOBACK')):
             # Where nobody measures the pose, a move takes as long as a person or chance says.
-            return math.inf if self._pose is None else DRIVE_RECOVERY
+            measured = self._pose is not None and self._node.count_publishers('amcl_pose')
+            return DRIVE_RECOVERY if measured else math.inf
         if 'RECHARG' in name:
             return settings.charge_stall_seconds or math.inf
         if 'INIT' in name or not state:

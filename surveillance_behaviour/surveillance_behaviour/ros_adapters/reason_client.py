@@ -45,7 +45,7 @@ class ReasonClient(Reasoner):
         self._told = threading.Condition()
         self._decision: Decision | None = None
         self._reason = ServiceCaller(node, Reason, 'reason')
-        StateSubscription(node, DecisionMessage, 'decision', self._on_decision)
+        StateSubscription(node, DecisionMessage, 'decision', self._on_decision, owner='reasoner')
 
     def _on_decision(self, message: DecisionMessage) -> None:
         with self._told:

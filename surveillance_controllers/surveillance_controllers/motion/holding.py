@@ -33,8 +33,9 @@ class Hold:
         self._reasons: set[str] = set()
         self.begun, self.ended = Interrupt(), Interrupt()
         self.ended.set()
-        for topic in (STOPPED, PAUSED):
-            StateSubscription(node, Bool, topic, self._follower(topic))
+        for topic, owner in ((STOPPED, 'collision_monitor'), (PAUSED, 'robot_behavior')):
+            # Where the owner does not run, nobody else may have the robot stand for ever.
+            StateSubscription(node, Bool, topic, self._follower(topic), owner=owner, only=True)
 
     def _follower(self, topic: str) -> Callable[[Bool], None]:
         def follow(message: Bool) -> None:

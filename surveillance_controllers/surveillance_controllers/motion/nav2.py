@@ -110,7 +110,7 @@ class Nav2Motion:
         self._places.set_positions(positions)
         knowledge.assume(positions)
         knowledge.follow_places(self._set_positions)
-        StateSubscription(node, OccupancyGrid, 'map', self._on_map)
+        StateSubscription(node, OccupancyGrid, 'map', self._on_map, owner='simulator')
         StateSubscription(
             node,
             PoseWithCovarianceStamped,

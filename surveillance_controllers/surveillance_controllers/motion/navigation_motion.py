@@ -124,9 +124,18 @@ class NavigationMotion:
         # The places that come and go change what the robot's place can be.
         knowledge.follow_places(self._set_positions)
         self._hold = Hold(node, self._on_hold)
-        StateSubscription(node, OccupancyGrid, 'map', self._on_map)
-        StateSubscription(node, DoorStates, 'door_states', self._on_doors)
-        node.create_subscription(Odometry, 'odom', self._on_odometry, SENSOR_QOS, raw=True)
+        StateSubscription(node, OccupancyGrid, 'map', self._on_map, owner='simulator')
+        StateSubscription(node, DoorStates, 'door_states', self._on_doors, owner='simulator')
+        StateSubscription(
+            node,
+            Odometry,
+            'odom',
+            self._on_odometry,
+            raw=True,
+            each=True,
+            qos=SENSOR_QOS,
+            owner='simulator',
+        )
         self._lidar.subscribe(self._on_scan)
         node.create_subscription(PoseWithCovarianceStamped, 'initialpose', self._on_initial_pose, 1)
         self._silence = SilenceWatch(node.incidents, time.monotonic())

@@ -25,6 +25,7 @@ from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.profile.parameters import LidarSettings
 from surveillance_runtime.profile.record import Frames
 from surveillance_runtime.qos import SENSOR_QOS
+from surveillance_runtime.state_topics import StateSubscription
 
 try:
     from tf2_msgs.msg import TFMessage
@@ -74,7 +75,15 @@ class ScanReader:
     def subscribe(self, heard: Callable[[str, LaserScan], None]) -> None:
         """Hand over each scan with the name of its topic."""
         for topic in self.settings.scans:
-            self._node.create_subscription(LaserScan, topic, partial(heard, topic), SENSOR_QOS)
+            StateSubscription(
+                self._node,
+                LaserScan,
+                topic,
+                partial(heard, topic),
+                each=True,
+                qos=SENSOR_QOS,
+                owner='simulator',
+            )
 
     def read(self, message: LaserScan, topic: str = '') -> Scan:
         """Return a scan of one of the lidars.

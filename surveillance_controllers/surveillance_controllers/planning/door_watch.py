@@ -50,7 +50,7 @@ class DoorWatch:
         self._set_door = ServiceCaller(node, SetDoor, 'ontology_map/set_door')
         self._news = Interrupt()
         keep_up(node, 'door watch', self._news, self._catch_up, RETRY_PERIOD)
-        StateSubscription(node, DoorStates, 'door_states', self._on_states)
+        StateSubscription(node, DoorStates, 'door_states', self._on_states, owner='simulator')
 
     def rooms_of(self, interrupt: Interrupt) -> dict[str, set[str]]:
         """Return the places that each door leads into; empty while the ontology does not say.

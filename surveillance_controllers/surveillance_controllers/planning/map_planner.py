@@ -60,8 +60,9 @@ class NavigationPlanning:
         self._planner: GridPlanner | None = None
         self._obstacles: tuple[Points, NDArray[np.bool_] | None] = np.zeros((0, 2)), None
         self._pose: Pose | None = None
-        StateSubscription(node, OccupancyGrid, 'map', self._on_map)
-        StateSubscription(node, PointCloud2, 'obstacles', self._on_obstacles)
+        StateSubscription(node, OccupancyGrid, 'map', self._on_map, owner='simulator')
+        owner = 'motion_controller'
+        StateSubscription(node, PointCloud2, 'obstacles', self._on_obstacles, owner=owner)
         StateSubscription(
             node,
             PoseWithCovarianceStamped,
@@ -69,6 +70,7 @@ class NavigationPlanning:
             self._on_pose,
             raw=True,
             stamp=stamp_of_serialized,
+            owner=owner,
         )
 
     def start(self, target: str, run: GoalRun) -> Points:
