@@ -171,7 +171,7 @@ class Watch:
 
     def _on_battery(self, message: BatteryState) -> None:
         percent = 100.0 * float(message.percentage)
-        x, y, _ = self._world.plan.station
+        x, y, _ = next(iter(self._world.plan.stations.values())).pose
         robot = self._stack.robot.base.pose
         if math.dist(robot[:2], (x, y)) > 0.5:
             self.least_charge = min(self.least_charge, percent)

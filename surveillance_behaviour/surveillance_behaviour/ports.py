@@ -65,7 +65,10 @@ class Places(Protocol):
     """Where the places are."""
 
     def position(self, place: str, interrupt: Interrupt) -> Point:
-        """Return a point in the place; raises UnknownPlaceError when there is no such place."""
+        """Return a point in the place; raises UnknownPlaceError when there is no such place.
+
+        A recharge room's name with `AT_STATION` behind it stands for its charging station.
+        """
 
 
 class Reasoner(Protocol):

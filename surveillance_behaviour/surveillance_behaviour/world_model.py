@@ -14,10 +14,10 @@ import contextlib
 import math
 import random
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
-from patrol_policy.battery import Battery
+from patrol_policy.battery import Battery, ChargeCurve
 from patrol_policy.decision import (
     RECHARGE,
     DecisionSettings,
@@ -61,6 +61,8 @@ class WorldModel:
             None: by the times that are told.
         rules: What holds for single places.
         tell: Told what can be kept of the places, at the start and when that changes.
+        rates: How fast stations charge, by their places, percent per second: what is taken for
+            true until it was seen.
 
     Attributes:
         settings: Those.
@@ -84,6 +86,7 @@ class WorldModel:
         elapsed: Callable[[], float] | None = None,
         rules: PatrolRules | None = None,
         tell: Callable[[str], None] = lambda sentence: None,
+        rates: Mapping[str, float] | None = None,
     ) -> None:
         self.settings = settings
         self.experience = experience or Experience()
@@ -109,6 +112,7 @@ class WorldModel:
         self._warn = warn
         self._rules = rules or PatrolRules()
         self._tell = tell
+        self._curves = {place: ChargeCurve.even(rate) for place, rate in (rates or {}).items()}
         self._told: dict[str, str] = {}
         self._told_about: object = None
         self._announce = announce
@@ -125,7 +129,7 @@ class WorldModel:
             monitor.low,
             experience.draw.draw,
             experience.sent_to_charge,
-            experience.charge.curves(),
+            {**self._curves, **experience.charge.curves()},
         )
         if battery.sent_to_charge and battery.charged_enough(self.settings.battery):
             experience.sent_to_charge = ''

@@ -17,11 +17,12 @@ turn are held to what the robot's top speeds allow.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from surveillance_controllers.geometry import Pose, angle_between
 from surveillance_runtime.parameters import parameter
+from surveillance_runtime.place.stations import Station, station_at
 from surveillance_runtime.robot_arm import ARM, TrajectoryPoint
 
 SECONDS_PER_HOUR = 3600.0
@@ -161,8 +162,12 @@ class Battery:
             return p.charging_power
         return p.charging_power * max(p.taper_floor, (1.0 - charge) / (1.0 - p.taper_from))
 
-    def charge(self, seconds: float) -> None:
-        """Charge for some time at the station.
+    def charge(self, seconds: float, rate: float | None = None) -> None:
+        """Charge for some time at a station.
+
+        Args:
+            seconds: The time.
+            rate: Percent a minute below `taper_from`; None: as `charging_power` gives.
 
         Raises:
             ValueError: The time is negative.
@@ -170,31 +175,32 @@ class Battery:
         if seconds < 0:
             raise ValueError(f'charging for {seconds!r} s: expected 0 or more')
         p = self.parameters
+        power = p.charging_power if rate is None else rate * 60.0 / 100.0 * p.capacity
         left = seconds / SECONDS_PER_HOUR
         bound = p.taper_from * p.capacity
         if self.energy < bound:
-            hours = min(left, (bound - self.energy) / p.charging_power)
-            self.energy += hours * p.charging_power
+            hours = min(left, (bound - self.energy) / power)
+            self.energy += hours * power
             left -= hours
         floor_from = p.capacity * (1.0 - p.taper_floor * (1.0 - p.taper_from))
         if left > 0 and self.energy < floor_from:
-            rate = p.charging_power / (p.capacity * (1.0 - p.taper_from))
-            to_floor = math.log((p.capacity - self.energy) / (p.capacity - floor_from)) / rate
+            decay = power / (p.capacity * (1.0 - p.taper_from))
+            to_floor = math.log((p.capacity - self.energy) / (p.capacity - floor_from)) / decay
             hours = min(left, to_floor)
-            self.energy = p.capacity - (p.capacity - self.energy) * math.exp(-rate * hours)
+            self.energy = p.capacity - (p.capacity - self.energy) * math.exp(-decay * hours)
             left -= hours
         if left > 0:
-            self.energy += left * p.taper_floor * p.charging_power
+            self.energy += left * p.taper_floor * power
         self.energy = min(self.energy, p.capacity)
 
 
 class BatteryInUse:
-    """A battery in a robot that drives, uses its arm, and charges at the station only.
+    """A battery in a robot that drives, uses its arm, and charges at a station only.
 
     Args:
         battery: The battery.
-        station: Where the charging station is.
-        dock_reach: Distance from the station within which the robot charges, metres.
+        stations: The charging stations, by their rooms.
+        dock_reach: Distance from a station within which the robot charges, metres.
         since: When the battery had its level, seconds; None: when time first passes.
 
     Attributes:
@@ -202,10 +208,14 @@ class BatteryInUse:
     """
 
     def __init__(
-        self, battery: Battery, station: Pose, dock_reach: float, since: float | None
+        self,
+        battery: Battery,
+        stations: Mapping[str, Station],
+        dock_reach: float,
+        since: float | None,
     ) -> None:
         self._battery = battery
-        self._station = station
+        self._stations = stations
         self._dock_reach = dock_reach
         self._last = since
         self.pose: Pose | None = None
@@ -217,11 +227,14 @@ class BatteryInUse:
 
     @property
     def docked(self) -> bool:
-        """Whether the robot stands at the station."""
-        return (
-            self.pose is not None
-            and math.dist(self.pose[:2], self._station[:2]) <= self._dock_reach
-        )
+        """Whether the robot stands at a station."""
+        return self._dock is not None
+
+    @property
+    def _dock(self) -> Station | None:
+        if self.pose is None:
+            return None
+        return station_at(self.pose[:2], self._stations, self._dock_reach)
 
     def see_pose(self, pose: Pose, now: float) -> None:
         """Take where the robot is at `now` (seconds)."""
@@ -248,7 +261,7 @@ class BatteryInUse:
         self._arm_moves = now, until
 
     def advance(self, now: float) -> None:
-        """Let time pass up to `now` (seconds): draw, and charge at the station."""
+        """Let time pass up to `now` (seconds): draw, and charge at a station."""
         passed = 0.0 if self._last is None else now - self._last
         self._last = now
         if not 0.0 <= passed <= LONGEST_AWAY:
@@ -256,8 +269,8 @@ class BatteryInUse:
         self._count_arm(now)
         self._battery.draw(passed, self._metres, self._radians, min(self._arm_seconds, passed))
         self._metres = self._radians = self._arm_seconds = 0.0
-        if self.docked:
-            self._battery.charge(passed)
+        if (dock := self._dock) is not None:
+            self._battery.charge(passed, dock.rate)
 
     def skip(self, now: float) -> None:
         """Let time pass up to `now` (seconds) that somebody else accounts for."""
@@ -272,5 +285,6 @@ class BatteryInUse:
         if self.pose is None:
             return 'where the robot is is not known (nothing came on amcl_pose)'
         x, y, _ = self.pose
-        at_x, at_y, _ = self._station
-        return f'the robot is at ({x:.2f}, {y:.2f}), not at the station ({at_x:.2f}, {at_y:.2f})'
+        at = ' or '.join(f'({s.pose[0]:.2f}, {s.pose[1]:.2f})' for s in self._stations.values())
+        which = 'the station' if len(self._stations) == 1 else 'a station'
+        return f'the robot is at ({x:.2f}, {y:.2f}), not at {which} {at}'

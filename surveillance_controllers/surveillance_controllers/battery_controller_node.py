@@ -27,6 +27,7 @@ from surveillance_controllers import conversions, stimuli
 from surveillance_controllers.battery import Battery, BatteryInUse
 from surveillance_controllers.battery_driver import DrivenBattery
 from surveillance_controllers.controller_parameters import (
+    STATION_NOT_GIVEN,
     BatterySettings,
     battery_settings,
 )
@@ -183,7 +184,7 @@ class RobotBattery:
 
     Args:
         node: The battery controller's node.
-        settings: The station, and how often the model is stepped.
+        settings: The stations, and how often the model is stepped.
         battery: The battery.
         change: Carries out a change of the battery and publishes what became different.
         since: When the battery had its level, seconds; None: it has it now.
@@ -204,8 +205,9 @@ class RobotBattery:
         if since is not None:
             # From then on no setting of the clock counts.
             since += self._wait.elapsed() - self._wait.now()
-        self._station, self._low_below = settings.station, settings.require_recharge
-        self._use = BatteryInUse(battery, settings.station, settings.dock_reach, since)
+        self._low_below = settings.require_recharge
+        self._stations = settings.stations
+        self._use = BatteryInUse(battery, settings.stations, settings.dock_reach, since)
         self._driver: DrivenBattery | None = None
         self._states: OwnedTopic[BatteryState] | None = None
         self._begun = self._wait.elapsed()
@@ -285,14 +287,12 @@ class RobotBattery:
 
     def _look_for_station(self) -> None:
         """Tell of a low battery that no station can charge, because none was given."""
-        if self._use.docked or self._node.was_given('station'):
+        if self._use.docked or self._stations is not STATION_NOT_GIVEN:
             self._node.incidents.end(STATION)
         elif self._battery.level < self._low_below:
-            x, y, _ = self._station
             self._node.incidents.begin(
                 STATION,
-                f'no `station` in the place file: it is taken for ({x:g}, {y:g}), and the battery '
-                'is low',
+                'no `station` in the place file: it is taken for (0, 0), and the battery is low',
                 Severity.ALARM,
             )
 

@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from surveillance_controllers.battery import BatteryParameters
 from surveillance_controllers.battery_driver import DriverSettings
-from surveillance_controllers.geometry import Points, Pose
+from surveillance_controllers.geometry import Points
 from surveillance_runtime import parameter_checks
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.parameters import ParameterError, converted, parameter
 from surveillance_runtime.place.floor_plan import Door, Segment
 from surveillance_runtime.place.rooms import ZONE_TABLES, PlaceError
+from surveillance_runtime.place.stations import Station, described_stations
 from surveillance_runtime.place.zones import Zones, zones_from
 
 EXECUTION_MODES = ('MANUAL', 'RANDOM', 'SIMULATED', 'ROBOT')
@@ -58,15 +59,19 @@ class PeerSettings(ControllerSettings):
     )
 
 
+STATION_NOT_GIVEN: Mapping[str, Station] = {'': Station((0.0, 0.0, 0.0))}
+"""Where a robot is taken to charge of which nobody says it: where its map begins."""
+
+
 @dataclass(frozen=True)
 class StationSettings(ControllerSettings):
-    """What a controller is told that models where the robot is or how far it is charged."""
+    """What a controller is told that models where the robot is or how far it is charged.
 
-    station: Pose = parameter(
-        (0.0, 0.0, 0.0),
-        'Where the charging station is: x, y in metres, yaw in radians, world frame.',
-        check=parameter_checks.pose,
-    )
+    Attributes:
+        stations: The charging stations by their rooms.
+    """
+
+    stations: Mapping[str, Station] = field(default_factory=lambda: STATION_NOT_GIVEN)
     dock_reach: float = parameter(
         0.5,
         'SIMULATED and ROBOT: the robot is at the station within this distance of it, m.',
@@ -122,6 +127,7 @@ def battery_settings(
     settings = node.declare_fields(BatterySettings())
     return replace(
         settings,
+        stations=described_stations(node) or STATION_NOT_GIVEN,
         model=node.declare_fields(settings.model, prefix='battery.', mode='SIMULATED and ROBOT'),
         driver=node.declare_fields(settings.driver, prefix='source.'),
         require_recharge=node.parameter(
@@ -204,6 +210,16 @@ class MotionSettings(PeerSettings, StationSettings):
         'MANUAL, RANDOM and Nav2: the room in which the robot starts; empty: as the map says that '
         'is built from a message.',
     )
+
+
+def motion_settings(node: PatrolNode) -> MotionSettings:
+    """Declare the parameters of `motion_controller`, but those of its own navigation.
+
+    Raises:
+        ParameterError: A value is of the wrong type or out of range.
+    """
+    stations = described_stations(node) or STATION_NOT_GIVEN
+    return replace(node.declare_fields(MotionSettings()), stations=stations)
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from typing import Any, TextIO
 
 from state_machines.ros import GoalAbortedError, GoalRun, GoalServer
 from surveillance_controllers import conversions, geometry, stimuli
-from surveillance_controllers.controller_parameters import MotionSettings
+from surveillance_controllers.controller_parameters import motion_settings
 from surveillance_controllers.geometry import Points
 from surveillance_controllers.manual import commands
 from surveillance_controllers.manual.commands import MOTION, ParsedCommand
@@ -40,7 +40,7 @@ class MotionController(PatrolNode):
 
     def __init__(self, console_source: TextIO | None = None, **node_options: Any) -> None:
         super().__init__('motion_controller', **node_options)
-        self._settings = self.declare_fields(MotionSettings())
+        self._settings = motion_settings(self)
         self._mode = self._settings.execution_mode
         self._draw = stimuli.generator(self._settings.random_seed)
         self._knowledge = MapKnowledge(self, self._settings.peer_timeout)

@@ -26,6 +26,7 @@ from surveillance_interfaces.action import ComputePath, Plan
 from surveillance_ontology.patrol_ontology import OntologyNotReadyError
 from surveillance_runtime.conversions import point_messages
 from surveillance_runtime.node import PatrolNode
+from surveillance_runtime.place.stations import AT_STATION
 from surveillance_runtime.process import run_node
 from surveillance_runtime.state_topics import OwnedTopic
 
@@ -79,7 +80,7 @@ class PlannerController(PatrolNode):
     def _plan(self, goal: Any, run: GoalRun) -> Plan.Result:
         try:
             target = self._knowledge.position(goal.target, run.interrupt)
-            start = self._start(goal.target, run)
+            start = self._start(goal.target.removesuffix(AT_STATION), run)
         except OntologyNotReadyError as error:
             raise GoalAbortedError(f'no way to {goal.target!r}: {error}') from error
         for what, point in (('the robot', start), (f'place {goal.target!r}', target)):

@@ -32,6 +32,7 @@ from surveillance_runtime.conversions import point_from, point_message
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.parameters import ParameterError
 from surveillance_runtime.place import Place, PlaceError, described_place
+from surveillance_runtime.place.stations import AT_STATION, described_stations
 from surveillance_runtime.process import run_node
 from surveillance_runtime.state_topics import StateSubscription
 from surveillance_runtime.waiting import AwaitedEvent, AwaitedWork
@@ -67,6 +68,7 @@ class OntologyMapBuilder(PatrolNode):
         )
         source = self.declare_fields(Source())
         place = described_place(self)
+        self._stations = described_stations(self, self.get_parameter('recharge_rooms').value)
         if place is not None:
             try:
                 checked_names(place)
@@ -168,7 +170,10 @@ class OntologyMapBuilder(PatrolNode):
 
     def _on_room_position(self, request: Any, response: Any) -> Any:
         place = self._keeper.place
-        position = place.positions.get(request.room_name) if place else None
+        name, asked, _ = request.room_name.partition(AT_STATION)
+        position = place.positions.get(name) if place else None
+        if position is not None and asked and (station := self._stations.get(name)):
+            position = (station.pose[0], station.pose[1], position[2])
         response.valid = position is not None
         if position is not None:
             response.position = point_message(position)

@@ -21,8 +21,8 @@ from surveillance_runtime.conversions import (
     pose_message,
 )
 from surveillance_runtime.place.floor_plan import Marker
-from surveillance_runtime.place.floor_plan import Pose as PlanePose
 from surveillance_runtime.place.occupancy_grid import Grid
+from surveillance_runtime.place.rooms import Pose as PlanePose
 from surveillance_simulation.camera.model import Camera, Picture
 from surveillance_simulation.robot.lidar import LidarModel
 from surveillance_simulation.world.world import World

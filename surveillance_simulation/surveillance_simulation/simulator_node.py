@@ -28,7 +28,7 @@ from surveillance_runtime.conversions import (
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.parameters import ParameterError
 from surveillance_runtime.place import PlaceError
-from surveillance_runtime.place.rooms import PLACE_TABLES
+from surveillance_runtime.place.rooms import PLACE_TABLES, nested
 from surveillance_runtime.process import run_node
 from surveillance_runtime.profile.parameters import CommandSettings
 from surveillance_runtime.qos import STATE_QOS
@@ -299,13 +299,13 @@ def _place_parameters(node: PatrolNode) -> dict[str, Any]:
     for table in PLACE_TABLES:
         entries = node.parameters_under(table)
         if entries:
-            described[table] = entries
+            described[table] = nested(entries) if table == 'stations' else entries
     described['robot_room'] = node.parameter('robot_room', '', 'Place where the robot starts.')
     described['recharge_rooms'] = node.parameter(
         'recharge_rooms', [], 'Places with a charging station.', of=str
     )
     described['station'] = node.parameter(
-        'station', [], 'Pose of the charging station: x, y in metres, yaw in rad.', of=float
+        'station', [], 'Pose of the only charging station: x, y in metres, yaw in rad.', of=float
     )
     described['map_file'] = node.parameter(
         'map_file', '', "Map of the place in map_server's format, or a picture; empty: none."

@@ -22,6 +22,7 @@ from surveillance_behaviour.mission.mission_log import MissionRecord
 from surveillance_behaviour.ports import Point, Ports, UnknownPlaceError
 from surveillance_behaviour.world_model import WorldModel
 from surveillance_ontology.patrol_ontology import Snapshot
+from surveillance_runtime.place.stations import AT_STATION
 from tests.seven_rooms import SEVEN_ROOMS
 
 POSITIONS = {
@@ -79,6 +80,7 @@ class World:
         rooms: Doors of each room.
         faults: Called with the name of each port method before it works; may raise, or change the
             world.
+        station_points: Where the stations are that are not at the points of their rooms.
         speed: Metres per second.
         draw: Percent per second away from the station; there it charges with ``charge``.
     """
@@ -87,6 +89,7 @@ class World:
     positions: dict[str, Point] = field(default_factory=lambda: dict(POSITIONS))
     start_place: str = 'E'
     stations: tuple[str, ...] = ('E',)
+    station_points: dict[str, Point] = field(default_factory=dict)
     speed: float = 1.0
     draw: float = 0.0
     charge: float = 2.0
@@ -199,6 +202,9 @@ class World:
 
     def position(self, place: str, interrupt: Interrupt) -> Point:
         self._call('position', interrupt)
+        room, asked, _ = place.partition(AT_STATION)
+        if asked and room in self.station_points:
+            return self.station_points[room]
         if place not in self.positions or place not in self.rooms:
             raise UnknownPlaceError(f'ontology_map/room_position: there is no place {place}')
         return self.positions[place]
@@ -209,7 +215,8 @@ class World:
 
     def docked(self) -> bool:
         """Tell whether the robot stands at a station."""
-        return any(math.dist(self.at, self.positions[place]) < 1.0 for place in self.stations)
+        points = {place: self.positions[place] for place in self.stations} | self.station_points
+        return any(math.dist(self.at, point) < 1.0 for point in points.values())
 
     def plan_path(self, start: Point, goal: Point, interrupt: Interrupt) -> list[Point]:
         """Port of the planner."""
@@ -345,9 +352,7 @@ class ScriptedRoutine:
 
     def plan(self, target: str, interrupt: Interrupt) -> list[Point]:
         world = self.world
-        if target not in world.rooms:
-            raise CallError(f'motion/planner: there is no place {target}')
-        return world.plan_path(world.at, world.positions[target], interrupt)
+        return world.plan_path(world.at, world.position(target, interrupt), interrupt)
 
     def control(self, via_points: Sequence[Point], interrupt: Interrupt) -> Point:
         return self.world.control(via_points, interrupt)

@@ -16,7 +16,7 @@ from hypothesis.stateful import (
     run_state_machine_as_test,
 )
 
-from patrol_policy.decision import DecisionSettings
+from patrol_policy.decision import DecisionSettings, energy_of
 from patrol_policy.world import Decision
 from state_machines.exceptions import CallError, UnavailableError
 from surveillance_behaviour.machines import MACHINES
@@ -52,6 +52,12 @@ class CheckedWorld(World):
             return
         reachable = set(self.neighbours(self.is_in))
         allowed = reachable - self.avoided() or reachable
+        world = self.world_model.world
+        assert world is not None
+        energy = energy_of(world, self.world_model.battery(), self.world_model.settings)
+        if energy is not None:
+            # A fall of the charge that is the only one yet tells of a small range.
+            allowed = {place for place in allowed if energy.within_range[energy.index[place]]}
         assert decision.place in allowed, decision
         urgent = self.urgent() & allowed
         if urgent:

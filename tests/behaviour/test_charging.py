@@ -13,7 +13,7 @@ from surveillance_behaviour.mission.mission_log import (
 )
 
 from .machine_runs import CALLS, Killed, Run, settings, visited
-from .scripted_world import SEVEN_ROOMS, World
+from .scripted_world import POSITIONS, SEVEN_ROOMS, World
 
 
 def test_an_hour_of_patrol_reaches_all_places_and_charges_in_time(machine: str) -> None:
@@ -98,3 +98,16 @@ def test_a_robot_killed_on_its_way_to_charge_still_goes_to_charge(
     world.set_level(50.0)  # more than it must have, less than what it was sent to charge for
     mission.run(160.0)
     assert summarize(read(tmp_path / 'record')).recharges == 1
+
+
+def test_the_robot_charges_at_a_station_far_from_its_rooms_point(machine: str) -> None:
+    x, y, _ = POSITIONS['E']
+    world = World(stations=(), station_points={'E': (x + 1.5, y, 0.0)}, draw=0.4, start_place='R1')
+    run = Run(machine, world).until(900.0)
+    charged = [text.split()[2] for text in world.said if text.startswith('charged in')]
+    assert len(charged) >= 2
+    assert world.stranded == 0
+    # Nothing was tried at the room's point, where nothing charges.
+    assert not [text for text in world.said if 'failed' in text]
+    assert len({room for _, room in world.arrivals}) == 7
+    assert run.mission.recovery.avoided(run.mission.now()) == frozenset()

@@ -7,6 +7,7 @@ import math
 import pytest
 
 from surveillance_controllers.battery import Battery, BatteryInUse, BatteryParameters
+from surveillance_runtime.place.stations import Station
 from surveillance_runtime.robot_arm import TrajectoryPoint
 
 PARAMETERS = BatteryParameters(
@@ -21,7 +22,7 @@ PARAMETERS = BatteryParameters(
 
 def in_use(level: float = 50.0) -> tuple[Battery, BatteryInUse]:
     battery = Battery(PARAMETERS, level)
-    return battery, BatteryInUse(battery, (1.0, 0.0, 0.0), 0.5, since=0.0)
+    return battery, BatteryInUse(battery, {'E': Station((1.0, 0.0, 0.0))}, 0.5, since=0.0)
 
 
 def move_arm(use: BatteryInUse, seconds: float, now: float, pan: float = 1.0) -> None:

@@ -26,6 +26,7 @@ from surveillance_interfaces.action import FollowPath
 from surveillance_runtime.conversions import point_messages
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.parameters import ParameterError
+from surveillance_runtime.place.stations import Station
 from surveillance_runtime.qos import STATE_QOS
 from surveillance_simulation.conversions import grid_to_ros
 from tests.nav2_definitions import ACTIONS, stand_in
@@ -219,7 +220,8 @@ def test_what_nav2_cannot_do_fails_with_the_reason(
 
 
 def docked(graph: Any, station: tuple[float, float, float]) -> nav2_motion.DockingMotion:
-    settings = MotionSettings(station=station, dock_type='charger', peer_timeout=1.0)
+    stations = {'C2': Station((90.0, 0.0, 0.0)), 'E': Station(station)}
+    settings = MotionSettings(stations=stations, dock_type='charger', peer_timeout=1.0)
     return nav2_motion.DockingMotion(graph.node, nav2(graph), settings)
 
 

@@ -147,7 +147,7 @@ def test_a_place_with_a_map_knows_its_rooms(tmp_path: Path) -> None:
     regions = Regions(plan)
     assert [regions.room_at(x, 3.5) for x in (0.6, 3.0, 3.5, 6.0)] == ['A', 'A', 'B', 'B']
     assert regions.room_at(0.8, 3.9) == 'A'  # below the table
-    assert plan.station == (1.5, 3.0, 0.0)
+    assert [station.pose for station in plan.stations.values()] == [(1.5, 3.0, 0.0)]
     assert draw_place(plan, 'Two rooms', '').size[0] > 500
 
 
@@ -234,4 +234,4 @@ def test_a_change_keeps_the_comments(tmp_path: Path) -> None:
     parameters['station'] = [1.0, 2.0, 0.0]
     path.write_text(updated_text(before, parameters))
     assert '0.9]  # wide' in path.read_text()
-    assert read_place_file(path).plan.station == (1.0, 2.0, 0.0)
+    assert next(iter(read_place_file(path).plan.stations.values())).pose == (1.0, 2.0, 0.0)

@@ -136,12 +136,12 @@ GOOD = """\
         (
             'recharge_rooms: [B]',
             'recharge_rooms: [B, A]',
-            ":8: recharge_rooms: room 'A' has no station: expected [B], one room",
+            ":8: recharge_rooms: room 'A' has no station: expected [B] alone, or stations",
         ),
         (
             '    recharge_rooms: [B]',
             '    recharge_rooms: [B, A]\n    station: [2.0, 3.0, 0.0]',
-            ":8: recharge_rooms: room 'A' has no station: expected [B], one room",
+            ":8: recharge_rooms: room 'A' has no station: expected [B] alone, or stations",
         ),
     ],
 )

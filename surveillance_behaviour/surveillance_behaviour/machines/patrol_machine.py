@@ -110,8 +110,8 @@ class MoveStep(MissionState):
 
 def plan_path(mission: Mission, ud: Any, interrupt: fsm.Interrupt) -> None:
     """Ask for the via points to the target."""
-    via_points = routine_of(mission).plan(ud.target, interrupt)
-    goal = mission.ports.places.position(ud.target, interrupt)
+    name, goal = mission.goal(ud.target, interrupt)
+    via_points = routine_of(mission).plan(name, interrupt)
     check_path(via_points, goal, mission.settings.goal_tolerance, 'motion/planner')
     ud.via_points = via_points
 
@@ -130,7 +130,8 @@ class GoBack(MissionState):
 
     def work(self, ud: Any, interrupt: fsm.Interrupt) -> str:
         place = self.mission.place
-        via_points = routine_of(self.mission).plan(place, interrupt)
+        name, _ = self.mission.goal(place, interrupt)
+        via_points = routine_of(self.mission).plan(name, interrupt)
         self.mission.came_back(drive(self.mission, place, via_points, interrupt))
         return 'returned'
 
@@ -171,7 +172,7 @@ class Recharge(MissionState):
                 decision = mission.decide(interrupt, to_charge=True)
             ud.target = decision.place
             return 'not_at_dock' if decision.rule == RECHARGE else 'battery_full'
-        self.charging = True
+        self.charging = mission.docking = True
         ud.target = mission.place
         mission.say(f'charging in {mission.place} ({mission.battery.level_text()})')
         mission.charge(interrupt, routine_of(mission).recharge)

@@ -151,7 +151,7 @@ def drive(mission: Mission, place: str, interrupt: fsm.Interrupt) -> tuple[list[
     """
     motion, before = mission.ports.motion, mission.place
     assert motion is not None
-    goal = mission.ports.places.position(place, interrupt)
+    _, goal = mission.goal(place, interrupt)
     start = motion.last_position() or mission.ports.places.position(before, interrupt)
     path: list[Point] = []
     for stop in _stops(mission, place, goal, interrupt):
@@ -250,5 +250,6 @@ class ReDock(MissionState):
         if mission.recovery.next_step(mission.failure, mission.now()) != Step.ANOTHER_PATH:
             return 'give_up'
         ud.next_room = mission.place
+        mission.docking = True
         mission.say(f'driving to the station in {mission.place} again')
         return 'again'

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 from patrol_policy.battery import Battery
-from patrol_policy.decision import QUIET, DecisionSettings
+from patrol_policy.decision import QUIET, RECHARGE, REQUEST, DecisionSettings
 from patrol_policy.world import Decision
 from state_machines import Clock, Interrupt
 from state_machines.clock import elapsed_of
@@ -14,10 +15,13 @@ from state_machines.exceptions import CallError, CallInterruptedError
 from surveillance_behaviour.charging import BatteryMonitor, charge
 from surveillance_behaviour.mission.mission_log import MissionRecord, is_other_simulation
 from surveillance_behaviour.mission.recovery import Failure, Recovery, RecoveryLimits
-from surveillance_behaviour.ports import Point, Ports
+from surveillance_behaviour.ports import Point, Ports, UnknownPlaceError
 from surveillance_runtime.files import FileError
 from surveillance_runtime.parameters import parameter, parameters
+from surveillance_runtime.place.stations import AT_STATION
 
+SAME_POINT = 0.2
+"""A station within this distance of its room's point is at it, metres."""
 QUIET_SECONDS = 60.0
 """How long the robot stays at its station before it is decided anew, seconds."""
 
@@ -81,6 +85,7 @@ class Mission:
         failure: What did not work last, until something did.
         astray: Whether it has left its place and not arrived anywhere since.
         explored: Seconds for which it explored its place since it came there; inf: it is done.
+        docking: Whether a drive to a recharge room ends at its station, not at the room's point.
     """
 
     def __init__(
@@ -104,6 +109,9 @@ class Mission:
         self.failure: Failure | None = None
         self.astray = False
         self.explored = 0.0
+        self.docking = False
+        # Where it starts in a recharge room, it starts at the station.
+        self._docked = self._will_dock = True
         self._record = record
         self._cut_off = None if record is None else record.left_at
         self._started: float | None = None
@@ -170,6 +178,7 @@ class Mission:
             self.place = decision.from_place
         self.heading_to = decision.place
         self.pending = decision
+        self.docking = decision.rule in (RECHARGE, QUIET, REQUEST)
         if reasoner.places != self._noted_places:
             self._noted_places = reasoner.places
             self.note('map', places=sorted(self._noted_places))
@@ -189,6 +198,7 @@ class Mission:
         here = self.ports.ontology.await_place(self.place, 0.0, interrupt)
         if here not in (self.place, ''):
             self.place = here
+            self._docked = False
             self.note('visit', place=here, distance=0.0)
 
     def watch_ways(self, interrupt: Interrupt) -> Callable[[], bool]:
@@ -208,6 +218,26 @@ class Mission:
             return not reachable <= known
 
         return way_opened
+
+    def goal(self, place: str, interrupt: Interrupt) -> tuple[str, Point]:
+        """Return where a drive to a place ends, as a name and as a point.
+
+        Raises:
+            CallError: The map does not have it.
+        """
+        places = self.ports.places
+        point = places.position(place, interrupt)
+        self._will_dock = False
+        if place not in self.settings.choice.recharge_rooms:
+            return place, point
+        try:
+            station = places.position(place + AT_STATION, interrupt)
+        except UnknownPlaceError:
+            # The map is another program's, which knows of no stations.
+            self._will_dock = True
+            return place, point
+        self._will_dock = self.docking or math.dist(point[:2], station[:2]) <= SAME_POINT
+        return (place + AT_STATION, station) if self.docking else (place, point)
 
     def departs(self) -> None:
         """Note that the robot leaves its place; until it arrives it may be anywhere."""
@@ -242,6 +272,7 @@ class Mission:
     def _visit(self, place: str, distance: float, path: Sequence[Point] = ()) -> None:
         self.place = place
         self.astray = False
+        self._docked = self._will_dock
         self.explored = 0.0
         planned = {'path': _rounded(path)} if path else {}
         self.note('visit', place=place, distance=distance, **planned, **self._driven())
@@ -299,7 +330,8 @@ class Mission:
         """
         stations = self.settings.choice.recharge_rooms
         good = [place for place in stations if place not in self.recovery.avoided(self.now())]
-        return self.place in (good or stations) and not self.astray
+        docked = self._docked or bool(self.battery.charging)
+        return docked and self.place in (good or stations) and not self.astray
 
     def charged_enough(self) -> bool:
         """Return whether the robot may leave the station."""

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import random
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
+from rcl_interfaces.msg import SetParametersResult
 from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.parameter import Parameter
 
 from patrol_policy.decision import DecisionSettings
 from patrol_policy.world import Decision
@@ -22,6 +25,7 @@ from surveillance_interfaces.srv import GoTo, WhyNot
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.parameters import parameter
 from surveillance_runtime.place.patrol_rules import described_patrol_rules
+from surveillance_runtime.place.stations import Station, described_stations
 from surveillance_runtime.state_topics import OwnedTopic
 from surveillance_runtime.waiting import AwaitedWork
 
@@ -63,6 +67,8 @@ def world_model_of(
         elapsed: Seconds as they pass on the mission's clock, which no setting of the date changes.
     """
     log = node.get_logger()
+    stations = described_stations(node, settings.recharge_rooms)
+    node.add_on_set_parameters_callback(partial(_stations_expected, stations))
     experience = Experience.of_record(memory.record)
     if experience.problem:
         log.warn(experience.problem)
@@ -92,9 +98,26 @@ def world_model_of(
         elapsed,
         described_patrol_rules(node),
         lambda sentence: log.info(sentence),
+        {place: station.rate / 60.0 for place, station in stations.items() if station.rate},
     )
     world_model.learn_draw(elapsed)
     return world_model
+
+
+def _stations_expected(
+    stations: Mapping[str, Station], changed: Iterable[Parameter]
+) -> SetParametersResult:
+    """Refuse a recharge room without a station, where the place says where its stations are."""
+    for each in changed:
+        if each.name == 'recharge_rooms' and '' not in stations and stations:
+            for room in each.value or ():
+                if room not in stations:
+                    reason = (
+                        f'parameter recharge_rooms: room {room!r} has no station, expected some '
+                        f'of [{", ".join(stations)}]'
+                    )
+                    return SetParametersResult(successful=False, reason=reason)
+    return SetParametersResult(successful=True)
 
 
 def offer_decision_services(

@@ -45,6 +45,7 @@ from surveillance_controllers.motion.place_regions import PlaceMap
 from surveillance_runtime.conversions import pose_from, pose_message, seconds_of
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.parameters import ParameterError
+from surveillance_runtime.place.stations import station_at
 from surveillance_runtime.state_topics import StateSubscription
 
 SPACING = 1.5
@@ -230,12 +231,12 @@ def rest_of(path: Points, position: Points) -> Points:
 
 
 class DockingMotion:
-    """Moves as another motion does, and docks where a way ends at the station.
+    """Moves as another motion does, and docks where a way ends at a station.
 
     Args:
         node: The motion controller's node.
         inner: Drives the robot.
-        settings: The station, how near to it a way must end, the dock's type, and how long the
+        settings: The stations, how near to one a way must end, the dock's type, and how long the
             server may take to appear and accept a goal.
 
     Raises:
@@ -253,7 +254,7 @@ class DockingMotion:
         self._docked = False
 
     def follow(self, path: Points, run: GoalRun, report: Callable[[Points], None]) -> Points:
-        """Undocks where that is needed, drives, and docks where the way ends at the station.
+        """Undocks where that is needed, drives, and docks where the way ends at a station.
 
         Raises:
             MotionFailedError: One of the three failed.
@@ -263,17 +264,16 @@ class DockingMotion:
             goal = self._undock.Goal(dock_type=self._settings.dock_type)
             self._carry_out(self._undocker, goal, 'undocking', path[0], run)
         end = self._inner.follow(path, run, report)
-        if (
-            math.dist(end[:2], self._settings.station[:2]) > self._settings.dock_reach
-            or run.interrupt.is_set()
-        ):
+        station = station_at((end[0], end[1]), self._settings.stations, self._settings.dock_reach)
+        if station is None or run.interrupt.is_set():
             return end
         pose = PoseStamped()
         pose.header.frame_id = 'map'
         pose.header.stamp = self._node.get_clock().now().to_msg()
-        pose.pose = pose_message(self._settings.station)
+        pose.pose = pose_message(station.pose)
         goal = self._dock.Goal(
-            use_dock_id=False,
+            use_dock_id=bool(station.dock),
+            dock_id=station.dock,
             dock_pose=pose,
             dock_type=self._settings.dock_type,
             navigate_to_staging_pose=False,

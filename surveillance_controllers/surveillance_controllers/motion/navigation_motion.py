@@ -72,7 +72,7 @@ class NavigationMotion:
         node: The motion controller's node.
         knowledge: Map and ontology.
         recorder: Is told the place that the robot is in.
-        settings: The station, and how long the planner may take to answer.
+        settings: The stations, and how long the planner may take to answer.
         navigator: What steers; unless given, one for the doors of the parameters.
     """
 
@@ -93,8 +93,9 @@ class NavigationMotion:
         self._settings = node.declare_fields(NavigationSettings(), mode='SIMULATED and ROBOT')
         self._frames = declared_frames(node, 'map', 'odom', 'base', 'transform_tolerance')
         self._lidar = ScanReader(node, self._robot.radius, self._frames.base)
+        guesses = [station.pose for station in settings.stations.values()]
         self._navigator = navigator or Navigator(
-            door_segments(node), guesses=[settings.station], zones=place_zones(node)
+            door_segments(node), guesses=guesses, zones=place_zones(node)
         )
         self._navigator.before_search = self._stand_for_search
         self._stands_for_search = False

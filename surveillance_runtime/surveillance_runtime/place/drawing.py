@@ -88,7 +88,7 @@ def draw_place(plan: FloorPlan, title: str, facts: str, run: Run | None = None) 
         canvas.traces(run.planned, _PLANNED, max(1.2, scale / 40), 0.7)
         canvas.traces(run.driven, _DRIVEN, max(1.5, scale / 26), 0.5)
         picture.failures(run)
-    picture.station()
+    picture.stations()
     if run is not None:
         picture.recharges(run)
     picture.signs()
@@ -243,11 +243,12 @@ class _Picture:
         at = (x + away * math.cos(marker.yaw), y - away * math.sin(marker.yaw))
         self._canvas.text(at, str(marker.id), self._size * 0.8, _INK, anchor='mm')
 
-    def station(self) -> None:
-        x, y, _ = self._plan.station
+    def stations(self) -> None:
         radius = max(9.0, self._canvas.scale * 0.24)
-        # Below the sign of the place, which stands at the same point.
-        self._bolt(*self._canvas.at((x, y - (radius + self._size * 1.5) / self._canvas.scale)))
+        for station in self._plan.stations.values():
+            x, y, _ = station.pose
+            # Below the sign of the place, which may stand at the same point.
+            self._bolt(*self._canvas.at((x, y - (radius + self._size * 1.5) / self._canvas.scale)))
 
     def failures(self, run: Run) -> None:
         for x, y in run.failures:
@@ -268,13 +269,13 @@ class _Picture:
         return (x - west) / self._canvas.scale, (north - y) / self._canvas.scale
 
     def recharges(self, run: Run) -> None:
-        """Write beside the station's sign how often the robot charged."""
-        count = sum(run.recharges.values())
-        if count:
-            radius = max(9.0, self._canvas.scale * 0.24)
-            x, y = self._canvas.at(self._plan.station[:2])
-            at = (x + radius + 6, y + radius + self._size * 1.5)
-            self._canvas.text(at, f'x {count}', self._size, _SIGN_HOME, anchor='lm')
+        """Write beside each station's sign how often the robot charged there."""
+        for room, count in run.recharges.items():
+            if count and room in self._plan.stations:
+                radius = max(9.0, self._canvas.scale * 0.24)
+                x, y = self._canvas.at(self._plan.stations[room].pose[:2])
+                at = (x + radius + 6, y + radius + self._size * 1.5)
+                self._canvas.text(at, f'x {count}', self._size, _SIGN_HOME, anchor='lm')
 
     def _bolt(self, x: float, y: float) -> None:
         radius = max(8.0, min(14.0, self._canvas.scale * 0.24))

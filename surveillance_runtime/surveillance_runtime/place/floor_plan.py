@@ -1,4 +1,4 @@
-"""The unchanging geometry of a place: walls, doors, markers, station, as its parameter file says.
+"""The unchanging geometry of a place: walls, doors, markers, stations, as its file says.
 
 Walls and doors are boxes around a centre line. A wall runs through; each door cuts its opening out
 of the wall it lies on. A place may refer to a map instead of walls, or besides, and may have
@@ -16,14 +16,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from surveillance_runtime.files import FileError
-from surveillance_runtime.place.rooms import Place, PlaceError, place_from
+from surveillance_runtime.place.rooms import Place, PlaceError, Pose, place_from
+from surveillance_runtime.place.stations import Station, stations_of
 from surveillance_runtime.place.zones import NO_ZONES, Zones, zones_from
+from surveillance_runtime.yaml_file import KeyPath
 
 if TYPE_CHECKING:
     from surveillance_runtime.place.occupancy_map import OccupancyMap
 
 Point = tuple[float, float]
-Pose = tuple[float, float, float]
 Segment = tuple[float, float, float, float]
 """A line from x1, y1 to x2, y2, metres."""
 
@@ -100,8 +101,8 @@ class FloorPlan:
         markers: Markers by name.
         marker_size: Side of a marker's black square, metres.
         marker_dictionary: OpenCV's name of the markers' dictionary.
-        station: Pose of the charging station, metres and rad; where the file names none, the point
-            of the recharge room.
+        stations: The charging station of each room that has one; where the file names none, one at
+            the point of the recharge room.
         map: The map that the file refers to.
         zones: Where the robot never drives, and where it drives slowly.
     """
@@ -112,7 +113,7 @@ class FloorPlan:
     markers: Mapping[str, Marker]
     marker_size: float
     marker_dictionary: str
-    station: Pose
+    stations: Mapping[str, Station]
     map: OccupancyMap | None = None
     zones: Zones = NO_ZONES
 
@@ -154,7 +155,7 @@ class FloorPlan:
             marker_dictionary=_name(
                 parameters.get('marker_dictionary', 'DICT_5X5_100'), 'marker_dictionary'
             ),
-            station=_station(parameters.get('station'), place),
+            stations=stations_of(parameters, place.positions, place.start),
             map=_map_of(parameters),
             zones=zones_from(parameters),
         )
@@ -165,7 +166,7 @@ class FloorPlan:
     def start(self) -> Pose:
         """Where the robot starts: the station if that is in its room, else the room's point."""
         if self.place.start in self.place.recharge_rooms:
-            return self.station
+            return self.stations[self.place.start].pose
         x, y, _ = self.place.positions[self.place.start]
         return x, y, 0.0
 
@@ -227,7 +228,9 @@ class FloorPlan:
                 )
 
     def _check_zones(self) -> None:
-        points: list[tuple[tuple[str, ...], Pose]] = [(('station',), self.station)]
+        points: list[tuple[KeyPath, Pose]] = [
+            (each.where, each.pose) for each in self.stations.values()
+        ]
         points += [(('room_positions', room), at) for room, at in self.place.positions.items()]
         for where, (x, y, _) in points:
             if zone := self.zones.barred((x, y)):
@@ -310,21 +313,6 @@ def _row(value: object, columns: Sequence[str], *where: str) -> list[float]:
     if isinstance(value, str) or not isinstance(value, Sequence) or len(value) != len(columns):
         raise PlaceError(where, f'{value!r}: {expected}')
     return [_number(entry, *where) for entry in value]
-
-
-def _station(value: object, place: Place) -> Pose:
-    for room in place.recharge_rooms[1:]:
-        # `station` is the pose of one; at the point of any other room nothing charges the robot.
-        raise PlaceError(
-            ('recharge_rooms',),
-            f"room '{room}' has no station: expected [{place.recharge_rooms[0]}], one room, "
-            'as a place has one station',
-        )
-    if not value and not isinstance(value, int | float | str):  # a node's parameter is [] then
-        x, y, _ = place.positions[next(iter(place.recharge_rooms), place.start)]
-        return x, y, 0.0
-    x, y, yaw = _row(value, ('x', 'y', 'yaw'), 'station')
-    return x, y, yaw
 
 
 def _map_of(parameters: Mapping[str, Any]) -> OccupancyMap | None:

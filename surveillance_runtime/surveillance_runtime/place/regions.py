@@ -49,7 +49,7 @@ class Regions:
             self._labels = self._divided()
         if plan.is_enclosed:
             self._check_doors()
-            self._check_station()
+            self._check_stations()
 
     def room_at(self, x: float, y: float) -> str | None:
         """Return the room that a point (metres) lies in, None outside of every room."""
@@ -152,16 +152,18 @@ class Regions:
                         f"stands between {found}: expected it at '{room}', as the map says",
                     )
 
-    def _check_station(self) -> None:
-        x, y, _ = self._plan.station
-        room = self.room_at(x, y)
-        allowed = self._plan.place.recharge_rooms or tuple(self._plan.place.rooms)
-        if room not in allowed:
-            raise PlaceError(
-                ('station',),
-                f'({x:g}, {y:g}) lies in {room or "no place"}: '
-                f'expected a point in {" or ".join(allowed)}',
-            )
+    def _check_stations(self) -> None:
+        for room, station in self._plan.stations.items():
+            x, y, _ = station.pose
+            found = self.room_at(x, y)
+            # Without a recharge room the only station may stand anywhere.
+            allowed = (room,) if self._plan.place.recharge_rooms else tuple(self._plan.place.rooms)
+            if found not in allowed:
+                raise PlaceError(
+                    station.where,
+                    f'({x:g}, {y:g}) lies in {found or "no place"}: '
+                    f'expected a point in {" or ".join(allowed)}',
+                )
 
 
 def check_passable(plan: FloorPlan, radius: float) -> None:

@@ -19,16 +19,23 @@ from surveillance_runtime.yaml_file import KeyPath
 PLACE_KEYS = ('map', 'room_positions', 'robot_room', 'recharge_rooms')
 ZONE_TABLES = ('keep_out_zones', 'slow_zones')
 GEOMETRY_KEYS = (
-    *('walls', 'doors', 'markers', 'marker_size', 'marker_dictionary', 'station', *ZONE_TABLES),
+    *('walls', 'doors', 'markers', 'marker_size', 'marker_dictionary', 'station', 'stations'),
+    *ZONE_TABLES,
     *('map_file', 'map_file_resolution', 'map_file_origin'),
 )
 PATROL_TABLES = ('thresholds', 'exploration', 'hours')
 PATROL_KEYS = (*PATROL_TABLES, 'keep_out', 'quiet_hours', 'time_zone')
-PLACE_TABLES = ('map', 'room_positions', 'walls', 'doors', 'markers', *ZONE_TABLES, *PATROL_TABLES)
+PLACE_TABLES = (
+    *('map', 'room_positions', 'walls', 'doors', 'markers', 'stations'),
+    *ZONE_TABLES,
+    *PATROL_TABLES,
+)
 """Those that hold an entry for each room, wall, door, marker or zone: `map.R1`, `map.R2`, ..."""
 _NAME = re.compile(r'[A-Za-z_][A-Za-z0-9_-]*\Z')
 
 Position = tuple[float, float, float]
+Pose = tuple[float, float, float]
+"""x, y in metres, yaw in rad, world frame."""
 
 
 class PlaceError(ValueError):
@@ -233,7 +240,21 @@ def tables_of(parameters: Iterable[tuple[str, Any]]) -> dict[str, Any]:
         else:
             hint = "; a map's file is map_file: NAME" if table == 'map' else ''
             raise PlaceError((table,), f'got {_shown(value)}, expected NAME: [...] for each{hint}')
+    if 'stations' in described:
+        described['stations'] = nested(described['stations'])
     return described
+
+
+def nested(entries: Mapping[str, Any]) -> dict[str, Any]:
+    """Return entries like `E.pose` and `E.rate` together, by their first part."""
+    found: dict[str, Any] = {}
+    for name, value in entries.items():
+        first, dot, rest = name.partition('.')
+        if not dot:
+            found[first] = value
+        elif isinstance(inner := found.setdefault(first, {}), dict):
+            inner[rest] = value
+    return found
 
 
 def _rooms(rooms: Any) -> dict[str, tuple[str, ...]]:

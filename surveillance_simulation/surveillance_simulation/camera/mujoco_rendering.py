@@ -125,9 +125,10 @@ def _model(world: World, camera: Camera) -> Any:
         )
     for name, panel in world.panels.items():
         _panel(spec, name, panel, world.plan.marker_dictionary)
-    x, y, yaw = world.plan.station
     _material(spec, 'station', textures.station(), mujoco.mjtTexture.mjTEXTURE_CUBE)
-    _add_box(spec, (x, y, 0.002), yaw, (STATION_SIDE / 2, STATION_SIDE / 2, 0.002), 'station')
+    for station in world.plan.stations.values():
+        x, y, yaw = station.pose
+        _add_box(spec, (x, y, 0.002), yaw, (STATION_SIDE / 2, STATION_SIDE / 2, 0.002), 'station')
     return spec.compile()
 
 

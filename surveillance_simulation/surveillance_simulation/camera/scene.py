@@ -64,8 +64,9 @@ def faces_of(world: World) -> list[Face]:
         faces += _barrel(obstacle)
     for panel in world.panels.values():
         faces.append(_panel(panel, plan.marker_dictionary))
-    x, y, yaw = plan.station
-    faces.append(_lying(x, y, 0.004, yaw, STATION_SIDE, textures.station()))
+    for station in plan.stations.values():
+        x, y, yaw = station.pose
+        faces.append(_lying(x, y, 0.004, yaw, STATION_SIDE, textures.station()))
     if world.wall_brightness == 1.0:
         return faces
     return [

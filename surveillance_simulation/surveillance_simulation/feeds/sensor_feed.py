@@ -18,7 +18,7 @@ from surveillance_runtime.conversions import nanoseconds_of
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.parameters import parameter
 from surveillance_runtime.place import occupancy_grid
-from surveillance_runtime.place.floor_plan import Pose
+from surveillance_runtime.place.rooms import Pose
 from surveillance_runtime.profile.parameters import LidarSettings, declared_frames
 from surveillance_runtime.profile.record import Frames
 from surveillance_runtime.state_topics import OwnedTopic

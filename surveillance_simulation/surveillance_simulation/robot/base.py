@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from surveillance_runtime.parameters import parameter
-from surveillance_runtime.place.floor_plan import Pose
+from surveillance_runtime.place.rooms import Pose
 from surveillance_runtime.robot_base import robot_deceleration, robot_radius
 from surveillance_simulation.world.world import World
 

@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from surveillance_runtime.parameters import parameter
 from surveillance_runtime.place import boxes
-from surveillance_runtime.place.floor_plan import Pose
+from surveillance_runtime.place.rooms import Pose
 from surveillance_simulation.world.world import World
 
 _PARALLEL = 1e-12
