@@ -33,7 +33,7 @@ from tables import table
 from surveillance_controllers.geometry import Pose, Scan, angle_between, composed, in_map, relative
 from surveillance_controllers.motion.localisation import Localiser
 from surveillance_controllers.motion.odometry import OdometryBuffer, joined
-from surveillance_runtime.place import occupancy_grid
+from surveillance_runtime.place import plan_grid
 from surveillance_runtime.place.occupancy_grid import Grid, distance_to
 from surveillance_simulation.robot.lidar import LidarModel, scan
 from surveillance_simulation.world.world import World, read_world
@@ -333,7 +333,7 @@ def drive(world: World, late: float, sweep: float, seconds: float) -> Iterator[t
 def late_scans(*, quick: bool) -> None:
     """Print how late and swept scans change the estimate, with and without joining in time."""
     world = read_world(ROOT / 'config' / 'seven_rooms.yaml')
-    grid = occupancy_grid.draw(world.plan, 0.05)
+    grid = plan_grid.draw(world.plan, 0.05)
     rows = []
     for late, sweep in ((0.0, 0.0), (0.1, 0.0), (0.3, 0.0), (0.1, 0.1), (0.3, 0.1)):
         row = [f'{late:g} s', f'{sweep:g} s']

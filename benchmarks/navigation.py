@@ -42,6 +42,7 @@ from skimage.graph import MCP_Geometric
 from tables import table
 from whole_stack import ROOT, Stack, ros_arguments
 
+from benchmarks import regular_places
 from launcher.run import Run
 from launcher.run_processes import command, node_environ
 from patrol_policy.battery import PERCENTILE_99
@@ -57,8 +58,7 @@ from surveillance_controllers.planning.grid_planning import (
     PlanningParameters,
 )
 from surveillance_runtime import node_table
-from surveillance_runtime.place import generation as place_generation
-from surveillance_runtime.place import occupancy_grid
+from surveillance_runtime.place import plan_grid
 from surveillance_runtime.place.occupancy_grid import Grid
 from surveillance_simulation.robot.robot import Robot
 from surveillance_simulation.world.people import People, PeopleModel
@@ -86,10 +86,10 @@ def median_ms(work: Callable[[], Any], budget: float) -> float:
 def grid_of(side: int) -> tuple[Grid, npt.NDArray[np.float64], npt.NDArray[np.float64]]:
     """Return a map of about side x side cells full of rooms, and two of its opposite corners."""
     rooms = max(2, round(side / 90))
-    world = World.from_parameters(place_generation.grid(rooms, rooms))
-    cell = rooms * place_generation.ROOM / side
-    drawn = occupancy_grid.draw(world.plan, cell, margin=0.0)
-    half = place_generation.ROOM / 2
+    world = World.from_parameters(regular_places.grid(rooms, rooms))
+    cell = rooms * regular_places.ROOM / side
+    drawn = plan_grid.draw(world.plan, cell, margin=0.0)
+    half = regular_places.ROOM / 2
     first = np.array([half, half])
     return drawn, first, rooms * 2 * half - first
 
@@ -223,7 +223,7 @@ def control(*, quick: bool) -> None:
     """Time of one step of each part of a drive through the seven rooms, without any ROS."""
     world = read_world(ROOT / 'config' / 'seven_rooms.yaml')
     robot = Robot(world, rng=np.random.default_rng(1))
-    drawn = occupancy_grid.draw(world.plan)
+    drawn = plan_grid.draw(world.plan)
     grid = drawn
     planner = GridPlanner(grid)
     navigator = Navigator()
@@ -286,7 +286,7 @@ def among_people(model: PeopleModel, seconds: float, seed: int, place: str) -> D
     rng = np.random.default_rng(seed)
     people = People(world.plan, model, np.random.default_rng(seed + 1)) if model.count else None
     robot = Robot(world, rng=rng, people=people)
-    drawn = occupancy_grid.draw(world.plan)
+    drawn = plan_grid.draw(world.plan)
     grid = drawn
     doors = {door.name: door.segment for door in world.plan.doors.values()}
     planner, navigator = GridPlanner(grid, doors=doors), Navigator()
@@ -388,7 +388,7 @@ def kidnaps(*, quick: bool) -> None:
         'seven_rooms': (read_world(ROOT / 'config' / 'seven_rooms.yaml'), 16),
         'patrol_world': (read_world(ROOT / 'config' / 'patrol_world.yaml'), 10),
         'office, rooms alike': (read_world(ROOT / 'config' / 'office.yaml'), 10),
-        'grid, all rooms alike': (World.from_parameters(place_generation.grid(3, 3)), 10),
+        'grid, all rooms alike': (World.from_parameters(regular_places.grid(3, 3)), 10),
     }
     rows = []
     for name, (world, count) in places.items():
@@ -419,7 +419,7 @@ def kidnapped(world: World, seed: int) -> tuple[float | None, float]:
     """Carry a driving robot off; return when it knew its pose again, and how long it was wrong."""
     rng = np.random.default_rng(seed)
     robot = Robot(world, rng=np.random.default_rng(seed))
-    drawn = occupancy_grid.draw(world.plan)
+    drawn = plan_grid.draw(world.plan)
     grid = drawn
     planner, navigator = GridPlanner(grid), Navigator()
     navigator.set_map(grid)
@@ -812,12 +812,12 @@ def places_to_patrol(folder: Path) -> list[tuple[str, Path]]:
     """Return eight places, those that are generated as files in a folder."""
     places = [(name, ROOT / 'config' / f'{name}.yaml') for name in ('seven_rooms', 'patrol_world')]
     for name, parameters in (
-        ('grid 2x2', place_generation.grid(2, 2)),
-        ('grid 3x2', place_generation.grid(3, 2)),
-        ('ring of 6', place_generation.ring(6)),
-        ('ring of 8', place_generation.ring(8)),
-        ('tree 3x2', place_generation.tree(3, 2, random.Random(1))),
-        ('tree 3x3', place_generation.tree(3, 3, random.Random(2))),
+        ('grid 2x2', regular_places.grid(2, 2)),
+        ('grid 3x2', regular_places.grid(3, 2)),
+        ('ring of 6', regular_places.ring(6)),
+        ('ring of 8', regular_places.ring(8)),
+        ('tree 3x2', regular_places.tree(3, 2, random.Random(1))),
+        ('tree 3x3', regular_places.tree(3, 3, random.Random(2))),
     ):
         file = folder / f'{name.replace(" ", "_")}.yaml'
         file.write_text(yaml.safe_dump({'/**': {'ros__parameters': parameters}}))

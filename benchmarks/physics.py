@@ -35,7 +35,7 @@ from surveillance_controllers.planning.grid_planning import (
     NoPathError,
     PlanningParameters,
 )
-from surveillance_runtime.place import occupancy_grid
+from surveillance_runtime.place import plan_grid
 from surveillance_simulation.physics.model import PhysicsModel
 from surveillance_simulation.robot.base import BaseModel
 from surveillance_simulation.robot.lidar import LidarModel
@@ -64,7 +64,7 @@ def patrol(robot: Robot, seconds: float, seed: int) -> Outcome:
     """Drive from room to room for simulated seconds, and compare each estimate with the truth."""
     world, outcome = robot.world, Outcome(robot)
     rng = np.random.default_rng(seed)
-    grid = occupancy_grid.draw(world.plan)
+    grid = plan_grid.draw(world.plan)
     doors = {door.name: door.segment for door in world.plan.doors.values()}
     limits = {'radius': robot.base.model.radius}
     planner = GridPlanner(grid, PlanningParameters(**limits), doors=doors)

@@ -32,7 +32,7 @@ from state_machines.ros.waiting import reported
 from surveillance_controllers import conversions
 from surveillance_controllers.controller_parameters import door_segments, place_positions
 from surveillance_controllers.geometry import Scan, composed, relative
-from surveillance_controllers.motion.place_regions import PlaceMap
+from surveillance_controllers.motion.place_locator import PlaceLocator
 from surveillance_controllers.motion.transforms import ScanReader
 from surveillance_interfaces.msg import MarkerDetectionArray, RobotPlace
 from surveillance_interfaces.srv import ConsoleCommand
@@ -115,7 +115,7 @@ class Observer(PatrolNode):
         self._map_frame = frames.map
         self._lidar = ScanReader(self, self._settings.radius, frames.base)
         self._doors, places = door_segments(self), place_positions(self)
-        self._places = PlaceMap(self._doors.values())
+        self._places = PlaceLocator(self._doors.values())
         self._places.set_positions(places)
         self._observations = self.create_publisher(String, 'observations', QoSProfile(depth=100))
         self._events = OwnedTopic(self, String, 'events')

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from patrol_policy.policies import POLICIES
-from surveillance_operator.regions import regions
+from surveillance_operator.room_outlines import room_outlines
 from surveillance_operator.snapshot import NO_POINTS, TRAIL_STEP, Health, Snapshot
 from surveillance_runtime.place.occupancy_grid import Grid
 
@@ -108,7 +108,7 @@ def _transitions(snapshot: Snapshot) -> Any:
 def _regions(snapshot: Snapshot) -> Any:
     if snapshot.grid is None:
         return {}
-    found = regions(snapshot.grid, snapshot.positions, snapshot.door_lines)
+    found = room_outlines(snapshot.grid, snapshot.positions, snapshot.door_lines)
     return {
         name: {
             'boxes': [[round(edge, 2) for edge in box] for box in each.boxes],

@@ -47,7 +47,7 @@ from surveillance_runtime.configuration import (
     Setting,
     read_schema,
 )
-from surveillance_runtime.diagnostics import Health
+from surveillance_runtime.health import Health
 from surveillance_runtime.incidents import Incidents, Severity, Told
 from surveillance_runtime.logging import CleanLogger, clean
 from surveillance_runtime.parameters import ParameterError, ParameterSpec, specs_of, with_values

@@ -23,7 +23,7 @@ import math
 from array import array
 from collections.abc import Callable, Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
@@ -40,6 +40,19 @@ _LIST_NAMES = {bool: 'booleans', int: 'integers', float: 'numbers', str: 'texts'
 
 class ParameterError(ValueError):
     """A node cannot work with what a parameter says; the message is one line."""
+
+
+class ParameterHost(Protocol):
+    """Who declares parameters: a node, as the modules see it that describe what they need."""
+
+    def get_name(self) -> str:
+        """Return the node's name, for errors."""
+
+    def declare_fields(self, record: Record) -> Record:
+        """Declare the fields of a record; return it with the parameters' values."""
+
+    def parameters_under(self, prefix: str) -> dict[str, Any]:
+        """Declare and return all parameters that were given below a prefix."""
 
 
 @dataclass(frozen=True)

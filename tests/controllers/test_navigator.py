@@ -14,7 +14,7 @@ from surveillance_controllers.motion.driving import Drive, State
 from surveillance_controllers.motion.navigator import Navigator
 from surveillance_controllers.motion.obstacle_memory import ObstacleMemory
 from surveillance_controllers.motion.path_following import Velocity
-from surveillance_controllers.motion.place_regions import PlaceRegions
+from surveillance_controllers.motion.place_locator import PlaceRegions
 from surveillance_controllers.planning.door_watch import DoorWatch
 from surveillance_controllers.planning.grid_planning import NoPathError
 from surveillance_controllers.planning.map_planner import route

@@ -14,7 +14,7 @@ from state_machines.ros import GoalAbortedError, GoalRun, GoalServer
 from surveillance_controllers.geometry import equally_spaced
 from surveillance_runtime.conversions import pose_estimate, pose_from, pose_message
 from surveillance_runtime.node import PatrolNode
-from surveillance_runtime.place import occupancy_grid, read_place_file
+from surveillance_runtime.place import plan_grid, read_place_file
 from surveillance_runtime.qos import STATE_QOS
 from surveillance_simulation.conversions import grid_to_ros
 
@@ -32,7 +32,7 @@ class MapServer(PatrolNode):
         super().__init__('map_server', **options)
         plan = read_place_file(place).plan
         assert plan is not None
-        grid = occupancy_grid.draw(plan)
+        grid = plan_grid.draw(plan)
         topic = self.create_publisher(OccupancyGrid, 'map', STATE_QOS)
         topic.publish(grid_to_ros(grid, 'map', self.get_clock().now().to_msg()))
 

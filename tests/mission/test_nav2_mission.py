@@ -11,9 +11,9 @@ from typing import Any
 import pytest
 import yaml
 
-from surveillance_controllers.motion.place_regions import PlaceRegions
+from surveillance_controllers.motion.place_locator import PlaceRegions
 from surveillance_interfaces.msg import RobotPlace
-from surveillance_runtime.place import occupancy_grid, read_place_file
+from surveillance_runtime.place import plan_grid, read_place_file
 from surveillance_runtime.qos import STATE_QOS
 from tests import nav2_definitions
 
@@ -50,7 +50,7 @@ def robot(graph: Any, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterat
 
 def place_regions() -> PlaceRegions:
     file = read_place_file(PLACE)
-    grid = occupancy_grid.draw(file.plan)
+    grid = plan_grid.draw(file.plan)
     doors = [door.segment for door in file.plan.doors.values()]
     return PlaceRegions(grid, doors, file.place.positions)
 

@@ -14,8 +14,8 @@ from launcher.run import make_parser
 from surveillance_operator import map_command
 from surveillance_operator.import_command import main
 from surveillance_runtime.place import read_place_file
-from surveillance_runtime.place.occupancy_grid import draw
 from surveillance_runtime.place.occupancy_map import write_map
+from surveillance_runtime.place.plan_grid import draw
 from surveillance_runtime.place.regions import Regions
 
 CONFIG = Path(__file__).parents[2] / 'config'

@@ -10,7 +10,8 @@ import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 
 from surveillance_runtime import diagnostics
-from surveillance_runtime.diagnostics import ERROR, OK, WARN, DiagnosticsThread, Health, Heartbeat
+from surveillance_runtime.diagnostics import DiagnosticsThread, Heartbeat
+from surveillance_runtime.health import ERROR, OK, WARN, Health
 from surveillance_runtime.launch_protocol import HEARTBEAT, RESTARTS
 from surveillance_runtime.node import PatrolNode, report_exception
 

@@ -13,8 +13,8 @@ import yaml
 from surveillance_runtime.files import FileError
 from surveillance_runtime.place import read_place_file
 from surveillance_runtime.place.filter_masks import write_filter_masks
-from surveillance_runtime.place.occupancy_grid import draw
 from surveillance_runtime.place.occupancy_map import read_map
+from surveillance_runtime.place.plan_grid import draw
 from surveillance_runtime.place.rooms import PlaceError
 from surveillance_runtime.place.zones import zones_from
 

@@ -14,7 +14,7 @@ from surveillance_controllers.geometry import Scan
 from surveillance_controllers.motion.driving import Drive, State
 from surveillance_controllers.motion.navigator import Navigator
 from surveillance_controllers.planning.grid_planning import GridPlanner, NoPathError
-from surveillance_runtime.place import occupancy_grid
+from surveillance_runtime.place import plan_grid
 from surveillance_simulation.robot.robot import Robot
 from surveillance_simulation.world.people import PeopleModel
 from surveillance_simulation.world.world import World, read_world
@@ -33,7 +33,7 @@ points = st.tuples(st.floats(2.0, 18.0), st.floats(2.0, 18.0))
 
 @pytest.fixture(scope='module')
 def planner() -> GridPlanner:
-    drawn = occupancy_grid.draw(PLAN)
+    drawn = plan_grid.draw(PLAN)
     return GridPlanner(drawn)
 
 
@@ -63,7 +63,7 @@ def test_a_path_never_touches_a_wall_or_a_closed_door(
 def driven(world: World, seed: int, goals: list[str]) -> tuple[Robot, float]:
     """Drive through places on cores alone; return the robot and how far it left its paths."""
     robot = Robot(world, rng=np.random.default_rng(seed))
-    drawn = occupancy_grid.draw(world.plan)
+    drawn = plan_grid.draw(world.plan)
     grid = drawn
     planner, navigator = GridPlanner(grid), Navigator()
     navigator.set_map(grid)

@@ -8,9 +8,9 @@ import random
 import numpy as np
 import pytest
 
+from benchmarks import regular_places
 from surveillance_runtime.files import FileError
-from surveillance_runtime.place import generation as place_generation
-from surveillance_runtime.place import occupancy_grid, writing
+from surveillance_runtime.place import occupancy_grid, plan_grid, writing
 from surveillance_runtime.place.floor_plan import Marker, PlaceError
 from surveillance_simulation.world.world import World, read_world
 
@@ -26,7 +26,7 @@ def test_every_place_of_the_project_is_sound(name: str) -> None:
 
 
 def test_office_file_is_what_its_generator_writes() -> None:
-    written = writing.format_place(place_generation.office(), '')
+    written = writing.format_place(regular_places.office(), '')
     text = (CONFIG / 'office.yaml').read_text()
     assert text[text.index('/**:') :] == written[written.index('/**:') :]
 
@@ -34,9 +34,9 @@ def test_office_file_is_what_its_generator_writes() -> None:
 @pytest.mark.parametrize(
     ('parameters', 'rooms', 'doors'),
     [
-        (place_generation.grid(5, 4), 20, 31),
-        (place_generation.ring(8), 8, 8),
-        (place_generation.tree(5, 4, random.Random(3)), 20, 19),
+        (regular_places.grid(5, 4), 20, 31),
+        (regular_places.ring(8), 8, 8),
+        (regular_places.tree(5, 4, random.Random(3)), 20, 19),
     ],
 )
 def test_generated_places_are_sound(parameters: dict, rooms: int, doors: int) -> None:
@@ -169,7 +169,7 @@ def test_an_error_in_a_file_names_file_and_line(tmp_path) -> None:
 
 def test_the_map_shows_walls_as_occupied_and_doors_as_free() -> None:
     plan = two_rooms().plan
-    grid = occupancy_grid.draw(plan)
+    grid = plan_grid.draw(plan)
     assert grid.cells[grid.cell_of(1.0, 1.0)] == occupancy_grid.FREE
     assert grid.cells[grid.cell_of(3.0, 1.0)] == occupancy_grid.FREE
     assert grid.cells[grid.cell_of(3.0, 0.2)] == occupancy_grid.OCCUPIED
@@ -178,7 +178,7 @@ def test_the_map_shows_walls_as_occupied_and_doors_as_free() -> None:
 
 def test_free_cells_of_the_map_are_free_in_the_world() -> None:
     world = read_world(CONFIG / 'seven_rooms.yaml')
-    grid = occupancy_grid.draw(world.plan)
+    grid = plan_grid.draw(world.plan)
     rows, columns = np.nonzero(grid.cells == occupancy_grid.FREE)
     for row, column in list(zip(rows, columns, strict=True))[::97]:
         assert world.clearance(*grid.centre_of(int(row), int(column))) >= grid.resolution / 2 - 1e-9
@@ -186,13 +186,13 @@ def test_free_cells_of_the_map_are_free_in_the_world() -> None:
 
 def test_a_generator_refuses_an_odd_ring() -> None:
     with pytest.raises(ValueError, match='ring of 5 rooms: expected an even number'):
-        place_generation.ring(5)
+        regular_places.ring(5)
 
 
 def test_a_wrong_option_of_the_generator_is_one_line(capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit, match='2'):
-        place_generation.main(['grid', '--colums', '3'])
+        regular_places.main(['grid', '--colums', '3'])
     assert capsys.readouterr().err.splitlines() == [
-        "place_generation: unknown option '--colums': expected '--columns' "
-        '(see place_generation --help)'
+        "regular_places: unknown option '--colums': expected '--columns' "
+        '(see regular_places --help)'
     ]

@@ -3,7 +3,7 @@
 These need no ROS:
 
 - `navigator` takes odometry and scans, asks the others, and carries out one task at a time;
-- `localisation` says where the robot is, `place_regions` in which place that is;
+- `localisation` says where the robot is, `place_locator` in which place that is;
 - `tracking` finds what moves, `obstacle_memory` what stands and is not on the map;
 - `driving` is a drive along a path with its recoveries. It steers by `path_following`, and by the
   local planner of `sampled_planning` while somebody moves nearby.

@@ -40,8 +40,8 @@ from surveillance_controllers.geometry import (
 from surveillance_controllers.map_knowledge import MapKnowledge
 from surveillance_controllers.motion.arrival import Motion, MotionFailedError, expect_place
 from surveillance_controllers.motion.holding import Hold
+from surveillance_controllers.motion.place_locator import PlaceLocator
 from surveillance_controllers.motion.place_recording import PlaceRecorder
-from surveillance_controllers.motion.place_regions import PlaceMap
 from surveillance_runtime.conversions import pose_from, pose_message, seconds_of
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.parameters import ParameterError
@@ -105,7 +105,7 @@ class Nav2Motion:
         self._navigator = GoalCaller(node, self._type, 'navigate_through_poses')
         self._hold = Hold(node)
         self._lock = threading.Lock()
-        self._places = PlaceMap(door_segments(node).values())
+        self._places = PlaceLocator(door_segments(node).values())
         self._point: Points | None = None
         positions = place_positions(node)
         self._places.set_positions(positions)

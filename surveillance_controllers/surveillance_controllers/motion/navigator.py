@@ -19,7 +19,7 @@ from surveillance_controllers.motion.localisation import Localiser
 from surveillance_controllers.motion.obstacle_memory import ObstacleMemory
 from surveillance_controllers.motion.odometry import OdometryBuffer, joined
 from surveillance_controllers.motion.path_following import Velocity
-from surveillance_controllers.motion.place_regions import PlaceMap
+from surveillance_controllers.motion.place_locator import PlaceLocator
 from surveillance_controllers.motion.tracking import Mover, Tracker
 from surveillance_runtime.place.floor_plan import Segment
 from surveillance_runtime.place.occupancy_grid import Grid, with_walls
@@ -74,7 +74,7 @@ class Navigator:
         self._doors = dict(doors or {})
         self._closed: frozenset[str] = frozenset()
         self._guesses = tuple(guesses)
-        self._places = PlaceMap(self._doors.values())
+        self._places = PlaceLocator(self._doors.values())
         self._grid: Grid | None = None
         self._localiser: Localiser | None = None
         self._memory: ObstacleMemory | None = None

@@ -26,13 +26,8 @@ from surveillance_controllers.geometry import Points
 from surveillance_controllers.planning.grid_search import Cell, GridSearch
 from surveillance_runtime.parameters import parameter
 from surveillance_runtime.place.floor_plan import Segment
-from surveillance_runtime.place.occupancy_grid import (
-    Grid,
-    distance_to,
-    points_on,
-    with_walls,
-    zone_cells,
-)
+from surveillance_runtime.place.occupancy_grid import Grid, distance_to, points_on, with_walls
+from surveillance_runtime.place.plan_grid import zone_cells
 from surveillance_runtime.place.zones import NO_ZONES, Zones
 from surveillance_runtime.robot_base import robot_radius
 

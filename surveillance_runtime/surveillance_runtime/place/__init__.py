@@ -3,8 +3,7 @@
 `Place` is what the nodes share: rooms, the doors that join them, a point in each. `FloorPlan` adds
 what the place's file says of walls, doors and markers, and `Regions` which room a point lies in.
 `read_place_file` reads and checks a file, `described_place` the parameters of a node;
-`python -m surveillance_runtime.place.generation` writes regular files;
-`surveillance_runtime.place.drawing` draws places.
+`occupancy_grid` is a map's cells, `plan_grid` draws a floor plan on them, `drawing` draws places.
 """
 
 from surveillance_runtime.place.description import PlaceFile as PlaceFile

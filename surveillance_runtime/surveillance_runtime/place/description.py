@@ -8,10 +8,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from surveillance_runtime.files import FileError
-from surveillance_runtime.parameters import ParameterError, parameter
+from surveillance_runtime.parameters import ParameterError, ParameterHost, parameter
 from surveillance_runtime.place.floor_plan import FloorPlan
 from surveillance_runtime.place.occupancy_map import is_map_description, is_picture
 from surveillance_runtime.place.patrol_rules import PatrolRules, patrol_rules
@@ -28,9 +28,6 @@ from surveillance_runtime.place.rooms import (
 from surveillance_runtime.robot_base import ROBOT_RADIUS
 from surveillance_runtime.suggestions import nearest
 from surveillance_runtime.yaml_file import YamlFile, parameters_of, read_yaml_file
-
-if TYPE_CHECKING:
-    from surveillance_runtime.node import PatrolNode
 
 
 @dataclass(frozen=True)
@@ -136,7 +133,7 @@ class PlaceSettings:
 
 
 def described_place(
-    node: PatrolNode, source: str = 'configuration', *, required: bool = False
+    node: ParameterHost, source: str = 'configuration', *, required: bool = False
 ) -> Place | None:
     """Declare where the map comes from, and make the place that the parameters describe.
 

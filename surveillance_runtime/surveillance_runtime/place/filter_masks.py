@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 
 from surveillance_runtime.files import FileError, in_one_line
 from surveillance_runtime.place.floor_plan import FloorPlan
-from surveillance_runtime.place.occupancy_grid import OCCUPIED, Grid, draw, zone_cells
+from surveillance_runtime.place.occupancy_grid import OCCUPIED, Grid
+from surveillance_runtime.place.plan_grid import draw, zone_cells
 
 KEEP_OUT, SPEED = 'keepout', 'speed'
 _KEEP_OUT_TYPE, _SPEED_TYPE = 0, 2

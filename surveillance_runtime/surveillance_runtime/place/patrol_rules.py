@@ -5,16 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 from zoneinfo import ZoneInfo, ZoneInfoNotFoundError
 
 from patrol_policy.hours import NO_CALENDAR, Calendar, WeeklyHours
-from surveillance_runtime.parameters import ParameterError, parameter
+from surveillance_runtime.parameters import ParameterError, ParameterHost, parameter
 from surveillance_runtime.place.rooms import PATROL_TABLES, PlaceError
 from surveillance_runtime.suggestions import nearest
-
-if TYPE_CHECKING:
-    from surveillance_runtime.node import PatrolNode
 
 LONGEST = 1e9
 """Seconds: 31 years."""
@@ -118,7 +115,7 @@ class CalendarSettings:
     )
 
 
-def described_patrol_rules(node: PatrolNode) -> PatrolRules:
+def described_patrol_rules(node: ParameterHost) -> PatrolRules:
     """Declare what holds for single places, and read it.
 
     Raises:

@@ -12,14 +12,8 @@ import numpy as np
 import numpy.typing as npt
 
 from surveillance_runtime.place.floor_plan import WALL_THICKNESS, FloorPlan
-from surveillance_runtime.place.occupancy_grid import (
-    UNKNOWN,
-    distance_to,
-    draw,
-    regions,
-    walled,
-    zone_cells,
-)
+from surveillance_runtime.place.occupancy_grid import UNKNOWN, distance_to, regions
+from surveillance_runtime.place.plan_grid import draw, walled, zone_cells
 from surveillance_runtime.place.rooms import PlaceError
 
 _LARGE = 1.0

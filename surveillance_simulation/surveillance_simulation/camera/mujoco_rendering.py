@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from surveillance_runtime.place import boxes
 from surveillance_runtime.place.floor_plan import WALL_HEIGHT, WALL_THICKNESS, Door
-from surveillance_runtime.place.occupancy_grid import solid_lines
+from surveillance_runtime.place.plan_grid import solid_lines
 from surveillance_simulation.camera.model import Array, Camera
 from surveillance_simulation.camera.scene import DOOR_HEIGHT, OBSTACLE_HEIGHT, STATION_SIDE
 from surveillance_simulation.world import textures

@@ -11,7 +11,7 @@ import numpy as np
 
 from surveillance_runtime.place import boxes
 from surveillance_runtime.place.floor_plan import WALL_HEIGHT, WALL_THICKNESS, Door
-from surveillance_runtime.place.occupancy_grid import solid_lines
+from surveillance_runtime.place.plan_grid import solid_lines
 from surveillance_simulation.camera.model import Array
 from surveillance_simulation.world import textures
 from surveillance_simulation.world.textures import TILE, Texture

@@ -17,7 +17,7 @@ from surveillance_interfaces.msg import DoorStates
 from surveillance_runtime.conversions import nanoseconds_of
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.parameters import parameter
-from surveillance_runtime.place import occupancy_grid
+from surveillance_runtime.place import plan_grid
 from surveillance_runtime.place.rooms import Pose
 from surveillance_runtime.profile.parameters import LidarSettings, declared_frames
 from surveillance_runtime.profile.record import Frames
@@ -93,7 +93,7 @@ class SensorFeed:
         self._tf = None if TFMessage is None else node.create_publisher(TFMessage, 'tf', 10)
         self._told_collisions = -1
         options = node.declare_fields(PublishedOptions())
-        grid = occupancy_grid.draw(robot.world.plan, options.map_resolution)
+        grid = plan_grid.draw(robot.world.plan, options.map_resolution)
         self._map.publish(conversions.grid_to_ros(grid, self._frames.map, Time()))
         self.tell_doors()
         if options.announce_pose:

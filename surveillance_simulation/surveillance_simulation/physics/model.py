@@ -16,7 +16,7 @@ import numpy as np
 from surveillance_runtime.parameters import parameter
 from surveillance_runtime.place import boxes
 from surveillance_runtime.place.floor_plan import WALL_HEIGHT, WALL_THICKNESS
-from surveillance_runtime.place.occupancy_grid import solid_lines
+from surveillance_runtime.place.plan_grid import solid_lines
 from surveillance_runtime.place.rooms import Pose
 from surveillance_runtime.profile.parameters import robot_footprint
 from surveillance_simulation.camera.scene import OBSTACLE_HEIGHT

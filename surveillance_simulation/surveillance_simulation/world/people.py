@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from surveillance_runtime.parameters import parameter
-from surveillance_runtime.place import boxes, occupancy_grid
+from surveillance_runtime.place import boxes, occupancy_grid, plan_grid
 from surveillance_runtime.place.floor_plan import WALL_THICKNESS, FloorPlan, Point
 
 MANNERS = ('polite', 'pushy')
@@ -156,7 +156,7 @@ class _Ways:
 
     def __init__(self, plan: FloorPlan, reach: float) -> None:
         self._points = {name: (x, y) for name, (x, y, _) in plan.place.positions.items()}
-        grid = self._grid = occupancy_grid.draw(plan, _CELL)
+        grid = self._grid = plan_grid.draw(plan, _CELL)
         self._cell = grid.resolution  # that of a map is the map's own
         rows, columns = np.indices(grid.cells.shape)
         x = (columns + 0.5) * self._cell + grid.origin[0]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from surveillance_operator.regions import Region, regions
+from surveillance_operator.room_outlines import RoomOutline, room_outlines
 from surveillance_runtime.place.occupancy_grid import Grid
 
 WALL = 100
@@ -24,12 +24,12 @@ DOOR = {'D': (9.25, 7.0, 9.25, 9.0)}
 POINTS = {'A': (4.0, 8.0), 'B': (14.0, 8.0)}
 
 
-def area(region: Region) -> float:
+def area(region: RoomOutline) -> float:
     return sum((right - left) * (top - bottom) for left, bottom, right, top in region.boxes)
 
 
 def test_a_door_parts_two_rooms_and_names_stand_inside() -> None:
-    found = regions(two_rooms(), POINTS, DOOR)
+    found = room_outlines(two_rooms(), POINTS, DOOR)
     assert found.keys() == {'A', 'B'}
     for name, region in found.items():
         assert area(region) == pytest.approx(19 * 9.25, rel=0.05)
@@ -40,20 +40,20 @@ def test_a_door_parts_two_rooms_and_names_stand_inside() -> None:
 
 
 def test_without_a_door_each_cell_is_the_nearer_places() -> None:
-    found = regions(two_rooms(), {'A': (4.0, 8.0), 'C': (4.0, -1.0), 'B': (14.0, 8.0)}, {})
+    found = room_outlines(two_rooms(), {'A': (4.0, 8.0), 'C': (4.0, -1.0), 'B': (14.0, 8.0)}, {})
     assert area(found['A']) + area(found['C']) + area(found['B']) == pytest.approx(343.0, rel=0.05)
     assert max(top for _, _, _, top in found['C'].boxes) == pytest.approx(3.5, abs=0.5)
 
 
 def test_a_place_in_a_wall_or_off_the_map_has_no_region() -> None:
-    assert regions(two_rooms(), {'A': (9.2, 1.0), 'B': (100.0, 0.0)}, DOOR) == {}
+    assert room_outlines(two_rooms(), {'A': (9.2, 1.0), 'B': (100.0, 0.0)}, DOOR) == {}
 
 
 def test_a_large_map_is_taken_coarsely() -> None:
-    found = regions(two_rooms(size=1200), {'A': (20.0, 300.0)}, {})
+    found = room_outlines(two_rooms(size=1200), {'A': (20.0, 300.0)}, {})
     assert len(found['A'].boxes) < 20
 
 
 def test_a_map_of_one_long_row_of_cells_has_its_region() -> None:
     strip = Grid(np.zeros((1, 900_000), np.int8), 0.05)
-    assert regions(strip, {'A': (5.0, 0.02)}, {})['A'].boxes == ((0.0, 0.0, 45_000.0, 0.05),)
+    assert room_outlines(strip, {'A': (5.0, 0.02)}, {})['A'].boxes == ((0.0, 0.0, 45_000.0, 0.05),)

@@ -28,7 +28,7 @@ MOST_CELLS = 200_000
 
 
 @dataclass(frozen=True)
-class Region:
+class RoomOutline:
     """The floor of one place.
 
     Attributes:
@@ -42,9 +42,9 @@ class Region:
     room: float
 
 
-def regions(
+def room_outlines(
     grid: Grid, positions: Mapping[str, tuple[float, float]], doors: Mapping[str, Segment]
-) -> dict[str, Region]:
+) -> dict[str, RoomOutline]:
     """Return the region of each place whose point lies on free floor.
 
     Args:
@@ -72,7 +72,7 @@ def regions(
         inside = [(row - bottom, column - left) for row, column in cells]
         nearest = _nearest(mask, inside)
         for number, name in enumerate(names):
-            found[name] = _region(mask & (nearest == number), inside[number], own)
+            found[name] = _outline(mask & (nearest == number), inside[number], own)
     return found
 
 
@@ -92,7 +92,7 @@ def _nearest(mask: NDArray[np.bool_], cells: list[tuple[int, int]]) -> NDArray[n
     return nearest
 
 
-def _region(mask: NDArray[np.bool_], cell: tuple[int, int], grid: Grid) -> Region:
+def _outline(mask: NDArray[np.bool_], cell: tuple[int, int], grid: Grid) -> RoomOutline:
     inside = distance_to(~np.pad(mask, 1), 1.0)[1:-1, 1:-1]
     rows, columns = np.indices(mask.shape)
     # The robot stops at the point and would hide a name there; above it is better than below, and
@@ -105,7 +105,7 @@ def _region(mask: NDArray[np.bool_], cell: tuple[int, int], grid: Grid) -> Regio
         grid.box(bottom, left, top, right) for left, bottom, right, top in _rectangles(mask)
     )
     label = grid.centre_of(int(row), int(column))
-    return Region(boxes, label, grid.resolution * float(inside[row, column]))
+    return RoomOutline(boxes, label, grid.resolution * float(inside[row, column]))
 
 
 def _rectangles(mask: NDArray[np.bool_]) -> list[tuple[int, int, int, int]]:

@@ -4,7 +4,7 @@ A place is drawn by naming rectangles and which of them a door connects; walls, 
 room positions follow. The result is the parameter mapping that a place's YAML file holds, so what
 is generated here can be written to a file and be checked and changed by hand afterwards:
 
-    python -m surveillance_runtime.place.generation office > config/office.yaml
+    python benchmarks/regular_places.py office > config/office.yaml
 """
 
 from __future__ import annotations
@@ -215,7 +215,7 @@ def _joined(pieces: list[tuple[float, float]]) -> list[tuple[float, float]]:
 def main(argv: Sequence[str] | None = None) -> int:
     """Print a generated place as a parameter file."""
     parser = CommandParser(
-        prog='place_generation', description='Write a regular place as a parameter file.'
+        prog='regular_places', description='Write a regular place as a parameter file.'
     )
     parser.add_argument('kind', choices=['office', 'grid', 'ring', 'tree'])
     parser.add_argument(
@@ -241,7 +241,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     except ValueError as error:
         parser.error(str(error))
     made = ' '.join(argv if argv is not None else sys.argv[1:])
-    title += f'\nWritten by: python -m surveillance_runtime.place.generation {made}'
+    title += f'\nWritten by: python benchmarks/regular_places.py {made}'
     title += '\nMetres and radians in the world frame; each door cuts its opening out of its wall.'
     sys.stdout.write(format_place(parameters, title))
     return 0

@@ -81,7 +81,7 @@ class PlaceRegions:
         return region
 
 
-class PlaceMap:
+class PlaceLocator:
     """Which place a point belongs to, while the map and the places may change.
 
     Args:
