@@ -193,7 +193,7 @@ class WorldModel:
             place=found.place,
             now=now,
             reachable=tuple(place for place in found.reachable if place in graph.index),
-            classes=found.classes,
+            classes=self._rules.with_classes(found.classes),
             # The ontology counts whole seconds; another robot's visit may be later.
             visited_at={
                 place: max(seconds, visits.get(place, -1.0))

@@ -90,7 +90,7 @@ def propose(building: OccupancyMap, radius: float) -> Proposal:
 
     positions: dict[str, list[float]] = {}
     for number in sorted(rooms):
-        cell = _point_in(labels == number, reach, clearance, radius)
+        cell = point_in(labels == number, reach, clearance, radius)
         positions[names[number]] = _rounded(world([cell])[0])
     table: dict[str, list[str]] = {names[number]: [] for number in sorted(rooms)}
     placed: dict[str, list[float]] = {}
@@ -223,15 +223,27 @@ def _names(rooms: set[int], found: Segmentation) -> dict[int, str]:
     return names
 
 
-def _point_in(
-    room: Mask, reach: Mask, clearance: NDArray[np.float32], radius: float
+def point_in(
+    room: Mask,
+    reach: Mask,
+    clearance: NDArray[np.float32],
+    radius: float,
+    resolution: float = 0.05,
 ) -> tuple[float, float]:
-    """Return a cell of a room that is free enough and near its middle, column and row."""
+    """Return a cell of a room that is free enough and near its middle, column and row.
+
+    Args:
+        room: Its cells.
+        reach: Those that the robot can be in.
+        clearance: How far each cell is from what is not free, metres.
+        radius: Of the robot, metres.
+        resolution: Side of a cell, metres.
+    """
     cells = np.argwhere(room & reach)
     clear = clearance[cells[:, 0], cells[:, 1]]
     # Also far from the room's own borders, so that the robot is clearly inside.
     inside = cv2.distanceTransform(np.pad(room, 1).astype(np.uint8), cv2.DIST_L2, 3)[1:-1, 1:-1]
-    deep = np.minimum(clear, 0.05 * inside[cells[:, 0], cells[:, 1]])
+    deep = np.minimum(clear, resolution * inside[cells[:, 0], cells[:, 1]])
     enough = deep >= min(float(deep.max()), _NEAR_POINT * radius) - 1e-6
     good = cells[enough]
     middle = np.argwhere(room).mean(axis=0)

@@ -56,6 +56,25 @@ def read_place_file(path: str | Path, *, radius: float = ROBOT_RADIUS) -> PlaceF
         FileError: The file cannot be read, or what it describes is no sound place; one line
             with file and line number.
     """
+    file, described = described_in(path)
+    try:
+        if isinstance(name := described.get('map_file'), str) and name:
+            described['map_file'] = map_file_beside(file.path, name)
+        plan = checked_plan(described, radius)
+        rules = patrol_rules(described, plan.place.rooms)
+    except PlaceError as error:
+        raise file.error(error.where, error.problem) from None
+    return PlaceFile(plan.place, plan, rules)
+
+
+def described_in(path: str | Path) -> tuple[YamlFile, dict[str, Any]]:
+    """Return what a place's file has below `ros__parameters`, its tables as mappings.
+
+    Only the names of the keys are checked. The file comes with it, for errors with a line.
+
+    Raises:
+        FileError: The file cannot be read or is none of a place.
+    """
     if is_picture(path) and Path(path).exists():
         raise FileError(f'{path}: the picture of a map, and no place: {_importing(path)}')
     file = read_yaml_file(path)
@@ -73,8 +92,6 @@ def read_place_file(path: str | Path, *, radius: float = ROBOT_RADIUS) -> PlaceF
     file = YamlFile(file.path, given, lines)
     try:
         described = tables_of(given.items())
-        if isinstance(name := described.get('map_file'), str) and name:
-            described['map_file'] = map_file_beside(file.path, name)
         known = (*PLACE_KEYS, *GEOMETRY_KEYS, *PATROL_KEYS)
         for key in described:
             if key not in known:
@@ -82,11 +99,9 @@ def read_place_file(path: str | Path, *, radius: float = ROBOT_RADIUS) -> PlaceF
         for key in PLACE_KEYS[:3]:
             if key not in described:
                 raise PlaceError((), f"parameter '{key}' is missing")
-        plan = checked_plan(described, radius)
-        rules = patrol_rules(described, plan.place.rooms)
     except PlaceError as error:
         raise file.error(error.where, error.problem) from None
-    return PlaceFile(plan.place, plan, rules)
+    return file, described
 
 
 def map_file_beside(place: Path, name: str) -> str:

@@ -118,12 +118,15 @@ class FloorPlan:
     zones: Zones = NO_ZONES
 
     @classmethod
-    def from_parameters(cls, parameters: Mapping[str, Any]) -> FloorPlan:
+    def from_parameters(
+        cls, parameters: Mapping[str, Any], building: OccupancyMap | None = None
+    ) -> FloorPlan:
         """Return the plan that a place's parameters describe.
 
         Args:
             parameters: The mapping below `ros__parameters` in the place's file; the name of its
                 map's file is absolute or relative to the working directory.
+            building: That map, where it has been read already.
 
         Raises:
             PlaceError: An entry is of the wrong shape, contradicts another, or its map cannot be
@@ -156,7 +159,7 @@ class FloorPlan:
                 parameters.get('marker_dictionary', 'DICT_5X5_100'), 'marker_dictionary'
             ),
             stations=stations_of(parameters, place.positions, place.start),
-            map=_map_of(parameters),
+            map=building or _map_of(parameters),
             zones=zones_from(parameters),
         )
         plan._check()

@@ -13,6 +13,7 @@ from surveillance_runtime.parameters import ParameterError, ParameterHost, param
 from surveillance_runtime.place.rooms import PATROL_TABLES, PlaceError
 from surveillance_runtime.suggestions import nearest
 
+CLASSES = ('ROOM', 'CORRIDOR')
 LONGEST = 1e9
 """Seconds: 31 years."""
 
@@ -25,11 +26,25 @@ class PatrolRules:
         thresholds: Seconds without a visit after which a place is URGENT, where it differs.
         exploration: Seconds that the robot explores a place, where it differs.
         calendar: Hours, keep-out places and the quiet hours of the station.
+        classes: ROOM or CORRIDOR, where a person says it; else it follows from the doors.
     """
 
     thresholds: Mapping[str, float] = field(default_factory=dict)
     exploration: Mapping[str, float] = field(default_factory=dict)
     calendar: Calendar = NO_CALENDAR
+    classes: Mapping[str, str] = field(default_factory=dict)
+
+    def with_classes(self, found: Mapping[str, frozenset[str]]) -> Mapping[str, frozenset[str]]:
+        """Return the classes of places as a person says them, in place of what was inferred."""
+        if not self.classes:
+            return found
+        # As the ontology has it, a corridor is a room, too.
+        said = {place: frozenset({'ROOM', name}) for place, name in self.classes.items()}
+        own = frozenset(CLASSES)
+        return {
+            place: (kinds - own) | said[place] if place in said else kinds
+            for place, kinds in found.items()
+        }
 
 
 def patrol_rules(described: Mapping[str, Any], rooms: Collection[str] | None = None) -> PatrolRules:
@@ -68,6 +83,7 @@ def patrol_rules(described: Mapping[str, Any], rooms: Collection[str] | None = N
             frozenset(keep_out),
             time_zone,
         ),
+        _classes(described, rooms),
     )
 
 
@@ -81,6 +97,16 @@ def _seconds(
         if not is_number or not math.isfinite(value) or not 0.0 <= value <= LONGEST:
             raise PlaceError((key, place), f'expected seconds from 0 to 1e9, got {value!r}')
         found[place] = float(value)
+    return found
+
+
+def _classes(described: Mapping[str, Any], rooms: Collection[str] | None) -> dict[str, str]:
+    found = {}
+    for place, value in dict(described.get('classes') or {}).items():
+        _check_room(('classes', place), place, rooms)
+        if value not in CLASSES:
+            raise PlaceError(('classes', place), f'{value!r}: expected {" or ".join(CLASSES)}')
+        found[place] = str(value)
     return found
 
 

@@ -53,6 +53,15 @@ class Regions:
         """Return the cells (rows, columns) of each room on `grid`, every door closed."""
         return {name: self._labels == label for label, name in self._names.items()}
 
+    def mask(self, room: str) -> npt.NDArray[np.bool_]:
+        """Return the cells (rows, columns) of one room on `grid`, every door closed."""
+        numbers = [number for number, name in self._names.items() if name == room]
+        return np.asarray(np.isin(self._labels, numbers))
+
+    def numbers(self) -> tuple[npt.NDArray[np.int32], dict[int, str]]:
+        """Return the number of each cell's room, and the rooms by their numbers."""
+        return self._labels, dict(self._names)
+
     def _named(self) -> dict[int, str]:
         names: dict[int, str] = {}
         outside, free = int(self._labels[0, 0]), self.grid.free

@@ -23,7 +23,7 @@ GEOMETRY_KEYS = (
     *ZONE_TABLES,
     *('map_file', 'map_file_resolution', 'map_file_origin'),
 )
-PATROL_TABLES = ('thresholds', 'exploration', 'hours')
+PATROL_TABLES = ('thresholds', 'exploration', 'hours', 'classes')
 PATROL_KEYS = (*PATROL_TABLES, 'keep_out', 'quiet_hours', 'time_zone')
 PLACE_TABLES = (
     *('map', 'room_positions', 'walls', 'doors', 'markers', 'stations'),

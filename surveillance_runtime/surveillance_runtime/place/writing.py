@@ -42,7 +42,11 @@ def _scalar(value: object) -> str:
     return str(value)
 
 
-def updated_text(text: str, parameters: Mapping[str, Any]) -> str:
+def updated_text(
+    text: str,
+    parameters: Mapping[str, Any],
+    renamed: Mapping[tuple[str, str], str] | None = None,
+) -> str:
     """Return the text of a place's file with other parameters; comments and order stay.
 
     What is as before is not touched. A table's entry that `parameters` does not have is taken out
@@ -51,6 +55,8 @@ def updated_text(text: str, parameters: Mapping[str, Any]) -> str:
     Args:
         text: A place's file; it has been read without an error.
         parameters: All that it is to say below `ros__parameters`.
+        renamed: Entries that have another name now, by table and new name: the old one. They stay
+            where they are, with their comments.
     """
     from ruamel.yaml import YAML  # only whoever edits a place pays for it
 
@@ -61,10 +67,24 @@ def updated_text(text: str, parameters: Mapping[str, Any]) -> str:
     step = len(indent[1]) if indent else 2
     yaml.indent(mapping=step, sequence=step, offset=0)
     document = yaml.load(text)
-    _merge(document['/**']['ros__parameters'], parameters)
+    described = document['/**']['ros__parameters']
+    for (table, new), old in (renamed or {}).items():
+        if isinstance(described.get(table), Mapping):
+            _rename(described[table], old, new)
+    _merge(described, parameters)
     written = io.StringIO()
     yaml.dump(document, written)
     return written.getvalue()
+
+
+def _rename(table: Any, old: str, new: str) -> None:
+    if old not in table or new in table:
+        return
+    comment = table.ca.items.pop(old, None)
+    table.insert(list(table).index(old), new, table[old])
+    del table[old]
+    if comment is not None:
+        table.ca.items[new] = comment
 
 
 def _merge(old: Any, new: Mapping[str, Any]) -> None:

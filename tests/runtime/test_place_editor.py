@@ -1,0 +1,187 @@
+"""Editing a place: what each change makes of the file, what is refused, and what is kept."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+from surveillance_runtime.files import FileError
+from surveillance_runtime.map_rooms import propose
+from surveillance_runtime.place import read_place_file
+from surveillance_runtime.place.occupancy_grid import draw
+from surveillance_runtime.place.occupancy_map import read_map, write_map
+from surveillance_runtime.place.writing import format_place
+from surveillance_runtime.place_editor import PlaceEditor
+
+pytestmark = pytest.mark.unit
+SEVEN = Path(__file__).parents[2] / 'config' / 'seven_rooms.yaml'
+
+
+@pytest.fixture
+def typed(tmp_path: Path) -> PlaceEditor:
+    """Provide a place with walls, as a person typed it."""
+    shutil.copy(SEVEN, tmp_path / 'place.yaml')
+    return PlaceEditor(tmp_path / 'place.yaml')
+
+
+@pytest.fixture
+def scanned(tmp_path: Path) -> PlaceEditor:
+    """Provide the same place as a map, with the rooms that are proposed for it."""
+    grid = draw(read_place_file(SEVEN).plan)
+    write_map(tmp_path / 'map.yaml', grid.cells[::-1], 0.05, (*grid.origin, 0.0))
+    found = propose(read_map(tmp_path / 'map.yaml'), 0.22)
+    text = format_place({'map_file': 'map.yaml', **found.parameters}, 'Made by a test.')
+    (tmp_path / 'place.yaml').write_text(text)
+    return PlaceEditor(tmp_path / 'place.yaml')
+
+
+def room_at(editor: PlaceEditor, x: float, y: float) -> str:
+    return editor.now.regions.room_at(x, y) or ''
+
+
+@pytest.mark.parametrize('kind', ['typed', 'scanned'])
+def test_a_room_is_cut_and_joined_again(kind: str, request: pytest.FixtureRequest) -> None:
+    editor: PlaceEditor = request.getfixturevalue(kind)
+    before = editor.now.plan.place
+    east, west = room_at(editor, 17, 13), room_at(editor, 8, 13)
+    assert east == west
+    # Not as far as the walls: it is carried on to them.
+    editor.apply('cut', {'x1': 14, 'y1': 11, 'x2': 14, 'y2': 13})
+    sides = {room_at(editor, 13, 12), room_at(editor, 15, 12)}
+    assert len(sides) == 2
+    place = editor.now.plan.place
+    assert len(place.rooms) == 8
+    fourth = room_at(editor, 15, 15)
+    (door,) = place.rooms[fourth]
+    assert room_at(editor, 15, 12) in place.doors[door], 'the doors go with their side'
+    editor.save()
+    assert len(read_place_file(editor.path).place.rooms) == 8, 'as anybody reads it'
+    first, second = (room_at(editor, x, 12) for x in (13, 15))
+    editor.apply('join', {'first': first, 'second': second})
+    after = editor.now.plan.place
+    assert {frozenset(sides) for sides in after.doors.values()} == {
+        frozenset(sides) for sides in before.doors.values()
+    } or kind == 'typed'
+    assert room_at(editor, 15, 12) == room_at(editor, 13, 12) == first
+
+
+def test_what_a_line_cannot_cut_is_said(typed: PlaceEditor, scanned: PlaceEditor) -> None:
+    for editor in (typed, scanned):
+        with pytest.raises(ValueError, match='runs through no room'):
+            editor.apply('cut', {'x1': -50, 'y1': 0, 'x2': -40, 'y2': 0})
+        with pytest.raises(ValueError, match='expected two points'):
+            editor.apply('cut', {'x1': 9, 'y1': 3, 'x2': 9, 'y2': 3})
+        with pytest.raises(ValueError, match="x1 'a': expected a number"):
+            editor.apply('cut', {'x1': 'a', 'y1': 3, 'x2': 9, 'y2': 3})
+        with pytest.raises(ValueError, match='no change'):
+            editor.apply('saw', {})
+        with pytest.raises(ValueError, match='missing a required argument'):
+            editor.apply('cut', {'x1': 1})
+        assert not editor.undoable
+
+
+def test_two_rooms_with_a_wall_between_become_one_through_the_opening(typed: PlaceEditor) -> None:
+    typed.apply('join', {'first': 'C1', 'second': 'R1'})
+    assert room_at(typed, 10, 5) == room_at(typed, 10, 8) == 'C1'
+    assert 'D1' not in typed.now.plan.doors
+    grid = draw(typed.now.plan)
+    assert grid.at(grid.free, 10.0, 6.5), 'the opening is still there'
+    assert not grid.at(grid.free, 9.0, 6.5), 'and the wall beside it'
+
+
+def test_a_door_finds_its_wall_or_its_opening(typed: PlaceEditor, scanned: PlaceEditor) -> None:
+    typed.apply('move_door', {'name': 'D1', 'x': 11.0, 'y': 6.7})
+    assert typed.now.plan.doors['D1'].y == pytest.approx(6.5)
+    with pytest.raises(ValueError, match=r'no wall of 1\.2 m or more within 1 m'):
+        typed.apply('move_door', {'name': 'D1', 'x': 11.0, 'y': 4.2})
+    with pytest.raises(ValueError, match="no door 'D11': expected 'D1'"):
+        typed.apply('move_door', {'name': 'D11', 'x': 11.0, 'y': 4.2})
+    name = next(name for name, door in scanned.now.plan.doors.items() if abs(door.y - 6.5) < 0.3)
+    door = scanned.now.plan.doors[name]
+    scanned.apply('move_door', {'name': name, 'x': door.x + 0.2, 'y': 6.5})
+    found = scanned.now.plan.doors[name]
+    assert found.width == pytest.approx(1.2, abs=0.15)
+    assert found.x == pytest.approx(door.x, abs=0.1)
+
+
+def test_names_keep_their_place_and_comments_and_undo_takes_all_back(typed: PlaceEditor) -> None:
+    text = SEVEN.read_text().replace('R1: [D1]', 'R1: [D1]  # where the coffee is')
+    typed.path.write_text(text)
+    typed.reload()
+    typed.apply('rename', {'kind': 'room', 'name': 'R1', 'new': 'kitchen'})
+    typed.apply('rename', {'kind': 'door', 'name': 'D1', 'new': 'flap'})
+    typed.apply('rename', {'kind': 'room', 'name': 'E', 'new': 'dock'})
+    typed.apply('set_rule', {'room': 'kitchen', 'key': 'thresholds', 'value': 600})
+    written = typed.text()
+    assert 'kitchen: [flap] # where the coffee is\n      R2: [D2]' in written
+    assert 'robot_room: dock' in written
+    assert '# Walls by their centre lines' in written
+    for _ in range(4):
+        typed.undo()
+    assert typed.text() == text
+    with pytest.raises(ValueError, match='nothing to undo'):
+        typed.undo()
+    for _ in range(4):
+        typed.redo()
+    assert typed.text() == written
+    assert typed.is_changed
+    typed.save()
+    typed.undo()
+    typed.undo()
+    typed.save()
+    assert 'E: [D6, D7]' in typed.path.read_text()
+    assert 'kitchen: [flap] # where the coffee is' in typed.path.read_text()
+
+
+def test_the_file_s_own_checks_refuse_a_change(typed: PlaceEditor) -> None:
+    corners = [[9, 4], [11, 4], [11, 6], [9, 6]]
+    said = typed.problem_with('set_zone', {'kind': 'keep_out', 'corners': corners})
+    assert said == 'room_positions.R1: (10, 5) lies in the keep-out zone K1: expected it outside'
+    said = typed.problem_with('remove_door', {'name': 'D1'})
+    assert said == 'map.R1: expected a list of at least one door, got []'
+    said = typed.problem_with('set_rule', {'room': 'R1', 'key': 'hours', 'value': 'mon 8'})
+    assert said.startswith('hours.R1: ')
+    said = typed.problem_with('move_point', {'room': 'R1', 'x': 10, 'y': 8})
+    assert said == '(10.00, 8.00) lies in C1: expected R1'
+    said = typed.problem_with('set_rule', {'room': 'R1', 'key': 'classes', 'value': 'HALL'})
+    assert said == "classes.R1: 'HALL': expected ROOM or CORRIDOR"
+    assert not typed.is_changed
+    assert typed.problem_with('set_text', {'key': 'time_zone', 'value': 'Europe/Rome'}) == ''
+
+
+def test_what_somebody_else_wrote_is_not_overwritten(typed: PlaceEditor) -> None:
+    typed.apply('move_station', {'x': 4, 'y': 9})
+    assert typed.now.plan.stations['E'].pose == (4.0, 9.0, 0.0)
+    typed.path.write_text(typed.path.read_text() + '# a note\n')
+    with pytest.raises(FileError, match='changed by somebody else'):
+        typed.save()
+    typed.reload()
+    assert not typed.is_changed
+    typed.apply('set_marker', {'id': 7, 'x': 7.1, 'y': 4, 'z': 1.0, 'yaw': 0.0})
+    typed.apply('add_door', {'x': 12.4, 'y': 4.0})
+    typed.save()
+    assert '# a note' in typed.path.read_text()
+    plan = read_place_file(typed.path).plan
+    assert plan.markers['M1'].id == 7
+    assert set(plan.place.doors['D8']) == {'R1', 'R2'}
+
+
+def test_the_part_with_the_station_is_where_the_robot_charges(scanned: PlaceEditor) -> None:
+    room = room_at(scanned, 5, 10)
+    scanned.apply('move_station', {'x': 3.0, 'y': 12.0})
+    scanned.apply('cut', {'x1': 2.5, 'y1': 11.0, 'x2': 6.5, 'y2': 11.0})
+    with_station = room_at(scanned, 3.0, 12.0)
+    assert scanned.now.plan.place.recharge_rooms == (with_station,)
+    assert room in scanned.now.plan.place.rooms
+    other = room_at(scanned, 8, 12)
+    scanned.apply('add_station', {'x': 9, 'y': 12})
+    assert set(scanned.now.plan.stations) == {with_station, other}
+    with pytest.raises(ValueError, match='both have a charging station'):
+        scanned.apply('join', {'first': with_station, 'second': other})
+    scanned.apply('move_station', {'x': 8.5, 'y': 12, 'room': other})
+    scanned.apply('remove_station', {'room': with_station})
+    assert scanned.now.plan.place.recharge_rooms == (other,)
+    scanned.save()
+    assert read_place_file(scanned.path).plan.stations[other].pose[:2] == (8.5, 12.0)
