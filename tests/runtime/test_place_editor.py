@@ -10,8 +10,8 @@ import pytest
 from surveillance_runtime.files import FileError
 from surveillance_runtime.map_rooms import propose
 from surveillance_runtime.place import read_place_file
-from surveillance_runtime.place.occupancy_grid import draw
 from surveillance_runtime.place.occupancy_map import read_map, write_map
+from surveillance_runtime.place.plan_grid import draw
 from surveillance_runtime.place.writing import format_place
 from surveillance_runtime.place_editor import PlaceEditor
 

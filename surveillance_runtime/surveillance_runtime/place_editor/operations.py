@@ -14,7 +14,7 @@ from typing import Any
 
 from surveillance_runtime.place import problem_in_name
 from surveillance_runtime.place.floor_plan import Door, FloorPlan
-from surveillance_runtime.place.occupancy_grid import draw
+from surveillance_runtime.place.plan_grid import draw
 from surveillance_runtime.place.regions import Regions
 from surveillance_runtime.place.rooms import PATROL_TABLES
 from surveillance_runtime.place_editor.shapes import (
