@@ -242,6 +242,13 @@ class Run:
         metavar='FILE',
         help=OPTIONS['watch'].help,
     )
+    stage: Path | None = _option(
+        '--stage',
+        group=_TRACES,
+        type=Path,
+        metavar='FILE',
+        help=OPTIONS['stage'].help,
+    )
     fresh: bool = _switch('--fresh', 'begin a new run even if the last one was killed', _TRACES)
     web: bool = _switch('--web', OPTIONS['web'].help, _PAGE_GROUP)
     web_control: bool = _switch('--web-control', OPTIONS['web_control'].help, _PAGE_GROUP)
@@ -284,6 +291,15 @@ class Run:
                 read_watch_file(self.watch)
             except FileError as error:
                 raise ValueError(f'--watch {error}') from None
+        if self.stage is not None:
+            from surveillance_simulation.staging import read_script
+
+            try:
+                read_script(self.stage)
+            except FileError as error:
+                raise ValueError(f'--stage {error}') from None
+            if not any(node.name == 'simulator' for node in self.nodes()):
+                raise ValueError(f'--stage {self.stage}: expected a run whose simulator is started')
         for text in self.remaps:
             if not _REMAP.match(text):
                 raise ValueError(f'--remap {text!r}: expected FROM:=TO like scan:=front/scan')

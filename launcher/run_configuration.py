@@ -17,7 +17,7 @@ from surveillance_runtime.configuration import (
     argument_layer,
     resolved_text,
 )
-from surveillance_runtime.files import RECORD, RECORDING, FileError
+from surveillance_runtime.files import RECORD, RECORDING, TRUTH, FileError
 from surveillance_runtime.profile import (
     ProfileFile,
     RobotProfile,
@@ -34,6 +34,7 @@ from surveillance_runtime.run_parameters import (
     record_entries,
     run_layers,
     simulator_entries,
+    stage_entry,
     watch_entries,
 )
 
@@ -126,6 +127,7 @@ def _folders_of(folder: Path) -> Iterator[Entry]:
         'simulator',
     ):
         yield for_node(node, 'state_file', str(folder / f'{node}.json'), 'this run')
+    yield for_node('simulator', 'truth_file', str(folder / TRUTH), 'this run')
 
 
 def _option_entries(run: Run, folder: Path | None) -> Iterator[Entry]:
@@ -134,6 +136,8 @@ def _option_entries(run: Run, folder: Path | None) -> Iterator[Entry]:
     if folder is not None:
         yield from record_entries(folder / RECORD)
         yield from _observer_entries(run, folder)
+    if run.stage is not None:
+        yield stage_entry(run.stage)
     # Without one that was asked for, the mode is what the parameter files say.
     if run.mode:
         # In a whole run one console reads for all.

@@ -45,6 +45,7 @@ from surveillance_runtime.run_parameters import (
     record_entries,
     run_layers,
     simulator_entries,
+    stage_entry,
     watch_entries,
     write_parameters,
 )
@@ -166,6 +167,8 @@ def _traces(given: Mapping[str, str], folder: Path) -> Iterator[Entry]:
     if given['watch']:
         kept = Path(given['record']) if given['record'] else folder
         yield from watch_entries(kept, Path(given['watch']))
+    if given['stage']:
+        yield stage_entry(Path(given['stage']))
     if _has_page(given):
         yield from page_entries(
             folder,

@@ -135,6 +135,28 @@ _COMMANDS = (
         _word('NAME', 'its name'),
     ),
     _command(
+        'stage',
+        'Change the simulated place.',
+        lambda a, words: a.stage(' '.join(words)),
+        _rest('LINE...', 'a line like: box parcel 2.0 1.5'),
+    ),
+    _command(
+        'events', 'List what the observer has noticed and is open.', lambda a: a.event('events')
+    ),
+    *(
+        _command(
+            word,
+            text,
+            lambda a, number, word=word: a.event(f'{word} {number}'),
+            _word('NUMBER', "an event's number"),
+        )
+        for word, text in (
+            ('acknowledge', 'Say that somebody takes care of an event.'),
+            ('normal', 'Say that an event is normal from now on.'),
+            ('false', 'Say that an event was a false alarm.'),
+        )
+    ),
+    _command(
         'room add',
         'Add a place to the map and the ontology.',
         lambda a, *room: a.add_room(*room),

@@ -50,7 +50,7 @@ from surveillance_runtime.suggestions import nearest
 
 _DISCOVERY = 2.0
 """Seconds in which a node that has just started finds the services that there are."""
-_OPTIONAL = ('simulation/', 'move_arm')
+_OPTIONAL = ('simulation/', 'observer/', 'move_arm')
 """How the names of services begin that a mission need not have."""
 _OFFERED_BY = {
     'simulation': ('simulator',),
@@ -67,6 +67,8 @@ _KINDS: Mapping[str, Any] = {
     'simulation/place_obstacle': PlaceObstacle,
     'simulation/remove_obstacle': RemoveObstacle,
     'simulation/drain_battery': DrainBattery,
+    'simulation/stage': ConsoleCommand,
+    'observer/command': ConsoleCommand,
     'ontology_map/add_room': AddRoom,
     'ontology_map/remove_room': RemoveRoom,
     'ontology_map/reference_name': ReferenceName,
@@ -123,6 +125,14 @@ class MissionActions:
     def remove_obstacle(self, name: str) -> str:
         """Take an obstacle away."""
         return self._told('simulation/remove_obstacle', name=_name(name))
+
+    def stage(self, line: str) -> str:
+        """Change the simulated place by a line such as `door D1 ajar 30`."""
+        return self._line('simulation/stage', line)
+
+    def event(self, line: str) -> str:
+        """Answer an event of the observer: `events`, `acknowledge 3`, `normal 3` or `false 3`."""
+        return self._line('observer/command', line)
 
     def drain_battery(self, percent: float) -> str:
         """Take charge out of the simulated battery."""
@@ -225,7 +235,10 @@ class MissionActions:
         """Give a controller one of its console's commands: the answers of mode MANUAL."""
         if controller not in CONTROLLERS:
             raise ValueError(f'{controller!r}: expected {nearest(controller, CONTROLLERS)}')
-        answer = self._call(f'{controller}/command', line=str(line)[:20_000])
+        return self._line(f'{controller}/command', line)
+
+    def _line(self, service: str, line: str) -> str:
+        answer = self._call(service, line=str(line)[:20_000])
         if not answer.accepted:
             raise ValueError(answer.answer)
         return str(answer.answer)

@@ -15,7 +15,7 @@ from state_machines import files
 from surveillance_runtime.suggestions import like
 
 RECORD, PLACE = 'mission.jsonl', 'place.yaml'
-INCIDENTS = 'incidents.jsonl'
+INCIDENTS, TRUTH = 'incidents.jsonl', 'truth.jsonl'
 RECORDING, TIMELINE = 'recording', 'timeline.jsonl'
 """In the folder of a run: the mission's record, the place, the recording and its time line."""
 

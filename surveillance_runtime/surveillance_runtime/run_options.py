@@ -87,6 +87,12 @@ OPTIONS = {
             '',
             'rules of what a person wants to know of, watch.yaml; starts the observer',
         ),
+        RunOption(
+            'stage',
+            '',
+            'what happens in the simulated place at which times, stage.yaml; the truth is written '
+            "to the run's truth.jsonl",
+        ),
         RunOption('web', 'false', 'serve a live page; its address is printed', _SWITCH),
         RunOption(
             'web_control',

@@ -139,6 +139,11 @@ def watch_entries(folder: Path, file: Path) -> Iterator[Entry]:
     yield for_node(OBSERVER, 'evidence_folder', str(kept / 'evidence'), 'this run')
 
 
+def stage_entry(file: Path) -> Entry:
+    """Return what the simulator is told of a script of what happens in its place."""
+    return for_node('simulator', 'stage_file', str(file.absolute()), '--stage')
+
+
 def for_node(node: str, name: str, value: object, origin: str) -> Entry:
     """Return the entry of one node's parameter, in whatever namespace the node is."""
     return Entry(f'/**/{node}', name, value, origin)

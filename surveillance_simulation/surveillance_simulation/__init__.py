@@ -19,7 +19,8 @@ from surveillance_simulation.robot.base import Base, BaseModel
 from surveillance_simulation.robot.lidar import LidarModel
 from surveillance_simulation.robot.robot import Robot
 from surveillance_simulation.world.people import People, PeopleModel
-from surveillance_simulation.world.world import Obstacle, Panel, World, read_world
+from surveillance_simulation.world.things import Thing
+from surveillance_simulation.world.world import Panel, World, read_world
 
 __all__ = [
     'Base',
@@ -27,12 +28,12 @@ __all__ = [
     'Camera',
     'Conditions',
     'LidarModel',
-    'Obstacle',
     'Panel',
     'People',
     'PeopleModel',
     'Renderer',
     'Robot',
+    'Thing',
     'World',
     'read_world',
 ]

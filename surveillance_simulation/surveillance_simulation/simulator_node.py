@@ -8,6 +8,7 @@ import time
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -25,6 +26,7 @@ from surveillance_runtime.conversions import (
     stamp_of_serialized,
     trajectory_from,
 )
+from surveillance_runtime.files import FileError, LineFile
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.parameters import ParameterError
 from surveillance_runtime.place import PlaceError
@@ -49,6 +51,7 @@ from surveillance_simulation.physics.model import PhysicsModel
 from surveillance_simulation.robot.base import BaseModel
 from surveillance_simulation.robot.lidar import LidarModel
 from surveillance_simulation.robot.robot import Robot
+from surveillance_simulation.staging import Happening, Stage, check_script, read_script
 from surveillance_simulation.world.people import People, PeopleModel
 from surveillance_simulation.world.world import World
 
@@ -113,6 +116,7 @@ class Simulator(PatrolNode):
         self._kept_pose = self.robot.base.pose
         self._changing = threading.RLock()
         self._drives_clock = rate.speed != 1.0 or bool(self.get_parameter('use_sim_time').value)
+        self.stage = self._staged()
         # As fast as possible, there is a measurement after each step of time.
         self._measurement_period = rate.step if rate.speed else 0.0
         self._next_measurement = self.robot.time + self._measurement_period
@@ -125,7 +129,7 @@ class Simulator(PatrolNode):
             raise ParameterError(f'simulator: {error}') from None
         rate = replace(rate, look_window=self._camera.period + rate.step)
         self._rate = ClockRate(rate, time.monotonic())
-        FaultServices(self, self.robot, self._changing, self._changed)
+        FaultServices(self, self.robot, self.stage, self._changing, self._changed, self._seconds)
         stamped = self.declare_fields(CommandSettings()).command_type == 'TwistStamped'
         # Past a collision monitor nobody stamps a command.
         self._unmonitored = (
@@ -174,6 +178,53 @@ class Simulator(PatrolNode):
             self._told_of_clock = False
             self.create_timer(1.0, self._look_for_another_clock, clock=steady)
 
+    def _staged(self) -> Stage:
+        """Return the stage, with its script and what was staged before a restart."""
+        script_file = self.parameter(
+            'stage_file',
+            '',
+            'What happens in the place at which times, stage.yaml; empty: nothing.',
+        )
+        truth_file = self.parameter(
+            'truth_file',
+            '',
+            'File for what was staged, one line of JSON each; no node reads it; empty: none.',
+            read_only=True,
+        )
+        script: list[Happening] = []
+        if script_file:
+            try:
+                script = read_script(script_file)
+            except FileError as error:
+                raise ParameterError(f'simulator: {error}') from None
+            if problem := check_script(Robot(World(self.robot.world.plan)), script):
+                raise ParameterError(f'simulator: {script_file}: {problem}')
+        truth: LineFile | None = None
+
+        def write(line: str) -> None:
+            nonlocal truth
+            if not truth_file:
+                return
+            try:
+                truth = truth or LineFile(Path(truth_file))
+                truth.append(f'{line}\n'.encode())
+            except OSError as error:
+                self.get_logger().warn(
+                    f'truth_file {truth_file}: {error.strerror}', throttle_duration_sec=600.0
+                )
+
+        stage = Stage(self.robot, write, script, self._seconds())
+        if kept := self._kept.found.get('stage'):
+            try:
+                stage.restore(str(kept), self._seconds())
+            except (ValueError, KeyError, TypeError):
+                self.get_logger().warn('parameter state_file: what was staged cannot be read')
+        return stage
+
+    def _seconds(self) -> float:
+        """Return the time of the nodes' clock, seconds."""
+        return seconds_of(self._stamp())
+
     def _stamp(self) -> Time:
         if self._drives_clock:
             return conversions.time_to_ros(self.robot.time)
@@ -198,6 +249,10 @@ class Simulator(PatrolNode):
             self.robot.time, time.monotonic(), moving=self.robot.is_moving
         ):
             self.robot.advance(passed)
+            if said := self.stage.advance(self._seconds()):
+                for each in said:
+                    self.get_logger().info(each)
+                self._changed()
             if self.robot.time >= self._next_measurement - 1e-9:
                 self._next_measurement = self.robot.time + self._measurement_period
                 if self._drives_clock or self.robot.base.pose != self._kept_pose:
@@ -207,7 +262,7 @@ class Simulator(PatrolNode):
 
     def _keep(self) -> None:
         self._kept_pose = self.robot.base.pose
-        self._kept.save(self.robot.state())
+        self._kept.save({**self.robot.state(), 'stage': self.stage.state()})
 
     def _changed(self) -> None:
         self._keep()

@@ -44,6 +44,8 @@ def said(line: str, actions: Any = None) -> list[Answer]:
         ('obstacle place box 1 -2.5 0.3', ('place_obstacle', 'box', 1.0, -2.5, 0.3)),
         ('obstacle remove box', ('remove_obstacle', 'box')),
         ('room add R9 1 2 D1 D2', ('add_room', 'R9', 1.0, 2.0, ['D1', 'D2'])),
+        ('stage door D1 ajar 30', ('stage', 'door D1 ajar 30')),
+        ('false 3', ('event', 'false 3')),
         ('room remove R9', ('remove_room', 'R9')),
         ('battery drain 30', ('drain_battery', 30.0)),
         ('battery set 15', ('command', 'battery_controller', 'battery set 15')),

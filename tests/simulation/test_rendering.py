@@ -197,7 +197,7 @@ def test_pictures_under_every_lighting_go_through_the_exposure(lighting: str) ->
 def test_dark_walls_leave_the_panels_white() -> None:
     world, pose = facing_west()
     light = look(world, *pose)
-    world.wall_brightness, world.version = 0.2, world.version + 1
+    world.wall_brightness, world.drawn_version = 0.2, world.drawn_version + 1
     dark = look(world, *pose)
     assert np.median(dark) < 0.6 * np.median(light)
     assert np.percentile(dark, 99) > 0.9 * np.percentile(light, 99)

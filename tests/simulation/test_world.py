@@ -76,7 +76,7 @@ def test_obstacles_come_move_and_go() -> None:
     world.place_obstacle('box', 5.0, 1.0, 0.3)
     assert world.clearance(1.5, 1.0) == pytest.approx(0.95)
     world.remove_obstacle('box')
-    assert not world.obstacles
+    assert not world.things
 
 
 def test_every_change_counts_up_the_version() -> None:
@@ -104,7 +104,7 @@ def test_every_change_counts_up_the_version() -> None:
         (lambda w: w.place_obstacle('b', math.nan, 0.0, 1.0), "obstacle 'b' at (nan, 0)"),
         (lambda w: w.place_obstacle('b', 0.0, 0.0, 0.0), "obstacle 'b': radius 0 m"),
         (lambda w: w.set_marker('m9', 'broken'), "there is no marker 'm9': expected 'm1'"),
-        (lambda w: w.set_marker('m1', 'gone'), "marker state 'gone': expected one of whole"),
+        (lambda w: w.set_marker('m1', 'lost'), "marker state 'lost': expected one of whole"),
         (lambda w: w.hang_marker(Marker('m', -1, 0, 0, 0, 0, 0.2)), "marker 'm': "),
     ],
 )

@@ -119,6 +119,11 @@ class Conditions:
     )
 
 
+def covered(scene: Scene) -> Scene:
+    """Return what a camera sees of a scene through something that lies on its lens: a dim glow."""
+    return np.full_like(scene, 0.12 * float(scene.mean()) + 8.0)
+
+
 def lit(scene: Scene, lighting: str, rng: np.random.Generator) -> Scene:
     """Return a scene (rows, columns, channels) under one of `LIGHTINGS`.
 

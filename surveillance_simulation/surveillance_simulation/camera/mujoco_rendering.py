@@ -16,11 +16,13 @@ import numpy.typing as npt
 from surveillance_runtime.place import boxes
 from surveillance_runtime.place.floor_plan import WALL_HEIGHT, WALL_THICKNESS, Door
 from surveillance_runtime.place.plan_grid import solid_lines
+from surveillance_simulation.camera.lamps import LampLight
 from surveillance_simulation.camera.model import Array, Camera
-from surveillance_simulation.camera.scene import DOOR_HEIGHT, OBSTACLE_HEIGHT, STATION_SIDE
+from surveillance_simulation.camera.scene import DOOR_HEIGHT, STATION_SIDE
 from surveillance_simulation.world import textures
 from surveillance_simulation.world.textures import Texture
-from surveillance_simulation.world.world import Panel, World
+from surveillance_simulation.world.things import Shape, Thing
+from surveillance_simulation.world.world import LEAF_THICKNESS, Panel, World
 
 if not os.environ.get('DISPLAY'):
     # Read when mujoco is imported.
@@ -31,6 +33,8 @@ except ImportError:
     mujoco = None
 
 _PANEL_THICKNESS = 0.004
+_FURTHEST = 500.0
+"""What the depth of a pixel is less than, metres, unless it shows the ceiling."""
 
 
 class MujocoRenderer:
@@ -51,13 +55,19 @@ class MujocoRenderer:
         self._model: Any = None
         self._renderer: Any = None
         self._drawn: Any = None
+        self._people: tuple[Thing, ...] = ()
+        self._lamps: LampLight | None = None
         self.refresh()
 
     def refresh(self) -> None:
         """Take over what has changed in the world since the last time."""
-        if self._version != self._world.version:
+        people = self._world.people
+        # Who stands still stands otherwise than who walks: all are placed anew for each picture.
+        if self._version != self._world.drawn_version or len(people) != len(self._people):
             self._model = _model(self._world, self._camera)
-            self._version = self._world.version
+            self._version = self._world.drawn_version
+        self._people = people
+        self._lamps = LampLight.of(self._world, self._lamps)
 
     def close(self) -> None:
         """Free the graphics context; in the thread that took the pictures."""
@@ -79,10 +89,20 @@ class MujocoRenderer:
         mujoco.mju_mat2Quat(quaternion, turn.ravel())
         self._model.cam_pos[0] = camera_pose[:3, 3]
         self._model.cam_quat[0] = quaternion
+        for body, each in enumerate(self._people, start=1):  # body 0 is the world
+            self._model.body_pos[body] = each.x, each.y, 0.0
+            self._model.body_quat[body] = _about_z(each.yaw)
         data = mujoco.MjData(self._model)
         mujoco.mj_forward(self._model, data)
         self._renderer.update_scene(data, camera=0)
-        return np.asarray(self._renderer.render(), dtype=np.float32)
+        picture = np.asarray(self._renderer.render(), dtype=np.float32)
+        if self._lamps is None:
+            return picture
+        self._renderer.enable_depth_rendering()
+        depth = np.asarray(self._renderer.render(), np.float32)
+        self._renderer.disable_depth_rendering()
+        nearness = np.where(depth < _FURTHEST, 1.0 / np.maximum(depth, 1e-3), 0.0)
+        return self._lamps.shine(picture, nearness.astype(np.float32), self._camera, camera_pose)
 
 
 def _model(world: World, camera: Camera) -> Any:
@@ -115,16 +135,15 @@ def _model(world: World, camera: Camera) -> Any:
     for start, end in solid_lines(world.plan):
         _box(spec, start, end, 0.0, WALL_HEIGHT, 'plaster')
     for door in world.plan.doors.values():
-        _door(spec, door, is_open=world.is_open(door.name))
-    for obstacle in world.obstacles.values():
-        spec.worldbody.add_geom(
-            type=mujoco.mjtGeom.mjGEOM_CYLINDER,
-            size=[obstacle.radius, OBSTACLE_HEIGHT / 2, 0.0],
-            pos=[obstacle.x, obstacle.y, OBSTACLE_HEIGHT / 2],
-            rgba=[0.88, 0.41, 0.11, 1.0],
-        )
+        _door(spec, door, world)
+    for thing in world.things.values():
+        if thing.kind != 'person':
+            _parts(spec.worldbody, thing)
+    for each in world.people:
+        _parts(spec.worldbody.add_body(), each.moved(0.0, 0.0, 0.0))
     for name, panel in world.panels.items():
-        _panel(spec, name, panel, world.plan.marker_dictionary)
+        if panel.state != 'gone':
+            _panel(spec, name, panel, world.plan.marker_dictionary)
     _material(spec, 'station', textures.station(), mujoco.mjtTexture.mjTEXTURE_CUBE)
     for station in world.plan.stations.values():
         x, y, yaw = station.pose
@@ -169,17 +188,39 @@ def _box(
     bottom: float,
     top: float,
     material: str,
+    thickness: float = WALL_THICKNESS,
 ) -> None:
-    x, y, cos, sin, along, across = boxes.boxes_around([(start, end)], WALL_THICKNESS)[0]
+    x, y, cos, sin, along, across = boxes.boxes_around([(start, end)], thickness)[0]
     centre = (float(x), float(y), (bottom + top) / 2)
     size = (float(along), float(across), (top - bottom) / 2)
     _add_box(spec, centre, math.atan2(sin, cos), size, material)
 
 
-def _door(spec: Any, door: Door, *, is_open: bool) -> None:
+def _door(spec: Any, door: Door, world: World) -> None:
     _box(spec, *door.ends, DOOR_HEIGHT, WALL_HEIGHT, 'plaster')
-    if not is_open:
-        _box(spec, *door.ends, 0.0, DOOR_HEIGHT, 'leaf')
+    if (leaf := world.leaf(door.name)) is not None:
+        thickness = LEAF_THICKNESS if world.door_angle(door.name) else WALL_THICKNESS
+        _box(spec, *leaf, 0.0, DOOR_HEIGHT, 'leaf', thickness)
+
+
+def _parts(body: Any, thing: Thing) -> None:
+    """Add the parts of a thing to a body, in whose frame the thing is given."""
+    for part in thing.parts:
+        x, y = thing.at(part)
+        half = (part.top - part.bottom) / 2
+        is_box = part.shape == Shape.BOX
+        body.add_geom(
+            type=mujoco.mjtGeom.mjGEOM_BOX if is_box else mujoco.mjtGeom.mjGEOM_CYLINDER,
+            size=[part.length / 2, part.width / 2, half] if is_box else [part.length / 2, half, 0],
+            pos=[x, y, part.bottom + half],
+            quat=_about_z(thing.yaw),
+            rgba=[*(each / 255 for each in part.colour), 1.0],
+        )
+
+
+def _about_z(yaw: float) -> list[float]:
+    """Return the quaternion (w, x, y, z) of a turn in the plane."""
+    return [math.cos(yaw / 2), 0.0, 0.0, math.sin(yaw / 2)]
 
 
 def _panel(spec: Any, name: str, panel: Panel, dictionary: str) -> None:
@@ -202,6 +243,6 @@ def _add_box(
         type=mujoco.mjtGeom.mjGEOM_BOX,
         size=list(size),
         pos=list(centre),
-        quat=[math.cos(yaw / 2), 0.0, 0.0, math.sin(yaw / 2)],
+        quat=_about_z(yaw),
         material=material,
     )

@@ -11,8 +11,9 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from surveillance_simulation.camera.lamps import LampLight
 from surveillance_simulation.camera.model import Array, Camera, Picture
-from surveillance_simulation.camera.scene import Face, faces_of
+from surveillance_simulation.camera.scene import Face, faces_of, thing_faces
 from surveillance_simulation.world.textures import Texture
 from surveillance_simulation.world.world import World
 
@@ -42,8 +43,10 @@ class Renderer:
         self._matrix = matrix
         self._inverse = np.linalg.inv(matrix)
         self._size = (camera.width * _FINER, camera.height * _FINER)
+        self._standing: list[Face] = []
         self._faces: list[Face] = []
         self._version = -1
+        self._lamps: LampLight | None = None
         self._shrunk: dict[tuple[int, int, int], Texture] = {}
         self.refresh()
 
@@ -53,10 +56,13 @@ class Renderer:
         Raises:
             PlaceError: A marker's dictionary or id does not exist.
         """
-        if self._version != self._world.version:
-            self._faces = faces_of(self._world)
-            self._version = self._world.version
+        if self._version != self._world.drawn_version:
+            self._standing = faces_of(self._world)
+            self._version = self._world.drawn_version
             self._shrunk.clear()
+        people = [face for each in self._world.people for face in thing_faces(each)]
+        self._faces = self._standing + people
+        self._lamps = LampLight.of(self._world, self._lamps)
 
     def close(self) -> None:
         """Free what the pictures needed: nothing but memory."""
@@ -85,7 +91,10 @@ class Renderer:
             (self._camera.width, self._camera.height),
             interpolation=cv2.INTER_AREA,
         )
-        return np.asarray(small, dtype=np.float32)
+        picture = np.asarray(small, dtype=np.float32)
+        if self._lamps is None:
+            return picture
+        return self._lamps.shine(picture, nearness[::_FINER, ::_FINER], self._camera, camera_pose)
 
     def _draw(
         self, face: Face, to_camera: Array, colours: Picture, nearness: npt.NDArray[np.float32]

@@ -15,10 +15,10 @@ from surveillance_runtime.place.plan_grid import solid_lines
 from surveillance_simulation.camera.model import Array
 from surveillance_simulation.world import textures
 from surveillance_simulation.world.textures import TILE, Texture
-from surveillance_simulation.world.world import Obstacle, Panel, World
+from surveillance_simulation.world.things import Part, Shape, Thing
+from surveillance_simulation.world.world import LEAF_THICKNESS, Panel, World
 
 DOOR_HEIGHT = 2.05
-OBSTACLE_HEIGHT = 0.8
 STATION_SIDE = 0.6
 
 
@@ -49,7 +49,7 @@ class Face:
 
 
 def faces_of(world: World) -> list[Face]:
-    """Return every face of a world.
+    """Return every face of a world, but for its people.
 
     Raises:
         PlaceError: A marker's dictionary or id does not exist.
@@ -59,11 +59,13 @@ def faces_of(world: World) -> list[Face]:
     for start, end in solid_lines(plan):
         faces += _box(start, end, WALL_THICKNESS, 0.0, WALL_HEIGHT, None)
     for door in plan.doors.values():
-        faces += _door(door, is_open=world.is_open(door.name))
-    for obstacle in world.obstacles.values():
-        faces += _barrel(obstacle)
+        faces += _door(door, world.leaf(door.name), ajar=world.door_angle(door.name) > 0.0)
+    for thing in world.things.values():
+        if thing.kind != 'person':
+            faces += thing_faces(thing)
     for panel in world.panels.values():
-        faces.append(_panel(panel, plan.marker_dictionary))
+        if panel.state != 'gone':
+            faces.append(_panel(panel, plan.marker_dictionary))
     for station in plan.stations.values():
         x, y, yaw = station.pose
         faces.append(_lying(x, y, 0.004, yaw, STATION_SIDE, textures.station()))
@@ -136,11 +138,15 @@ def _box(
         )
 
 
-def _door(door: Door, *, is_open: bool) -> Iterator[Face]:
+def _door(
+    door: Door, leaf: tuple[tuple[float, float], tuple[float, float]] | None, *, ajar: bool
+) -> Iterator[Face]:
     yield from _box(*door.ends, WALL_THICKNESS, DOOR_HEIGHT, WALL_HEIGHT, None)
-    if not is_open:
-        yield from _box(*door.ends, WALL_THICKNESS, 0.0, DOOR_HEIGHT, textures.leaf())
-        return
+    if leaf is not None:
+        thickness = LEAF_THICKNESS if ajar else WALL_THICKNESS
+        yield from _box(*leaf, thickness, 0.0, DOOR_HEIGHT, textures.leaf())
+        if not ajar:
+            return
     along = np.array([math.cos(door.yaw), math.sin(door.yaw), 0.0]) * door.width
     across = np.array([-math.sin(door.yaw), math.cos(door.yaw), 0.0]) * WALL_THICKNESS
     corner = np.array([door.x, door.y, DOOR_HEIGHT]) - along / 2 - across / 2
@@ -148,17 +154,41 @@ def _door(door: Door, *, is_open: bool) -> Iterator[Face]:
     yield Face(corner, along, across, textures.plaster(), crop, shade=0.7)
 
 
-def _barrel(obstacle: Obstacle, sides: int = 12) -> Iterator[Face]:
-    angles = np.arange(sides + 1) * (2 * math.pi / sides)
-    ring = [
-        (obstacle.x + obstacle.radius * math.cos(a), obstacle.y + obstacle.radius * math.sin(a))
-        for a in angles
-    ]
-    for first, second in pairwise(ring):
-        yield from _upright(first, second, 0.0, OBSTACLE_HEIGHT, textures.barrel())
-    lid = np.full((4, 4, 3), (198, 88, 22), np.uint8)
-    side = obstacle.radius * math.sqrt(2.0)
-    yield _lying(obstacle.x, obstacle.y, OBSTACLE_HEIGHT, math.pi / 4, side, lid)
+def thing_faces(thing: Thing) -> Iterator[Face]:
+    """Yield the faces of a thing."""
+    for part in thing.parts:
+        x, y = thing.at(part)
+        texture = textures.barrel() if thing.kind == 'barrel' else textures.plain(part.colour)
+        outline = _outline(part, x, y, thing.yaw)
+        for first, second in pairwise([*outline, outline[0]]):
+            yield from _upright(first, second, part.bottom, part.top, texture)
+        # Of a cylinder the lid is the square inside it: the rim's height hides the rest.
+        shrink = math.sqrt(0.5) if part.shape == Shape.CYLINDER else 1.0
+        turn = thing.yaw + (math.pi / 4 if part.shape == Shape.CYLINDER else 0.0)
+        ahead = np.array([math.cos(turn), math.sin(turn), 0.0]) * part.length * shrink
+        left = np.array([-math.sin(turn), math.cos(turn), 0.0]) * part.width * shrink
+        for height, across, shade in ((part.top, -left, 0.95), (part.bottom, left, 0.6)):
+            corner = np.array([x, y, height]) - across / 2 - ahead / 2
+            yield Face(corner + ahead, across, -ahead, textures.plain(part.colour), shade=shade)
+
+
+def _outline(part: Part, x: float, y: float, yaw: float) -> list[tuple[float, float]]:
+    """Return the corners of a part seen from above, anticlockwise, metres."""
+    if part.shape == Shape.BOX:
+        angles = [math.pi / 4 + math.pi / 2 * each for each in range(4)]
+        points = [
+            (
+                math.copysign(part.length / 2, math.cos(a)),
+                math.copysign(part.width / 2, math.sin(a)),
+            )
+            for a in angles
+        ]
+    else:
+        ring = np.arange(12) * (2 * math.pi / 12)
+        radius = part.length / 2
+        points = [(radius * math.cos(a), radius * math.sin(a)) for a in ring.tolist()]
+    cosine, sine = math.cos(yaw), math.sin(yaw)
+    return [(x + cosine * a - sine * b, y + sine * a + cosine * b) for a, b in points]
 
 
 def _panel(panel: Panel, dictionary: str) -> Face:

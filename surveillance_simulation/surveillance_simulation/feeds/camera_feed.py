@@ -16,7 +16,7 @@ from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.parameters import parameter
 from surveillance_runtime.profile.parameters import declared_frames
 from surveillance_simulation import conversions
-from surveillance_simulation.camera.model import Camera, Conditions, expose
+from surveillance_simulation.camera.model import Camera, Conditions, covered, expose
 from surveillance_simulation.camera.mujoco_rendering import MujocoRenderer
 from surveillance_simulation.camera.rendering import Renderer
 from surveillance_simulation.feeds.sensor_feed import SENSOR_DEPTH
@@ -127,8 +127,12 @@ class CameraFeed:
             with self._changing:
                 self._renderer.refresh()
                 pose = self._robot.camera_pose()
+                is_covered = self._robot.lens_covered
                 stamp = self._stamp()
             self._infos.publish(conversions.camera_info_to_ros(self._camera, self._frame, stamp))
             if self.is_watched:
-                picture = expose(self._renderer.ideal(pose), self.conditions, self._rng)
+                scene = self._renderer.ideal(pose)
+                if is_covered:
+                    scene = covered(scene)
+                picture = expose(scene, self.conditions, self._rng)
                 self._images.publish(conversions.image_to_ros(picture, self._frame, stamp))

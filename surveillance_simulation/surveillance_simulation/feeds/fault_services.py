@@ -10,6 +10,7 @@ from rclpy.qos import QoSProfile
 from std_msgs.msg import Float32
 
 from surveillance_interfaces.srv import (
+    ConsoleCommand,
     DrainBattery,
     PlaceObstacle,
     PushRobot,
@@ -21,6 +22,7 @@ from surveillance_interfaces.srv import (
 from surveillance_runtime.place import PlaceError
 from surveillance_simulation import conversions
 from surveillance_simulation.robot.robot import Robot
+from surveillance_simulation.staging import Stage
 from surveillance_simulation.world.textures import marker_panel
 
 LONGEST_SHIFT = 1000.0
@@ -34,19 +36,25 @@ class FaultServices:
         self,
         node: rclpy.node.Node,
         robot: Robot,
+        stage: Stage,
         changing: Any,
         on_change: Callable[[], None],
+        now: Callable[[], float],
     ) -> None:
         """Create the services.
 
         Args:
             node: The node that offers them.
             robot: The robot in its world, which they change.
+            stage: Carries out lines on both, and keeps the truth.
             changing: Lock to hold during a change.
             on_change: Called after each change.
+            now: Returns the time of the nodes' clock, seconds.
         """
         self._node = node
         self._robot = robot
+        self._stage = stage
+        self._now = now
         self._changing = changing
         self._on_change = on_change
         self._drained = node.create_publisher(Float32, 'battery_drain', QoSProfile(depth=10))
@@ -60,6 +68,7 @@ class FaultServices:
             ('set_marker', SetMarker, self._set_marker),
         ):
             node.create_service(kind, f'simulation/{name}', self._answered(change))
+        node.create_service(ConsoleCommand, 'simulation/stage', self._on_stage)
 
     def _answered(self, change: Callable[[Any], str]) -> Callable[[Any, Any], Any]:
         def answer(request: Any, response: Any) -> Any:
@@ -71,10 +80,23 @@ class FaultServices:
                 response.success, response.message = False, str(error)
             self._node.get_logger().info(response.message)
             if response.success:
+                self._stage.note('', {'text': response.message}, self._now())
                 self._on_change()
             return response
 
         return answer
+
+    def _on_stage(self, request: Any, response: Any) -> Any:
+        try:
+            with self._changing:
+                response.answer = self._stage.do(request.line[:1000], self._now())
+            response.accepted = True
+        except PlaceError as error:
+            response.answer = str(error)
+        self._node.get_logger().info(response.answer)
+        if response.accepted:
+            self._on_change()
+        return response
 
     def _set_door(self, request: SetDoor.Request) -> str:
         self._robot.world.set_door(request.door, request.open)

@@ -17,6 +17,7 @@ from surveillance_simulation.robot.arm_motion import ArmMotion
 from surveillance_simulation.robot.base import Base, BaseModel
 from surveillance_simulation.robot.lidar import LidarModel, Sweep, scan
 from surveillance_simulation.world.people import People
+from surveillance_simulation.world.walks import Walks
 from surveillance_simulation.world.world import World
 
 _PHYSICS_STEP = 0.05
@@ -32,6 +33,8 @@ class Robot:
         base: Its wheels.
         lidar: Its lidar, at the middle of the base.
         arm: Its arm's motors.
+        walks: The people who walk a given way.
+        lens_covered: Whether something covers its camera.
         time: Seconds since the start.
     """
 
@@ -60,6 +63,8 @@ class Robot:
             self.base = PhysicsBase(world, world.plan.start, base_model, physics)
             self._sweeping = SweepingLidar(self.base, self.lidar, rng)
         self.arm = ArmMotion(arm)
+        self.walks = Walks(world)
+        self.lens_covered = False
         self.time = 0.0
         self._rng = rng
         self._people = people
@@ -71,19 +76,22 @@ class Robot:
             if self._people is not None:
                 x, y, _ = self.base.pose
                 self._people.step(seconds / steps, (x, y), self.base.model.radius)
-                self.world.move_people(self._people.discs)
+                self.world.move_people(self._people.poses)
+            if self.walks:
+                self.walks.step(seconds / steps, self.base.pose[:2])
             self.base.step(seconds / steps)
         self.time += seconds
 
     @property
     def is_moving(self) -> bool:
         """Whether the base moves or is told to, the arm moves, or people walk about."""
-        return self.base.is_moving or self.arm.is_moving(self.time) or self._people is not None
+        walking = self._people is not None or bool(self.walks)
+        return self.base.is_moving or self.arm.is_moving(self.time) or walking
 
     def state(self) -> dict[str, float | str]:
         """Return what must outlive a process: where the robot is, the time, and the closed doors.
 
-        The arm, obstacles and people begin anew.
+        The arm and people who walk at random begin anew; `staging.Stage` keeps what was staged.
         """
         numbers = (*self.base.pose, *self.base.odometry, self.time)
         closed = '\n'.join(sorted(self.world.closed_doors))

@@ -70,6 +70,14 @@ class People:
             [(*person.at, self._model.radius) for person in self._people], dtype=float
         ).reshape(-1, 3)
 
+    @property
+    def poses(self) -> boxes.Array:
+        """Where they are, shape (n, 4): centre x, y and radius in metres, direction in rad."""
+        return np.array(
+            [(*person.at, self._model.radius, person.ahead) for person in self._people],
+            dtype=float,
+        ).reshape(-1, 4)
+
     def step(self, dt: float, robot: Point, robot_radius: float) -> None:
         """Let everybody walk on for `dt` seconds (at most 0.1) around a robot."""
         for person in self._people:
@@ -99,7 +107,7 @@ class People:
             if after < reach and after < before:
                 continue
             if self._ways.is_free((x, y)):
-                person.at = x, y
+                person.at, person.ahead = (x, y), ahead + turn
                 return
 
     def _turn(self, person: _Person) -> None:
@@ -128,6 +136,7 @@ class _Person:
         rest: Time for which the person still stays, seconds.
         nearest: The least way that was left, metres.
         held_up: Time since the way that is left became less, seconds.
+        ahead: Direction of the last step, rad.
     """
 
     at: Point
@@ -136,6 +145,7 @@ class _Person:
     rest: float = 0.0
     nearest: float = math.inf
     held_up: float = 0.0
+    ahead: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)

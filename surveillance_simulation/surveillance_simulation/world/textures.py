@@ -5,7 +5,7 @@ Everything is drawn by the program from fixed seeds, so that a place looks the s
 
 from __future__ import annotations
 
-from functools import cache
+from functools import cache, lru_cache
 
 import cv2
 import numpy as np
@@ -71,6 +71,14 @@ def barrel() -> Texture:
     picture[:] = (226, 104, 28)
     picture[24:36] = picture[60:72] = (240, 240, 236)
     return picture
+
+
+@lru_cache(64)
+def plain(colour: tuple[int, int, int]) -> Texture:
+    """Return a surface of one colour with a little grain."""
+    rng = np.random.default_rng(14)
+    grain = rng.normal(0.0, 3.0, (64, 64, 1)) + np.asarray(colour, float)
+    return np.asarray(np.clip(grain, 0, 255), np.uint8)
 
 
 @cache

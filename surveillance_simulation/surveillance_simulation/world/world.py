@@ -1,4 +1,4 @@
-"""A place as it is now: its floor plan, which doors are open, what stands in the way.
+"""A place as it is now: its floor plan, how far each door is open, what stands in it, the lamps.
 
 The world answers where the robot may be: how far the nearest solid surface is, and which place a
 point belongs to. It knows nothing of time, sensors or the robot itself.
@@ -19,22 +19,18 @@ from surveillance_runtime.place.floor_plan import (
     WALL_THICKNESS,
     FloorPlan,
     Marker,
+    Point,
 )
 from surveillance_runtime.place.regions import Regions
 from surveillance_runtime.suggestions import nearest
 from surveillance_simulation.world.map_surface import MapSurface
+from surveillance_simulation.world.things import Thing, barrel, boxes_of, discs_of, person
 
-MARKER_STATES = ('whole', 'broken', 'covered')
-
-
-@dataclass(frozen=True)
-class Obstacle:
-    """An upright cylinder that stands in the way: centre and radius, metres."""
-
-    name: str
-    x: float
-    y: float
-    radius: float
+MARKER_STATES = ('whole', 'broken', 'covered', 'gone')
+LEAF_THICKNESS = 0.04
+"""Of a door that is ajar, metres."""
+PASSABLE = 60.0
+"""A door lets a robot through from this angle on, degrees."""
 
 
 @dataclass(frozen=True)
@@ -43,7 +39,8 @@ class Panel:
 
     Attributes:
         marker: Where it hangs and what it shows.
-        state: 'whole'; 'broken', a corner torn off so that its code is gone; 'covered' by a sheet.
+        state: 'whole'; 'broken', a corner torn off so that its code is gone; 'covered' by a sheet;
+            'gone', taken off the wall.
     """
 
     marker: Marker
@@ -51,12 +48,14 @@ class Panel:
 
 
 class World:
-    """A place whose doors, obstacles and markers change.
+    """A place whose doors, things, people, markers and lamps change.
 
     Attributes:
         plan: The place's unchanging geometry.
         regions: Which room a point of it lies in.
-        version: Counts the changes; whoever caches something drawn from the world compares it.
+        version: Counts all changes.
+        drawn_version: Counts the changes of what a picture shows, but for people and lamps; whoever
+            caches something drawn from the world compares it.
         wall_brightness: 1 is white plaster; to be set before anything is drawn.
     """
 
@@ -70,10 +69,11 @@ class World:
                 the place it leads into, or a position lies in a wall.
         """
         self.plan = plan
-        self.version = 0
-        self._closed: set[str] = set()
-        self._obstacles: dict[str, Obstacle] = {}
-        self._people: boxes.Array = np.zeros((0, 3))
+        self.version = self.drawn_version = 0
+        self._angles: dict[str, float] = {}
+        self._things: dict[str, Thing] = {}
+        self._lamps: dict[str, float] = {}
+        self._people: boxes.Array = np.zeros((0, 4))
         self._panels = {name: Panel(marker) for name, marker in plan.markers.items()}
         self._walls = boxes.boxes_around(plan.wall_pieces(), WALL_THICKNESS)
         self._surface = None if plan.map is None else MapSurface(plan.map.grid)
@@ -94,7 +94,7 @@ class World:
 
     @property
     def solid(self) -> boxes.Array:
-        """Walls and closed doors as boxes (n, 6)."""
+        """Walls, leaves of doors and what is square at the lidar's height, as boxes (n, 6)."""
         return self._solid
 
     @property
@@ -104,13 +104,28 @@ class World:
 
     @property
     def discs(self) -> boxes.Array:
-        """Obstacles and people (n, 3): centre x, y and radius, metres."""
+        """What is round at the lidar's height (n, 3): centre x, y and radius, metres."""
         return self._discs
 
     @property
-    def obstacles(self) -> Mapping[str, Obstacle]:
-        """Obstacles by name."""
-        return self._obstacles
+    def things(self) -> Mapping[str, Thing]:
+        """What stands in the place, by name."""
+        return self._things
+
+    @property
+    def people(self) -> tuple[Thing, ...]:
+        """The people who stand or walk in the place, as the camera sees them."""
+        standing = (each for each in self._things.values() if each.kind == 'person')
+        walking = (
+            person(f'walker {number}', x, y, yaw)
+            for number, (x, y, _, yaw) in enumerate(self._people.tolist())
+        )
+        return (*standing, *walking)
+
+    @property
+    def lamps(self) -> Mapping[str, float]:
+        """Brightness of the places whose lamp was turned, 1: as bright as by day."""
+        return self._lamps
 
     @property
     def panels(self) -> Mapping[str, Panel]:
@@ -119,62 +134,116 @@ class World:
 
     @property
     def closed_doors(self) -> frozenset[str]:
-        """Names of the doors that are closed."""
-        return frozenset(self._closed)
+        """Names of the doors through which no robot comes."""
+        return frozenset(name for name, angle in self._angles.items() if angle < PASSABLE)
 
     def is_open(self, door: str) -> bool:
-        """Tell whether a door is open.
+        """Tell whether a robot may come through a door.
+
+        Raises:
+            PlaceError: There is no such door.
+        """
+        return self.door_angle(door) >= PASSABLE
+
+    def door_angle(self, door: str) -> float:
+        """Return how far a door is open, degrees; inf: the leaf is folded away.
 
         Raises:
             PlaceError: There is no such door.
         """
         self._known(door, self.plan.doors, 'door')
-        return door not in self._closed
+        return self._angles.get(door, math.inf)
+
+    def leaf(self, door: str) -> tuple[Point, Point] | None:
+        """Return from where to where the leaf of a door reaches, metres; None: folded away."""
+        angle = self.door_angle(door)
+        if math.isinf(angle):
+            return None
+        (x, y), end = self.plan.doors[door].ends
+        turn = self.plan.doors[door].yaw + math.radians(angle)
+        width = math.dist((x, y), end)
+        return (x, y), (x + width * math.cos(turn), y + width * math.sin(turn))
 
     def set_door(self, door: str, is_open: bool) -> None:
-        """Open or close a door.
+        """Open a door so far that its leaf is out of the way, or close it.
 
         Raises:
             PlaceError: There is no such door.
         """
         self._known(door, self.plan.doors, 'door')
         if is_open:
-            self._closed.discard(door)
+            self._angles.pop(door, None)
         else:
-            self._closed.add(door)
+            self._angles[door] = 0.0
         self._refresh()
 
+    def turn_door(self, door: str, angle: float) -> None:
+        """Turn the leaf of a door about its first jamb, anticlockwise from above.
+
+        Args:
+            door: Which one.
+            angle: From the closed position, degrees.
+
+        Raises:
+            PlaceError: There is no such door, or the angle is not from 0 to 120.
+        """
+        self._known(door, self.plan.doors, 'door')
+        if not 0.0 <= angle <= 120.0:
+            raise PlaceError((), f"door '{door}': angle {angle:g}: expected 0 to 120 degrees")
+        self._angles[door] = angle
+        self._refresh()
+
+    def put(self, thing: Thing) -> None:
+        """Put a thing into the place, or move the one of this name."""
+        before = self._things.get(thing.name)
+        self._things[thing.name] = thing
+        if thing.kind == 'person' and (before is None or before.kind == 'person'):
+            self._stand()  # people's steps leave the rest of a picture as it is
+        else:
+            self._refresh()
+
     def place_obstacle(self, name: str, x: float, y: float, radius: float) -> None:
-        """Put a cylinder into the place, or move the one of this name.
+        """Put a barrel into the place, or move the one of this name.
 
         Raises:
             PlaceError: A number is not finite, or the radius is not between 1 cm and 5 m.
         """
-        if not name:
-            raise PlaceError((), "obstacle '': expected a name")
-        if not (math.isfinite(x) and math.isfinite(y)):
-            raise PlaceError(
-                (), f"obstacle '{name}' at ({x:g}, {y:g}): expected two numbers in metres"
-            )
-        if not 0.01 <= radius <= 5.0:
-            raise PlaceError((), f"obstacle '{name}': radius {radius:g} m: expected 0.01 to 5 m")
-        self._obstacles[name] = Obstacle(name, x, y, radius)
-        self._refresh()
+        self.put(barrel(name, x, y, radius))
 
     def remove_obstacle(self, name: str) -> None:
-        """Take an obstacle away.
+        """Take a thing away.
 
         Raises:
-            PlaceError: There is no such obstacle.
+            PlaceError: There is no such thing.
         """
-        self._known(name, self._obstacles, 'obstacle')
-        del self._obstacles[name]
+        self._known(name, self._things, 'obstacle')
+        del self._things[name]
         self._refresh()
 
-    def move_people(self, discs: boxes.Array) -> None:
-        """Take where the people are now, shape (n, 3): centre x, y and radius, metres."""
-        self._people = discs
-        self._discs = np.concatenate([self._standing, discs])
+    def move_people(self, people: boxes.Array) -> None:
+        """Take where the people who walk about are now.
+
+        Args:
+            people: (n, 3): centre x, y and radius, metres; or (n, 4), with their direction, rad.
+        """
+        turned = people.shape[1] == 4
+        self._people = people if turned else np.pad(people, ((0, 0), (0, 1)))
+        self._discs = np.concatenate([self._standing, people[:, :3]])
+        self.version += 1
+
+    def set_lamp(self, place: str, brightness: float) -> None:
+        """Turn the lamp of a place.
+
+        Raises:
+            PlaceError: There is no such place, or the brightness is not from 0 to 2.
+        """
+        self._known(place, self.plan.place.positions, 'place')
+        if not 0.0 <= brightness <= 2.0:
+            raise PlaceError((), f"lamp of '{place}': {brightness:g}: expected 0 to 2, 1 is day")
+        if brightness == 1.0:
+            self._lamps.pop(place, None)
+        else:
+            self._lamps[place] = brightness
         self.version += 1
 
     def set_marker(self, name: str, state: str) -> None:
@@ -189,7 +258,7 @@ class World:
                 (), f"marker state '{state}': expected {nearest(state, MARKER_STATES)}"
             )
         self._panels[name] = replace(self._panels[name], state=state)
-        self.version += 1
+        self._count()
 
     def hang_marker(self, marker: Marker) -> None:
         """Hang a marker up, or move the one of this name; it is whole.
@@ -204,7 +273,11 @@ class World:
                 f"marker '{marker.name}': {marker}: expected finite numbers, id >= 0 and size > 0",
             )
         self._panels[marker.name] = Panel(marker)
+        self._count()
+
+    def _count(self) -> None:
         self.version += 1
+        self.drawn_version += 1
 
     def clearance(self, x: float, y: float) -> float:
         """Return the distance from a point to the nearest solid surface, 0 inside one, metres."""
@@ -216,6 +289,12 @@ class World:
             nearest = min(nearest, float((centre - self._discs[:, 2]).min()))
         return max(nearest, 0.0)
 
+    def wall_clearance(self, x: float, y: float) -> float:
+        """Return the distance from a point to the nearest wall or leaf, whatever stands about."""
+        closed = boxes.distances(self._enclosing, x, y).min(initial=math.inf)
+        surface = math.inf if self._surface is None else self._surface.clearance(x, y)
+        return float(min(closed, surface))
+
     def is_free(self, x: float, y: float, radius: float) -> bool:
         """Tell whether a disc touches nothing."""
         return self.clearance(x, y) > radius
@@ -225,13 +304,24 @@ class World:
         return self.regions.room_at(x, y)
 
     def _refresh(self) -> None:
-        panels = boxes.boxes_around(
-            [self.plan.doors[name].ends for name in sorted(self._closed)], WALL_THICKNESS
+        self.drawn_version += 1
+        closed: list[tuple[Point, Point]] = []
+        turned: list[tuple[Point, Point]] = []
+        for name in sorted(self._angles):
+            if (leaf := self.leaf(name)) is not None:
+                (turned if self._angles[name] else closed).append(leaf)
+        self._enclosing = np.concatenate(
+            [
+                self._walls,
+                boxes.boxes_around(closed, WALL_THICKNESS),
+                boxes.boxes_around(turned, LEAF_THICKNESS),
+            ]
         )
-        self._solid = np.concatenate([self._walls, panels])
-        self._standing = np.array(
-            [(each.x, each.y, each.radius) for each in self._obstacles.values()], dtype=float
-        ).reshape(-1, 3)
+        self._solid = np.concatenate([self._enclosing, boxes_of(self._things.values())])
+        self._stand()
+
+    def _stand(self) -> None:
+        self._standing = discs_of(self._things.values())
         self.move_people(self._people)
 
     @staticmethod

@@ -1,0 +1,190 @@
+"""What stands or walks in a place, made of boxes and cylinders: barrels, boxes, chairs, people.
+
+A thing is the same to all sensors: the lidar meets the parts that its plane cuts, the camera sees
+all of them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from enum import StrEnum
+
+import numpy as np
+
+from surveillance_runtime.place import PlaceError, boxes
+
+LIDAR_HEIGHT = 0.18
+"""Height of the lidar's plane, metres."""
+Colour = tuple[int, int, int]
+
+
+class Shape(StrEnum):
+    """What a part looks like from above."""
+
+    BOX = 'box'
+    CYLINDER = 'cylinder'
+
+
+@dataclass(frozen=True)
+class Part:
+    """One upright body of a thing, in the thing's frame: x ahead, y to the left.
+
+    Attributes:
+        shape: Box or cylinder.
+        x, y: Its middle, metres.
+        length, width: Its sides along x and y, metres; of a cylinder both are its diameter.
+        bottom, top: Its heights, metres.
+        colour: RGB.
+    """
+
+    shape: Shape
+    x: float
+    y: float
+    length: float
+    width: float
+    bottom: float
+    top: float
+    colour: Colour
+
+    @property
+    def is_cut(self) -> bool:
+        """Whether the lidar's plane cuts it."""
+        return self.bottom <= LIDAR_HEIGHT < self.top
+
+
+@dataclass(frozen=True)
+class Thing:
+    """What stands or walks in a place.
+
+    Attributes:
+        name: Its own name.
+        kind: barrel, box, chair or person.
+        x, y, yaw: Where it is, metres and rad.
+        parts: What it is made of.
+    """
+
+    name: str
+    kind: str
+    x: float
+    y: float
+    yaw: float
+    parts: tuple[Part, ...]
+
+    def at(self, part: Part) -> tuple[float, float]:
+        """Return where the middle of a part is, world frame, metres."""
+        cosine, sine = math.cos(self.yaw), math.sin(self.yaw)
+        return (
+            self.x + cosine * part.x - sine * part.y,
+            self.y + sine * part.x + cosine * part.y,
+        )
+
+    def moved(self, x: float, y: float, yaw: float) -> Thing:
+        """Return it elsewhere."""
+        return replace(self, x=x, y=y, yaw=yaw)
+
+
+BARREL_HEIGHT = 0.8
+_ORANGE, _BROWN, _WOOD = (224, 104, 28), (150, 108, 62), (96, 62, 36)
+_TROUSERS, _SHIRT, _SKIN, _HAIR = (40, 48, 84), (176, 36, 44), (214, 168, 138), (52, 36, 26)
+
+
+def barrel(name: str, x: float, y: float, radius: float) -> Thing:
+    """Return an orange barrel.
+
+    Raises:
+        PlaceError: A number is not finite, or the radius is not between 1 cm and 5 m.
+    """
+    if not 0.01 <= radius <= 5.0:
+        raise PlaceError((), f"obstacle '{name}': radius {radius:g} m: expected 0.01 to 5 m")
+    side = 2.0 * radius
+    part = Part(Shape.CYLINDER, 0.0, 0.0, side, side, 0.0, BARREL_HEIGHT, _ORANGE)
+    return _checked(Thing(name, 'barrel', x, y, 0.0, (part,)))
+
+
+def box(
+    name: str, x: float, y: float, yaw: float, length: float, width: float, height: float
+) -> Thing:
+    """Return a cardboard box.
+
+    Raises:
+        PlaceError: A number is not finite, or a side is not between 2 cm and 5 m.
+    """
+    for word, side in (('length', length), ('width', width), ('height', height)):
+        if not 0.02 <= side <= 5.0:
+            raise PlaceError((), f"box '{name}': {word} {side:g} m: expected 0.02 to 5 m")
+    part = Part(Shape.BOX, 0.0, 0.0, length, width, 0.0, height, _BROWN)
+    return _checked(Thing(name, 'box', x, y, yaw, (part,)))
+
+
+def chair(name: str, x: float, y: float, yaw: float) -> Thing:
+    """Return a chair of usual size: four legs, a seat, a back that it has behind it."""
+    legs = tuple(
+        Part(Shape.CYLINDER, dx, dy, 0.05, 0.05, 0.0, 0.45, _WOOD)
+        for dx in (-0.19, 0.19)
+        for dy in (-0.19, 0.19)
+    )
+    seat = Part(Shape.BOX, 0.0, 0.0, 0.44, 0.44, 0.45, 0.5, _WOOD)
+    back = Part(Shape.BOX, -0.2, 0.0, 0.04, 0.44, 0.5, 0.95, _WOOD)
+    return _checked(Thing(name, 'chair', x, y, yaw, (*legs, seat, back)))
+
+
+def person(name: str, x: float, y: float, yaw: float) -> Thing:
+    """Return a person of 1.75 m who stands on both legs; the lidar meets the shanks."""
+
+    def limb(y: float, wide: float, bottom: float, top: float, colour: Colour) -> Part:
+        return Part(Shape.CYLINDER, 0.0, y, wide, wide, bottom, top, colour)
+
+    parts = (
+        *(limb(side * 0.1, 0.12, 0.0, 0.5, _TROUSERS) for side in (-1, 1)),
+        *(limb(side * 0.1, 0.17, 0.5, 0.88, _TROUSERS) for side in (-1, 1)),
+        Part(Shape.BOX, 0.0, 0.0, 0.2, 0.34, 0.84, 1.16, _SHIRT),
+        Part(Shape.BOX, 0.0, 0.0, 0.22, 0.42, 1.16, 1.42, _SHIRT),
+        *(limb(side * 0.26, 0.1, 1.1, 1.42, _SHIRT) for side in (-1, 1)),
+        *(limb(side * 0.27, 0.08, 0.76, 1.1, _SKIN) for side in (-1, 1)),
+        limb(0.0, 0.12, 1.42, 1.5, _SKIN),
+        limb(0.0, 0.18, 1.5, 1.69, _SKIN),
+        limb(0.0, 0.2, 1.69, 1.75, _HAIR),
+    )
+    return _checked(Thing(name, 'person', x, y, yaw, parts))
+
+
+def discs_of(things: Iterable[Thing]) -> boxes.Array:
+    """Return the cylinders that the lidar's plane cuts, (n, 3): centre x, y and radius, metres."""
+    rows = [
+        (*thing.at(part), part.length / 2)
+        for thing in things
+        for part in thing.parts
+        if part.is_cut and part.shape == Shape.CYLINDER
+    ]
+    return np.array(rows, dtype=float).reshape(-1, 3)
+
+
+def boxes_of(things: Iterable[Thing]) -> boxes.Array:
+    """Return the boxes that the lidar's plane cuts, (n, 6), see `boxes`."""
+    rows = [
+        (
+            *thing.at(part),
+            math.cos(thing.yaw),
+            math.sin(thing.yaw),
+            part.length / 2,
+            part.width / 2,
+        )
+        for thing in things
+        for part in thing.parts
+        if part.is_cut and part.shape == Shape.BOX
+    ]
+    return np.array(rows, dtype=float).reshape(-1, 6)
+
+
+def _checked(thing: Thing) -> Thing:
+    word = 'obstacle' if thing.kind == 'barrel' else thing.kind
+    if not thing.name:
+        raise PlaceError((), f"{word} '': expected a name")
+    if not all(map(math.isfinite, (thing.x, thing.y, thing.yaw))):
+        raise PlaceError(
+            (),
+            f"{word} '{thing.name}' at ({thing.x:g}, {thing.y:g}): expected two numbers in metres",
+        )
+    return thing
