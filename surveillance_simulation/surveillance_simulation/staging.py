@@ -107,6 +107,12 @@ class Stage:
         """Write to the truth what was done by other means."""
         self._truth(json.dumps({'at': round(stamp, 3), 'line': line, **told}))
 
+    def forget(self, kind: str, subject: str) -> None:
+        """Forget what was staged of a door, thing, marker or lamp: it was changed otherwise."""
+        self._lines.pop((kind, subject), None)
+        if kind == 'thing':
+            self._robot.walks.end(subject)
+
     def advance(self, stamp: float) -> list[str]:
         """Carry out what the script has for the time up to now; return what was done or refused."""
         said = []

@@ -7,7 +7,6 @@ wherever a picture is wanted.
 from __future__ import annotations
 
 import math
-import os
 from typing import Any
 
 import numpy as np
@@ -19,18 +18,11 @@ from surveillance_runtime.place.plan_grid import solid_lines
 from surveillance_simulation.camera.lamps import LampLight
 from surveillance_simulation.camera.model import Array, Camera
 from surveillance_simulation.camera.scene import DOOR_HEIGHT, STATION_SIDE
+from surveillance_simulation.optional_mujoco import mujoco
 from surveillance_simulation.world import textures
 from surveillance_simulation.world.textures import Texture
 from surveillance_simulation.world.things import Shape, Thing
 from surveillance_simulation.world.world import LEAF_THICKNESS, Panel, World
-
-if not os.environ.get('DISPLAY'):
-    # Read when mujoco is imported.
-    os.environ.setdefault('MUJOCO_GL', 'egl')
-try:
-    import mujoco
-except ImportError:
-    mujoco = None
 
 _PANEL_THICKNESS = 0.004
 _FURTHEST = 500.0

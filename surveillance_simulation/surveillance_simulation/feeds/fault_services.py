@@ -99,8 +99,9 @@ class FaultServices:
         return response
 
     def _set_door(self, request: SetDoor.Request) -> str:
-        self._robot.world.set_door(request.door, request.open)
-        return f'door {request.door} is {"open" if request.open else "closed"}'
+        return self._stage.do(
+            f'door {request.door} {"open" if request.open else "closed"}', self._now()
+        )
 
     def _place_obstacle(self, request: PlaceObstacle.Request) -> str:
         self._robot.world.place_obstacle(request.name, request.x, request.y, request.radius)
@@ -108,6 +109,7 @@ class FaultServices:
 
     def _remove_obstacle(self, request: RemoveObstacle.Request) -> str:
         self._robot.world.remove_obstacle(request.name)
+        self._stage.forget('thing', request.name)
         return f'obstacle {request.name} is gone'
 
     def _push_robot(self, request: PushRobot.Request) -> str:
@@ -128,6 +130,7 @@ class FaultServices:
 
     def _set_marker(self, request: SetMarker.Request) -> str:
         world = self._robot.world
+        self._stage.forget('marker', request.name)
         if request.state != SetMarker.Request.MOVED:
             world.set_marker(request.name, request.state)
             return f'marker {request.name} is {request.state}'

@@ -16,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from surveillance_runtime.place.rooms import Pose
+from surveillance_simulation.optional_mujoco import mujoco
 from surveillance_simulation.physics.model import (
     SOLID,
     STEP,
@@ -33,11 +34,6 @@ from surveillance_simulation.robot.base import (
     wrapped,
 )
 from surveillance_simulation.world.world import World
-
-try:
-    import mujoco
-except ImportError:
-    mujoco = None
 
 Floats = npt.NDArray[np.float64]
 _STIFFNESS, _DAMPING = 60.0, 0.6
@@ -245,9 +241,8 @@ class PhysicsBase:
     def _renew(self) -> None:
         """Build the model anew where doors or things came or went."""
         world = self._world
-        things = tuple(world.obstacles.values())
-        people = len(world.discs) - len(things)
-        now = world.closed_doors, things, people
+        people = len(world.bodies)
+        now = world.drawn_version, people
         if now == self._built:
             return
         kept = None if self._built is None else (self._data.qpos.copy(), self._data.qvel.copy())
@@ -265,7 +260,7 @@ class PhysicsBase:
     def _place_people(self) -> None:
         if not self._people:
             return
-        for index, (x, y, radius) in enumerate(self._world.discs[-self._people :].tolist()):
+        for index, (x, y, radius) in enumerate(self._world.bodies.tolist()):
             body = self._model.body(f'person{index}')
             self._model.geom_size[body.geomadr[0], 0] = radius
             self._model.geom_rbound[body.geomadr[0]] = math.hypot(radius, 1.0)

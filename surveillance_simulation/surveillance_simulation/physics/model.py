@@ -19,13 +19,9 @@ from surveillance_runtime.place.floor_plan import WALL_HEIGHT, WALL_THICKNESS
 from surveillance_runtime.place.plan_grid import solid_lines
 from surveillance_runtime.place.rooms import Pose
 from surveillance_runtime.profile.parameters import robot_footprint
-from surveillance_simulation.camera.scene import OBSTACLE_HEIGHT
-from surveillance_simulation.world.world import World
-
-try:
-    import mujoco
-except ImportError:
-    mujoco = None
+from surveillance_simulation.optional_mujoco import mujoco
+from surveillance_simulation.world.things import Shape, Thing
+from surveillance_simulation.world.world import LEAF_THICKNESS, World
 
 STEP = 0.002
 """Step of the physics, seconds."""
@@ -119,10 +115,12 @@ def compiled(world: World, radius: float, robot: PhysicsModel, people: int) -> A
     _add_robot(spec, radius, robot)
     for line in solid_lines(world.plan):
         _add_wall(spec, line)
-    for name in sorted(world.closed_doors):
-        _add_wall(spec, world.plan.doors[name].ends)
-    for thing in world.obstacles.values():
-        _add_upright(spec.worldbody, (thing.x, thing.y), thing.radius, OBSTACLE_HEIGHT)
+    for name in world.plan.doors:
+        if (leaf := world.leaf(name)) is not None:
+            _add_wall(spec, leaf, LEAF_THICKNESS if world.door_angle(name) else WALL_THICKNESS)
+    for thing in world.things.values():
+        if thing.kind != 'person':
+            _add_thing(spec.worldbody, thing)
     for index in range(people):
         body = spec.worldbody.add_body(name=f'person{index}', mocap=True)
         _add_upright(body, (0.0, 0.0), 1.0, _PERSON_HEIGHT)
@@ -210,8 +208,12 @@ def _add_wheel(body: Any, side: float, name: str, robot: PhysicsModel, radius: f
     )
 
 
-def _add_wall(spec: Any, line: tuple[tuple[float, float], tuple[float, float]]) -> None:
-    x, y, cos, sin, along, across = boxes.boxes_around([line], WALL_THICKNESS)[0]
+def _add_wall(
+    spec: Any,
+    line: tuple[tuple[float, float], tuple[float, float]],
+    thickness: float = WALL_THICKNESS,
+) -> None:
+    x, y, cos, sin, along, across = boxes.boxes_around([line], thickness)[0]
     yaw = math.atan2(sin, cos)
     spec.worldbody.add_geom(
         type=mujoco.mjtGeom.mjGEOM_BOX,
@@ -222,6 +224,22 @@ def _add_wall(spec: Any, line: tuple[tuple[float, float], tuple[float, float]]) 
         contype=_IN_THE_WAY,
         conaffinity=_IN_THE_WAY,
     )
+
+
+def _add_thing(body: Any, thing: Thing) -> None:
+    for part in thing.parts:
+        x, y = thing.at(part)
+        half = (part.top - part.bottom) / 2
+        is_box = part.shape == Shape.BOX
+        body.add_geom(
+            type=mujoco.mjtGeom.mjGEOM_BOX if is_box else mujoco.mjtGeom.mjGEOM_CYLINDER,
+            size=[part.length / 2, part.width / 2, half] if is_box else [part.length / 2, half, 0],
+            pos=[x, y, part.bottom + half],
+            quat=[math.cos(thing.yaw / 2), 0.0, 0.0, math.sin(thing.yaw / 2)],
+            group=SOLID,
+            contype=_IN_THE_WAY,
+            conaffinity=_IN_THE_WAY,
+        )
 
 
 def _add_upright(body: Any, at: tuple[float, float], radius: float, height: float) -> None:

@@ -31,6 +31,8 @@ LEAF_THICKNESS = 0.04
 """Of a door that is ajar, metres."""
 PASSABLE = 60.0
 """A door lets a robot through from this angle on, degrees."""
+_BODY = 0.2
+"""Radius of a person who stands, metres."""
 
 
 @dataclass(frozen=True)
@@ -121,6 +123,12 @@ class World:
             for number, (x, y, _, yaw) in enumerate(self._people.tolist())
         )
         return (*standing, *walking)
+
+    @property
+    def bodies(self) -> boxes.Array:
+        """The people as upright cylinders (n, 3): centre x, y and radius, metres."""
+        standing = [(e.x, e.y, _BODY) for e in self._things.values() if e.kind == 'person']
+        return np.concatenate([np.reshape(standing, (-1, 3)), self._people[:, :3]])
 
     @property
     def lamps(self) -> Mapping[str, float]:
