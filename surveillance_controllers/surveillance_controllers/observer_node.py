@@ -19,7 +19,6 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 from geometry_msgs.msg import PoseWithCovarianceStamped
 from nav_msgs.msg import OccupancyGrid, Odometry
@@ -43,9 +42,11 @@ from surveillance_perception.observation.answers import answered
 from surveillance_perception.observation.events import Event, EventBook, EventState
 from surveillance_perception.observation.evidence import EvidenceStore
 from surveillance_perception.observation.observations import Observation
+from surveillance_perception.observation.persons import Person, load_finder
 from surveillance_perception.observation.reference_views import ReferenceViews, Viewpoint
 from surveillance_perception.observation.watch_rules import DEFAULT_RULES, read_watch_file
-from surveillance_perception.observation.watcher import Watcher
+from surveillance_perception.observation.watcher import Look, Watcher
+from surveillance_perception.observation.ways import Ways
 from surveillance_runtime.conversions import (
     PlanarPose,
     map_from,
@@ -99,6 +100,13 @@ class ObserverSettings:
     )
     radius: float = robot_radius()
     camera: bool = parameter(True, 'Whether pictures are looked at.')
+    persons: bool = parameter(
+        True,
+        'Whether persons are looked for in pictures, where the packages for that are installed.',
+    )
+    person_weights: str = parameter(
+        '', 'The file pose_detection.tflite; empty: the one of the package mediapipe.'
+    )
 
 
 class Observer(PatrolNode):
@@ -119,6 +127,8 @@ class Observer(PatrolNode):
         self._places.set_positions(places)
         self._observations = self.create_publisher(String, 'observations', QoSProfile(depth=100))
         self._events = OwnedTopic(self, String, 'events')
+        self._looks = OwnedTopic(self, String, 'looks')
+        self._last_looks: dict[str, Look] = {}
         self._said = ''
         self.sweeps = 0
         self._told: dict[int, EventState] = {}
@@ -132,7 +142,10 @@ class Observer(PatrolNode):
             robot=self.get_namespace().strip('/') or ROBOT,
             doors=self._doors,
             markers=self._known_markers(),
-            place_of=self._places.place_at,
+            rooms=self._places,
+            ways_of=lambda grid: Ways(grid, self._settings.radius, self._doors, places),
+            find_persons=self._person_finder(),
+            looked=self._on_look,
             store=self._store(),
             views=self._views(),
         )
@@ -208,6 +221,18 @@ class Observer(PatrolNode):
             return EvidenceStore(Path(folder), round(1e6 * self._settings.evidence_megabytes))
         except OSError as error:
             self._complain(f'evidence_folder {folder}: {error.strerror}; no picture is kept')
+            return None
+
+    def _person_finder(self) -> Callable[[np.ndarray], list[Person]] | None:
+        settings = self._settings
+        if not (settings.camera and settings.persons):
+            return None
+        try:
+            return load_finder(settings.person_weights).find
+        except ValueError as error:
+            if settings.person_weights:
+                raise ParameterError(f'observer: {error}') from None
+            self.get_logger().warn(f'{error}; those who walk are seen by the lidar')
             return None
 
     def _complain(self, problem: str) -> None:
@@ -350,8 +375,7 @@ class Observer(PatrolNode):
         markers: frozenset[int] | None,
     ) -> None:
         image = image_from_ros(deserialize_message(serialized, Image), MOST_PIXELS)
-        grey = image if image.ndim == 2 else cv2.cvtColor(image, cv2.COLOR_BGR2GRAY)
-        self._watcher.picture(np.asarray(grey, np.uint8), viewpoint, stamp, markers)
+        self._watcher.picture(np.asarray(image, np.uint8), viewpoint, stamp, markers)
 
     def _assess(self) -> None:
         self._watcher.assess(self._now())
@@ -363,6 +387,12 @@ class Observer(PatrolNode):
 
     def _on_observation(self, seen: Observation) -> None:
         self._observations.publish(String(data=json.dumps(seen.to_json())))
+
+    def _on_look(self, look: Look) -> None:
+        """Tell what was covered of each place in the last stay there."""
+        self._last_looks[look.place] = look
+        told = {place: each.to_json() for place, each in sorted(self._last_looks.items())}
+        self._looks.publish(String(data=json.dumps(told)))
 
     def _on_event(self, event: Event) -> None:
         """Log each beginning and end."""

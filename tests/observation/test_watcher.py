@@ -15,9 +15,11 @@ import yaml
 from surveillance_perception.observation.events import EventBook, EventState
 from surveillance_perception.observation.evidence import EvidenceStore
 from surveillance_perception.observation.observations import Kind, Observation
+from surveillance_perception.observation.persons import Person
 from surveillance_perception.observation.reference_views import ReferenceViews
 from surveillance_perception.observation.watch_rules import rule_from
-from surveillance_perception.observation.watcher import Watcher
+from surveillance_perception.observation.watcher import Look, Watcher
+from surveillance_perception.observation.ways import Ways
 from surveillance_runtime.place.occupancy_grid import Grid
 
 RULES = """
@@ -28,6 +30,9 @@ RULES = """
 - marker: all
 - view: clear
   severity: warning
+- person: nobody
+- way: free
+- light: 'on'
 """
 DOOR = (6.0, 2.0, 6.0, 3.0)
 
@@ -64,12 +69,29 @@ def beams(
     return np.asarray(sensor) + rays * lengths[:, None], met
 
 
+class Halves:
+    """The two rooms, west and east of the door."""
+
+    def place_at(self, point) -> str:
+        return 'R1' if point[0] < DOOR[0] else 'R2'
+
+    def cells_of(self, place: str) -> np.ndarray:
+        free = room().free
+        west = np.arange(free.shape[1]) * 0.05 < DOOR[0]
+        return free & (west if place == 'R1' else ~west)
+
+
 class Round:
     """A watcher in the room, and what it told."""
 
     def __init__(
-        self, store: EvidenceStore | None = None, views: Path | None = None, markers=None
+        self,
+        store: EvidenceStore | None = None,
+        views: Path | None = None,
+        markers=None,
+        find_persons=None,
     ) -> None:
+        self.looks: list[Look] = []
         self.told: list[Observation] = []
         self.alerts: list[int] = []
         self.book = EventBook()
@@ -85,7 +107,12 @@ class Round:
             store=store,
             views=ReferenceViews(views),
             markers=markers,
-            place_of=lambda point: 'R1' if point[0] < DOOR[0] else 'R2',
+            rooms=Halves(),
+            ways_of=lambda grid: Ways(
+                grid, 0.22, {'D1': DOOR}, {'R1': (3.0, 2.5), 'R2': (9.0, 2.5)}
+            ),
+            find_persons=find_persons,
+            looked=self.looks.append,
         )
         self.watcher.use_map(room())
 
@@ -107,7 +134,8 @@ def test_nothing_happens_and_nothing_is_told():
     for _ in range(4):
         watch.visit('R1', HERE)
         watch.visit('R2', (9.0, 2.5))
-    assert {each.kind for each in watch.told} <= {Kind.DOOR}
+    told = {(each.kind, each.state) for each in watch.told if each.kind != Kind.DOOR}
+    assert told == {(Kind.PERSON, 'nobody')}
     assert not watch.book.events
     assert not watch.alerts
 
@@ -233,6 +261,92 @@ def test_markers_move_and_go_missing_only_where_their_spot_was_in_view():
     assert [(each.subject, each.seen) for each in watch.book.events] == [('14', 'missing')]
     watch.watcher.marker(14, (2.0, 0.5, 1.0), 60.0)
     assert {each.seen for each in watch.book.events if each.state == EventState.OPEN} == {'moved'}
+
+
+def walk(watch: Round, start: tuple[float, float], step: tuple[float, float], steps: int) -> None:
+    """One who walks before a robot that stands."""
+    for number in range(steps):
+        watch.time += 0.25
+        x, y = start[0] + number * step[0], start[1] + number * step[1]
+        legs = [(x, y - 0.1, 0.06), (x, y + 0.1, 0.06)]
+        watch.watcher.sweep(HERE, *beams(room(), HERE, legs, True, seed=number), watch.time)
+
+
+def test_one_who_walks_is_seen_by_the_lidar_and_is_over_when_nobody_is_there():
+    watch = Round()
+    watch.visit('R1', HERE)
+    watch.watcher.arrive('R1', watch.time)
+    for number in range(8):
+        watch.time += 0.25
+        watch.watcher.sweep(HERE, *beams(room(), HERE, (), True, seed=number), watch.time)
+    walk(watch, (1.0, 1.0), (0.3, 0.0), 12)
+    seen = [each for each in watch.book.events if each.kind == Kind.PERSON]
+    assert [(each.seen, each.place, each.state) for each in seen] == [
+        ('seen', 'R1', EventState.OPEN)
+    ]
+    watch.watcher.arrive('R2', watch.time)
+    assert seen[0].number not in [
+        each.number for each in watch.book.events if each.state == EventState.OVER
+    ]
+    watch.visit('R1', HERE)
+    (event,) = [each for each in watch.book.events if each.kind == Kind.PERSON]
+    assert event.state == EventState.OVER
+
+
+def test_what_stands_or_is_uncovered_by_the_robot_does_not_walk():
+    watch = Round()
+    watch.watcher.arrive('R1', watch.time)
+    chairs = [(x, y, 0.03) for x in (1.0, 1.5, 4.2) for y in (1.0, 1.5, 4.0)]
+    for number in range(40):
+        watch.time += 0.25
+        at = 1.8 + 0.06 * number, 2.5 + 0.3 * math.sin(number / 6.0)
+        watch.watcher.sweep(at, *beams(room(), at, chairs, True, seed=number), watch.time)
+    assert not [each for each in watch.told if each.kind == Kind.PERSON]
+
+
+def test_a_person_in_a_picture_is_an_event_with_a_picture_of_it(tmp_path: Path):
+    watch = Round(EvidenceStore(tmp_path), find_persons=lambda _: [Person((10, 20, 60, 80), 0.9)])
+    watch.watcher.arrive('R1', watch.time)
+    for number in range(3):
+        watch.watcher.picture(texture(), None, watch.time + number, None)
+    (event,) = [each for each in watch.book.events if each.kind == Kind.PERSON]
+    assert (event.place, event.seen) == ('R1', 'seen')
+    assert (tmp_path / event.evidence[0]).is_file()
+
+
+def test_the_light_of_each_room_is_its_own():
+    watch = Round()
+    dark = np.full((240, 320), 3, np.uint8)
+    for place in ('R1', 'R2'):
+        watch.watcher.arrive(place, watch.time)
+        for _ in range(3):
+            watch.time += 2.0
+            watch.watcher.picture(dark, None, watch.time, None)
+    assert [(each.place, each.state) for each in watch.told if each.kind == Kind.LIGHT] == [
+        ('R1', 'off'),
+        ('R2', 'off'),
+    ]
+
+
+def test_boxes_across_a_doorway_block_the_way_until_they_are_gone():
+    watch = Round()
+    watch.visit('R1', (4.0, 2.5), shut=False)
+    watch.visit('R1', (4.0, 2.5), boxes=[(1.0, 4.0, 0.2)], shut=False)
+    assert not [each for each in watch.told if each.kind == Kind.WAY]
+    watch.visit('R1', (4.0, 2.5), boxes=[(5.7, 2.5, 0.25)], shut=False)
+    blocked = [each for each in watch.told if each.kind == Kind.WAY]
+    assert {(each.state, each.subject) for each in blocked} == {('blocked', 'D1')}
+    watch.visit('R1', (4.0, 2.5), shut=False)
+    assert {each.state for each in watch.book.events if each.kind == Kind.WAY} == {EventState.OVER}
+
+
+def test_a_look_says_how_much_of_the_room_was_in_view():
+    watch = Round()
+    watch.visit('R1', HERE)
+    (look,) = watch.looks
+    assert (look.place, look.pictures) == ('R1', 0)
+    assert 0.8 < look.share <= 1.0
+    assert 20.0 < look.area < 30.0
 
 
 def test_a_covered_camera_is_told_once():

@@ -11,7 +11,7 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from surveillance_controllers.geometry import Points
 from surveillance_runtime.place.floor_plan import Segment
@@ -76,6 +76,22 @@ class PlaceRegions:
             seen |= front
         return None
 
+    def cells_of(self, place: str) -> NDArray[np.bool_] | None:
+        """Return the cells of a place, shape as the map's; None where it has none."""
+        region = self._region(*self._points[place]) if place in self._points else None
+        if region is None:
+            return None
+        cells = np.asarray(self._regions == region)
+        others = [name for name in self._places[region] if name != place]
+        if others:
+            rows, columns = np.nonzero(cells)
+            spots = self._grid.centres_of(np.stack([rows, columns], axis=1))
+            own = np.linalg.norm(spots - self._points[place], axis=1)
+            for name in others:
+                nearer = np.linalg.norm(spots - self._points[name], axis=1) < own
+                cells[rows[nearer], columns[nearer]] = False
+        return cells
+
     def _region(self, x: float, y: float) -> int | None:
         region: int | None = self._grid.at(self._regions, x, y)
         return region
@@ -112,6 +128,10 @@ class PlaceLocator:
     def place_at(self, point: Sequence[float] | Points) -> str | None:
         """Return the place that a point (x, y in metres) belongs to; None: in none."""
         return None if self._regions is None else self._regions.place_at(point)
+
+    def cells_of(self, place: str) -> NDArray[np.bool_] | None:
+        """Return the cells of a place, shape as the map's; None where it has none."""
+        return None if self._regions is None else self._regions.cells_of(place)
 
     def _divide(self) -> None:
         if self._grid is not None and self._positions:

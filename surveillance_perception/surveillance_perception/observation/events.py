@@ -274,6 +274,10 @@ def _alike(event: Event, seen: Observation) -> bool:
         return False
     if event.subject:
         return True
+    if event.kind == Kind.VIEW:
+        return True  # it is the camera that is covered, wherever the robot is
+    if event.kind == Kind.PERSON:
+        return event.place == seen.place  # a person walks
     if event.position is None or seen.position is None:
         return event.place == seen.place
     return math.dist(event.position, seen.position) <= SAME_PLACE
@@ -282,6 +286,6 @@ def _alike(event: Event, seen: Observation) -> bool:
 def _same(normal: Observation, seen: Observation) -> bool:
     if normal.kind != seen.kind or normal.state != seen.state or normal.subject != seen.subject:
         return False
-    if normal.position is None or seen.position is None:
+    if normal.kind == Kind.PERSON or normal.position is None or seen.position is None:
         return normal.place == seen.place
     return math.dist(normal.position, seen.position) <= SAME_PLACE

@@ -39,6 +39,8 @@ SAME_SIZE = 1.6
 """Extents of a thing that moved may differ by this factor: it is seen from another side."""
 LEAF_SLACK = 0.13
 """How far from the line of a door's leaf its cells may lie, metres: a cell, noise, its depth."""
+FAR_FROM_WALL, NEAR_END, PASSED_BEFORE = 0.25, 0.1, 3
+"""Where all was free: so far from walls and from any end of a beam, metres; passed so often."""
 _WITH_CORNERS = np.ones((3, 3), np.bool_)
 
 
@@ -143,6 +145,26 @@ class FloorVisit:
             np.uint8
         )
         self._last_end[hit] = self.sweeps
+
+    def fresh(self, points: Points) -> Mask:
+        """Tell of each point whether all was free there until now, as far as this visit knows.
+
+        Args:
+            points: (n, 2), map frame, metres.
+        """
+        cells = self._grid.cells_of(points)
+        free = self._grid.contains(cells)
+        height, width = self._grid.cells.shape
+        rows, columns = np.clip(cells[:, 0], 0, height - 1), np.clip(cells[:, 1], 0, width - 1)
+        free &= (self._walls[rows, columns] > FAR_FROM_WALL) & (
+            self._passes[rows, columns] >= PASSED_BEFORE
+        )
+        reach = max(1, round(NEAR_END / self._grid.resolution))
+        for down in range(-reach, reach + 1):
+            for right in range(-reach, reach + 1):
+                beside = np.clip(rows + down, 0, height - 1), np.clip(columns + right, 0, width - 1)
+                free &= self._ends[beside] == 0
+        return np.asarray(free, np.bool_)
 
     def view(self) -> FloorView:
         """Return what was seen so far."""

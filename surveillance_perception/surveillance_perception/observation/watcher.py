@@ -14,10 +14,12 @@ from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import datetime
-from typing import Any
+from typing import Any, Protocol
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
+from scipy import ndimage
 
 from surveillance_perception.observation.doors import Segment, read_door
 from surveillance_perception.observation.events import Event, EventBook, EventState
@@ -30,7 +32,9 @@ from surveillance_perception.observation.floor import (
     changes,
     is_leaf,
 )
+from surveillance_perception.observation.motion import WalkFinder
 from surveillance_perception.observation.observations import Kind, Observation
+from surveillance_perception.observation.persons import Person, Picture
 from surveillance_perception.observation.reference_views import (
     ReferenceView,
     ReferenceViews,
@@ -38,6 +42,7 @@ from surveillance_perception.observation.reference_views import (
 )
 from surveillance_perception.observation.views import Grey, Sight, sight_of, view_changes
 from surveillance_perception.observation.watch_rules import Level, WatchRule, severity_of
+from surveillance_perception.observation.ways import Ways
 from surveillance_runtime.place.occupancy_grid import Grid
 
 Points = NDArray[np.float64]
@@ -55,6 +60,14 @@ SEEN_AGAIN = 10.0
 """What goes on is told again after this time, seconds."""
 AGREED_PICTURES = 3
 """A dark or covered view, and a marker that is missing, must be so in so many pictures."""
+WALKING = 0.8
+"""Confidence that what walks is a person."""
+LOOKED = 0.6
+"""Share of a place's floor that must have been in view before nobody is said to be there."""
+LOOKED_SECONDS = 5.0
+"""And for so long."""
+BEHIND = 0.3
+"""Depth of what stands in a way, metres."""
 MARKER_MOVED = 0.3
 """A marker seen so far from where it hung hangs elsewhere, metres."""
 
@@ -65,6 +78,47 @@ class _Door:
     readings: deque[tuple[str, float]] = field(default_factory=lambda: deque(maxlen=READINGS))
     told: str = ''
     told_at: float = -math.inf
+
+
+class Rooms(Protocol):
+    """Which place is where."""
+
+    def place_at(self, point: Sequence[float]) -> str | None:
+        """Return the place that a point of the map lies in; None: in none."""
+
+    def cells_of(self, place: str) -> Mask | None:
+        """Return the cells of a place, shape as the map's; None where it has none."""
+
+
+@dataclass(frozen=True)
+class Look:
+    """What was looked at in one stay at a place.
+
+    Attributes:
+        place: The place.
+        began, ended: Seconds since 1970.
+        share: Part of its floor that was in view, 0 to 1; nan where the map does not show it.
+        area: Of that part, square metres.
+        pictures: How many were looked at.
+    """
+
+    place: str
+    began: float
+    ended: float
+    share: float
+    area: float
+    pictures: int
+
+    def to_json(self) -> dict[str, Any]:
+        """Return it as plain values; the share is missing where it is not known."""
+        values = {
+            'place': self.place,
+            'began': round(self.began, 3),
+            'ended': round(self.ended, 3),
+            'area': round(self.area, 2),
+            'pictures': self.pictures,
+        }
+        return values if math.isnan(self.share) else {**values, 'share': round(self.share, 3)}
 
 
 class Watcher:
@@ -80,7 +134,10 @@ class Watcher:
         robot: Whose observations they are.
         markers: The ids that hang here, and where, map frame, metres; None: that is learned. Empty:
             all that is seen is known.
-        place_of: Returns the place that a point of the map lies in; None: in none.
+        rooms: Which place is where; None: a thing is in the robot's place.
+        ways_of: Returns the ways of a map; None: no way is looked at.
+        find_persons: Finds the persons in a picture; None: the lidar sees those who walk.
+        looked: Called with each stay at a place when it ends.
         store: Keeps pictures; None: nothing is kept.
         views: How each viewpoint looks normally.
     """
@@ -96,7 +153,10 @@ class Watcher:
         alert: Callable[[Event], object] = lambda _: None,
         doors: Mapping[str, Segment] | None = None,
         markers: Mapping[int, tuple[float, float, float] | None] | None = None,
-        place_of: Callable[[tuple[float, float]], str | None] = lambda _: None,
+        rooms: Rooms | None = None,
+        ways_of: Callable[[Grid], Ways] | None = None,
+        find_persons: Callable[[Picture], list[Person]] | None = None,
+        looked: Callable[[Look], object] = lambda _: None,
         store: EvidenceStore | None = None,
         views: ReferenceViews | None = None,
     ) -> None:
@@ -108,7 +168,13 @@ class Watcher:
         self._markers = {
             number: where for number, where in (markers or {}).items() if where is not None
         }
-        self._place_of = place_of
+        self._rooms, self._ways_of = rooms, ways_of
+        self._find_persons, self._looked = find_persons, looked
+        self._ways: Ways | None = None
+        self._walks = WalkFinder()
+        self._persons = 0
+        self._began = math.nan
+        self._pictures = 0
         self._store = store
         self._robot = robot
         self._place = ''
@@ -132,6 +198,7 @@ class Watcher:
             return
         self._grid = grid
         self._visit, self._normal, self._candidates = None, None, []
+        self._ways = None if self._ways_of is None else self._ways_of(grid)
         if self._kept:
             self._normal = _unpacked(self._kept, grid)
 
@@ -140,14 +207,67 @@ class Watcher:
         if place == self._place:
             return
         self.assess(stamp)
+        self._end_look(stamp)
         self._learn()
         self._place = place
+        self._began, self._pictures, self._persons = stamp, 0, 0
+        self._walks.clear()
+        # The light is that of the place.
+        self._sights.clear()
+        self._sight = None
         self._look += 1
         self._visit = None
         self._candidates = []
         self._told = {}
         for door in self._doors.values():
             door.readings.clear()
+
+    def _end_look(self, stamp: float) -> None:
+        """Tell what was in view, and that nobody was there."""
+        if not self._place or math.isnan(self._began):
+            return
+        look = self.look(stamp)
+        self._looked(look)
+        long = look.ended - look.began >= LOOKED_SECONDS
+        if long and look.share >= LOOKED and not self._persons:
+            sure = look.share if look.pictures and self._find_persons is not None else 0.5
+            self._take(
+                Observation(Kind.PERSON, 'nobody', self._place, confidence=sure, stamp=stamp)
+            )
+
+    def look(self, stamp: float) -> Look:
+        """Return what was in view since the robot came here."""
+        share, area = math.nan, 0.0
+        floor = None if self._rooms is None else self._rooms.cells_of(self._place)
+        if floor is not None and self._grid is not None and floor.shape == self._grid.cells.shape:
+            seen = 0
+            if self._visit is not None and self._visit.sweeps:
+                seen = int((floor & self._visit.view().seen).sum())
+            share = seen / max(1, int(floor.sum()))
+            area = seen * self._grid.resolution**2
+        return Look(self._place, self._began, stamp, share, area, self._pictures)
+
+    def _place_of(self, point: tuple[float, float]) -> str:
+        """Return where a thing lies that was seen, perhaps through a doorway."""
+        found = None if self._rooms is None else self._rooms.place_at(point)
+        return found or self._place
+
+    def _walk(self, ends: Points, met: Mask, stamp: float) -> None:
+        """Tell of what walks; before the sweep is taken into the visit."""
+        assert self._visit is not None
+        fresh = ends[met]
+        fresh = fresh[self._visit.fresh(fresh)]
+        if self._normal is not None and len(fresh):
+            cells = self._normal.grid.cells_of(fresh)
+            fresh = fresh[~self._normal.occupied[cells[:, 0], cells[:, 1]]]
+        if self._at_door(fresh):
+            return
+        for walk in self._walks.add(fresh, len(ends), stamp)[:1]:
+            self._persons += 1
+            place = self._place_of(walk.position)
+            seen = Observation(Kind.PERSON, 'seen', place, '', walk.position, WALKING, stamp)
+            if self._is_due(seen):
+                self._take(seen)
 
     def sweep(self, sensor: tuple[float, float], ends: Points, met: Mask, stamp: float) -> None:
         """Take a sweep of the lidar.
@@ -162,6 +282,7 @@ class Watcher:
         if self._grid is not None:
             if self._visit is None:
                 self._visit = FloorVisit(self._grid)
+            self._walk(ends, met, stamp)
             self._visit.add(sensor, ends, met)
         for name, door in self._doors.items():
             x1, y1, x2, y2 = door.segment
@@ -189,19 +310,15 @@ class Watcher:
         if self._visit is None or self._visit.sweeps < FEWEST_SWEEPS or self._normal is None:
             return
         now = self._visit.view()
-        found = [each for each in changes(self._normal, now) if not self._at_door(each)]
+        found = [each for each in changes(self._normal, now) if not self._at_door(each.points)]
         for each in found:
-            if not any(
-                before.change == each.change
-                and math.dist(before.position, each.position) < SAME_THING
-                for before in self._candidates
-            ):
+            if not self._is_candidate(each):
                 continue
             observation = Observation(
                 Kind.OBJECT,
                 str(each.change),
                 # A thing seen through a doorway is where it lies.
-                self._place_of(each.position) or self._place,
+                self._place_of(each.position),
                 position=each.position,
                 confidence=each.confidence,
                 stamp=stamp,
@@ -209,13 +326,47 @@ class Watcher:
             )
             if self._is_due(observation):
                 self._take(observation)
+        self._look_at_ways(now, found, stamp)
         self._candidates = found
         self._end_gone(now, found, stamp)
+
+    def _look_at_ways(self, now: FloorView, found: Sequence[ObjectChange], stamp: float) -> None:
+        """Tell of the ways that are blocked by what was seen in two assessments."""
+        new = [
+            each.points
+            for each in found
+            if each.change != Change.REMOVED and self._is_candidate(each)
+        ]
+        if self._ways is None or self._grid is None or self._normal is None or not new:
+            return
+        things = self._normal.occupied.copy()
+        before = {(each.door, each.place) for each in self._ways.blocked(things)}
+        cells = self._grid.cells_of(np.concatenate(new))
+        things[cells[:, 0], cells[:, 1]] = True
+        # Of a thing its front alone is seen: what lies hidden just behind it is taken for it, too.
+        away = ndimage.distance_transform_edt(~things) * self._grid.resolution
+        things |= (away < BEHIND) & ~now.free
+        for each in self._ways.blocked(things):
+            if (each.door, each.place) not in before:
+                place = each.place or self._place_of(each.position)
+                seen = Observation(Kind.WAY, 'blocked', place, each.door, each.position, 0.9, stamp)
+                if self._is_due(seen):
+                    self._take(seen)
+
+    def _is_candidate(self, thing: ObjectChange) -> bool:
+        """Tell whether the assessment before found a thing, too."""
+        return any(
+            before.change == thing.change
+            and math.dist(before.position, thing.position) < SAME_THING
+            for before in self._candidates
+        )
 
     def _end_gone(self, now: FloorView, found: Sequence[ObjectChange], stamp: float) -> None:
         """End the events of things whose spot was in view, and is as before."""
         for event in self.book.events:
-            if event.kind != Kind.OBJECT or event.position is None or event.state in _ENDED:
+            if event.kind not in (Kind.OBJECT, Kind.WAY) or event.state in _ENDED:
+                continue
+            if event.position is None:
                 continue
             if any(math.dist(each.position, event.position) < 2 * SAME_THING for each in found):
                 continue
@@ -239,29 +390,37 @@ class Watcher:
             moving=np.zeros_like(now.moving),
         )
 
-    def _at_door(self, thing: ObjectChange) -> bool:
+    def _at_door(self, points: Points) -> bool:
         """Tell whether a thing may be a door's leaf, which is the door's own matter."""
         for door in self._doors.values():
             width = math.dist(door.segment[:2], door.segment[2:])
             for hinge in (door.segment[:2], door.segment[2:]):
-                if is_leaf(thing.points, hinge, width):
+                if is_leaf(points, hinge, width):
                     return True
         return False
 
     # --- the camera ---
 
     def picture(
-        self, grey: Grey, viewpoint: Viewpoint | None, stamp: float, markers: frozenset[int] | None
+        self,
+        picture: Picture,
+        viewpoint: Viewpoint | None,
+        stamp: float,
+        markers: frozenset[int] | None,
     ) -> None:
         """Take a picture.
 
         Args:
-            grey: (rows, columns) of bytes.
+            picture: (rows, columns) of grey bytes, or (rows, columns, 3) of BGR.
             viewpoint: Where the camera is: x, y in metres, then angles in radians; None while it
                 moves.
             stamp: Seconds since 1970.
             markers: The ids seen in it; None: nobody looked for markers.
         """
+        grey = picture
+        if picture.ndim == 3:
+            grey = np.asarray(cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY), np.uint8)
+        self._pictures += 1
         self._sights.append(sight_of(grey))
         settled = len(self._sights) == AGREED_PICTURES and len(set(self._sights)) == 1
         sight = self._sights[-1]
@@ -273,7 +432,10 @@ class Watcher:
             if sight != Sight.DARK:
                 view = 'blocked' if sight == Sight.BLOCKED else 'clear'
                 self._take(Observation(Kind.VIEW, view, self._place, stamp=stamp), grey)
-        if viewpoint is None or sight != Sight.CLEAR:
+        if sight != Sight.CLEAR:
+            return
+        self._look_for_persons(picture, stamp)
+        if viewpoint is None:
             return
         known = self._views.at(viewpoint)
         if known is None:
@@ -281,7 +443,12 @@ class Watcher:
             return
         if markers is not None:
             self._miss(known, markers, viewpoint, stamp, grey)
-        for change in (view_changes(known.picture, grey) or [])[:1]:
+        differences = view_changes(known.picture, grey)
+        if differences == []:
+            going_on = [each for each in self.book.events if each.state not in _ENDED]
+            if any((each.kind, each.subject) == (Kind.VIEW, known.name) for each in going_on):
+                self._take(Observation(Kind.VIEW, 'clear', self._place, known.name, stamp=stamp))
+        for change in (differences or [])[:1]:
             observation = Observation(
                 Kind.VIEW,
                 'changed',
@@ -294,6 +461,20 @@ class Watcher:
             )
             if self._is_due(observation):
                 self._take(observation, grey)
+
+    def _look_for_persons(self, picture: Picture, stamp: float) -> None:
+        found = [] if self._find_persons is None else self._find_persons(picture)
+        if not found:
+            return
+        self._persons += len(found)
+        sure = max(each.confidence for each in found)
+        seen = Observation(Kind.PERSON, 'seen', self._place, confidence=sure, stamp=stamp)
+        if self._is_due(seen):
+            shown = picture.copy()
+            for each in found:
+                left, top, width, height = each.box
+                cv2.rectangle(shown, (left, top), (left + width, top + height), (0, 200, 0), 2)
+            self._take(seen, shown)
 
     def _miss(
         self,
@@ -329,7 +510,7 @@ class Watcher:
             state = 'unknown'
         else:
             state = 'moved' if math.dist(hung, position) > MARKER_MOVED else 'here'
-        place = self._place_of(where) or self._place
+        place = self._place_of(where)
         seen = Observation(Kind.MARKER, state, place, str(number), where, 0.95, stamp)
         if self._is_due(seen):
             self._take(seen)
@@ -356,7 +537,7 @@ class Watcher:
         self._told[key] = seen.stamp
         return True
 
-    def _take(self, seen: Observation, picture: NDArray[np.uint8] | None = None) -> None:
+    def _take(self, seen: Observation, picture: Picture | None = None) -> None:
         severity, rule = severity_of(self.rules, seen, self._local(seen.stamp))
         evidence = ''
         if self._store is not None and severity:
