@@ -41,6 +41,7 @@ class Ontology(Protocol):
         visits: Mapping[str, float],
         interrupt: Interrupt,
         threshold: float | None = None,
+        own_thresholds: Mapping[str, float] | None = None,
     ) -> Snapshot:
         """Tell the time and the visits that the ontology does not know, and ask what follows.
 
@@ -52,6 +53,7 @@ class Ontology(Protocol):
             visits: When the robot was in each place last, seconds.
             interrupt: Ends it.
             threshold: Seconds without a visit after which a place is URGENT; None: as it was.
+            own_thresholds: The same for places that differ and of which the ontology has none.
         """
 
     def reachable(self, interrupt: Interrupt) -> frozenset[str]:

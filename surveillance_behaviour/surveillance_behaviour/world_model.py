@@ -186,7 +186,8 @@ class WorldModel:
         self._since = now if self._since is None else min(self._since + jump, now)
         threshold, classes = settings.urgency_threshold, settings.rules.classes
         visits = experience.visits
-        found = self._ontology.snapshot(now, classes, visits, interrupt, threshold)
+        own = self._rules.thresholds
+        found = self._ontology.snapshot(now, classes, visits, interrupt, threshold, own)
         self.graph = graph = self._map_of(found, interrupt)
         self.place = found.place
         return World(
@@ -203,7 +204,7 @@ class WorldModel:
             time_spread=experience.leg_times.spread,
             since=self._since,
             threshold=threshold,
-            own_thresholds=self._rules.thresholds,
+            own_thresholds={**own, **found.thresholds},
             openings=self._rules.calendar.at(now),
             target=self._target,
             avoided=avoided,

@@ -19,10 +19,11 @@ may take snapshots.
 
 from __future__ import annotations
 
+import re
 import threading
 import time
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Protocol
 
@@ -30,6 +31,7 @@ from armor_service.client import (
     ArmorClient,
     ArmorServiceInternalError,
 )
+from armor_service.facts import parse_fact
 from armor_service.protocol import (
     DirectiveRequest,
     DirectiveResponse,
@@ -131,6 +133,7 @@ class Snapshot:
         visited_at: When each place was visited last, seconds; without those that never were.
         connections: The neighbours of every place.
         contradiction: Which facts clashed while it was taken, as a sentence; empty: none did.
+        thresholds: Seconds after which a place is URGENT that has a threshold of its own.
     """
 
     place: str
@@ -140,6 +143,7 @@ class Snapshot:
     visited_at: Mapping[str, float]
     connections: Mapping[str, tuple[str, ...]]
     contradiction: str = ''
+    thresholds: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -153,6 +157,8 @@ class _Answers:
     members: Mapping[str, frozenset[str]]
     connections: Mapping[str, tuple[str, ...]]
     visited: Mapping[str, int]
+    own: Mapping[str, int]
+    usual: Mapping[str, int]
 
 
 class PatrolOntology:
@@ -168,6 +174,9 @@ class PatrolOntology:
         self._robot = robot
         self._places: tuple[str, ...] = ()
         self._last: Snapshot | None = None
+        # Thresholds of places as the ontology had them last, and whether it has the rule for them.
+        self._own: Mapping[str, int] = {}
+        self._knows_own: bool | None = None
 
     @property
     def reference(self) -> str:
@@ -369,6 +378,7 @@ class PatrolOntology:
         not_before: int = 0,
         visits: Mapping[str, float] | None = None,
         threshold: float | None = None,
+        own_thresholds: Mapping[str, float] | None = None,
         patience: float = 0.0,
         interrupt: Waiting | None = None,
     ) -> Snapshot:
@@ -389,6 +399,8 @@ class PatrolOntology:
                 clock was set back. A place that was taken away does not come back.
             threshold: Seconds without a visit after which a place is URGENT, told with each
                 snapshot, since an ontology that was built anew does not know it; None: as it was.
+            own_thresholds: The same for places that differ; told of a place that has none. From
+                then on it is the ontology's: what somebody else sets there stays.
             patience: How long to wait for an ontology that is there, is consistent and knows where
                 the robot is, seconds of steady time. One that is built anew is gone meanwhile.
             interrupt: Ends the wait early.
@@ -405,7 +417,7 @@ class PatrolOntology:
         while True:
             is_over = time.monotonic() >= deadline
             try:
-                found = self._ask(now, classes, visits or {}, threshold)
+                found = self._ask(now, classes, visits or {}, threshold, own_thresholds or {})
                 if found.is_in.is_consistent:
                     snapshot = self._snapshot_of(found, classes)
                 else:
@@ -454,16 +466,29 @@ class PatrolOntology:
         classes: Sequence[str],
         visits: Mapping[str, float],
         threshold: float | None,
+        own_thresholds: Mapping[str, float],
     ) -> _Answers:
         """Tell and ask until the answers are about all places, of one moment."""
-        own = {'now': now} if threshold is None else {'urgencyThreshold': threshold, 'now': now}
+        if self._knows_own is None:
+            (rules,) = self._carry_out([self._request('QUERY RULES')])
+            self._knows_own = any('acceptedWait' in rule for rule in rules.queried_objects)
+        limits: list[DirectiveRequest] = []
+        told_limits = False
         asked = self._places
         # A visit of this moment is the latest there can be, and nobody takes away the place that
         # the robot stands in: it can be told unasked. For any other the ontology is asked first.
         owed = [place for place, at in visits.items() if place in asked and int(at) >= int(now)]
         while True:
-            found = self._exchange(own, {place: visits[place] for place in owed}, classes, asked)
+            robot = {'now': now}
+            if threshold is not None:
+                # The rule of the robot's threshold holds for all places: it is the longest one.
+                robot['urgencyThreshold'] = max([threshold, *self._own.values()])
+            told = {place: visits[place] for place in owed}
+            found = self._exchange(robot, told, classes, asked, limits)
             self._places = _names(found.locations)
+            # Once: somebody else may be setting them at the same time.
+            told_limits, was_told = told_limits or bool(limits), told_limits
+            limits = [] if was_told else self._owed_limits(found, threshold, own_thresholds)
             owed = [
                 place
                 for place in asked
@@ -474,9 +499,43 @@ class PatrolOntology:
                     or found.visited[place] > int(now) >= int(visits[place])
                 )
             ]
-            if asked == self._places and not owed:
+            if asked == self._places and not owed and not limits:
                 return found
             asked = self._places
+
+    def _owed_limits(
+        self, found: _Answers, threshold: float | None, wanted: Mapping[str, float]
+    ) -> list[DirectiveRequest]:
+        """Return what is to be told of the thresholds of places.
+
+        The seeds' rule makes every place URGENT after the robot's threshold, and what a rule
+        says no other can take back. So the robot's becomes the longest of all, and where it is
+        longer than the usual one, each other place accepts that one.
+        """
+        if not self._knows_own:
+            return []
+        places = set(self._places)
+        missing = {p: int(s) for p, s in wanted.items() if p in places and p not in found.own}
+        own = {**{p: at for p, at in found.own.items() if p in places}, **missing}
+        todo = [self._set_value('urgencyThreshold', *entry) for entry in missing.items()]
+        if own != self._own:
+            self._own = own
+            # The robot's threshold follows; nothing else need be told for that.
+            todo.append(self._request('REASON'))
+        if threshold is not None:
+            usual = int(threshold)
+            fill = places - own.keys() if max([usual, *own.values()]) > usual else set()
+            todo += [
+                self._set_value('acceptedWait', place, usual)
+                for place in sorted(fill)
+                if found.usual.get(place) != usual
+            ]
+            todo += [
+                self._request('REMOVE DATAPROP IND', 'acceptedWait', place, 'LONG', str(value))
+                for place, value in found.usual.items()
+                if place not in fill
+            ]
+        return todo
 
     def _exchange(
         self,
@@ -484,12 +543,14 @@ class PatrolOntology:
         visits: Mapping[str, float],
         classes: Sequence[str],
         asked: Sequence[str],
+        limits: Sequence[DirectiveRequest],
     ) -> _Answers:
         """Tell visits and values of the robot, ask about it and some places, all in one batch."""
         request, robot = self._request, self._robot
         told = [self._set_value('visitedAt', place, int(at)) for place, at in visits.items()]
         told += [self._set_value(name, robot, int(value)) for name, value in own.items()]
-        told.append(request('REASON'))
+        told += [*limits, request('REASON')]
+        kept = ('urgencyThreshold', 'acceptedWait') if self._knows_own else ()
         questions = [
             request('QUERY OBJECTPROP IND', 'isIn', robot),
             request('QUERY DATAPROP IND', 'seenAt', robot),
@@ -498,6 +559,7 @@ class PatrolOntology:
             *(request('QUERY IND CLASS', name) for name in classes),
             *(request('QUERY OBJECTPROP IND', 'connectedTo', place) for place in asked),
             *(request('QUERY DATAPROP IND', 'visitedAt', place) for place in asked),
+            *(request('QUERY FACT', f'{name}(?, ?)', 'true') for name in kept),
         ]
         answers = iter(self._carry_out([*told, *questions], whole=True)[len(told) :])
         return _Answers(
@@ -508,6 +570,8 @@ class PatrolOntology:
             members={name: frozenset(_names(next(answers))) for name in classes},
             connections={place: _names(next(answers)) for place in asked},
             visited={place: _time(f'visitedAt of {place}', next(answers)) for place in asked},
+            own=_values(next(answers), robot) if kept else {},
+            usual=_values(next(answers), robot) if kept else {},
         )
 
     def _snapshot_of(self, found: _Answers, classes: Sequence[str]) -> Snapshot:
@@ -530,6 +594,7 @@ class PatrolOntology:
             },
             visited_at={place: float(at) for place, at in found.visited.items() if at > NEVER},
             connections=found.connections,
+            thresholds={place: float(at) for place, at in found.own.items()},
         )
 
     # --- directives ---
@@ -630,6 +695,19 @@ def is_gone(error: ArmorServiceInternalError) -> bool:
 
 def _names(answer: DirectiveResponse) -> tuple[str, ...]:
     return tuple(sorted(name_in(text) for text in answer.queried_objects))
+
+
+def _values(answer: DirectiveResponse, robot: str) -> dict[str, int]:
+    """Return the value of each individual but the robot, by facts of one property."""
+    found: dict[str, int] = {}
+    for text in answer.queried_objects:
+        name, value = parse_fact(text).arguments
+        number = re.match(r'"?(\d+)\b', value)
+        if name != robot and number:
+            # Of several the shortest one counts, as for the rule.
+            seconds = int(number[1])
+            found[name] = min(seconds, found.get(name, seconds))
+    return found
 
 
 def never_visited(now: int) -> int:

@@ -170,6 +170,7 @@ class World:
         visits: Mapping[str, float],
         interrupt: Interrupt,
         threshold: float | None = None,
+        own_thresholds: Mapping[str, float] | None = None,
     ) -> Snapshot:
         self._call('snapshot', interrupt)
         self.threshold = self.threshold if threshold is None else threshold

@@ -128,3 +128,55 @@ def test_an_interrupted_call_is_no_fault_of_the_server(transport: InProcessTrans
         knowledge.snapshot(110.0, RULES, {}, raised)
     with pytest.raises(CallError, match='armor: interrupted'):
         ask(knowledge, 110.0)
+
+
+def own(knowledge: ArmorKnowledge, now: float, told: dict[str, float], usual: float) -> Snapshot:
+    return knowledge.snapshot(now, RULES, {}, NOBODY, usual, told)
+
+
+def urgent(found: Snapshot) -> set[str]:
+    return {place for place, classes in found.classes.items() if 'URGENT' in classes}
+
+
+def test_a_place_with_its_own_threshold_is_urgent_by_that_alone(
+    knowledge: ArmorKnowledge, armor: ArmorClient
+) -> None:
+    told = {'R1': 10.0, 'R2': 500.0}
+    found = own(knowledge, 111.0, told, 30.0)
+    assert found.thresholds == told
+    assert urgent(found) == {'R1'}
+    assert urgent(own(knowledge, 131.0, told, 30.0)) == set(PLACE.rooms) - {'R2'}
+    assert urgent(own(knowledge, 131.0, told, 60.0)) == {'R1'}
+    sentence, tree = armor.query.explain('URGENT(R1)') or ('', '')
+    assert sentence == 'R1 is URGENT because now 131 - visitedAt 100 = 31 > acceptedWait 10'
+    assert 'urgencyThreshold' in tree
+    assert urgent(own(knowledge, 601.0, told, 60.0)) == set(PLACE.rooms)
+
+
+def test_a_threshold_that_somebody_sets_in_the_ontology_overrides_the_place_file(
+    knowledge: ArmorKnowledge, armor: ArmorClient
+) -> None:
+    own(knowledge, 105.0, {'R1': 10.0}, 30.0)
+    armor.manipulation.replace_one_dataprop_b2_ind('urgencyThreshold', 'R1', 'LONG', '90')
+    armor.manipulation.add_dataprop_to_ind('urgencyThreshold', 'R3', 'LONG', '5')
+    found = own(knowledge, 131.0, {'R1': 10.0}, 30.0)
+    assert found.thresholds == {'R1': 90.0, 'R3': 5.0}
+    assert urgent(found) == set(PLACE.rooms) - {'R1'}
+    # The usual threshold is the robot's again once no place accepts a longer wait.
+    armor.manipulation.replace_one_dataprop_b2_ind('urgencyThreshold', 'R1', 'LONG', '20')
+    assert urgent(own(knowledge, 125.0, {}, 30.0)) == {'R1', 'R3'}
+    assert armor.query.dataprop_b2_ind('urgencyThreshold', 'Robot1') == ['"30"^^xsd:long']
+    assert armor.query.facts('acceptedWait(R2, ?)') == []
+
+
+def test_an_ontology_without_the_rule_for_places_is_told_nothing_of_them() -> None:
+    transport = InProcessTransport(ArmorService())
+    armor = ArmorClient('builder', 'map', transport)
+    ontology = PatrolOntology(armor)
+    ontology.build(PLACE, str(DATA / 'surveillance.owl'), 'http://bnc/exp-rob-lab/2022-23', 100)
+    (rule,) = (each for each in armor.query.rules() if 'acceptedWait' in each)
+    armor.manipulation.remove_rule(rule)
+    ontology.record_place('E', 1)
+    found = ontology.snapshot(111.0, RULES, threshold=30.0, own_thresholds={'R1': 10.0})
+    assert found.thresholds == {}
+    assert armor.query.dataprop_b2_ind('urgencyThreshold', 'R1') == []

@@ -126,6 +126,7 @@ class ArmorKnowledge:
         visits: Mapping[str, float],
         interrupt: fsm.Interrupt,
         threshold: float | None = None,
+        own_thresholds: Mapping[str, float] | None = None,
     ) -> Snapshot:
         """Tell the time and what the ontology does not know of ``visits``; ask what follows.
 
@@ -138,6 +139,7 @@ class ArmorKnowledge:
                 not_before=self._whereabouts.stamp,
                 visits=visits,
                 threshold=threshold,
+                own_thresholds=own_thresholds,
                 patience=self._patience,
                 interrupt=interrupt,
             )
