@@ -17,6 +17,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -27,6 +28,7 @@ from std_srvs.srv import SetBool
 
 from surveillance_controllers import conversions
 from surveillance_controllers.controller_parameters import place_zones
+from surveillance_controllers.footprint import Footprint
 from surveillance_controllers.geometry import Points, Pose, Scan, composed
 from surveillance_controllers.motion.command_publisher import STANDSTILL, CommandPublisher
 from surveillance_controllers.motion.holding import STOPPED
@@ -34,6 +36,7 @@ from surveillance_controllers.motion.path_following import (
     Velocity,
     as_forwards,
     room_ahead,
+    safe_turn,
     speed_to_stop,
 )
 from surveillance_controllers.motion.transforms import ScanReader
@@ -44,7 +47,7 @@ from surveillance_runtime.parameters import parameter
 from surveillance_runtime.place.zones import Zones
 from surveillance_runtime.process import run_node
 from surveillance_runtime.profile.check_up import Awaited, findings
-from surveillance_runtime.profile.parameters import declared_frames
+from surveillance_runtime.profile.parameters import declared_frames, robot_footprint
 from surveillance_runtime.robot_base import robot_deceleration, robot_radius
 from surveillance_runtime.state_file import StateFile
 from surveillance_runtime.state_topics import OwnedTopic, StateSubscription
@@ -59,6 +62,8 @@ LONGEST_GUESS = 0.5
 """A pose is carried on by the velocity for at most this time, seconds."""
 LATENCY = 0.15
 """Time between seeing and braking, seconds: a period of the lidar and a half."""
+TURN_DECELERATION = 3.0
+"""With which the base stops turning, rad/s^2."""
 
 
 @dataclass(frozen=True)
@@ -66,6 +71,7 @@ class MonitorSettings:
     """What the monitor allows."""
 
     radius: float = robot_radius()
+    footprint: tuple[float, ...] = robot_footprint()
     margin: float = parameter(0.02, 'Kept free beside the robot, m.', 0.0, 20.0)
     deceleration: float = robot_deceleration()
     longest_silence: float = parameter(
@@ -82,14 +88,23 @@ class MonitorSettings:
         read_only=True,
     )
 
+    @cached_property
+    def body(self) -> Footprint:
+        """The robot's shape."""
+        return Footprint(self.radius, self.footprint)
+
     @property
     def reach(self) -> float:
-        """What is kept free around the robot's centre, metres."""
-        return self.radius + self.margin
+        """Nothing farther from the robot's centre than this comes near a robot that stands, m."""
+        return self.body.circumscribed + self.margin
 
-    def way_to_stand(self, speed: float) -> float:
-        """Return how far the robot goes until it stands, from a speed in m/s; metres."""
-        return abs(speed) * LATENCY + speed**2 / (2.0 * self.deceleration)
+    def way_to_stand(self, velocity: Velocity) -> float:
+        """Return how far the robot goes until it stands and turns no more, metres."""
+        speed = abs(velocity.speed)
+        way = speed * LATENCY + speed**2 / (2.0 * self.deceleration)
+        if self.body.is_round:
+            return way
+        return max(way, speed * (LATENCY + abs(velocity.turn) / (2.0 * TURN_DECELERATION)))
 
 
 def within_limit(wanted: Velocity, pose: Pose, zones: Zones, settings: MonitorSettings) -> Velocity:
@@ -112,10 +127,12 @@ def allowed(wanted: Velocity, seen: Points, settings: MonitorSettings) -> Veloci
         seen: What the lidar saw, robot's frame, shape (n, 2), metres.
         settings: The robot.
     """
+    body, margin = settings.body, settings.margin
     if wanted.speed == 0.0:
-        return wanted  # A round robot that turns on the spot touches nothing.
-    way = settings.way_to_stand(wanted.speed)
-    room = room_ahead(*as_forwards(wanted.speed, wanted.turn, seen), settings.reach, way)
+        top = safe_turn(wanted.turn, seen, body, margin, TURN_DECELERATION, LATENCY)
+        return Velocity(0.0, math.copysign(top, wanted.turn)) if top else Velocity()
+    way = settings.way_to_stand(wanted)
+    room = room_ahead(*as_forwards(wanted.speed, wanted.turn, seen, body), margin, way)
     if room >= way:
         return wanted
     speed = speed_to_stop(room, settings.deceleration, LATENCY)
@@ -195,10 +212,10 @@ class CollisionMonitor(PatrolNode):
             self._seen[topic] = self._lidar.read(message, topic)
             self._note_lidar(topic, message.header.frame_id)
             self._base.hear(topic)
-            allowed_now = self._allowed()
+            now, before = self._allowed(), self._base.wanted
             # Only what cannot wait for the next command.
-            if abs(allowed_now.speed) < abs(self._base.wanted.speed):
-                self._base.command(allowed_now)
+            if abs(now.speed) < abs(before.speed) or abs(now.turn) < abs(before.turn):
+                self._base.command(now)
 
     def _note_lidar(self, topic: str, frame: str) -> None:
         """Warn once of a second lidar on a topic: a scan takes the place of the one before."""
@@ -238,7 +255,7 @@ class CollisionMonitor(PatrolNode):
             return Velocity()
         # While nothing was seen the publisher lets nothing through.
         velocity = self._wanted
-        far = self._settings.reach + self._settings.way_to_stand(velocity.speed)
+        far = self._settings.reach + self._settings.way_to_stand(velocity)
         # Most of the time nothing is so near that the arc must be looked at.
         near = [scan.points for scan in self._seen.values() if _nearest(scan) <= far]
         if (self._zones.keep_out or self._zones.slow) and (pose := self._pose_now()):
@@ -247,7 +264,10 @@ class CollisionMonitor(PatrolNode):
             near += [edges] if len(edges) else []
         if near:
             velocity = allowed(velocity, np.concatenate(near), self._settings)
-        held_back = abs(velocity.speed) < 0.5 * abs(self._wanted.speed)
+        before = self._wanted
+        held_back = abs(velocity.speed) < 0.5 * abs(before.speed) or (
+            before.speed == 0.0 and abs(velocity.turn) < 0.5 * abs(before.turn)
+        )
         if held_back and not self._is_held_back:
             self.get_logger().warn('an obstacle is in the way: the robot is slowed down or stopped')
         self._is_held_back = held_back

@@ -15,6 +15,7 @@ import yaml
 
 from surveillance_controllers.geometry import Scan
 from surveillance_runtime.place.occupancy_grid import Grid, with_walls
+from surveillance_simulation.world.world import World, read_world
 
 
 class Operator:
@@ -121,3 +122,9 @@ def seven_rooms() -> dict[str, Any]:
 def flat() -> Flat:
     """Two rooms and a lidar in them."""
     return Flat()
+
+
+@pytest.fixture
+def seven_rooms_world() -> World:
+    """Provide the seven rooms, as simulated."""
+    return read_world(Path(__file__).parents[2] / 'config' / 'seven_rooms.yaml')

@@ -168,12 +168,22 @@ def test_no_progress_is_noticed_without_anything_in_sight() -> None:
 
 
 def test_a_spin_turns_once() -> None:
-    spin, yaw, turned = Spin(), 2.0, 0.0
+    spin, yaw, turned, now = Spin(), 2.0, 0.0, 0.0
     for _ in range(200):
-        velocity = spin.step(yaw)
+        now += PERIOD
+        velocity = spin.step(yaw, now)
         if spin.done:
             break
         turned += velocity.turn * PERIOD
         yaw = math.remainder(yaw + velocity.turn * PERIOD, math.tau)
     assert turned == pytest.approx(math.tau, abs=0.05)
-    assert spin.step(yaw) == Velocity()
+    assert spin.step(yaw, now) == Velocity()
+
+
+def test_a_spin_that_does_not_go_on_ends() -> None:
+    spin = Spin()
+    steps = 0
+    while not spin.done:
+        spin.step(1.0, steps * PERIOD)
+        steps += 1
+    assert 2.0 < steps * PERIOD < 10.0

@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from surveillance_controllers import geometry
+from surveillance_controllers.footprint import Footprint
 from surveillance_controllers.geometry import composed
 from surveillance_controllers.motion.path_following import (
     DriveParameters,
@@ -138,24 +139,24 @@ def test_a_robot_that_halts_before_a_wall_does_not_do_so_gently() -> None:
 
 def test_what_is_beside_the_way_does_not_stop_the_robot() -> None:
     beside = np.array([[x, side * 0.3] for x in np.arange(-1, 3, 0.05) for side in (-1, 1)])
-    assert room_ahead(beside, 0.0, ROBOT.radius + ROBOT.margin, 2.0) == 2.0
+    assert room_ahead(beside, 0.0, ROBOT.body, ROBOT.margin, 2.0) == 2.0
     follower = PathFollower([[0.0, 0.0], [2.0, 0.0]], ROBOT)
     assert not follower.step((0, 0, 0), beside, PERIOD).blocked
 
 
 def test_room_ahead_is_measured_along_the_arc() -> None:
-    radius, reach = 1.0, 0.2
+    radius, body, margin = 1.0, Footprint(0.15), 0.05
     quarter = np.array([[radius, radius]])
-    room = room_ahead(quarter, 1 / radius, reach, 3.0)
-    assert room == pytest.approx(math.pi / 2 - reach, abs=0.05)
-    assert room_ahead(quarter, -1 / radius, reach, 3.0) == 3.0
-    assert room_ahead(NOTHING, 0.3, reach, 3.0) == 3.0
+    room = room_ahead(quarter, 1 / radius, body, margin, 3.0)
+    assert room == pytest.approx(math.pi / 2 - 0.2, abs=0.05)
+    assert room_ahead(quarter, -1 / radius, body, margin, 3.0) == 3.0
+    assert room_ahead(NOTHING, 0.3, body, margin, 3.0) == 3.0
 
 
 def test_a_robot_that_touches_something_may_leave_it() -> None:
     behind = np.array([[-0.2, 0.0]])
-    assert room_ahead(behind, 0.0, 0.26, 1.0) == 1.0
-    assert room_ahead(-behind, 0.0, 0.26, 1.0) < 0.05
+    assert room_ahead(behind, 0.0, Footprint(0.22), 0.04, 1.0) == 1.0
+    assert room_ahead(-behind, 0.0, Footprint(0.22), 0.04, 1.0) < 0.05
 
 
 def test_acceleration_and_jerk_keep_their_limits_on_a_free_path() -> None:

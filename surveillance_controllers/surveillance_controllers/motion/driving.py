@@ -91,6 +91,10 @@ _STANDS = 0.004
 SPIN_SPEED, SPIN_ACCELERATION = 1.0, 3.0
 """Of one turn on the spot, rad/s and rad/s^2."""
 
+SPIN_PATIENCE = 4.0
+"""A turn on the spot that does not go on for so long ends, seconds: a robot that is not round may
+have no room for it."""
+
 _RECOVERIES = (State.WAITING, State.BACKING, State.LOOKING)
 """What is tried one after the other; after each, another path is asked for."""
 
@@ -200,8 +204,8 @@ class Drive:
 
     def _is_through(self) -> bool:
         """Tell whether an obstacle is on the path ahead."""
-        reach = self._robot.radius + self._robot.margin / 2
-        return not self._follower.is_clear(self._obstacles, reach, self._recovery.look_ahead)
+        margin = self._robot.margin / 2
+        return not self._follower.is_clear(self._obstacles, margin, self._recovery.look_ahead)
 
     def new_path(self, path: ArrayLike) -> None:
         """Go on along another path."""
@@ -326,7 +330,7 @@ class Drive:
     def _back(self, now: float, seen: Points) -> Velocity:
         r = self._recovery
         behind = -seen if len(seen) else seen
-        room = room_ahead(behind, 0.0, self._robot.radius + self._robot.margin, 1.0)
+        room = room_ahead(behind, 0.0, self._robot.body.turned_round, self._robot.margin, 1.0)
         slow = r.back_speed**2 / (2 * self._robot.acceleration) + 0.02
         if self._backed >= r.back_up or room <= slow or now - self._since > 10.0:
             self._begin(State.ASKING, now)
@@ -335,22 +339,32 @@ class Drive:
 
 
 class Spin:
-    """One turn on the spot."""
+    """One turn on the spot; it ends early where the robot cannot turn."""
 
     def __init__(self) -> None:
         self._turned = 0.0
         self._last: float | None = None
+        self._moved_at: float | None = None
+        self._is_stuck = False
 
     @property
     def done(self) -> bool:
-        """Whether the turn is complete, to a degree."""
-        return self._turned >= math.tau - 0.02
+        """Whether the turn is complete, to a degree, or does not go on."""
+        return self._is_stuck or self._turned >= math.tau - 0.02
 
-    def step(self, yaw: float) -> Velocity:
-        """Decide the velocity for the next moment from the robot's yaw, rad."""
-        if self._last is not None:
-            self._turned += angle_between(self._last, yaw)
+    def step(self, yaw: float, now: float) -> Velocity:
+        """Decide the velocity for the next moment.
+
+        Args:
+            yaw: The robot's, rad.
+            now: The time, seconds.
+        """
+        step = 0.0 if self._last is None else angle_between(self._last, yaw)
+        self._turned += step
         self._last = yaw
+        if self._moved_at is None or abs(step) > _STANDS:
+            self._moved_at = now
+        self._is_stuck = now - self._moved_at >= SPIN_PATIENCE
         if self.done:
             return Velocity()
         left = math.tau - self._turned

@@ -243,7 +243,7 @@ class Navigator:
                 limit=self._zones.speed_limit(pose, SLOWING),
             )
         if isinstance(self.task, Spin):
-            return self.task.step(pose[2])
+            return self.task.step(pose[2], now - self._stood)
         return None
 
     def _passed(self, stamp: float) -> float:

@@ -13,13 +13,16 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from surveillance_controllers import geometry
+from surveillance_controllers.footprint import Footprint, poses_on_arc
 from surveillance_controllers.geometry import Points, Pose, angle_between
 from surveillance_runtime.parameters import parameter
+from surveillance_runtime.profile.parameters import robot_footprint
 from surveillance_runtime.robot_base import robot_deceleration, robot_radius
 
 
@@ -45,6 +48,7 @@ class DriveParameters:
     """
 
     radius: float = robot_radius()
+    footprint: tuple[float, ...] = robot_footprint()
     margin: float = parameter(0.04, 'Kept from what the lidar sees, m.', 0.01, 20.0)
     speed: float = parameter(0.6, 'Top speed, m/s.', 0.01, 20.0)
     turn: float = parameter(1.5, 'Top turning speed, rad/s.', 0.01, 20.0)
@@ -63,6 +67,11 @@ class DriveParameters:
     tolerance: float = parameter(0.08, 'The end is reached within this distance, m.', 0.01, 20.0)
     settle: float = 1.0
     latency: float = 0.3
+
+    @cached_property
+    def body(self) -> Footprint:
+        """The robot's shape."""
+        return Footprint(self.radius, self.footprint)
 
 
 @dataclass(frozen=True)
@@ -139,7 +148,9 @@ class PathFollower:
         bearing = math.atan2(target[1] - pose[1], target[0] - pose[0])
         side = angle_between(pose[2], bearing)
         if abs(side) > p.turn_first:
-            return self._guide(*self._turn(side, seen, dt), False, off_path, dt)
+            speed, turn = self._turn(side, seen, dt)
+            stuck = turn == 0.0 and self._velocity.turn == 0.0
+            return self._guide(speed, turn, stuck, off_path, dt)
         distance = max(math.dist(target, position), 1e-6)
         curvature = 2 * math.sin(side) / distance
         wanted = min(
@@ -150,11 +161,11 @@ class PathFollower:
         )
         if abs(curvature) * p.tight_arc > 1:
             wanted /= abs(curvature) * p.tight_arc
-        beside = _nearest(seen) - p.radius
+        beside = float(p.body.gap(*seen.T).min()) if len(seen) else math.inf
         if beside < p.caution:
             wanted *= max(beside, 0.0) / p.caution
         wanted = max(wanted, min(p.creep, self.limit, remaining / max(dt, 1e-6)))
-        safe = self._safe_speed(seen, curvature, math.inf)
+        safe = self._safe_speed(seen, curvature, p.body, math.inf)
         blocked = safe < 0.02
         speed = min(self._sped(min(wanted, safe), dt), safe)
         turn = speed * curvature
@@ -214,12 +225,13 @@ class PathFollower:
         self._velocity = Velocity()
         return Guidance(self._velocity, True, False, off_path)
 
-    def _safe_speed(self, seen: Points, curvature: float, way: float) -> float:
+    def _safe_speed(self, seen: Points, curvature: float, body: Footprint, way: float) -> float:
         """Return the speed from which the robot stops before what it sees on an arc, m/s.
 
         Args:
             seen: Points in the robot's frame, shape (n, 2), metres.
             curvature: Of the arc, 1/m.
+            body: The robot's shape.
             way: How much of the arc is looked at, metres; at most what a stop from top speed takes.
 
         Returns:
@@ -229,7 +241,7 @@ class PathFollower:
         # Braking begins after the latency, and counts on less than the full deceleration.
         a, t = 0.8 * p.acceleration, p.latency
         horizon = min(way, p.speed * t + p.speed**2 / (2 * a) + 0.1)
-        room = room_ahead(seen, curvature, p.radius + p.margin, horizon)
+        room = room_ahead(seen, curvature, body, p.margin, horizon)
         return p.speed if room >= horizon else min(p.speed, speed_to_stop(room, a, t))
 
     def _safely(self, speed: float, turn: float, seen: Points, way: float = math.inf) -> float:
@@ -238,17 +250,17 @@ class PathFollower:
         """
         if speed == 0.0:
             return 0.0
-        safe = self._safe_speed(*as_forwards(speed, turn, seen), way)
+        safe = self._safe_speed(*as_forwards(speed, turn, seen, self.parameters.body), way)
         return math.copysign(min(abs(speed), safe), speed)
 
-    def is_clear(self, obstacles: Points, reach: float, ahead: float) -> bool:
-        """Tell whether the next part of the path keeps away from obstacles.
+    def is_clear(self, obstacles: Points, margin: float, ahead: float) -> bool:
+        """Tell whether the next part of the path keeps the robot away from obstacles.
 
-        What is within reach already counts only where going on brings it closer.
+        What is nearer already counts only where going on brings it closer.
 
         Args:
             obstacles: Points of shape (n, 2), metres, in the path's frame.
-            reach: What it must keep from each, metres.
+            margin: What is kept from each, metres.
             ahead: How much of the path is looked at, metres.
         """
         if not len(obstacles):
@@ -256,8 +268,10 @@ class PathFollower:
         end = min(self.progress + ahead, self.length)
         count = max(2, math.ceil((end - self.progress) / 0.05) + 1)
         way = self._at(np.linspace(self.progress, end, count))
-        gaps = np.hypot(way[:, :1] - obstacles[:, 0], way[:, 1:] - obstacles[:, 1])
-        return bool((gaps >= np.minimum(reach, gaps[0] - 1e-3)).all())
+        steps = np.diff(way, axis=0, append=2 * way[-1:] - way[-2:-1])
+        poses = np.column_stack([way, np.arctan2(steps[:, 1], steps[:, 0])])
+        gaps = self.parameters.body.gap_at(poses, obstacles)
+        return bool((gaps >= np.minimum(margin, gaps[0] - 1e-3)).all())
 
     def halt(self, seen: Points, dt: float) -> Velocity:
         """Brakes to a stand, gently unless something is near.
@@ -282,6 +296,9 @@ class PathFollower:
         p = self.parameters
         top = min(p.turn, math.sqrt(2 * p.turn_acceleration * abs(side)))
         wanted = math.copysign(top, side)
+        # Braking counts on less than the full deceleration, as for the speed.
+        top = safe_turn(wanted, seen, p.body, p.margin, 0.8 * p.turn_acceleration, p.latency)
+        wanted = math.copysign(top, wanted)
         turn = self._ramped(self._velocity.turn, wanted, p.turn_acceleration * dt)
         speed = self._sped(0.0, dt)
         return self._safely(speed, turn, seen), turn
@@ -367,8 +384,11 @@ def speed_to_stop(room: float, deceleration: float, latency: float) -> float:
     return max(0.0, math.sqrt(lost**2 + 2.0 * deceleration * room) - lost)
 
 
-def as_forwards(speed: float, turn: float, seen: Points) -> tuple[Points, float]:
-    """Return what is seen and the curvature of the arc, as for a robot that drives forwards.
+def as_forwards(
+    speed: float, turn: float, seen: Points, body: Footprint
+) -> tuple[Points, float, Footprint]:
+    """Return what is seen, the curvature of the arc and the shape, as of a robot that drives
+    forwards.
 
     One that drives backwards does so in a frame that is turned round: what is seen lies on the
     other side, and it turns to the same one.
@@ -377,24 +397,26 @@ def as_forwards(speed: float, turn: float, seen: Points) -> tuple[Points, float]
         speed: m/s, not 0.
         turn: rad/s.
         seen: Points in the robot's frame, shape (n, 2), metres.
+        body: The robot's shape.
     """
-    return seen if speed > 0.0 else -seen, turn / abs(speed)
+    if speed > 0.0:
+        return seen, turn / speed, body
+    return -seen, turn / -speed, body.turned_round
 
 
-def _nearest(seen: Points) -> float:
-    return float(np.hypot(*seen.T).min()) if len(seen) else math.inf
+def room_ahead(
+    seen: Points, curvature: float, body: Footprint, margin: float, horizon: float
+) -> float:
+    """Return how far the robot can go on an arc before a point comes within a margin of it.
 
-
-def room_ahead(seen: Points, curvature: float, reach: float, horizon: float) -> float:
-    """Return how far the robot can go on an arc before a point comes within `reach` of its centre.
-
-    A point that is within reach already only counts where going on brings it closer, so that a
-    robot that stands too near to something can leave it.
+    A point that is nearer already only counts where going on brings it closer, so that a robot that
+    stands too near to something can leave it.
 
     Args:
         seen: Points in the robot's frame, shape (n, 2), metres.
         curvature: Of the arc, positive to the left, 1/m.
-        reach: Radius to be kept free, metres.
+        body: The robot's shape.
+        margin: Kept free around it, metres.
         horizon: Longest way looked at, metres.
 
     Returns:
@@ -402,26 +424,67 @@ def room_ahead(seen: Points, curvature: float, reach: float, horizon: float) -> 
     """
     if not len(seen):
         return horizon
+    reach = body.circumscribed + margin
     x, y = np.abs(seen.T)
     near = seen[(x <= horizon + reach) & (y <= horizon + reach)]
     if not len(near):
         return horizon
-    way = np.linspace(0.0, horizon, max(2, math.ceil(horizon / 0.04)) + 1)
-    if abs(curvature) < 1e-6:
-        arc = np.stack([way, np.zeros_like(way)], axis=1)
-    else:
-        angle = way * curvature
-        # Beyond a half turn the robot comes back; it will not go that far on one arc.
-        arc = np.stack([np.sin(angle), 1 - np.cos(angle)], axis=1) / curvature
-        arc = arc[np.abs(angle) <= math.pi]
-    gap = np.hypot(near[:, 0] - arc[:, :1], near[:, 1] - arc[:, 1:])
-    hit = gap < np.minimum(reach, gap[0] - 1e-3)
+    count = math.ceil(horizon / 0.04)
+    if not body.is_round:
+        # Its corners swing out.
+        count = max(count, math.ceil(min(horizon * abs(curvature), math.pi) / 0.1))
+    way = np.linspace(0.0, horizon, max(2, count) + 1)
+    # Beyond a half turn the robot comes back; it will not go that far on one arc.
+    arc = poses_on_arc(curvature, way[np.abs(way * curvature) <= math.pi])
+    at = _first_contact(body.gap_at(arc, near), margin)
+    return horizon if at is None else float(at * way[1])
+
+
+def safe_turn(
+    turn: float, seen: Points, body: Footprint, margin: float, deceleration: float, latency: float
+) -> float:
+    """Return how fast the robot may turn on the spot, rad/s, at most as wanted; 0 or more.
+
+    A round robot that turns touches nothing. Of another one the corners swing out: it may turn as
+    fast as it can still stop before a point comes within a margin of it.
+
+    Args:
+        turn: What is wanted, rad/s, anticlockwise.
+        seen: Points in the robot's frame, shape (n, 2), metres.
+        body: The robot's shape.
+        margin: Kept free around it, metres.
+        deceleration: With which it stops turning, rad/s^2.
+        latency: Seconds until it begins to.
+    """
+    wanted = abs(turn)
+    if body.is_round or not wanted or not len(seen):
+        return wanted
+    near = seen[np.hypot(*seen.T) <= body.circumscribed + margin]
+    if not len(near):
+        return wanted
+    horizon = wanted * latency + wanted**2 / (2.0 * deceleration)
+    angles = np.linspace(0.0, horizon, max(2, math.ceil(horizon / 0.04)) + 1)
+    poses = np.column_stack([np.zeros((len(angles), 2)), math.copysign(1.0, turn) * angles])
+    at = _first_contact(body.gap_at(poses, near), margin)
+    if at is None:
+        return wanted
+    return min(wanted, speed_to_stop(float(at * angles[1]), deceleration, latency))
+
+
+def _first_contact(gap: Points, margin: float) -> float | None:
+    """Return at which step a point first comes within a margin, between two of them linearly.
+
+    Args:
+        gap: From the robot to each point with each step, shape (steps, points), metres.
+        margin: Metres; of a point that is nearer at first, only coming nearer counts.
+    """
+    hit = gap < np.minimum(margin, gap[0] - 1e-3)
     hit[0] = False
     blocked = hit.any(axis=1)
     if not blocked.any():
-        return horizon
+        return None
     index = int(np.argmax(blocked))
     before, after = gap[index - 1, hit[index]], gap[index, hit[index]]
-    bound = np.minimum(reach, gap[0, hit[index]])
+    bound = np.minimum(margin, gap[0, hit[index]])
     share = np.clip((before - bound) / np.maximum(before - after, 1e-9), 0.0, 1.0).min()
-    return float(way[index - 1] + share * (way[1] - way[0]))
+    return float(index - 1 + share)

@@ -15,6 +15,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import cv2
 import numpy as np
@@ -83,6 +84,8 @@ class SampledPlanner:
         ).astype(np.float32)
 
         self._manoeuvres = self._known_manoeuvres()
+        # Every 10 cm of its edge is looked at.
+        self._edge = robot.body.outline(0.1).astype(np.float32)
 
     def _known_manoeuvres(self) -> Floats:
         """Return what chance alone seldom draws: stand, back off, swerve; (n, steps, 2)."""
@@ -203,12 +206,28 @@ class SampledPlanner:
     def _of_standing(self, poses: Floats, controls: Floats, away: Floats) -> Floats:
         """Return what coming near to what stands costs, shape (samples,)."""
         p = self._parameters
-        at = np.clip((poses[..., :2] + p.reach) / p.cell, 0, len(away) - 1).astype(np.intp)
-        gaps = away[at[..., 1], at[..., 0]] - self._robot.radius
+        gaps = self._gaps(poses, away)
         moving = np.abs(controls[..., 0]) > 0.02
         touched = (gaps < self._robot.margin + p.cell / 2) & moving
         beside = np.exp(-np.maximum(gaps, 0.0) / 0.1)
         return np.asarray(50.0 * touched.sum(axis=1) + 0.5 * beside.sum(axis=1), np.float32)
+
+    def _gaps(self, poses: Floats, away: Floats) -> Floats:
+        """Return how far the robot is from what stands at each pose, shape (samples, steps)."""
+        p, body = self._parameters, self._robot.body
+        if body.is_round:
+            at = np.clip((poses[..., :2] + p.reach) / p.cell, 0, len(away) - 1).astype(np.intp)
+            return np.asarray(away[at[..., 1], at[..., 0]] - body.radius)
+        cos, sin = np.cos(poses[..., 2]), np.sin(poses[..., 2])
+        least = np.full(poses.shape[:2], np.inf, np.float32)
+        for x, y in self._edge:
+            column = (poses[..., 0] + cos * x - sin * y + p.reach) / p.cell
+            row = (poses[..., 1] + sin * x + cos * y + p.reach) / p.cell
+            last = len(away) - 1
+            at_row = np.clip(row, 0, last).astype(np.intp)
+            at_column = np.clip(column, 0, last).astype(np.intp)
+            np.minimum(least, away[at_row, at_column], out=least)
+        return least
 
     def _of_moving(self, poses: Floats, controls: Floats, movers: Sequence[Mover]) -> Floats:
         """Return what moving near to what moves costs, shape (samples,)."""
@@ -219,8 +238,10 @@ class SampledPlanner:
         for mover in movers:
             x = np.float32(mover.x) + np.float32(mover.vx) * self._ahead.astype(np.float32)
             y = np.float32(mover.y) + np.float32(mover.vy) * self._ahead.astype(np.float32)
-            gaps = np.hypot(poses[..., 0] - x, poses[..., 1] - y)
-            gaps -= np.float32(self._robot.radius + mover.radius)
+            dx, dy = x - poses[..., 0], y - poses[..., 1]
+            if not self._robot.body.is_round:
+                dx, dy = _turned_back(dx, dy, poses[..., 2])
+            gaps = self._robot.body.gap(dx, dy).astype(np.float32) - np.float32(mover.radius)
             wanted = (p.gap + p.gap_growth * self._ahead).astype(np.float32)
             near = 20.0 * (gaps < wanted) + 2.0 * np.exp(-np.maximum(gaps - wanted, 0) / 0.25)
             price += (near * moving * sooner).sum(axis=1)
@@ -255,6 +276,12 @@ def _standing(seen: Points, movers: Sequence[Mover]) -> Points:
         gaps = np.hypot(seen[:, 0] - each.x, seen[:, 1] - each.y) - each.radius
         seen = seen[gaps > MOVER_RIM]
     return seen
+
+
+def _turned_back(x: Any, y: Any, yaw: Any) -> tuple[Any, Any]:
+    """Return vectors in the frame of a robot that looks along `yaw`."""
+    cos, sin = np.cos(yaw), np.sin(yaw)
+    return cos * x + sin * y, cos * y - sin * x
 
 
 def _rolled_out(controls: Floats, step: float) -> Floats:
@@ -295,7 +322,7 @@ def is_safe(
     for mover in movers:
         dx = mover.x + mover.vx * times - x
         dy = mover.y + mover.vy * times - y
-        gaps = np.hypot(dx, dy) - robot.radius - mover.radius
+        gaps = robot.body.gap(*_turned_back(dx, dy, turn)) - mover.radius
         near = gaps < gap
         first = int(near.argmax())
         # Who comes from behind walks into the robot, not the robot into them.

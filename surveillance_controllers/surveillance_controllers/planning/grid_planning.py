@@ -1,7 +1,9 @@
-"""Paths over an occupancy grid for a round robot: inflation, search, smoothing, and what blocks.
+"""Paths over an occupancy grid: inflation, search, smoothing, and what blocks.
 
-The free cells are those whose centre keeps the robot's radius and a margin from everything that is
-not free. Among them, cells near obstacles cost more, so that a path keeps to the middle of a
+The free cells are those whose centre keeps the robot's inscribed radius and a margin from
+everything that is not free. Where the robot is not round, its footprint is checked along the path
+that was found; the cells at which it would touch something are left out, and another path is
+sought. Among them, cells near obstacles cost more, so that a path keeps to the middle of a
 passage where there is room. `grid_search` finds the cheapest way over the eight neighbours.
 Straight shortcuts that are no dearer replace the steps of the grid, and corners are rounded as far
 as the free space allows. A door or an obstacle that comes or goes changes the costs near it alone.
@@ -14,6 +16,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from itertools import pairwise
 
 import cv2
@@ -22,6 +25,7 @@ from numpy.typing import ArrayLike, NDArray
 from skimage.graph import MCP_Geometric
 
 from surveillance_controllers import geometry
+from surveillance_controllers.footprint import Footprint
 from surveillance_controllers.geometry import Points
 from surveillance_controllers.planning.grid_search import Cell, GridSearch
 from surveillance_runtime.parameters import parameter
@@ -29,6 +33,7 @@ from surveillance_runtime.place.floor_plan import Segment
 from surveillance_runtime.place.occupancy_grid import Grid, distance_to, points_on, with_walls
 from surveillance_runtime.place.plan_grid import zone_cells
 from surveillance_runtime.place.zones import NO_ZONES, Zones
+from surveillance_runtime.profile.parameters import robot_footprint
 from surveillance_runtime.robot_base import robot_radius
 
 Lines = Mapping[str, Segment]
@@ -37,6 +42,12 @@ _DEAREST = 20.0
 """No slow zone makes a way dearer than this many times."""
 _BLOCKED = 1e4
 """Cost of a blocked cell in the search for what blocks; more than any detour."""
+
+
+_TRIES = 12
+"""Paths that are tried for a robot that is not round."""
+_DEAR, _DEAR_REACH = 30.0, 0.12
+"""Where it would touch something, cells within this distance, metres, cost so much more."""
 
 
 class NoPathError(Exception):
@@ -61,6 +72,7 @@ class PlanningParameters:
     """
 
     radius: float = robot_radius()
+    footprint: tuple[float, ...] = robot_footprint()
     margin: float = parameter(0.05, 'Kept beyond the radius, m.', 0.0, 20.0)
     comfort: float = parameter(0.5, 'Room that a path prefers, m.', 0.0, 20.0)
     aversion: float = parameter(3.0, 'How much more a path near obstacles costs.', 0.0, 20.0)
@@ -69,6 +81,16 @@ class PlanningParameters:
     waiting: float = 100.0
     corner: float = 0.5
     cruise: float = 0.6
+
+    @cached_property
+    def body(self) -> Footprint:
+        """The robot's shape."""
+        return Footprint(self.radius, self.footprint)
+
+    @property
+    def kept(self) -> float:
+        """What every path keeps around the robot's centre, whichever way it looks, metres."""
+        return self.body.inscribed
 
 
 @dataclass
@@ -102,7 +124,7 @@ class GridPlanner:
                 barred |= zone_cells(self.grid, zone)
             self._static = self._distance(barred)
         self._slower = self._times_longer()
-        self._reach = math.ceil((p.radius + p.margin + p.comfort) / self.grid.resolution) + 1
+        self._reach = math.ceil((p.kept + p.margin + p.comfort) / self.grid.resolution) + 1
         # From what stays, and from everything.
         self._firm, self._clearance = self._static.copy(), self._static.copy()
         self._cost = np.empty(shape, np.float32)
@@ -149,7 +171,7 @@ class GridPlanner:
         """Tell whether the robot can go along a path, shape (n, 2), without touching anything."""
         samples = _samples(np.asarray(path, dtype=float), self.grid.resolution / 2)
         inside = self.grid.contains(self.grid.cells_of(samples)).all()
-        return bool(inside and (self.clearance(samples) >= self.parameters.radius).all())
+        return bool(inside and (self.clearance(samples) >= self.parameters.kept).all())
 
     def plan(self, start: ArrayLike, goal: ArrayLike) -> Points:
         """Find the way from one point to another.
@@ -184,6 +206,30 @@ class GridPlanner:
                 f'no path from {_shown(begin)} to {_shown(end)}: '
                 f'{self._what_blocks(start_cell, goal_cell)}'
             )
+        path = self._found(begin, end, start_cell, goal_cell)
+        if self.parameters.body.is_round:
+            return path
+        dear: list[tuple[tuple[slice, slice], NDArray[np.float32]]] = []
+        touches = begin
+        try:
+            for _ in range(_TRIES):
+                found = self._touches(path)
+                if found is None:
+                    return path
+                touches = found
+                dear.append(self._made_dear(found))
+                path = self._found(begin, end, start_cell, goal_cell)
+        finally:
+            for window, cost in reversed(dear):
+                self._cost[window] = cost
+                self._told_changed(window)
+        raise NoPathError(
+            f'no path from {_shown(begin)} to {_shown(end)}: the robot does not fit through at '
+            f'{_shown(touches)}, whose footprint is {2 * self.parameters.kept:.2f} m wide at least'
+        )
+
+    def _found(self, begin: Points, end: Points, start_cell: Cell, goal_cell: Cell) -> Points:
+        """Return the cheapest path between two points whose cells these are."""
         cells = self._search.way(start_cell, goal_cell)
         path = self.grid.centres_of(cells)
         path[0] = begin if self._is_free_at(begin) else path[0]
@@ -214,6 +260,46 @@ class GridPlanner:
             cells = zone_cells(self.grid, zone)
             longer[cells] = np.maximum(longer[cells], np.float32(times))
         return longer
+
+    def _touches(self, path: Points) -> Points | None:
+        """Return where a robot that looks along the path first touches something, shape (2,).
+
+        It may turn at the start as it likes: which way it looks there is not known.
+        """
+        poses = _poses_along(path, self.grid.resolution / 2)
+        poses = poses[np.hypot(*(poses[:, :2] - path[0]).T) > self.grid.resolution]
+        if not len(poses):
+            return None
+        edge = self.parameters.body.outline(self.grid.resolution)
+        cos, sin = np.cos(poses[:, 2:]), np.sin(poses[:, 2:])
+        x = poses[:, :1] + cos * edge[:, 0] - sin * edge[:, 1]
+        y = poses[:, 1:2] + sin * edge[:, 0] + cos * edge[:, 1]
+        clearance = self.grid.interpolated(self._clearance, np.stack([x.ravel(), y.ravel()], 1))
+        touching = (clearance.reshape(x.shape) < 0.0).any(axis=1)
+        return np.asarray(poses[int(touching.argmax()), :2]) if touching.any() else None
+
+    def _made_dear(self, at: Points) -> tuple[tuple[slice, slice], NDArray[np.float32]]:
+        """Make the cells around a point dear; return which, and what they cost before."""
+        row, column = (int(each) for each in self.grid.cells_of(at)[0])
+        steps = max(2, round(_DEAR_REACH / self.grid.resolution))
+        top, left = max(row - steps, 0), max(column - steps, 0)
+        window = slice(top, row + steps + 1), slice(left, column + steps + 1)
+        before = np.asarray(self._cost[window].copy())
+        rows = np.arange(top, top + len(before))[:, None]
+        columns = np.arange(left, left + before.shape[1])
+        near = (rows - row) ** 2 + (columns - column) ** 2 <= steps**2
+        self._cost[window] = np.where(near & (before > 0), before + np.float32(_DEAR), before)
+        self._told_changed(window)
+        return window, before
+
+    def _told_changed(self, window: tuple[slice, slice]) -> None:
+        rows, columns = self.grid.cells.shape
+        self._search.changed(
+            window[0].start,
+            min(window[0].stop, rows),
+            window[1].start,
+            min(window[1].stop, columns),
+        )
 
     def _distance(self, mask: NDArray[np.bool_]) -> NDArray[np.float32]:
         # From a cell's centre to the edge of the nearest cell that is not free.
@@ -264,7 +350,7 @@ class GridPlanner:
         p = self.parameters
 
         def priced(clearance: NDArray[np.float32]) -> tuple[NDArray[np.bool_], NDArray[np.float32]]:
-            spare = clearance[window] - np.float32(p.radius + p.margin)
+            spare = clearance[window] - np.float32(p.kept + p.margin)
             crowded = np.clip(1 - spare / np.float32(max(p.comfort, 1e-6)), 0, 1)
             return spare >= 0, 1 + np.float32(p.aversion) * crowded * crowded
 
@@ -291,7 +377,7 @@ class GridPlanner:
         return int(cell[0, 0]), int(cell[0, 1])
 
     def _is_free_at(self, point: Points) -> bool:
-        return bool(self.clearance(point)[0] >= self.parameters.radius)
+        return bool(self.clearance(point)[0] >= self.parameters.kept)
 
     def _free_cell_near(self, start: Points) -> Cell:
         at = self._cell('the start', start)
@@ -310,7 +396,7 @@ class GridPlanner:
         """Return the cell nearest to a goal that an obstacle covers, among those of the same room
         that can be reached; the goal's own where there is none, and it may become free.
         """
-        needed = self.parameters.radius + self.parameters.margin
+        needed = self.parameters.kept + self.parameters.margin
         if self._static[cell] >= needed:
             region = self._open & (self._regions == self._regions[start])
             if self._rooms[cell]:  # Else it lies in a door, so in both rooms.
@@ -345,7 +431,7 @@ class GridPlanner:
             return 'lies inside a wall'
         if not self.grid.free[row, column]:
             return 'lies where the map is unknown'
-        needed = self.parameters.radius + self.parameters.margin
+        needed = self.parameters.kept + self.parameters.margin
         near = f'{max(0.0, float(self._clearance[row, column])):.2f} m from '
         if self._walls[row, column] < needed:
             what = 'a wall'
@@ -372,7 +458,7 @@ class GridPlanner:
 
     def _what_blocks(self, start: Cell, goal: Cell) -> str:
         """Name what lies on the path that would be taken if doors and obstacles were not there."""
-        needed = np.float32(self.parameters.radius + self.parameters.margin)
+        needed = np.float32(self.parameters.kept + self.parameters.margin)
         cost = np.where(self._cost > 0, self._cost, np.float32(_BLOCKED))
         cost = np.where(self._walls >= needed, cost, np.float32(-1))
         search = MCP_Geometric(cost)
@@ -457,6 +543,27 @@ class GridPlanner:
                 return np.vstack([curve[:-1:step], curve[-1:]])
             arms = [arm / 2 for arm in arms]
         return corner[None, :]
+
+
+def _poses_along(path: Points, spacing: float) -> Points:
+    """Return x, y, yaw along a path, shape (n, 3); at a corner it turns on the spot."""
+    result: list[Points] = []
+    last: float | None = None
+    for begin, end in pairwise(path):
+        way = end - begin
+        length = float(np.hypot(*way))
+        if length < 1e-9:
+            continue
+        yaw = math.atan2(way[1], way[0])
+        if last is not None:
+            turn = geometry.angle_between(last, yaw)
+            turns = last + turn * np.linspace(0.0, 1.0, max(2, math.ceil(abs(turn) / 0.1) + 1))
+            result.append(np.column_stack([np.tile(begin, (len(turns), 1)), turns]))
+        last = yaw
+        share = np.linspace(0.0, 1.0, max(2, math.ceil(length / spacing) + 1))[:, None]
+        points = begin + share * way
+        result.append(np.column_stack([points, np.full(len(points), yaw)]))
+    return np.concatenate(result) if result else np.zeros((0, 3))
 
 
 def _corners(path: Points) -> NDArray[np.intp]:

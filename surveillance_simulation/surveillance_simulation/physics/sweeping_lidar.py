@@ -64,6 +64,8 @@ class SweepingLidar:
 
     def _turn(self, dt: float) -> None:
         """Measure what the lidars passed over during the last `dt` seconds."""
+        if not self._turning:
+            return
         rays, share = self._model.rays, dt / self._base.physics.sweep
         for mount, turning in list(self._turning.items()):
             turning.unasked += dt

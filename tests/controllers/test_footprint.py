@@ -1,0 +1,152 @@
+"""A robot that is not round: how near things are to it, where it passes, and what it may not do."""
+
+from __future__ import annotations
+
+import math
+
+import cv2
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from surveillance_controllers.collision_monitor_node import MonitorSettings, allowed
+from surveillance_controllers.footprint import Footprint
+from surveillance_controllers.geometry import Scan
+from surveillance_controllers.motion.driving import Drive, State
+from surveillance_controllers.motion.navigator import Navigator
+from surveillance_controllers.motion.path_following import (
+    DriveParameters,
+    Velocity,
+    room_ahead,
+    safe_turn,
+)
+from surveillance_controllers.motion.sampled_planning import SampledPlanner, is_safe
+from surveillance_controllers.motion.tracking import Mover
+from surveillance_controllers.planning.grid_planning import (
+    GridPlanner,
+    NoPathError,
+    PlanningParameters,
+)
+from surveillance_runtime.place import occupancy_grid
+from surveillance_runtime.place.occupancy_grid import Grid
+
+LONG = (0.5, 0.2, -0.3, 0.2, -0.3, -0.2, 0.5, -0.2)
+"""0.8 m long, 0.4 m wide; its wheels are 0.3 m before its rear."""
+WIDE = (0.2, 0.45, -0.2, 0.45, -0.2, -0.45, 0.2, -0.45)
+BODY = Footprint(9.0, LONG)
+
+
+@given(st.floats(-2, 2), st.floats(-2, 2))
+def test_gaps_are_those_that_opencv_measures(x: float, y: float) -> None:
+    corners = np.array(LONG, np.float32).reshape(-1, 1, 2)
+    peer = -cv2.pointPolygonTest(corners, (x, y), True)
+    assert float(BODY.gap(x, y)) == pytest.approx(peer, abs=1e-5)
+
+
+def test_its_radii_are_those_of_nav2() -> None:
+    assert BODY.inscribed == pytest.approx(0.2)
+    assert BODY.circumscribed == pytest.approx(math.hypot(0.5, 0.2))
+    clockwise = Footprint(9.0, tuple(np.array(LONG).reshape(-1, 2)[::-1].ravel()))
+    assert clockwise.gap(1.0, 0.0) == pytest.approx(0.5)
+    assert BODY.turned_round.gap(1.0, 0.0) == pytest.approx(0.7)
+    outline = BODY.outline(0.1)
+    assert BODY.gap(*outline.T) == pytest.approx(0.0, abs=1e-9)
+
+
+def test_it_drives_closely_past_what_a_disc_around_it_would_touch() -> None:
+    beside = np.array([[x, side * 0.26] for x in np.arange(-1, 3, 0.05) for side in (-1, 1)])
+    assert room_ahead(beside, 0.0, BODY, 0.04, 2.0) == 2.0
+    ahead = np.array([[1.0, 0.0]])
+    assert room_ahead(ahead, 0.0, BODY, 0.04, 2.0) == pytest.approx(0.46, abs=0.01)
+    assert room_ahead(ahead, 0.0, BODY.turned_round, 0.04, 2.0) == pytest.approx(0.66, abs=0.01)
+
+
+def test_its_corners_swing_out_in_a_turn() -> None:
+    beside = np.array([[0.42, 0.32]])
+    assert safe_turn(1.0, beside, BODY, 0.02, 3.0, 0.15) < 0.9
+    assert safe_turn(-1.0, beside, BODY, 0.02, 3.0, 0.15) == 1.0
+    assert safe_turn(1.0, beside, Footprint(0.2), 0.02, 3.0, 0.15) == 1.0
+    settings = MonitorSettings(footprint=LONG)
+    assert allowed(Velocity(0.0, 1.0), beside, settings).turn < 0.9
+    assert allowed(Velocity(0.0, -1.0), beside, settings) == Velocity(0.0, -1.0)
+    slow = allowed(Velocity(0.3, 1.5), beside, settings)
+    assert slow.speed < 0.25
+    assert slow.turn == pytest.approx(5 * slow.speed)
+
+
+def corridor(width: float, corner: bool) -> Grid:
+    """Return a corridor along y = 0 from x = -3 to 3, with a turn to the north at its end."""
+    side = 0.05
+    y, x = np.mgrid[-60:60, -70:70] * side + side / 2
+    free = (np.abs(y) < width / 2) & (x > -3) & (x < 3)
+    if corner:
+        free |= (y > -width / 2) & (x < 3) & (x > 3 - width)
+    return Grid(np.where(free, 0, 100).astype(np.int8), side, (-70 * side, -60 * side))
+
+
+def planner(grid: Grid, footprint: tuple[float, ...]) -> GridPlanner:
+    return GridPlanner(grid, PlanningParameters(footprint=footprint, margin=0.04))
+
+
+def test_paths_lead_where_its_footprint_fits_and_not_where_it_does_not() -> None:
+    straight, bent = corridor(0.6, corner=False), corridor(0.7, corner=True)
+    assert len(planner(straight, LONG).plan((-2, 0), (2, 0))) >= 2
+    with pytest.raises(NoPathError, match='does not fit through at'):
+        planner(straight, WIDE).plan((-2, 0), (2, 0))
+    with pytest.raises(NoPathError, match='does not fit through at'):
+        planner(bent, LONG).plan((-2, 0), (2.65, 2))
+    small = (0.2, 0.15, -0.2, 0.15, -0.2, -0.15, 0.2, -0.15)
+    path = planner(bent, small).plan((-2, 0), (2.65, 2))
+    again = planner(bent, small)
+    again.plan((-2, 0), (2.65, 2))
+    # What one search made dear is not dear for the next one.
+    assert np.array_equal(again.plan((-2, 0), (2.65, 2)), path)
+
+
+def test_among_people_it_keeps_its_whole_length_from_them() -> None:
+    robot = DriveParameters(footprint=LONG)
+    person = Mover(1.0, 0.0, 0.0, 0.0, 0.2)
+    assert not is_safe(Velocity(0.6, 0.0), [person], robot)
+    assert is_safe(Velocity(0.6, 0.0), [person], DriveParameters(radius=0.2))
+    path = np.stack([np.arange(0, 2.5, 0.1), np.zeros(25)], axis=1)
+    walls = np.array([[x, side * 0.3] for x in np.arange(-2, 3, 0.05) for side in (-1, 1)])
+    local = SampledPlanner(robot)
+    velocity = Velocity()
+    for _ in range(5):
+        velocity = local.step(path, walls, [Mover(2.5, 0.0, 0.5, 0.0, 0.2)], velocity, 0.1)
+    assert velocity.speed > 0.1
+
+
+def test_a_long_robot_drives_through_doors_of_a_foreign_physics_without_a_contact(
+    seven_rooms_world: object,
+) -> None:
+    pytest.importorskip('mujoco')
+    from surveillance_simulation.physics.model import PhysicsModel
+    from surveillance_simulation.robot.base import BaseModel
+    from surveillance_simulation.robot.robot import Robot
+    from surveillance_simulation.world.world import World
+
+    world = seven_rooms_world
+    assert isinstance(world, World)
+    physics = PhysicsModel(footprint=LONG, friction=0.5, sweep=0.0)
+    robot = Robot(world, BaseModel(radius=BODY.circumscribed), physics=physics)
+    grid = occupancy_grid.draw(world.plan)
+    paths, parameters = planner(grid, LONG), DriveParameters(footprint=LONG)
+    navigator = Navigator()
+    navigator.set_map(grid)
+    goal = world.plan.place.positions['R1'][:2]
+    drive = Drive(paths.plan(robot.base.pose[:2], goal), parameters)
+    navigator.move(robot.base.odometry, 0.0)
+    navigator.task = drive
+    while not drive.state.ended and robot.time < 60.0:
+        told = robot.measure()
+        assert told is not None
+        scan = Scan(robot.lidar.angles, np.asarray(told.ranges, float), 8.0)
+        velocity = navigator.see(scan, robot.time) or Velocity()
+        robot.base.command(velocity.speed, velocity.turn)
+        robot.advance(0.1)
+        navigator.move(robot.base.odometry, robot.time)
+    assert drive.state is State.ARRIVED, drive.reason
+    assert world.place_at(*robot.base.pose[:2]) == 'R1'
+    assert robot.base.collisions == 0
