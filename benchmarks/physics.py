@@ -66,9 +66,9 @@ def patrol(robot: Robot, seconds: float, seed: int) -> Outcome:
     rng = np.random.default_rng(seed)
     grid = plan_grid.draw(world.plan)
     doors = {door.name: door.segment for door in world.plan.doors.values()}
-    limits = {'radius': robot.base.model.radius}
-    planner = GridPlanner(grid, PlanningParameters(**limits), doors=doors)
-    navigator, parameters = Navigator(doors), DriveParameters(**limits)
+    radius = robot.base.model.radius
+    planner = GridPlanner(grid, PlanningParameters(radius=radius), doors=doors)
+    navigator, parameters = Navigator(doors), DriveParameters(radius=radius)
     navigator.set_map(grid)
     readings = OdometryBuffer()
     amcl = Amcl(grid, robot.base.pose, np.random.default_rng(seed))
