@@ -28,7 +28,7 @@ from surveillance_controllers.planning.grid_planning import (
     NoPathError,
     PlanningParameters,
 )
-from surveillance_runtime.place import occupancy_grid
+from surveillance_runtime.place import plan_grid
 from surveillance_runtime.place.occupancy_grid import Grid
 
 LONG = (0.5, 0.2, -0.3, 0.2, -0.3, -0.2, 0.5, -0.2)
@@ -131,7 +131,7 @@ def test_a_long_robot_drives_through_doors_of_a_foreign_physics_without_a_contac
     assert isinstance(world, World)
     physics = PhysicsModel(footprint=LONG, friction=0.5, sweep=0.0)
     robot = Robot(world, BaseModel(radius=BODY.circumscribed), physics=physics)
-    grid = occupancy_grid.draw(world.plan)
+    grid = plan_grid.draw(world.plan)
     paths, parameters = planner(grid, LONG), DriveParameters(footprint=LONG)
     navigator = Navigator()
     navigator.set_map(grid)

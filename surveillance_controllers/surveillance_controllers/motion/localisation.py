@@ -66,9 +66,10 @@ class LocalisationParameters:
         same_way: A pose that is turned by more than this looks elsewhere, rad.
         alike: A pose that explains less than the one taken, by at most this, is a rival.
         most_rivals: At most so many are kept.
-        rival_wins: A rival that explained so much more, summed over scans, is taken instead;
+        rival_wins: A rival that explained so much more, summed over scans, is taken instead,
+        equal_wins: or this much more, if it was as likely as the present pose;
         rival_loses: one that explained so much less is forgotten.
-        forgotten: This part of the sum with each scan.
+        forgotten: This part of the sum with each scan that tells something.
         noise: Of two poses that explain a scan as well the one explains this much more by chance;
             no more than that counts for nothing.
         standing: Of a robot that stands this part of the difference counts,
@@ -107,6 +108,7 @@ class LocalisationParameters:
     alike: float = 0.1
     most_rivals: int = 40
     rival_wins: float = 0.8
+    equal_wins: float = 0.3
     rival_loses: float = 0.5
     forgotten: float = 0.1
     noise: float = 0.05
@@ -294,8 +296,9 @@ class Localiser:
             explained = self.explained(rival.pose, thin.thinned(p.cast_rays))
             more = explained - agreement
             if moves:
-                rival.lead *= 1.0 - p.forgotten
-                rival.lead += more if abs(more) > p.noise else 0.0
+                # What tells nothing makes nothing forgotten, either.
+                if abs(more) > p.noise:
+                    rival.lead += more - p.forgotten * rival.lead
                 if plausible and not rival.is_equal:
                     rival.lead -= p.challenger
             elif abs(more) >= p.standing_from:
@@ -304,7 +307,7 @@ class Localiser:
                 rival.lead = -math.inf
             elif (
                 (rival.is_equal or not plausible)
-                and rival.lead >= p.rival_wins
+                and rival.lead >= (p.equal_wins if rival.is_equal else p.rival_wins)
                 and (best is None or rival.lead > best[0].lead)
             ):
                 best = rival, explained
@@ -367,7 +370,8 @@ class Localiser:
             self.jumps += 1
             self._settle(*found)
             self._shaken = False
-            self._rivals = self._alike(candidates)
+            # Somebody may only have stood in the way: where it was until now stays likely.
+            self._rivals = [_Rival(corrected, agreement - found[1]), *self._alike(candidates)]
         elif found is not None and self._follow(candidates, agreement) and self._rounds < p.rounds:
             self._rounds += 1
         elif agreement >= p.lost_below:
