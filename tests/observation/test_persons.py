@@ -8,10 +8,18 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+import skimage
+from numpy.typing import NDArray
 
 from surveillance_perception.observation.persons import PersonFinder, load_finder
 
-DATA = Path(str(importlib.util.find_spec('skimage').submodule_search_locations[0])) / 'data'
+DATA = Path(skimage.__file__).parent / 'data'
+
+
+def photograph(name: str) -> NDArray[np.uint8]:
+    picture = cv2.imread(str(DATA / f'{name}.png'))
+    assert picture is not None
+    return picture.astype(np.uint8)
 
 
 def finder() -> PersonFinder:
@@ -24,17 +32,17 @@ def finder() -> PersonFinder:
 
 def test_persons_are_found_in_photographs_and_in_no_other():
     find = finder().find
-    found = {name: find(cv2.imread(str(DATA / f'{name}.png'))) for name in ('astronaut', 'coffee')}
+    found = {name: find(photograph(name)) for name in ('astronaut', 'coffee')}
     assert len(found['astronaut']) == 1
     left, top, width, height = found['astronaut'][0].box
     assert left <= 224 <= left + width
     assert top <= 110 + 100 <= top + height
     for name in ('coffee', 'chelsea', 'brick', 'grass', 'motorcycle_left', 'coins', 'clock_motion'):
-        assert not find(cv2.imread(str(DATA / f'{name}.png'))), name
+        assert not find(photograph(name)), name
 
 
 def test_a_small_picture_of_a_person_in_a_wide_one_is_found_where_it_is():
-    person = cv2.resize(cv2.imread(str(DATA / 'astronaut.png')), (240, 240))
+    person = cv2.resize(photograph('astronaut'), (240, 240))
     scene = np.full((480, 1280, 3), 127, np.uint8)
     scene[200:440, 900:1140] = person
     (found,) = finder().find(scene)

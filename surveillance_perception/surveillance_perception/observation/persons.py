@@ -192,7 +192,8 @@ def _box(
     limits = np.array([picture.shape[1], picture.shape[0]])
     start = np.clip(np.floor(low), 0, limits).astype(int)
     end = np.clip(np.ceil(high), 0, limits).astype(int)
-    left, top, right, bottom = *start.tolist(), *end.tolist()
+    left, top = (int(each) for each in start)
+    right, bottom = (int(each) for each in end)
     return left, top, right - left, bottom - top
 
 

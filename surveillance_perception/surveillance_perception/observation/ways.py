@@ -66,7 +66,7 @@ class Ways:
         grid: Grid,
         radius: float,
         doors: Mapping[str, Segment],
-        points: Mapping[str, Sequence[float]],
+        points: Mapping[str, Sequence[float] | NDArray[np.float64]],
     ) -> None:
         self._grid = grid
         self._radius = radius
@@ -128,7 +128,7 @@ class Ways:
         return bool(first & second)
 
     def _labels_at(
-        self, labels: NDArray[np.int32], corner: tuple[int, int], point: tuple[float, float]
+        self, labels: NDArray[np.integer], corner: tuple[int, int], point: tuple[float, float]
     ) -> set[int]:
         """Return the areas within reach of a point, in its own room."""
         room = self._grid.at(self._rooms, *point)
