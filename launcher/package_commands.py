@@ -28,6 +28,10 @@ COMMANDS = {
     'replay': ('surveillance_operator.replay', 'show a recorded mission in a browser'),
     'report': ('surveillance_operator.report', 'write what a mission did into one HTML file'),
     'map': ('surveillance_operator.map_command', 'check a place and draw it as a picture'),
+    'edit': (
+        'surveillance_operator.place_page.edit_command',
+        'change a place in a browser: rooms, doors, zones, rules',
+    ),
     'import': ('surveillance_operator.import_command', 'make a place of a map'),
     'detect': ('surveillance_perception.detect_command', 'find ArUco markers in pictures'),
     'check-behaviour': (

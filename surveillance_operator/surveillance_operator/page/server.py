@@ -71,6 +71,7 @@ class Page:
             empty: there is no proxy.
         token: What gives access; one is made unless given.
         replay: Whether a recording is shown: then anybody who may look may move in time.
+        front: The document at the address itself, a file of `static`.
         report: Told one line about a request that failed, and about what was no request of HTTP;
             keep the number of lines small, anybody can send them.
 
@@ -91,12 +92,14 @@ class Page:
         origin: str = '',
         token: str = '',
         replay: bool = False,
+        front: str = 'index.html',
         report: Callable[[str], Any] = lambda _: None,
     ) -> None:
         self._hub = hub
         self._questions, self._actions = questions, actions
         self._picture = picture
         self._replay = replay
+        self._front = front
         self.token = token or secrets.token_urlsafe(24)
         self._socket = _bound(host, port)
         self.port: int = self._socket.getsockname()[1]
@@ -108,6 +111,7 @@ class Page:
         self._cookie = f'mission_{self.port}'
         routes = [
             Route('/', self._index),
+            Route('/edit', self._edit),
             Route('/events', self._events),
             Route('/camera.jpg', self._camera),
             Route('/ask/{name}', self._ask),
@@ -185,10 +189,20 @@ class Page:
                 max_age=30 * 86400,
             )
             return answer
-        text = (STATIC / 'index.html').read_text(encoding='utf-8')
+        return self._document(request, self._front)
+
+    async def _edit(self, request: Request) -> Response:
+        if 'place' not in self._questions:
+            return PlainTextResponse('there is no place to be edited here', 404)
+        return self._document(request, 'edit.html')
+
+    def _document(self, request: Request, name: str) -> Response:
+        text = (STATIC / name).read_text(encoding='utf-8')
         kind = 'replay' if self._replay else 'live'
         may_act = bool(self._actions) and (self._replay or self._has_token(request))
-        text = text.replace('data-kind=""', f'data-kind="{kind}" data-control="{int(may_act)}"')
+        may_edit = may_act and 'place' in self._questions
+        attributes = f'data-kind="{kind}" data-control="{int(may_act)}" data-edit="{int(may_edit)}"'
+        text = text.replace('data-kind=""', attributes)
         return Response(text, media_type='text/html')
 
     async def _events(self, _request: Request) -> Response:

@@ -160,6 +160,7 @@ function camera() {
   next.src = `/camera.jpg?${Date.now()}`;
 }
 
+$('edit-link').hidden = root.dataset.edit !== '1';
 document.body.classList.toggle('replay', replaying);
 $('replay').hidden = !replaying;
 for (const each of document.querySelectorAll('.control')) each.hidden = !may || replaying;

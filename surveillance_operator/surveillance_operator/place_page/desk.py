@@ -1,0 +1,170 @@
+"""One place that people edit in their browsers: what they see of it, and what they can do.
+
+The browser draws and sends; what a change means is decided here, by a `PlaceEditor`.
+"""
+
+from __future__ import annotations
+
+import base64
+import io
+import math
+import threading
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+from PIL import Image, ImageColor
+
+from surveillance_operator.page.server import Action
+from surveillance_runtime.place.patrol_rules import CLASSES
+from surveillance_runtime.place.plan_grid import draw
+from surveillance_runtime.place_editor import PlaceEditor
+
+_MOST_PIXELS = 1_500_000
+"""The picture of a larger map shows several cells as one pixel."""
+_UNKNOWN, _WALL, _FIRST = 0, 1, 3
+_FLOOR = 2
+_COLOURS = (
+    *('#fbe3d4', '#d9ecd2', '#d6e6f7', '#f6efc4', '#e7dcf3', '#cfeeea', '#f7d9e3', '#e3e6d0'),
+)
+
+
+class PlaceDesk:
+    """Lets any number of browsers edit one place, one change after the other.
+
+    Args:
+        editor: The place.
+        on_saved: Told when the file was written; returns what else there is to say.
+    """
+
+    def __init__(
+        self, editor: PlaceEditor, on_saved: Callable[[PlaceEditor], str] = lambda _: ''
+    ) -> None:
+        self._editor = editor
+        self._on_saved = on_saved
+        self._lock = threading.Lock()
+
+    @property
+    def questions(self) -> dict[str, Action]:
+        """What whoever may look can ask, by name."""
+        return {'place': self._place, 'room_at': self._room_at}
+
+    @property
+    def actions(self) -> dict[str, Action]:
+        """What whoever may act can do, by name."""
+        editor = self._editor
+        return {
+            'edit': lambda operation, fields: self._done(lambda: editor.apply(operation, fields)),
+            'check_edit': self._check,
+            'undo_edit': lambda: self._done(editor.undo),
+            'redo_edit': lambda: self._done(editor.redo),
+            'reload_place': lambda: self._done(editor.reload),
+            'save_place': lambda: self._done(self._save),
+        }
+
+    def _place(self) -> dict[str, Any]:
+        with self._lock:
+            return {'ok': True, 'place': shown(self._editor)}
+
+    def _room_at(self, x: str, y: str) -> dict[str, Any]:
+        at = float(x), float(y)
+        if not all(map(math.isfinite, at)):
+            raise ValueError(f'({x}, {y}): expected two numbers')
+        with self._lock:
+            return {'ok': True, 'room': self._editor.now.regions.room_at(*at)}
+
+    def _check(self, operation: str, fields: Mapping[str, Any]) -> dict[str, Any]:
+        with self._lock:
+            return {'ok': True, 'problem': self._editor.problem_with(operation, fields)}
+
+    def _save(self) -> str:
+        said = self._editor.save()
+        more = self._on_saved(self._editor)
+        return f'{said}; {more}' if more else said
+
+    def _done(self, change: Callable[[], str]) -> dict[str, Any]:
+        with self._lock:
+            said = change()
+            return {'ok': True, 'text': said, 'place': shown(self._editor)}
+
+
+def shown(editor: PlaceEditor) -> dict[str, Any]:
+    """Return what a browser draws of a place: plain values for JSON, metres and rad."""
+    now = editor.now
+    plan, rules, described = now.plan, now.rules, now.described
+    place, hours = plan.place, described.get('hours', {})
+    return {
+        'file': str(editor.path),
+        'changed': editor.is_changed,
+        'undo': editor.undoable,
+        'redo': editor.redoable,
+        'picture': _picture(editor),
+        'rooms': {
+            room: {
+                'point': list(place.positions[room][:2]),
+                'doors': list(doors),
+                'class': rules.classes.get(room, ''),
+                'by_doors': CLASSES[len(doors) > 1],
+                'threshold': rules.thresholds.get(room),
+                'exploration': rules.exploration.get(room),
+                'hours': hours.get(room, ''),
+                'keep_out': room in rules.calendar.keep_out,
+            }
+            for room, doors in place.rooms.items()
+        },
+        'doors': {
+            name: {
+                'at': [door.x, door.y, door.yaw, door.width],
+                'line': list(door.segment),
+                'joins': list(place.doors[name]),
+            }
+            for name, door in plan.doors.items()
+        },
+        'zones': {
+            zone.name: {
+                'kind': 'slow' if zone.speed is not None else 'keep_out',
+                'corners': [list(corner) for corner in zone.corners],
+                'speed': zone.speed,
+            }
+            for zone in (*plan.zones.keep_out.values(), *plan.zones.slow.values())
+        },
+        'stations': {room: list(station.pose) for room, station in plan.stations.items()},
+        'markers': {
+            each.name: {'id': each.id, 'at': [each.x, each.y, each.z, each.yaw]}
+            for each in plan.markers.values()
+        },
+        'start': place.start,
+        'quiet_hours': described.get('quiet_hours', ''),
+        'time_zone': described.get('time_zone', ''),
+    }
+
+
+def _picture(editor: PlaceEditor) -> dict[str, Any]:
+    """Return rooms and walls as a PNG, and what it covers: west, south, east, north, metres."""
+    regions, plan = editor.now.regions, editor.now.plan
+    grid = regions.grid
+    labels, names = regions.numbers()
+    order = {name: index for index, name in enumerate(plan.place.rooms)}
+    value = np.zeros(max([*names, int(labels.max()), 0]) + 1, np.uint8)
+    for number, name in names.items():
+        value[number] = _FIRST + order[name] % len(_COLOURS) if name in order else _FLOOR
+    open_grid = draw(plan) if plan.is_enclosed else grid
+    cells = np.where(open_grid.free, _FLOOR, _UNKNOWN).astype(np.uint8)
+    same = open_grid.cells.shape == labels.shape and plan.is_enclosed
+    if same:
+        cells = np.where(open_grid.free & (labels >= 0), value[np.maximum(labels, 0)], cells)
+    step = math.ceil(math.sqrt(cells.size / _MOST_PIXELS))
+    rows, columns = (size // step * step for size in cells.shape)
+    blocks = open_grid.occupied[:rows, :columns].reshape(rows // step, step, columns // step, step)
+    pixels = cells[:rows:step, :columns:step].copy()
+    pixels[blocks.any(axis=(1, 3))] = _WALL
+    image = Image.fromarray(np.ascontiguousarray(pixels[::-1]), 'P')
+    palette = ['#808080', '#3a4350', '#ffffff', *_COLOURS]
+    image.putpalette([part for colour in palette for part in ImageColor.getrgb(colour)[:3]])
+    data = io.BytesIO()
+    image.save(data, 'PNG', transparency=_UNKNOWN, optimize=False)
+    coded = base64.b64encode(data.getvalue()).decode('ascii')
+    return {
+        'png': f'data:image/png;base64,{coded}',
+        'box': list(open_grid.box(0, 0, rows, columns)),
+    }

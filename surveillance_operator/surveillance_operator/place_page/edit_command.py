@@ -1,0 +1,79 @@
+"""The command `edit`: a place in the browser, to be changed and saved."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from surveillance_ontology.patrol_ontology import checked_names
+from surveillance_operator.page.hub import Hub
+from surveillance_operator.page.server import Page
+from surveillance_operator.place_page.desk import PlaceDesk
+from surveillance_runtime.command_line import EXIT_BAD_INPUT, CommandParser
+from surveillance_runtime.place_editor import PlaceEditor
+from surveillance_runtime.robot_base import ROBOT_RADIUS
+
+
+def _parse(argv: Sequence[str] | None) -> argparse.Namespace:
+    parser = CommandParser(
+        prog='launch.py edit',
+        description='Shows a place in a browser: rooms, doors, zones, stations and rules can be '
+        'changed there and saved.',
+    )
+    parser.add_argument('place', type=Path, metavar='PLACE', help="the place's file")
+    parser.add_argument(
+        '--web-address',
+        default='127.0.0.1:0',
+        metavar='HOST:PORT',
+        help='where to serve the page (default: this machine alone, any port)',
+    )
+    parser.add_argument(
+        '--robot-radius',
+        type=float,
+        default=ROBOT_RADIUS,
+        metavar='M',
+        help=f'radius of the robot, metres (default: {ROBOT_RADIUS:g})',
+    )
+    options = parser.parse_args(argv)
+    if not 0.01 <= options.robot_radius <= 5.0:
+        parser.error(f'--robot-radius {options.robot_radius:g}: expected 0.01 to 5')
+    host, _, port = options.web_address.rpartition(':')
+    if not host or not port.isdecimal() or int(port) > 65535:
+        parser.error(f'--web-address {options.web_address}: expected HOST:PORT')
+    options.host, options.port = host.strip('[]'), int(port)
+    return options
+
+
+def editor_page(place: Path, host: str, port: int, radius: float, token: str = '') -> Page:
+    """Return the page on which a place is edited, not started yet.
+
+    Raises:
+        FileError: The file cannot be read or is no sound place.
+        OSError: The address cannot be used.
+    """
+    desk = PlaceDesk(PlaceEditor(place, radius=radius, more_checks=checked_names))
+    return Page(
+        Hub(),
+        questions=desk.questions,
+        actions=desk.actions,
+        host=host,
+        port=port,
+        token=token,
+        front='edit.html',
+        report=lambda line: print(f'edit: {line}', file=sys.stderr),
+    )
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Serve the page until Ctrl-C; the exit code is 2 for bad input."""
+    options = _parse(argv)
+    try:
+        page = editor_page(options.place, options.host, options.port, options.robot_radius)
+    except (ValueError, OSError) as error:
+        print(f'edit: {error}', file=sys.stderr)
+        return EXIT_BAD_INPUT
+    print(f'{options.place} is shown at {page.address} (Ctrl-C ends)', flush=True)
+    page.run()
+    return 0
