@@ -27,6 +27,8 @@ from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import Image, JointState, LaserScan
 from std_msgs.msg import String
 
+from state_machines import Interrupt
+from state_machines.ros import CallError, ServiceCaller
 from state_machines.ros.waiting import reported
 from surveillance_controllers import conversions
 from surveillance_controllers.controller_parameters import door_segments, place_positions
@@ -34,8 +36,14 @@ from surveillance_controllers.geometry import Scan, composed, relative
 from surveillance_controllers.motion.place_locator import PlaceLocator
 from surveillance_controllers.motion.transforms import ScanReader
 from surveillance_interfaces.msg import MarkerDetectionArray, RobotPlace
-from surveillance_interfaces.srv import ConsoleCommand
-from surveillance_ontology.patrol_ontology import ROBOT
+from surveillance_interfaces.srv import ConsoleCommand, ReferenceName
+from surveillance_ontology.armor_client import (
+    ArmorClient,
+    ArmorServiceCallError,
+    ArmorServiceInternalError,
+)
+from surveillance_ontology.event_facts import EventFact, EventOntology, Sighting
+from surveillance_ontology.patrol_ontology import LONGEST_THRESHOLD, ROBOT
 from surveillance_perception.conversions import image_from_ros
 from surveillance_perception.marker_registry import read_registry
 from surveillance_perception.observation.answers import answered
@@ -44,7 +52,7 @@ from surveillance_perception.observation.evidence import EvidenceStore
 from surveillance_perception.observation.observations import Observation
 from surveillance_perception.observation.persons import Person, load_finder
 from surveillance_perception.observation.reference_views import ReferenceViews, Viewpoint
-from surveillance_perception.observation.watch_rules import DEFAULT_RULES, read_watch_file
+from surveillance_perception.observation.watch_rules import DEFAULT_RULES, Level, read_watch_file
 from surveillance_perception.observation.watcher import Look, Watcher
 from surveillance_perception.observation.ways import Ways
 from surveillance_runtime.conversions import (
@@ -74,6 +82,9 @@ MOST_CELLS = 25_000_000
 MOST_PIXELS = 20_000_000
 STILL = 0.02
 """The camera stands where neither metres nor radians change by more between two messages."""
+FACTS_PERIOD = 10.0
+"""Seconds after which it is looked whether the ontology still has the events."""
+_GOING_ON = (EventState.OPEN, EventState.ACKNOWLEDGED)
 MOST_TOLD = 200
 """So many events are published, the newest."""
 
@@ -97,6 +108,22 @@ class ObserverSettings:
     markers_file: str = parameter(
         '',
         'What markers stand for: any other one is unknown; empty: each that is seen is known.',
+    )
+    verify_seconds: float = parameter(
+        20.0,
+        'An alert that one look alone does not make sure waits so long for a second one, s.',
+        0.0,
+        3600.0,
+    )
+    facts: bool = parameter(True, 'Whether events become facts of the ontology.')
+    alert_threshold: int = parameter(
+        60,
+        'While an alert is open its place is URGENT after so long without a visit, s.',
+        0,
+        LONGEST_THRESHOLD,
+    )
+    peer_timeout: float = parameter(
+        10.0, 'How long map builder and ontology may take to answer, s of real time.', 0.1, 3600.0
     )
     radius: float = robot_radius()
     camera: bool = parameter(True, 'Whether pictures are looked at.')
@@ -128,8 +155,13 @@ class Observer(PatrolNode):
         self._observations = self.create_publisher(String, 'observations', QoSProfile(depth=100))
         self._events = OwnedTopic(self, String, 'events')
         self._looks = OwnedTopic(self, String, 'looks')
+        self._doubts = OwnedTopic(self, String, 'doubts')
+        self._doubted: list[dict[str, Any]] = []
         self._last_looks: dict[str, Look] = {}
         self._said = ''
+        self._facts: list[EventFact] = []
+        self._facts_changed = Interrupt()
+        self._robot = self.get_namespace().strip('/') or ROBOT
         self.sweeps = 0
         self._told: dict[int, EventState] = {}
         self._book = EventBook(told=self._on_event)
@@ -139,7 +171,7 @@ class Observer(PatrolNode):
             local=datetime.fromtimestamp,
             tell=self._on_observation,
             alert=self._on_alert,
-            robot=self.get_namespace().strip('/') or ROBOT,
+            robot=self._robot,
             doors=self._doors,
             markers=self._known_markers(),
             rooms=self._places,
@@ -148,6 +180,7 @@ class Observer(PatrolNode):
             looked=self._on_look,
             store=self._store(),
             views=self._views(),
+            verify_seconds=self._settings.verify_seconds,
         )
         self._kept = KeptFile(self._settings.state_file, 'starting without it')
         self._complain(self._kept.read(self._watcher.restore))
@@ -186,6 +219,9 @@ class Observer(PatrolNode):
         self.create_timer(KEEP_PERIOD, lambda: self._later(self._keep))
         self._publish_events()
         self.spawn(self._watch, 'observer')
+        if self._settings.facts:
+            self.stopping.subscribe(self._facts_changed.set)
+            self.spawn(self._tell_facts, 'facts')
 
     def on_stop(self) -> None:
         """End the worker, which writes the state first."""
@@ -378,7 +414,20 @@ class Observer(PatrolNode):
         self._watcher.picture(np.asarray(image, np.uint8), viewpoint, stamp, markers)
 
     def _assess(self) -> None:
-        self._watcher.assess(self._now())
+        now = self._now()
+        self._watcher.assess(now)
+        doubts = [
+            {
+                'number': each.number,
+                'place': each.place,
+                'position': each.position,
+                'seen_from': each.seen_from,
+            }
+            for each in self._watcher.doubts(now)
+        ]
+        if doubts != self._doubted:
+            self._doubted = doubts
+            self._doubts.publish(String(data=json.dumps(doubts)))
         self._publish_events()
 
     def _keep(self) -> None:
@@ -410,10 +459,67 @@ class Observer(PatrolNode):
         if text != self._said:
             self._said = text
             self._events.publish(String(data=text))
+            going_on = [each for each in self._book.events if each.state in _GOING_ON]
+            self._facts = [_fact(each, self._settings.alert_threshold) for each in going_on]
+            self._facts_changed.set()
+
+    # --- in the thread of the facts ---
+
+    def _tell_facts(self) -> None:
+        """Keep the ontology's events as they are; it may be built anew at any time."""
+        names = ServiceCaller(self, ReferenceName, 'ontology_map/built')
+        ontology: EventOntology | None = None
+        told: list[EventFact] | None = None
+        while not self.stopping.is_set():
+            self._facts_changed.wait(FACTS_PERIOD)
+            self._facts_changed.clear()
+            facts = self._facts
+            if self.stopping.is_set() or facts == told == []:
+                continue
+            try:
+                if ontology is None:
+                    timeout = self._settings.peer_timeout
+                    name = names.call(ReferenceName.Request(), timeout, self.stopping).name
+                    armor = ArmorClient(
+                        self, self.get_name(), name, timeout=timeout, interrupt=self.stopping
+                    )
+                    ontology = EventOntology(armor, self._robot)
+                ontology.tell(facts)
+                told = facts
+            except (CallError, ArmorServiceCallError, ArmorServiceInternalError) as error:
+                if facts and not self.stopping.is_set():
+                    self.get_logger().warn(
+                        f'events are not in the ontology: {error}', throttle_duration_sec=60.0
+                    )
 
 
 def _cause(event: Event) -> tuple[str, str]:
     return 'event', str(event.number)
+
+
+def _fact(event: Event, checked_every: int) -> EventFact:
+    """Return an event as the ontology has it."""
+    first, last = [event.evidence[:1], event.evidence[-1:]]
+    by = event.robots or (ROBOT,)
+    return EventFact(
+        event.number,
+        event.kind.capitalize(),
+        event.seen,
+        event.place,
+        event.subject,
+        Level(max(1, event.severity)).name.capitalize(),
+        event.state.split()[0].capitalize(),
+        Sighting(int(event.began), event.confidence, event.position, ''.join(first), by=by[0]),
+        Sighting(
+            int(event.last),
+            event.confidence,
+            event.position,
+            ''.join(last),
+            event.compared_with,
+            by[-1],
+        ),
+        checked_every,
+    )
 
 
 def _is_near(one: Sequence[float], other: Sequence[float]) -> bool:

@@ -19,6 +19,12 @@ SAME_PLACE = 0.75
 """Two sightings of one kind without a name are of one thing up to here, metres."""
 
 
+SURE = 0.95
+"""A sighting as sure as this needs no second one."""
+ELSEWHERE = 0.5
+"""A second look is one from so far from where the first one was, metres."""
+
+
 class EventState(StrEnum):
     """How far an event is."""
 
@@ -45,6 +51,10 @@ class Event:
         confidence: That at least one of its sightings was right.
         robots: Who saw it.
         evidence: Of the first and the last sighting.
+        compared_with: What the last sighting was compared with; or empty.
+        seen_from: Where the robot was at the first sighting, map frame, metres; None: not known.
+        confirmed: Whether one sighting was sure, or it was seen from elsewhere or in another look,
+            too.
     """
 
     number: int
@@ -63,6 +73,9 @@ class Event:
     confidence: float
     robots: tuple[str, ...]
     evidence: tuple[str, ...]
+    compared_with: str = ''
+    seen_from: tuple[float, float] | None = None
+    confirmed: bool = False
 
     def words(self) -> str:
         """Return it in words, as '3: door D1 is ajar in C1'."""
@@ -84,6 +97,8 @@ class Event:
         given = dict(values)
         place = given['position']
         given['position'] = None if place is None else (float(place[0]), float(place[1]))
+        if (origin := given.get('seen_from')) is not None:
+            given['seen_from'] = (float(origin[0]), float(origin[1]))
         given['kind'], given['state'] = Kind(given['kind']), EventState(given['state'])
         given['robots'], given['evidence'] = tuple(given['robots']), tuple(given['evidence'])
         return cls(**given)
@@ -110,6 +125,10 @@ class EventBook:
     def events(self) -> list[Event]:
         """All events, the newest first."""
         return sorted(self._events.values(), key=lambda each: -each.last)
+
+    def find(self, number: int) -> Event | None:
+        """Return an event by its number."""
+        return self._events.get(number)
 
     def take(self, seen: Observation, *, severity: int, rule: str, look: int) -> Event | None:
         """Join an observation to its event, or begin one.
@@ -148,6 +167,9 @@ class EventBook:
                 seen.confidence,
                 (seen.robot,),
                 evidence,
+                seen.compared_with,
+                seen.seen_from,
+                seen.confidence >= SURE,
             )
             self._next += 1
             self._looks[event.number] = look
@@ -169,6 +191,11 @@ class EventBook:
             confidence=1.0 - (1.0 - event.confidence) * (1.0 - seen.confidence),
             robots=tuple(dict.fromkeys((*event.robots, seen.robot))),
             evidence=(*first, seen.evidence) if seen.evidence else event.evidence,
+            compared_with=seen.compared_with or event.compared_with,
+            confirmed=event.confirmed
+            or seen.confidence >= SURE
+            or event.looks + new_look > 1
+            or _from_elsewhere(event, seen),
         )
         self._events[event.number] = changed
         return changed
@@ -281,6 +308,12 @@ def _alike(event: Event, seen: Observation) -> bool:
     if event.position is None or seen.position is None:
         return event.place == seen.place
     return math.dist(event.position, seen.position) <= SAME_PLACE
+
+
+def _from_elsewhere(event: Event, seen: Observation) -> bool:
+    if event.seen_from is None or seen.seen_from is None:
+        return False
+    return math.dist(event.seen_from, seen.seen_from) >= ELSEWHERE
 
 
 def _same(normal: Observation, seen: Observation) -> bool:

@@ -51,6 +51,7 @@ class Observation:
         robot: Who saw it.
         evidence: File with the picture or sweep, relative to the evidence's folder; or empty.
         compared_with: What it was compared with: a file, or the stamp of a reference.
+        seen_from: Where the robot was, map frame, metres; None where that is not known.
 
     Raises:
         ValueError: A state that the kind does not know, or a number that is none.
@@ -66,12 +67,18 @@ class Observation:
     robot: str = ''
     evidence: str = ''
     compared_with: str = ''
+    seen_from: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
         if self.state not in STATES[self.kind]:
             expected = ', '.join(STATES[self.kind])
             raise ValueError(f'{self.kind} {self.state!r}: expected one of {expected}')
-        numbers = (self.confidence, self.stamp, *(self.position or ()))
+        numbers = (
+            self.confidence,
+            self.stamp,
+            *(self.position or ()),
+            *(self.seen_from or ()),
+        )
         if not all(map(math.isfinite, numbers)) or not 0.0 <= self.confidence <= 1.0:
             raise ValueError(f'{self.kind} {self.state}: expected finite numbers, got {numbers}')
 
@@ -87,9 +94,10 @@ class Observation:
             ValueError, KeyError, TypeError: It is something else.
         """
         given = dict(values)
-        if (position := given.get('position')) is not None:
-            x, y = position
-            given['position'] = (float(x), float(y))
+        for name in ('position', 'seen_from'):
+            if (point := given.get(name)) is not None:
+                x, y = point
+                given[name] = (float(x), float(y))
         return cls(**{**given, 'kind': Kind(given['kind'])})
 
     def words(self) -> str:

@@ -140,6 +140,7 @@ class Watcher:
         looked: Called with each stay at a place when it ends.
         store: Keeps pictures; None: nothing is kept.
         views: How each viewpoint looks normally.
+        verify_seconds: An alert that is not sure waits so long for a second look.
     """
 
     def __init__(
@@ -159,6 +160,7 @@ class Watcher:
         looked: Callable[[Look], object] = lambda _: None,
         store: EvidenceStore | None = None,
         views: ReferenceViews | None = None,
+        verify_seconds: float = 0.0,
     ) -> None:
         self.rules = tuple(rules)
         self.book = book
@@ -172,6 +174,8 @@ class Watcher:
         self._find_persons, self._looked = find_persons, looked
         self._ways: Ways | None = None
         self._walks = WalkFinder()
+        self._verify_seconds = verify_seconds
+        self._doubts: dict[int, float] = {}
         self._persons = 0
         self._began = math.nan
         self._pictures = 0
@@ -186,6 +190,7 @@ class Watcher:
         self._candidates: list[ObjectChange] = []
         self._told: dict[tuple[str, ...], float] = {}
         self._last: tuple[tuple[float, float], Points] = ((0.0, 0.0), np.zeros((0, 2)))
+        self._at: tuple[float, float] | None = None
         self._views = views or ReferenceViews()
         self._sights: deque[Sight] = deque(maxlen=AGREED_PICTURES)
         self._sight: Sight | None = None
@@ -278,7 +283,7 @@ class Watcher:
             met: Whether something was met there, (n,).
             stamp: Seconds since 1970.
         """
-        self._last = sensor, ends[met]
+        self._last, self._at = (sensor, ends[met]), sensor
         if self._grid is not None:
             if self._visit is None:
                 self._visit = FloorVisit(self._grid)
@@ -546,7 +551,7 @@ class Watcher:
             if picture is not None:
                 what = f'{seen.kind}-{seen.subject or seen.place}-{seen.state}'
                 evidence = self._store.keep(picture, what, severity, seen.stamp)
-        seen = replace(seen, robot=self._robot, evidence=evidence)
+        seen = replace(seen, robot=self._robot, evidence=evidence, seen_from=self._at)
         self._tell(seen)
         words = '' if rule is None else rule.words()
         event = self.book.take(seen, severity=severity, rule=words, look=self._look)
@@ -554,7 +559,25 @@ class Watcher:
             return
         lasts = rule.lasting(event.looks, event.last - event.began)
         if event.severity >= Level.ALERT and lasts:
-            self._alert(event)
+            if event.confirmed or not self._verify_seconds:
+                self._doubts.pop(event.number, None)
+                self._alert(event)
+            else:
+                self._doubts.setdefault(event.number, seen.stamp + self._verify_seconds)
+
+    def doubts(self, stamp: float) -> list[Event]:
+        """Return the alerts that wait until the robot has looked again.
+
+        One that nobody could look at again in time is told as it is.
+        """
+        for number, until in list(self._doubts.items()):
+            event = self.book.find(number)
+            if event is None or event.state != EventState.OPEN:
+                del self._doubts[number]
+            elif stamp >= until:
+                del self._doubts[number]
+                self._alert(event)
+        return [each for each in map(self.book.find, self._doubts) if each is not None]
 
     # --- over restarts ---
 

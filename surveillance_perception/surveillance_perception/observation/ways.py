@@ -8,11 +8,11 @@ another way. What the map alone does not allow is no way that could be blocked.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from scipy import ndimage
 
 from surveillance_perception.observation.doors import Segment
@@ -66,7 +66,7 @@ class Ways:
         grid: Grid,
         radius: float,
         doors: Mapping[str, Segment],
-        points: Mapping[str, Sequence[float] | NDArray[np.float64]],
+        points: Mapping[str, ArrayLike],
     ) -> None:
         self._grid = grid
         self._radius = radius
@@ -82,7 +82,8 @@ class Ways:
             for side in sides:
                 room = grid.at(rooms, *side)
                 for place, point in points.items():
-                    xy = float(point[0]), float(point[1])
+                    x, y = np.asarray(point, float)[:2].tolist()
+                    xy = float(x), float(y)
                     if room and grid.at(rooms, *xy) == room:
                         ways.append(_Way(door, place, xy, side, np.asarray(rooms == room)))
         self._ways = [
@@ -128,7 +129,7 @@ class Ways:
         return bool(first & second)
 
     def _labels_at(
-        self, labels: NDArray[np.integer], corner: tuple[int, int], point: tuple[float, float]
+        self, labels: NDArray[np.int32], corner: tuple[int, int], point: tuple[float, float]
     ) -> set[int]:
         """Return the areas within reach of a point, in its own room."""
         room = self._grid.at(self._rooms, *point)
