@@ -9,17 +9,14 @@ import cv2
 import numpy as np
 import pytest
 import skimage
-from numpy.typing import NDArray
 
 from surveillance_perception.observation.persons import PersonFinder, load_finder
 
 DATA = Path(skimage.__file__).parent / 'data'
 
 
-def photograph(name: str) -> NDArray[np.uint8]:
-    picture = cv2.imread(str(DATA / f'{name}.png'))
-    assert picture is not None
-    return picture.astype(np.uint8)
+def photograph(name: str) -> np.ndarray:
+    return np.asarray(cv2.imread(str(DATA / f'{name}.png')), np.uint8)
 
 
 def finder() -> PersonFinder:

@@ -10,6 +10,7 @@ package runs. `ai-edge-litert` runs the network.
 
 from __future__ import annotations
 
+import importlib
 import importlib.util
 import math
 from collections.abc import Callable, Sequence
@@ -127,10 +128,10 @@ def load_finder(weights: str = '', sure: float = SURE) -> PersonFinder:
     path = Path(weights) if weights else _installed_weights()
     if importlib.util.find_spec('ai_edge_litert') is None:
         raise ValueError(f'persons are not looked for: no package ai_edge_litert; {INSTALL}')
-    from ai_edge_litert.interpreter import Interpreter  # type: ignore[import-not-found,unused-ignore]
+    litert = importlib.import_module('ai_edge_litert.interpreter')
 
     try:
-        interpreter: Any = Interpreter(model_path=str(path), num_threads=1)
+        interpreter: Any = litert.Interpreter(model_path=str(path), num_threads=1)
         interpreter.allocate_tensors()
         (put,) = interpreter.get_input_details()
         outputs = {
@@ -192,9 +193,8 @@ def _box(
     limits = np.array([picture.shape[1], picture.shape[0]])
     start = np.clip(np.floor(low), 0, limits).astype(int)
     end = np.clip(np.ceil(high), 0, limits).astype(int)
-    left, top = (int(each) for each in start)
-    right, bottom = (int(each) for each in end)
-    return left, top, right - left, bottom - top
+    width, height = (end - start).tolist()
+    return int(start[0]), int(start[1]), int(width), int(height)
 
 
 def _one_person(one: Person, other: Person) -> bool:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -129,7 +130,7 @@ class Ways:
         return bool(first & second)
 
     def _labels_at(
-        self, labels: NDArray[np.int32], corner: tuple[int, int], point: tuple[float, float]
+        self, labels: NDArray[Any], corner: tuple[int, int], point: tuple[float, float]
     ) -> set[int]:
         """Return the areas within reach of a point, in its own room."""
         room = self._grid.at(self._rooms, *point)
