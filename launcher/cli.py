@@ -122,7 +122,8 @@ def _dispatch(argv: list[str]) -> int:
 
 def _run(argv: list[str]) -> int:
     options = make_parser().parse_args(argv)
-    node_table.select('RANDOM', only=options.only, without=options.without)
+    if options.robots is None and options.place is None:
+        node_table.select('RANDOM', only=options.only, without=options.without)
     _enter(['run', *argv])
     from launcher.run_folder import resumed
     from launcher.run_mission import run_mission

@@ -83,6 +83,8 @@ class MergedLog:
         if match := _ROS_LINE.match(_ESCAPES.sub('', text)):
             severity, origin, message = match.groups()
             name = origin.rsplit('.', 1)[-1]
+            if (of_robot := '/'.join(origin.split('.')[-2:])) in self._names:
+                name = of_robot
             if name in self._names:
                 self._heard(name, message)
                 self._write(name, severity, message)

@@ -140,6 +140,12 @@ class Run:
         metavar='NAME|FILE',
         help=f'{OPTIONS["robot"].help} (default: %(default)s)',
     )
+    robots: int | None = _option(
+        '--robots',
+        type=_number(int, 'a number of robots from 1 to 100', lambda value: 1 <= value <= 100),
+        metavar='N',
+        help=OPTIONS['robots'].help,
+    )
     simulator: str = _option(
         '--simulator',
         KINEMATIC,

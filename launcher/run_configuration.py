@@ -43,7 +43,11 @@ STORE = 'armor_store'
 
 
 def configuration(
-    config: Path, run: Run, folder: Path | None = None, more: RosArguments | None = None
+    config: Path,
+    run: Run,
+    folder: Path | None = None,
+    more: RosArguments | None = None,
+    fleet: Sequence[Entry] = (),
 ) -> Configuration:
     """Merge all that gives parameters to the nodes of a run; each entry and the place are checked.
 
@@ -52,13 +56,14 @@ def configuration(
         run: What the command line asks for.
         folder: Where the run leaves its record, its ontologies and their store.
         more: Further arguments in ROS's own form.
+        fleet: What the fleet says of the nodes; it yields to the user's files and options.
 
     Raises:
         ValueError: One line about the first entry that is wrong.
     """
     run.check()
     try:
-        merged = _merged(config, run, folder, more)
+        merged = _merged(config, run, folder, more, fleet)
         merged.check()
         merged.place('simulator', full_name(run.namespace, 'simulator'))
         _check_behaviour(merged, run)
@@ -89,7 +94,11 @@ def with_profile(run: Run, config: Path) -> tuple[Run, RobotProfile]:
 
 
 def _merged(
-    config: Path, run: Run, folder: Path | None, more: RosArguments | None
+    config: Path,
+    run: Run,
+    folder: Path | None,
+    more: RosArguments | None,
+    fleet: Sequence[Entry],
 ) -> Configuration:
     files = [run.parameters] if run.parameters is not None else []
     layers = run_layers(
@@ -97,7 +106,7 @@ def _merged(
         run.behaviour,
         place=run.place,
         robot=profile_of(config, run),
-        chosen=_folders_of(folder.resolve()) if folder is not None else (),
+        chosen=[*fleet, *(_folders_of(folder.resolve()) if folder is not None else ())],
         files=[*files, *(Path(file) for file in (more.files if more else ()))],
         options=[
             *_option_entries(run, folder),

@@ -17,12 +17,14 @@ from launcher.run_configuration import (
     check_assignments,
     check_clocks,
     configuration,
+    profile_of,
     with_mode_of,
     with_profile,
 )
 from launcher.run_processes import COMPOSED, node_environ, programs_of, ros_domain
 from launcher.service import is_service
 from launcher.supervisor import Supervisor
+from launcher.team import Part, parts
 from surveillance_behaviour.mission import mission_log
 from surveillance_runtime import node_table
 from surveillance_runtime.files import PLACE, RECORD, TIMELINE, FileError
@@ -39,30 +41,38 @@ def run_mission(run: Run, config: Path, runs: Path, resume: Path | None = None) 
     """Start the nodes, supervise them to the end, print the summary; return the exit code."""
     merged = configuration(config, run)  # before anything is written
     run, profile = with_profile(with_mode_of(run, merged), config)
-    nodes = run.nodes(monitored=profile.is_monitored)
-    observers = run.observers()
-    check_assignments(merged, (*nodes, *observers))
-    check_clocks(merged, run, (*nodes, *observers))
-    claims = claim(nodes, ros_domain(run), run.namespace)
+    team = parts(run, config, profile_of(config, run))
+    everyone = [node for part in team for node in part.everyone]
+    for part in team:
+        merged = configuration(config, part.run, fleet=part.entries)
+        check_assignments(merged, everyone)
+        check_clocks(merged, part.run, part.everyone)
+    domain = ros_domain(run)
+    claims = [held for part in team for held in claim(part.nodes, domain, part.run.namespace)]
     if run.record not in (None, NOT_RECORDED):
         runs = Path(run.record)
     folder, how = chosen_folder(run, runs, resume)
     deleted = run_folder.prune(runs, run.keep * 1e9, folder)
     state = run_folder.RunState(folder, run_folder.options_of(run))
-    merged = configuration(config, run, folder)
-    everyone = (*nodes, *observers)
-    files = write_parameters(folder / 'parameters', run.namespace, merged, everyone)
-    names = [node.name for node in nodes]
     mode = run.mode or node_table.DEFAULT_MODE
-    renamed = remappings(profile, names, mode)
     environ = node_environ(run, folder / 'ros')
-    programs = programs_of(run, nodes, observers, files, environ, renamed)
     place = place_file(config, run.behaviour, run.place)
-    copy_place(place, folder / PLACE)
-    names = [*(node.name for node in everyone), *([COMPOSED] if run.composed else [])]
+    programs = []
+    for part in team:
+        own = part.folder(folder)
+        own.mkdir(exist_ok=True)
+        merged = configuration(config, part.run, own, fleet=part.entries)
+        files = write_parameters(own / 'parameters', part.run.namespace, merged, part.everyone)
+        names = [node.name for node in part.nodes]
+        of_robot = profile_of(config, part.run).profile
+        renamed = (*part.renamed, *remappings(of_robot, names, mode))
+        programs += programs_of(part, files, environ, renamed)
+        copy_place(place, own / PLACE)
+    names = [part.name(node.name) for part in team for node in part.everyone]
+    names += [part.name(COMPOSED) for part in team if run.composed]
     log = MergedLog(None, names, path=folder / 'launch.log')
     log.say(
-        f'{run.behaviour} in mode {mode}, robot {profile.name}, '
+        f'{run.behaviour} in mode {mode}, {_robots(team, profile.name)}, '
         f'place {place.name}, '
         f'ROS domain {ros_domain(run)}, files in {_short(folder)}'
     )
@@ -76,10 +86,11 @@ def run_mission(run: Run, config: Path, runs: Path, resume: Path | None = None) 
     alarm = Alarm(caller(run.alarm, log), folder)
     log.listen(alarm.hear)
     supervisor = Supervisor(programs, log, on_trouble=alarm.trouble, on_restart=alarm.restarted)
-    code = _supervised(run, nodes, supervisor, folder, log)
+    code = _supervised(run, team, supervisor, folder, log)
     alarm.close()
-    for line in what_to_look_at(folder):
-        log.plain(line)
+    for part in team:
+        for line in what_to_look_at(part.folder(folder)):
+            log.plain(line)
     log.close()
     # A service is stopped with its machine, and goes on with it.
     state.end(ended=supervisor.time_is_over or not is_service())
@@ -105,14 +116,14 @@ def chosen_folder(run: Run, runs: Path, resume: Path | None) -> tuple[Path, str]
 
 def _supervised(
     run: Run,
-    nodes: Sequence[node_table.Node],
+    team: Sequence[Part],
     supervisor: Supervisor,
     folder: Path,
     log: MergedLog,
 ) -> int:
     """Run the processes to the end, print the summary; return the exit code."""
     console = None
-    if any(node.name == node_table.CONSOLE for node in nodes):
+    if any(node.name == node_table.CONSOLE for part in team for node in part.nodes):
         from launcher.console import OperatorConsole
 
         reader = COMPOSED if run.composed else node_table.CONSOLE
@@ -123,9 +134,11 @@ def _supervised(
     finally:
         if console is not None:
             console.stop()
-    if any(node.name == BEHAVIOUR_NODE for node in nodes):
-        done = summary(folder / RECORD)
-        log.plain(done)
+    for part in team:
+        if all(node.name != BEHAVIOUR_NODE for node in part.nodes):
+            continue
+        done = summary(part.folder(folder) / RECORD)
+        log.plain(f'{part.robot}: {done}' if part.robot else done)
         if supervisor.time_is_over and done == NOTHING_RECORDED:
             code = code or EXIT_NOTHING_DONE
     return code
@@ -164,6 +177,12 @@ def summary(record: Path) -> str:
         return str(mission_log.summarize(mission_log.read(record)))
     except FileError as error:
         return f'Mission: {error}'
+
+
+def _robots(team: Sequence[Part], profile: str) -> str:
+    """Return which robots a run has, in words."""
+    names = [part.robot for part in team if part.robot]
+    return f'robots {", ".join(names)} ({profile})' if names else f'robot {profile}'
 
 
 def _short(path: Path) -> str:

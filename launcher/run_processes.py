@@ -11,6 +11,7 @@ from launcher.environment import interpreter
 from launcher.log_merge import ROS_FORMAT
 from launcher.run import MARKERS, RECORDER, Run
 from launcher.supervisor import Program
+from launcher.team import Part
 from surveillance_runtime import node_table
 from surveillance_runtime.discovery import LAST_DOMAIN, launched_nodes
 from surveillance_runtime.launch_protocol import ONE_THREAD
@@ -91,34 +92,34 @@ def command(nodes: Sequence[node_table.Node], arguments: Sequence[str], parent: 
 
 
 def programs_of(
-    run: Run,
-    nodes: Sequence[node_table.Node],
-    observers: Sequence[node_table.Node],
+    part: Part,
     files: Mapping[str, Path],
     environ: Mapping[str, str],
     renamed: Sequence[tuple[str, str]] = (),
 ) -> list[Program]:
-    """Return the processes of a run, each with the nodes that share it."""
+    """Return the processes of a part of a run, each with the nodes that share it."""
+    run, nodes, observers = part.run, part.nodes, part.observers
 
     def program(members: Sequence[node_table.Node]) -> Program:
         arguments = ros_arguments([files[node.name] for node in members], run, renamed)
         # It prints into the launcher's log; one of its own, as ROS writes it, grows without bound.
         words = command(members, [*arguments, '--disable-external-lib-logs'], os.getpid())
         memory = run.memory * 2**20
-        return Program(members[0].name, words, environ, memory=memory)
+        return Program(part.name(members[0].name), words, environ, memory=memory)
 
-    if run.composed:
+    programs: list[Program] = []
+    if run.composed and nodes:
         everything = program(nodes)
         programs = [
             replace(
                 everything,
-                name=COMPOSED,
+                name=part.name(COMPOSED),
                 takes_input=run.mode == 'MANUAL',
                 # Together they may hold what each may hold by itself, and share much.
                 memory=everything.memory * COMPOSED_SHARE,
             )
         ]
-    else:
+    elif nodes:
         programs = [
             replace(
                 program([node]),

@@ -29,6 +29,7 @@ def decision_message(decision: Decision, sequence: int, stamp: Any) -> DecisionM
         reason=decision.reason,
         candidates=list(decision.scores),
         scores=[float(value) for value in decision.scores.values()],
+        stay=float(decision.stay),
     )
 
 
@@ -61,6 +62,7 @@ def decision_from(message: DecisionMessage) -> Decision:
         policy=message.policy,
         reason=message.reason,
         scores=scores,
+        stay=message.stay if 0.0 < message.stay < math.inf else 0.0,
     )
 
 

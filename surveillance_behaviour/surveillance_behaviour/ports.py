@@ -110,6 +110,10 @@ class Reasoner(Protocol):
     def why_charge(self) -> str:
         """Return why the robot must charge now, as a sentence; empty: it need not."""
 
+    def dock_is_taken(self) -> bool:
+        """Return whether another robot of the fleet charges where this one is."""
+        return False
+
     def send_to_charge(self, why: str) -> None:
         """Have the robot charge before anything else."""
         return

@@ -20,28 +20,38 @@ from dataclasses import replace
 from patrol_policy.battery import Battery, ChargeCurve
 from patrol_policy.decision import (
     RECHARGE,
+    URGENT,
+    WAIT,
     DecisionSettings,
     RequestError,
     WhyNot,
     check_place,
     decide,
+    energy_of,
     stations_within_reach,
     tour_warning,
     why_charge,
     why_not,
 )
+from patrol_policy.fleet import Intention, RightOfWay
 from patrol_policy.graph import GraphError, PatrolGraph
 from patrol_policy.plan import LEG_CHANGE
 from patrol_policy.promises import Promise, promises, summary, verdicts
 from patrol_policy.world import Decision, PolicyMemory, World
 from state_machines import Interrupt
-from state_machines.exceptions import CallError
+from state_machines.exceptions import CallError, CallInterruptedError
 from surveillance_behaviour.charging import BatteryMonitor
 from surveillance_behaviour.experience import Experience
+from surveillance_behaviour.fleet import FleetKnowledge, share_of
 from surveillance_behaviour.ports import Ontology, Places, Point, UnknownPlaceError
 from surveillance_ontology.patrol_ontology import Snapshot
 from surveillance_runtime.place.patrol_rules import PatrolRules
 from surveillance_runtime.suggestions import nearest
+
+LOOK_AGAIN = 1.0
+"""How long a robot waits for another one until it looks again, seconds."""
+UNKNOWN_CHARGE = 600.0
+"""How long a charge is taken to last before anything is known of the battery, seconds."""
 
 
 class WorldModel:
@@ -63,6 +73,9 @@ class WorldModel:
         tell: Told what can be kept of the places, at the start and when that changes.
         rates: How fast stations charge, by their places, percent per second: what is taken for
             true until it was seen.
+        fleet: The robots that share the patrol; None: this one is alone.
+        settle: Waits until what was published is heard, so that two robots that want the same at
+            the same moment know it of each other.
 
     Attributes:
         settings: Those.
@@ -87,8 +100,16 @@ class WorldModel:
         rules: PatrolRules | None = None,
         tell: Callable[[str], None] = lambda sentence: None,
         rates: Mapping[str, float] | None = None,
+        fleet: FleetKnowledge | None = None,
+        settle: Callable[[Interrupt], None] = lambda interrupt: None,
     ) -> None:
         self.settings = settings
+        self.fleet = fleet
+        self._settle = settle
+        self._fleet_graph = PatrolGraph({})
+        self._last: Snapshot | None = None
+        self._cut_off = False
+        self._wanted: tuple[str, float] = ('', 0.0)
         self.experience = experience or Experience()
         self.place = ''
         self.places: frozenset[str] = frozenset()
@@ -152,6 +173,7 @@ class WorldModel:
                 self.experience.draw.observe(now(), level)
                 if self.place in self.settings.recharge_rooms:
                     self.experience.charge.observe(self.place, now(), level)
+                self._tell_charge()
 
         self._battery.watch(learn)
 
@@ -185,11 +207,11 @@ class WorldModel:
         jump = experience.tell_time(now)
         self._since = now if self._since is None else min(self._since + jump, now)
         threshold, classes = settings.urgency_threshold, settings.rules.classes
-        visits = experience.visits
-        own = self._rules.thresholds
-        found = self._ontology.snapshot(now, classes, visits, interrupt, threshold, own)
+        visits, own = experience.visits, self._rules.thresholds
+        found = self._snapshot(now, classes, interrupt, threshold)
         self.graph = graph = self._map_of(found, interrupt)
         self.place = found.place
+        told = self.fleet.visits() if self.fleet is not None else {}
         return World(
             place=found.place,
             now=now,
@@ -197,8 +219,13 @@ class WorldModel:
             classes=self._rules.with_classes(found.classes),
             # The ontology counts whole seconds; another robot's visit may be later.
             visited_at={
-                place: max(seconds, visits.get(place, -1.0))
-                for place, seconds in found.visited_at.items()
+                place: max(
+                    found.visited_at.get(place, -1.0),
+                    visits.get(place, -1.0),
+                    told.get(place, -1.0),
+                )
+                for place in found.connections
+                if place in found.visited_at or place in told
             },
             graph=graph,
             time_spread=experience.leg_times.spread,
@@ -212,6 +239,60 @@ class WorldModel:
             requested=experience.requested,
             contradiction=found.contradiction,
             memory=self._memory,
+            fleet=None if self.fleet is None else self.fleet.outlook(self._fleet_graph, now),
+        )
+
+    def _snapshot(
+        self, now: float, classes: tuple[str, ...], interrupt: Interrupt, threshold: float
+    ) -> Snapshot:
+        """Return what the ontology says; in a fleet, while it does not answer, what it said last.
+
+        Raises:
+            CallError: It does not answer, and nothing is known yet.
+        """
+        visits = self.experience.visits
+        try:
+            self._last = self._ontology.snapshot(
+                now, classes, visits, interrupt, threshold, self._rules.thresholds
+            )
+        except CallInterruptedError:
+            raise
+        except CallError as error:
+            here = self._ontology.await_place(self.place, 0.0, interrupt) or self.place
+            last = self._last
+            if self.fleet is None or last is None or here not in last.connections:
+                raise
+            if not self._cut_off:
+                self._warn(f'{error}: patrolling on by what was known')
+            self._cut_off = True
+            return self._as_known(last, here, now, threshold)
+        if self._cut_off:
+            self._tell('the ontology answers again: it is told of the visits since')
+        self._cut_off = False
+        return self._last
+
+    def _as_known(self, last: Snapshot, here: str, now: float, threshold: float) -> Snapshot:
+        """Return a snapshot of what was known and what was seen since: the map is as it was."""
+        assert self.fleet is not None
+        seen = dict(last.visited_at)
+        for visits in (self.experience.visits, self.fleet.visits()):
+            for place, at in visits.items():
+                if place in last.connections:
+                    seen[place] = max(at, seen.get(place, -1.0))
+        since = now if self._since is None else self._since
+        late = {place for place in last.connections if now - seen.get(place, since) > threshold} | {
+            place for place in last.connections if place not in seen
+        }
+        classes = {
+            place: (found - {URGENT}) | ({URGENT} if place in late else set())
+            for place, found in last.classes.items()
+        }
+        return replace(
+            last,
+            place=here,
+            reachable=last.connections[here],
+            classes={place: frozenset(found) for place, found in classes.items()},
+            visited_at=seen,
         )
 
     def _map_of(self, found: Snapshot, interrupt: Interrupt) -> PatrolGraph:
@@ -245,6 +326,17 @@ class WorldModel:
         except GraphError as error:
             raise CallError(f'ontology: {error}') from None
         self._graph_key = (True, legs, exploring)
+        if self.fleet is not None:
+            # All compute with the same times, whatever each has learned.
+            alike = {
+                place: {
+                    other: max(0.1, round(self._metres(place, other) / self.settings.speed, 1))
+                    for other in ways
+                }
+                for place, ways in legs.items()
+            }
+            whole = PatrolGraph(alike, exploring, self._rules.exploration)
+            self._fleet_graph = whole.connected(found.place)
         return graph
 
     def _metres(self, start: str, goal: str) -> float:
@@ -358,6 +450,7 @@ class WorldModel:
                 self.experience.requested = ''
             self._warn(f'{error}: continuing without it')
             decision = decide(replace(world, requested=''), battery, self.settings)
+        decision = self._in_traffic(decision, world, interrupt)
         self._target = decision.target
         if decision.rule == RECHARGE and not self.experience.sent_to_charge:
             why = why_charge(world, battery, self.settings)
@@ -370,6 +463,130 @@ class WorldModel:
         self._save()
         self._announce(decision)
         return decision
+
+    def _in_traffic(self, decision: Decision, world: World, interrupt: Interrupt) -> Decision:
+        """Publish what was decided, and wait or give way where another robot goes first."""
+        fleet = self.fleet
+        if fleet is None:
+            return decision
+        here, now = world.place, world.now
+        goes = decision.place != here or not decision.stay
+        if decision.target != self._wanted[0]:
+            self._wanted = (decision.target, now)
+        dock = decision.target if decision.rule == RECHARGE else None
+        wish = Intention(
+            fleet.name,
+            here,
+            decision.place if goes and decision.place != here else '',
+            self._wanted[1],
+        )
+        share = share_of(decision, fleet.own.robot.share)
+        if dock is not None:
+            share = None
+        fleet.tell(
+            place=here,
+            now=now,
+            visits=self.experience.visits.copy(),
+            intention=wish,
+            share=share,
+            dock=dock,
+            **self._charge_facts(world, dock),
+        )
+        if dock is not None and dock in (here, decision.place) and (other := self._at_dock(dock)):
+            reason = f"{decision.reason}; the station in {dock} is {other}'s"
+            return self._waiting(decision, world, reason)
+        if not fleet.others():
+            right = RightOfWay(True, wish.heading_to or here)
+        else:
+            self._settle(interrupt)
+            if interrupt.is_set():
+                raise CallInterruptedError
+            right = fleet.right_of_way(world.graph.leg_seconds, now)
+        if not right.go:
+            return self._waiting(decision, world, f'waiting in {here}: {right.because}')
+        if not wish.heading_to and right.place not in ('', here):
+            decision = replace(
+                decision,
+                place=right.place,
+                target=right.place,
+                rule=WAIT,
+                reason=f'giving way: {right.because}',
+                stay=0.0,
+            )
+            wish = replace(wish, heading_to=right.place)
+        if wish.heading_to:
+            fleet.tell(intention=replace(wish, is_moving=True))
+        return decision
+
+    def _waiting(self, decision: Decision, world: World, reason: str) -> Decision:
+        return replace(
+            decision,
+            place=world.place,
+            rule=WAIT,
+            reason=reason,
+            stay=LOOK_AGAIN,
+            share=None,
+            slot=None,
+        )
+
+    def _at_dock(self, dock: str) -> str:
+        """Return the robot that has a dock, or is about to drive up to it; empty: none."""
+        assert self.fleet is not None
+        world = self.world
+        assert world is not None
+        assert world.fleet is not None
+        for robot in sorted(world.fleet.robots, key=lambda each: each.name):
+            if robot.name != self.fleet.name and robot.dock == dock and robot.place == dock:
+                return robot.name
+        return ''
+
+    def dock_is_taken(self) -> bool:
+        """Return whether another robot of the fleet charges where this one is."""
+        if self.fleet is None or self.world is None or self.place != self.world.place:
+            return False
+        return bool(self._at_dock(self.place))
+
+    def _charge_facts(self, world: World, dock: str | None) -> dict[str, float | None]:
+        """Return what the others must know of this robot's battery."""
+        battery, limits = self.battery(), self.settings.battery
+        energy = energy_of(world, battery, self.settings)
+        facts: dict[str, float | None] = {
+            'charging_until': None,
+            'runs_until': None,
+            'charge_seconds': 0.0,
+        }
+        if energy is None or battery.level is None:
+            if dock is not None:
+                facts['charging_until'] = world.now + UNKNOWN_CHARGE
+            return facts
+        least = max(
+            limits.require_recharge,
+            max(level for level in energy.least if math.isfinite(level)),
+        )
+        seconds = energy.charge_seconds(0, min(least, 100.0))
+        facts['charge_seconds'] = seconds
+        facts['runs_until'] = world.now + max(0.0, battery.level - least) / energy.draw
+        if dock is not None:
+            facts['charging_until'] = world.now + energy.charge_seconds(0, battery.level)
+        return facts
+
+    def _tell_charge(self) -> None:
+        """Tell the others until when this robot charges, as the level rises."""
+        fleet, world = self.fleet, self.world
+        if fleet is None or world is None or fleet.own.robot.dock is None:
+            return
+        battery = self.battery()
+        energy = energy_of(world, battery, self.settings)
+        if energy is not None and battery.level is not None:
+            now = self.experience.now or world.now
+            fleet.tell(charging_until=max(now, world.now) + energy.charge_seconds(0, battery.level))
+
+    def _stands(self) -> None:
+        """Tell the others that this robot is not on its way any more."""
+        if self.fleet is not None and self.fleet.own.intention.heading_to:
+            place = self.place or self.fleet.own.robot.place
+            since = self._wanted[1]
+            self.fleet.tell(intention=Intention(self.fleet.name, place, '', since))
 
     def _save(self) -> None:
         with self._saving:
@@ -396,6 +613,8 @@ class WorldModel:
             self._target = None
         if place == self.experience.requested:
             self.experience.requested = ''
+        if self.fleet is not None:
+            self.fleet.tell(place=place, now=now, visits=self.experience.visits.copy())
 
     def arrived(self, place: str, now: float, metres: float | None = None) -> None:
         """Note that the robot has come to ``place``, over a path of so many metres.
@@ -410,15 +629,19 @@ class WorldModel:
                 seconds = self._passed(now) - self._leg_began
                 self.experience.leg_times.observe(start, place, seconds, straight, metres)
         self.saw(place, now)
+        self._stands()
 
     def disturbed(self) -> None:
         """Note that the present drive is no example of how long a leg takes."""
         self._leg = None
+        self._stands()
 
     def charged(self) -> None:
         """Note that the robot has been charged."""
         self.experience.sent_to_charge = ''
         self._leg = None
+        if self.fleet is not None:
+            self.fleet.tell(dock=None, charging_until=None, share=None)
 
     def send_to_charge(self, why: str) -> None:
         """Have the robot charge before anything else."""

@@ -205,6 +205,13 @@ class MotionSettings(PeerSettings, StationSettings):
         0.0,
         1000.0,
     )
+    start_pose: tuple[float, ...] = parameter(
+        (),
+        'SIMULATED and ROBOT: where the robot starts, as the first guess of where it is: x, y in '
+        'metres, yaw in radians; empty: at the station.',
+        of=float,
+        check=parameter_checks.pose_or_none,
+    )
     robot_room: str = parameter(
         '',
         'MANUAL, RANDOM and Nav2: the room in which the robot starts; empty: as the map says that '

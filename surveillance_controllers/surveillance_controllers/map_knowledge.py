@@ -21,6 +21,7 @@ from surveillance_ontology.armor_client import (
     ArmorServiceCallError,
     ArmorServiceInternalError,
     FactSubscription,
+    declared_robot_name,
 )
 from surveillance_ontology.patrol_ontology import DOORS, OntologyNotReadyError, PatrolOntology
 from surveillance_runtime.conversions import seconds_of
@@ -44,6 +45,7 @@ class MapKnowledge:
     def __init__(self, node: PatrolNode, timeout: float) -> None:
         self._node = node
         self._timeout = timeout
+        self._robot = declared_robot_name(node)
         self._positions = ServiceCaller(node, RoomPosition, 'ontology_map/room_position')
         # Not `reference_name`: that answers when somebody, perhaps this node, has told the place.
         self._names = ServiceCaller(node, ReferenceName, 'ontology_map/built')
@@ -120,7 +122,7 @@ class MapKnowledge:
                 self._doors = FactSubscription(
                     self._node, self._armor, DOORS, lambda _fact, _came: self._doors_changed()
                 )
-                self._ontology = PatrolOntology(self._armor)
+                self._ontology = PatrolOntology(self._armor, self._robot)
             return self._ontology
 
     @property

@@ -43,6 +43,8 @@ from surveillance_ontology.conversions import (
     request_to_ros,
     response_from_ros,
 )
+from surveillance_ontology.patrol_ontology import ROBOT
+from surveillance_runtime.node import PatrolNode
 
 __all__ = [
     'ArmorClient',
@@ -50,6 +52,7 @@ __all__ = [
     'ArmorServiceInternalError',
     'FactSubscription',
     'RosTransport',
+    'declared_robot_name',
     'name_in',
     'value_in',
 ]
@@ -273,3 +276,14 @@ class FactSubscription:
     def _tell(self, changes: list[tuple[ShortFact, bool]]) -> None:
         for fact, came in changes:
             self._callback(fact, came)
+
+
+def declared_robot_name(node: PatrolNode) -> str:
+    """Declare and return the name that a node's robot has in the ontology."""
+    name: str = node.parameter(
+        'robot_name',
+        ROBOT,
+        "The robot's name in the ontology, in which each robot of a fleet has its own.",
+        read_only=True,
+    )
+    return name

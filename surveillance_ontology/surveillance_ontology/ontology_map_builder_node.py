@@ -27,7 +27,7 @@ from surveillance_ontology.armor_client import (
 )
 from surveillance_ontology.conversions import room_note_from_ros
 from surveillance_ontology.map_keeper import MapKeeper, Reports, Source
-from surveillance_ontology.patrol_ontology import PatrolOntology, checked_names
+from surveillance_ontology.patrol_ontology import ROBOT, PatrolOntology, checked_names
 from surveillance_runtime.conversions import point_from, point_message
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.parameters import ParameterError
@@ -69,9 +69,15 @@ class OntologyMapBuilder(PatrolNode):
         source = self.declare_fields(Source())
         place = described_place(self)
         self._stations = described_stations(self, self.get_parameter('recharge_rooms').value)
+        # Only their names matter here; the simulator checks the rest.
+        fleet = tuple(
+            dict.fromkeys(key.partition('.')[0] for key in self.parameters_under('robots'))
+        )
+        robot = fleet[0] if fleet else ROBOT
         if place is not None:
             try:
-                checked_names(place)
+                for each in fleet or (ROBOT,):
+                    checked_names(place, each)
             except PlaceError as error:
                 raise ParameterError(f'{self.get_name()}: parameter {error}') from None
         # The first reasoning over thousands of places takes its time.
@@ -82,7 +88,7 @@ class OntologyMapBuilder(PatrolNode):
         self._built = AwaitedEvent(self)
         log = self.get_logger()
         self._keeper = MapKeeper(
-            PatrolOntology(armor),
+            PatrolOntology(armor, robot, fleet),
             source,
             place,
             lambda: int(self.get_clock().now().nanoseconds // 1_000_000_000),
@@ -105,7 +111,7 @@ class OntologyMapBuilder(PatrolNode):
         self._placed = FactSubscription(
             self,
             armor,
-            PatrolOntology(armor).robot_place_facts,
+            PatrolOntology(armor, robot, fleet).robot_place_facts,
             lambda _fact, _came: self._built.happen(),
         )
         self._built_at: float | None = None

@@ -167,11 +167,13 @@ class PatrolOntology:
     Args:
         armor: A client of the ontology's reference.
         robot: The robot's name.
+        fleet: The names of all robots that share the ontology; empty: this one is alone.
     """
 
-    def __init__(self, armor: ArmorClient, robot: str = ROBOT) -> None:
+    def __init__(self, armor: ArmorClient, robot: str = ROBOT, fleet: Sequence[str] = ()) -> None:
         self._armor = armor
         self._robot = robot
+        self._fleet = tuple(fleet) or (robot,)
         self._places: tuple[str, ...] = ()
         self._last: Snapshot | None = None
         # Thresholds of places as the ontology had them last, and whether it has the rule for them.
@@ -185,8 +187,8 @@ class PatrolOntology:
 
     @property
     def robot_place_facts(self) -> str:
-        """The facts, for a subscription, that say where the robot is."""
-        return f'isIn({self._robot}, ?)'
+        """The facts, for a subscription, that say where the robot is, or those of a fleet are."""
+        return f'isIn({self._robot}, ?)' if len(self._fleet) == 1 else 'isIn(?, ?)'
 
     # --- the map ---
 
@@ -231,9 +233,12 @@ class PatrolOntology:
             for room, doors in known.items()
         }
         todo = [self._request('REMOVE IND', name) for name in sorted(gone)]
+        if ROBOT not in self._fleet:
+            # It would have the time that it was written with, for which every place is URGENT.
+            todo.append(self._request('REMOVE IND', ROBOT))
         todo += self._differences(mine, shown_doors(place), first_visit)
         if not known and now is not None:
-            todo.append(self._set_value('now', self._robot, now))
+            todo += [self._set_value('now', robot, now) for robot in self._fleet]
         self._carry_out(
             [
                 *todo,

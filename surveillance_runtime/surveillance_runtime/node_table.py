@@ -122,6 +122,35 @@ RUN_NODES = frozenset((*_ALWAYS, *_OF_PATROL, *_OF_BASE))
 """The nodes of which a robot has one each."""
 
 
+SHARED = frozenset(('armor_server', 'ontology_map_builder', 'simulator', 'mission_page', CONSOLE))
+"""The nodes that a fleet has once; each robot has the others in its namespace."""
+_SHARED_NAMES = (
+    *('armor_interface_srv', 'armor_interface_serialized_srv', 'fact_changes'),
+    *(
+        f'ontology_map/{name}'
+        for name in (
+            *('reference_name', 'built', 'room_position', 'build_map'),
+            *('add_room', 'remove_room', 'set_door'),
+        )
+    ),
+    *('map', 'door_states', 'fleet_robots'),
+    *(
+        f'simulation/{name}'
+        for name in ('set_door', 'place_obstacle', 'remove_obstacle', 'set_marker')
+    ),
+)
+
+
+def shared_names(namespace: str | None) -> list[tuple[str, str]]:
+    """Return from which name to which a robot of a fleet renames what all robots share.
+
+    Args:
+        namespace: The one that the shared nodes are in; None: none.
+    """
+    prefix = '/' + (namespace or '').strip('/')
+    return [(name, f'{prefix.rstrip("/")}/{name}') for name in _SHARED_NAMES]
+
+
 def find(name: str) -> Node:
     """Return the node called `name`.
 

@@ -15,6 +15,11 @@ def pose(values: Sequence[float]) -> str | None:
     return None if len(values) == 3 else 'three numbers: x, y, yaw'
 
 
+def pose_or_none(values: Sequence[float]) -> str | None:
+    """Ask for a place and a direction, if for anything."""
+    return None if len(values) in (0, 3) else 'three numbers: x, y, yaw; or none'
+
+
 def lidar_mounts(values: Sequence[float]) -> str | None:
     """Ask for where each lidar sits on the robot, if for anything; it stands or hangs."""
     good = len(values) % 4 == 0 and all(

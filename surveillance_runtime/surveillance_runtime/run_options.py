@@ -60,6 +60,12 @@ OPTIONS = {
             'file like those',
         ),
         RunOption(
+            'robots',
+            '',
+            'how many robots patrol the place together, robot1, robot2, ...; the table `robots` of '
+            'a place names others (default: as the place says, else one)',
+        ),
+        RunOption(
             'simulator',
             KINEMATIC,
             'what simulates the robot in mode SIMULATED: kinematic, which may run faster than real '
@@ -76,7 +82,12 @@ OPTIONS = {
         RunOption(
             'log_level', 'info', 'lowest severity that the nodes print', node_table.LOG_LEVELS
         ),
-        RunOption('only', '', 'start only these nodes; the others run elsewhere'),
+        RunOption(
+            'only',
+            '',
+            'start only these nodes; the others run elsewhere; of a fleet also robot1, '
+            'robot1/NODE or shared',
+        ),
         RunOption('without', '', 'do not start these nodes; they run elsewhere'),
         RunOption(
             'remap', '', 'rename a topic, service or action of all nodes, as -r of ros2 run does'

@@ -117,21 +117,16 @@ class Awaited:
         return False
 
 
-class ClockRate:
-    """Decides how much simulated time passes at each tick.
+class Lockstep:
+    """The programs of one robot that time waits for.
 
     Attributes:
-        is_waiting: Whether time stood still, when last asked, until a program answers.
-        awaits_picture: Whether that is one that reads a picture, or sees that the arm rests.
-        pause: At full speed, real seconds from the last `due` until it is to be asked again.
+        awaits_picture: Whether, when last asked, one was late that reads a picture, or sees that
+            the arm rests.
     """
 
-    def __init__(self, model: ClockRateModel, steady: float) -> None:
-        """Start at the given reading of the steady clock, seconds."""
+    def __init__(self, model: ClockRateModel) -> None:
         self._model = model
-        self._last = steady
-        self._owed = 0.0
-        self.pause: float | None = None
         self._commands = Awaited(model.patience)
         self._estimates = Awaited(model.patience)
         self._looks = Awaited(model.patience)
@@ -141,7 +136,7 @@ class ClockRate:
         self._executed: dict[str, bool] = {}
         self._places_written = Awaited(model.patience)
         self._place_told = -1.0
-        self.is_waiting = self.awaits_picture = False
+        self.awaits_picture = False
 
     def mission_waits(self, until: float) -> None:
         """Note that the mission waits until this simulated time, seconds; inf: for an event."""
@@ -166,6 +161,21 @@ class ClockRate:
         self._executed[action] = executed
         if was_driving and not self._is_driving:
             self._commands.end()
+
+    @property
+    def is_executing(self) -> bool:
+        """Whether a goal is executed."""
+        return any(self._executed.values())
+
+    @property
+    def waits_until(self) -> float:
+        """Until when the mission waits, simulated seconds; inf: for an event or a goal."""
+        answered = self._mission.answered
+        return math.inf if answered is None or self.is_executing else answered
+
+    def is_looking(self, simulated: float) -> bool:
+        """Return whether somebody may look through the camera at a simulated time, seconds."""
+        return self._look_from <= simulated <= self._look_until
 
     @property
     def _is_driving(self) -> bool:
@@ -201,8 +211,8 @@ class ClockRate:
         if self._look_from <= taken <= self._look_until:
             self._looks.note(taken)
 
-    def waits(self, simulated: float, steady: float) -> bool:
-        """Return whether time stands still until a program answers; times as for `due`."""
+    def is_late(self, simulated: float, steady: float) -> bool:
+        """Return whether time is to stand still until a program answers; times as for `due`."""
         if simulated > self._look_until:
             self._looks.end()
         model, just = self._model, 1e-9
@@ -219,7 +229,36 @@ class ClockRate:
             self._mission.holds_time(self._is_planning or step_is_late, steady),
             self._places_written.holds_time(place_is_late, steady),
         )
-        self.is_waiting = model.speed == 0.0 and any(late)
+        return any(late)
+
+
+class ClockRate:
+    """Decides how much simulated time passes at each tick.
+
+    Attributes:
+        robots: The programs of each robot; all share one time.
+        is_waiting: Whether time stood still, when last asked, until a program answers.
+        pause: At full speed, real seconds from the last `due` until it is to be asked again.
+    """
+
+    def __init__(self, model: ClockRateModel, steady: float, robots: int = 1) -> None:
+        """Start at the given reading of the steady clock, seconds."""
+        self._model = model
+        self._last = steady
+        self._owed = 0.0
+        self.pause: float | None = None
+        self.robots = tuple(Lockstep(model) for _ in range(robots))
+        self.is_waiting = False
+
+    @property
+    def awaits_picture(self) -> bool:
+        """Whether, when last asked, somebody was late who reads a picture or sees the arm rest."""
+        return any(robot.awaits_picture for robot in self.robots)
+
+    def waits(self, simulated: float, steady: float) -> bool:
+        """Return whether time stands still until a program answers; times as for `due`."""
+        late = [robot.is_late(simulated, steady) for robot in self.robots]
+        self.is_waiting = self._model.speed == 0.0 and any(late)
         return self.is_waiting
 
     def due(self, simulated: float, steady: float, *, moving: bool) -> float:
@@ -238,11 +277,11 @@ class ClockRate:
             self._owed = min(self._owed + elapsed * model.ceiling, step)
             return 0.0
         if model.speed == 0.0:
-            looking = self._look_from <= simulated <= self._look_until
-            if not (moving or looking or any(self._executed.values())):
+            busy = any(each.is_looking(simulated) or each.is_executing for each in self.robots)
+            if not (moving or busy):
                 step = model.idle_step
-            if self._mission.answered is not None and not any(self._executed.values()):
-                step = min(step, max(self._mission.answered - simulated, MIN_STEP))
+            until = min(each.waits_until for each in self.robots)
+            step = min(step, max(until - simulated, MIN_STEP))
             self._owed = min(self._owed + elapsed * model.ceiling, step)
         else:
             # What a busy machine falls behind is caught up with, but not without bound.

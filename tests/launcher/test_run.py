@@ -33,6 +33,7 @@ from launcher.run_mission import (
     what_to_look_at,
 )
 from launcher.run_processes import command, node_environ, programs_of, ros_arguments
+from launcher.team import Part
 from surveillance_behaviour.mission.mission_log import MissionRecord
 from surveillance_runtime import discovery
 from surveillance_runtime.command_line import page_address
@@ -382,10 +383,9 @@ def test_everything_that_only_looks_on_gets_a_process(tmp_path, composed):
     watch = tmp_path / 'watch.yaml'
     run = Run(web=True, watch=watch, record=str(tmp_path), composed=composed)
     nodes, observers = run.nodes(), run.observers()
-    files = {node.name: tmp_path / node.name for node in (*nodes, *observers)}
-    started = ' '.join(
-        word for each in programs_of(run, nodes, observers, files, {}) for word in each.command
-    )
+    part = Part(run, nodes=nodes, observers=observers)
+    files = {node.name: tmp_path / node.name for node in part.everyone}
+    started = ' '.join(word for each in programs_of(part, files, {}) for word in each.command)
     assert {'observer', 'mission_page', 'mission_recorder'} <= {node.name for node in observers}
     for node in observers:
         assert started.count(f'{node.name}={node.module}:{node.class_name}') == 1, node.name

@@ -37,11 +37,11 @@ def test_as_fast_as_possible_ends_at_the_ceiling() -> None:
 
 def test_time_waits_for_the_next_command_of_a_controller_at_work() -> None:
     rate = ClockRate(ClockRateModel(speed=0.0, step=0.1, window=0.15, patience=0.2), 0.0)
-    rate.command(True, 0.0)
+    rate.robots[0].command(True, 0.0)
     passed = [rate.due(0.1 * count, 0.01 * count, moving=True) for count in range(1, 6)]
     assert passed == pytest.approx([0.1, 0.0, 0.0, 0.0, 0.0])
     assert rate.is_waiting
-    rate.command(True, 0.2)
+    rate.robots[0].command(True, 0.2)
     # At once: what was owed while it waited is not lost.
     assert rate.due(0.2, 0.05, moving=True) == pytest.approx(0.1)
     assert not rate.is_waiting
@@ -50,36 +50,36 @@ def test_time_waits_for_the_next_command_of_a_controller_at_work() -> None:
 def test_time_waits_for_a_robot_that_works_out_where_it_is() -> None:
     rate = ClockRate(ClockRateModel(speed=0.0, estimate_window=0.45), 0.0)
     assert rate.due(0.5, 0.01, moving=False) > 0.0  # Nobody has told a pose yet.
-    rate.estimate(0.5)
+    rate.robots[0].estimate(0.5)
     assert rate.due(0.5, 0.02, moving=False) > 0.0
     assert rate.due(1.0, 0.03, moving=False) == 0.0
     assert rate.is_waiting
-    rate.estimate(1.0)
+    rate.robots[0].estimate(1.0)
     assert rate.due(1.0, 0.04, moving=False) > 0.0
 
 
 def test_a_silent_program_is_given_up_until_it_answers_again() -> None:
     rate = ClockRate(ClockRateModel(speed=0.0, patience=0.2), 0.0)
-    rate.command(True, 0.0)
+    rate.robots[0].command(True, 0.0)
     assert rate.due(1.0, 5.0, moving=True) == 0.0  # A machine that stood still is no silence.
     assert rate.due(1.0, 5.1, moving=True) == 0.0
     assert rate.due(1.0, 5.25, moving=True) > 0.0
     assert rate.due(1.1, 5.26, moving=True) > 0.0
-    rate.command(True, 1.2)
+    rate.robots[0].command(True, 1.2)
     assert rate.due(1.4, 5.27, moving=True) == 0.0
 
 
 def test_nothing_waits_when_the_base_was_told_to_stand() -> None:
     rate = ClockRate(ClockRateModel(speed=0.0), 0.0)
-    rate.command(True, 0.0)
-    rate.command(False, 0.1)
+    rate.robots[0].command(True, 0.0)
+    rate.robots[0].command(False, 0.1)
     assert rate.due(1.0, 0.01, moving=False) > 0.0
 
 
 def test_nothing_is_waited_for_at_a_set_speed() -> None:
     rate = ClockRate(ClockRateModel(speed=1.0), 0.0)
-    rate.command(True, 0.0)
-    rate.estimate(0.0)
+    rate.robots[0].command(True, 0.0)
+    rate.robots[0].estimate(0.0)
     assert rate.due(5.0, 5.0, moving=True) > 0.0
     assert not rate.is_waiting
 
@@ -94,66 +94,66 @@ def test_a_command_ends_an_idle_step_that_may_go_no_faster() -> None:
 
 def test_time_stands_at_the_end_of_the_mission_s_wait_until_it_waits_again() -> None:
     rate = ClockRate(ClockRateModel(speed=0.0, idle_step=0.5), 0.0)
-    rate.mission_waits(10.2)
+    rate.robots[0].mission_waits(10.2)
     assert rate.due(10.0, 0.01, moving=False) == pytest.approx(0.2)
     assert rate.due(10.2, 0.02, moving=False) == 0.0
     assert rate.is_waiting
-    rate.mission_waits(12.2)
+    rate.robots[0].mission_waits(12.2)
     assert rate.due(10.2, 0.03, moving=False) > 0.0
 
 
 def test_a_drive_takes_time_and_a_plan_takes_none() -> None:
     rate = ClockRate(ClockRateModel(speed=0.0), 0.0)
-    rate.mission_waits(1.0)
-    rate.goals('compute_path', 1.0, executed=True)
+    rate.robots[0].mission_waits(1.0)
+    rate.robots[0].goals('compute_path', 1.0, executed=True)
     assert rate.due(1.0, 0.01, moving=False) == 0.0
-    rate.goals('compute_path', 1.0, executed=False)
-    rate.goals('follow_path', 1.0, executed=True)
+    rate.robots[0].goals('compute_path', 1.0, executed=False)
+    rate.robots[0].goals('follow_path', 1.0, executed=True)
     assert rate.due(1.0, 0.02, moving=False) == pytest.approx(0.1)
-    rate.command(True, 1.1)
-    rate.goals('follow_path', 1.1, executed=False)
+    rate.robots[0].command(True, 1.1)
+    rate.robots[0].goals('follow_path', 1.1, executed=False)
     assert rate.due(1.1, 0.03, moving=False) == 0.0
 
 
 def test_a_drive_has_its_command_at_every_step_also_while_the_robot_stands() -> None:
     rate = ClockRate(ClockRateModel(speed=0.0), 0.0)
-    rate.goals('follow_path', 0.0, executed=True)
+    rate.robots[0].goals('follow_path', 0.0, executed=True)
     assert rate.due(0.0, 0.01, moving=False) > 0.0
     assert rate.due(0.1, 0.02, moving=False) == 0.0, 'the first command is waited for'
-    rate.command(False, 0.1)
+    rate.robots[0].command(False, 0.1)
     assert rate.due(0.1, 0.03, moving=False) > 0.0
     assert rate.due(0.2, 0.04, moving=False) == 0.0, 'the robot is told to stand, and again'
-    rate.command(False, 0.2)
-    rate.goals('follow_path', 0.2, executed=False)
+    rate.robots[0].command(False, 0.2)
+    rate.robots[0].goals('follow_path', 0.2, executed=False)
     assert rate.due(0.2, 0.05, moving=False) > 0.0
     assert rate.due(0.7, 0.06, moving=False) > 0.0, 'nobody drives'
 
 
 def test_a_mission_that_died_does_not_stop_time_for_good() -> None:
     rate = ClockRate(ClockRateModel(speed=0.0, patience=0.2), 0.0)
-    rate.mission_waits(1.0)
+    rate.robots[0].mission_waits(1.0)
     assert rate.due(1.0, 5.0, moving=False) == 0.0
     assert rate.due(1.0, 5.3, moving=False) > 0.0
-    rate.mission_waits(1.5)
+    rate.robots[0].mission_waits(1.5)
     assert rate.due(1.5, 5.4, moving=False) == 0.0
 
 
 def test_a_mission_that_waits_for_an_event_holds_nothing_back() -> None:
     rate = ClockRate(ClockRateModel(speed=0.0), 0.0)
-    rate.mission_waits(math.inf)
+    rate.robots[0].mission_waits(math.inf)
     assert rate.due(100.0, 0.01, moving=False) > 0.0
 
 
 def test_time_waits_until_the_ontology_has_the_place_as_long_as_somebody_writes_it() -> None:
     rate = ClockRate(ClockRateModel(speed=0.0), 0.0)
-    rate.place_told(1.0)
+    rate.robots[0].place_told(1.0)
     assert rate.due(1.0, 1.0, moving=True) > 0.0, 'nobody writes places'
-    rate.place_written(1.0)
-    rate.place_told(2.0)
+    rate.robots[0].place_written(1.0)
+    rate.robots[0].place_told(2.0)
     assert rate.due(2.0, 2.0, moving=True) == 0.0
-    rate.place_written(2.0)
+    rate.robots[0].place_written(2.0)
     assert rate.due(2.0, 2.1, moving=True) > 0.0
-    rate.place_told(3.0)
+    rate.robots[0].place_told(3.0)
     assert rate.due(3.0, 3.0, moving=True) == 0.0
     assert rate.due(3.0, 6.1, moving=True) > 0.0, 'given up after its patience'
 
@@ -161,18 +161,18 @@ def test_time_waits_until_the_ontology_has_the_place_as_long_as_somebody_writes_
 def test_time_waits_for_who_looks_where_the_arm_has_come_to_rest() -> None:
     rate = ClockRate(ClockRateModel(speed=0.0, look_window=0.2), 0.0)
     assert not rate.waits(0.0, 0.0)
-    rate.arm_moves(2.0)
+    rate.robots[0].arm_moves(2.0)
     assert not rate.waits(2.1, 0.1)
     assert rate.waits(2.2, 0.2)  # until its controller sees that it rests
-    rate.arm_rests(2.2)
+    rate.robots[0].arm_rests(2.2)
     assert not rate.waits(2.3, 0.3)
     assert rate.waits(2.4, 0.4)  # until a picture of that view is read
     assert rate.awaits_picture
-    rate.picture_read(1.9)
+    rate.robots[0].picture_read(1.9)
     assert rate.waits(2.4, 0.5)
-    rate.picture_read(2.3)
+    rate.robots[0].picture_read(2.3)
     assert not rate.waits(2.4, 0.6)
     assert rate.waits(2.5, 0.7)
     assert not rate.waits(5.3, 0.8)  # nobody looks for so long
-    rate.picture_read(5.3)
+    rate.robots[0].picture_read(5.3)
     assert not rate.waits(9.0, 0.9)

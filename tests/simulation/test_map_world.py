@@ -89,7 +89,7 @@ def test_people_walk_in_a_map(worlds: tuple[World, World]) -> None:
     people = People(by_map.plan, PeopleModel(count=3), rng)
     before = people.discs.copy()
     for _ in range(200):
-        people.step(0.1, (-50.0, 0.0), 0.2)
+        people.step(0.1, [(-50.0, 0.0)], 0.2)
     assert (np.hypot(*(people.discs - before)[:, :2].T) > 0.5).any()
     for x, y, radius in people.discs:
         assert by_map.clearance(x, y) > radius - CELL

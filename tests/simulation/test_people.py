@@ -25,7 +25,7 @@ def test_they_walk_from_room_to_room_and_through_no_wall() -> None:
     people = people_in(world, count=3)
     before, entered, walked = people.discs, set(), 0.0
     for _ in range(2400):
-        people.step(0.1, FAR_AWAY, 0.22)
+        people.step(0.1, [FAR_AWAY], 0.22)
         after = people.discs
         walked += float(np.hypot(*(after - before)[:, :2].T).max())
         for x, y, radius in after:
@@ -43,7 +43,7 @@ def test_nobody_walks_into_a_robot_that_stands_in_the_door(manner: str, kept: fl
     people = people_in(world, count=4, manner=manner, shortest_rest=0.0, longest_rest=1.0)
     nearest = math.inf
     for _ in range(1200):
-        people.step(0.1, (door.x, door.y), 0.22)
+        people.step(0.1, [(door.x, door.y)], 0.22)
         for x, y, radius in people.discs:
             nearest = min(nearest, math.dist((x, y), (door.x, door.y)) - radius - 0.22)
     assert kept - 1e-6 <= nearest < kept + 0.3
@@ -64,6 +64,6 @@ def test_the_same_seed_gives_the_same_people() -> None:
     world = two_rooms()
     first, second = people_in(world, count=2), people_in(world, count=2)
     for _ in range(100):
-        first.step(0.1, FAR_AWAY, 0.22)
-        second.step(0.1, FAR_AWAY, 0.22)
+        first.step(0.1, [FAR_AWAY], 0.22)
+        second.step(0.1, [FAR_AWAY], 0.22)
     assert (first.discs == second.discs).all()

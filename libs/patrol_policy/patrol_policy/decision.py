@@ -16,6 +16,7 @@ import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 from patrol_policy.battery import (
     PERCENTILE_99,
@@ -25,6 +26,7 @@ from patrol_policy.battery import (
     Energy,
     Station,
 )
+from patrol_policy.fleet.assignment import FleetOutlook
 from patrol_policy.policies import DEFAULT_POLICY, POLICIES, Charge, Scores, make_policy
 from patrol_policy.settings import converted, names_expected, parameter, parameters
 from patrol_policy.suggestions import closest_name
@@ -36,6 +38,10 @@ REQUEST = 'request'
 """The rule of a decision to go where an operator has sent the robot."""
 QUIET = 'quiet'
 """The rule of a decision to stay at the station: quiet hours, or nothing is open."""
+SHARE = 'share'
+"""The rule of a decision that a fleet's share asks for, where the rules ask nothing."""
+WAIT = 'wait'
+"""The rule of a decision to stay: another robot of the fleet goes first, or has the dock."""
 ANY = 'any'
 """The rule of a decision for which no class had a reachable member."""
 URGENT = 'URGENT'
@@ -218,6 +224,19 @@ def decide(world: World, battery: Battery, settings: DecisionSettings) -> Decisi
     Raises:
         NowhereToGoError: Nothing can be reached, or no charging place when one is needed.
     """
+    if world.fleet is not None:
+        return _one_move(world, _decide(world, battery, settings))
+    return _decide(world, battery, settings)
+
+
+def _one_move(world: World, decision: Decision) -> Decision:
+    """Go only as far as the next place: between robots each way has its own right of way."""
+    if decision.place in (world.place, *world.graph.leg_seconds[world.place]):
+        return decision
+    return replace(decision, place=world.graph.route(world.place, decision.place)[0])
+
+
+def _decide(world: World, battery: Battery, settings: DecisionSettings) -> Decision:
     if why := why_charge(world, battery, settings):
         return _to_charge(world, settings.recharge_rooms, why)
     if world.requested and world.requested != world.place:
@@ -230,15 +249,76 @@ def decide(world: World, battery: Battery, settings: DecisionSettings) -> Decisi
         rule, allowed = settings.rules.candidates(_within_range(world, energy))
     except (NothingOpenError, OutOfRangeError) as error:
         return _stay(world, settings, str(error))
-    scores = make_policy(settings.policy)(world, allowed, energy)
-    if isinstance(scores, Charge):
-        return _to_charge(world, (scores.place,), scores.words)
-    decision = _best(world, rule, allowed, scores, settings.policy)
+    if world.fleet is not None:
+        decision = _shared(world, world.fleet, _within_range(world, energy), settings)
+    else:
+        scores = make_policy(settings.policy)(world, allowed, energy)
+        if isinstance(scores, Charge):
+            return _to_charge(world, (scores.place,), scores.words)
+        decision = _best(world, rule, allowed, scores, settings.policy)
     if energy is not None and (why := _too_far(world, decision.place, energy)):
         here = world.graph.index[world.place]
         if not (here in energy.stations and world.level >= energy.full):
             return _to_charge(world, settings.recharge_rooms, why)
     return decision
+
+
+def _shared(
+    world: World, fleet: FleetOutlook, within: World, settings: DecisionSettings
+) -> Decision:
+    """Choose what the robot's share of the places asks for, as far as the rules allow it.
+
+    An URGENT place counts for the robot whose share it is in.
+    """
+    choice = fleet.choose(world.now, world.visited_at)
+    here = world.place
+    common: dict[str, Any] = {
+        'time': world.now,
+        'from_place': here,
+        'policy': 'fleet',
+        'share': choice.share,
+    }
+    if choice.slot is not None:
+        return Decision(
+            **common,
+            place=choice.place,
+            target=choice.place,
+            rule=RECHARGE,
+            reason=choice.reason,
+            slot=choice.slot,
+        )
+    if choice.share is None:
+        stay = max(1.0, (choice.until or world.now) - world.now)
+        return Decision(
+            **common, place=here, target=here, rule=WAIT, reason=choice.reason, stay=stay
+        )
+    mine = frozenset(choice.share.tour)
+    classes = {
+        place: found if place in mine else found - {URGENT}
+        for place, found in ((p, classes_of(world, p)) for p in world.graph.places)
+    }
+    own = {p: limit if p in mine else math.inf for p, limit in world.own_thresholds.items()}
+    rule, allowed = settings.rules.candidates(replace(within, classes=classes, own_thresholds=own))
+    goal, graph = choice.place, world.graph
+    if goal == here and rule != URGENT:
+        stay = max(1.0, (choice.until or world.now + 1.0) - world.now)
+        reason = choice.reason
+        return Decision(**common, place=here, target=here, rule=SHARE, reason=reason, stay=stay)
+    step = here if goal == here else graph.route(here, goal)[0]
+    if step in allowed or goal not in graph.index:
+        named = rule if step in allowed else SHARE
+        return Decision(**common, place=step, target=goal, rule=named, reason=choice.reason)
+    scores = {
+        place: -graph.move(here, place) - graph.seconds(place, goal) + world.unvisited(place) * 1e-3
+        for place in allowed
+    }
+    best = max(sorted(scores), key=lambda place: scores[place])
+    kind = 'place' if rule == ANY else f'{rule} place'
+    reason = (
+        f'{best} ({world.wait_in_words(best)}) is the {kind} within reach that is nearest to '
+        f'{goal}; {choice.reason}'
+    )
+    return Decision(**common, place=best, target=best, rule=rule, reason=reason, scores=scores)
 
 
 def world_with_charge(world: World, battery: Battery) -> World:

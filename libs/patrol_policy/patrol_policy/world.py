@@ -13,6 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from patrol_policy.battery import Energy
+from patrol_policy.fleet.assignment import FleetOutlook, Share
+from patrol_policy.fleet.docks import DockSlot
 from patrol_policy.graph import PatrolGraph
 from patrol_policy.hours import ALWAYS_OPEN, Openings
 
@@ -79,6 +81,7 @@ class World:
         openings: What the hours of the places come to now.
         contradiction: Which facts of the ontology clash, as a sentence; empty: none do.
         memory: What the policies remember.
+        fleet: What is known of the robots that share the patrol; None: this one is alone.
     """
 
     place: str
@@ -99,6 +102,7 @@ class World:
     openings: Openings = ALWAYS_OPEN
     contradiction: str = ''
     memory: PolicyMemory = field(default_factory=PolicyMemory)
+    fleet: FleetOutlook | None = None
 
     def unvisited(self, place: str) -> float:
         """Return the seconds since ``place`` was visited."""
@@ -149,6 +153,9 @@ class Decision:
         policy: The policy that chose among the rule's candidates.
         reason: One sentence with the numbers that decided.
         scores: The policy's value of each candidate.
+        stay: How long the robot stays before it decides anew, seconds; 0: it goes.
+        share: What it took upon itself of the places of a fleet; None: nothing.
+        slot: Its time at a dock, where a fleet has one for it.
     """
 
     time: float
@@ -159,3 +166,6 @@ class Decision:
     policy: str
     reason: str
     scores: Mapping[str, float] = field(default_factory=dict)
+    stay: float = 0.0
+    share: Share | None = None
+    slot: DockSlot | None = None

@@ -48,7 +48,10 @@ class ChooseRoomTask(MissionState):
     ends = ('recharge', 'explore')
 
     def work(self, ud: Any, interrupt: fsm.Interrupt) -> str:
-        must_charge = self.mission.at_station() and self.mission.ports.reasoner.why_charge()
+        reasoner = self.mission.ports.reasoner
+        must_charge = self.mission.at_station() and reasoner.why_charge()
+        if must_charge and reasoner.dock_is_taken():
+            return 'explore'
         return 'recharge' if must_charge else 'explore'
 
 

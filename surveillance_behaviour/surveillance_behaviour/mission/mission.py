@@ -167,10 +167,13 @@ class Mission:
         reasoner, now = self.ports.reasoner, self.now()
         avoided = self.recovery.avoided(now)
         decision = reasoner.decide(now, interrupt, avoided, to_charge=to_charge)
-        while decision.rule == QUIET and decision.place == self.place:
+        said = ''
+        while decision.stay or (decision.rule == QUIET and decision.place == self.place):
             # Nothing is to be done: it is decided anew now and then, and when it is interrupted.
-            self.say(decision.reason)
-            if not self.clock.sleep(QUIET_SECONDS, interrupt):
+            if decision.reason != said:
+                said = decision.reason
+                self.say(said)
+            if not self.clock.sleep(decision.stay or QUIET_SECONDS, interrupt):
                 raise CallInterruptedError
             now = self.now()
             decision = reasoner.decide(now, interrupt, avoided, to_charge=to_charge)

@@ -16,7 +16,12 @@ from armor_service.client import (
     Transport,
 )
 from state_machines.exceptions import CallError, CallInterruptedError, UnavailableError
-from surveillance_ontology.patrol_ontology import OntologyNotReadyError, PatrolOntology, Snapshot
+from surveillance_ontology.patrol_ontology import (
+    ROBOT,
+    OntologyNotReadyError,
+    PatrolOntology,
+    Snapshot,
+)
 
 
 class Whereabouts:
@@ -83,6 +88,7 @@ class ArmorKnowledge:
         patience: How long an ontology that is built (anew), or contradicts itself, may take until
             it knows where the robot is, seconds of steady time.
         is_back: Whether a server that was away is there again; None: nobody can tell.
+        robot: The robot's name in the ontology.
     """
 
     def __init__(
@@ -94,10 +100,11 @@ class ArmorKnowledge:
         whereabouts: Whereabouts | None = None,
         patience: float = 0.0,
         is_back: Callable[[], bool] | None = None,
+        robot: str = ROBOT,
     ) -> None:
         self._is_back = is_back
         self._armor = ArmorClient(client_id, '', transport)
-        self._ontology = PatrolOntology(self._armor)
+        self._ontology = PatrolOntology(self._armor, robot)
         self._wake = wake
         self._ask_reference = reference
         self._whereabouts = whereabouts or Whereabouts()

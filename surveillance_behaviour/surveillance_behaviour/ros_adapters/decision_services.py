@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import partial
@@ -14,11 +15,13 @@ from rclpy.parameter import Parameter
 
 from patrol_policy.decision import DecisionSettings
 from patrol_policy.world import Decision
+from state_machines import Interrupt
 from state_machines.exceptions import CallError
 from surveillance_behaviour import conversions
 from surveillance_behaviour.charging import BatteryMonitor
 from surveillance_behaviour.experience import Experience
 from surveillance_behaviour.ports import Ontology, Places
+from surveillance_behaviour.ros_adapters.fleet_topic import fleet_of
 from surveillance_behaviour.world_model import WorldModel
 from surveillance_interfaces.msg import Decision as DecisionMessage
 from surveillance_interfaces.srv import GoTo, WhyNot
@@ -28,6 +31,9 @@ from surveillance_runtime.place.patrol_rules import described_patrol_rules
 from surveillance_runtime.place.stations import Station, described_stations
 from surveillance_runtime.state_topics import OwnedTopic
 from surveillance_runtime.waiting import AwaitedWork
+
+SETTLE = 0.15
+"""How long a robot waits until the others have heard what it wants, seconds of real time."""
 
 
 @dataclass(frozen=True)
@@ -74,17 +80,28 @@ def world_model_of(
         log.warn(experience.problem)
     generator = random.Random(memory.random_seed if memory.random_seed >= 0 else None)
     topic = OwnedTopic(node, DecisionMessage, 'decision')
-    count = 0
+    count, logged = 0, ''
 
     def announce(decision: Decision) -> None:
-        nonlocal count
+        nonlocal count, logged
         count += 1
         stamp = node.get_clock().now().to_msg()
         topic.publish(conversions.decision_message(decision, count, stamp))
+        # One that only stays is made again and again, with other numbers.
+        said = re.sub(r'[\d.]+', '', f'{decision.place} {decision.reason}') if decision.stay else ''
+        if said and said == logged:
+            return
+        logged = said
         log.info(
             f'decision {count}: {decision.from_place} -> {decision.place} '
             f'[{decision.rule}] {decision.reason}'
         )
+
+    robot = str(node.get_parameter('robot_name').value)
+    fleet = fleet_of(node, robot, settings.recharge_rooms)
+
+    def settle(interrupt: Interrupt) -> None:
+        interrupt.wait(SETTLE)
 
     world_model = WorldModel(
         settings,
@@ -99,6 +116,8 @@ def world_model_of(
         described_patrol_rules(node),
         lambda sentence: log.info(sentence),
         {place: station.rate / 60.0 for place, station in stations.items() if station.rate},
+        fleet,
+        settle,
     )
     world_model.learn_draw(elapsed)
     return world_model

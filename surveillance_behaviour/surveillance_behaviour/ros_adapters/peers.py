@@ -36,7 +36,7 @@ from surveillance_behaviour.ros_adapters.armor_knowledge import ArmorKnowledge, 
 from surveillance_interfaces.action import ComputePath, Control, FollowPath, Plan
 from surveillance_interfaces.msg import MissionStatus, RobotPlace
 from surveillance_interfaces.srv import ReferenceName, RoomPosition
-from surveillance_ontology.armor_client import RosTransport
+from surveillance_ontology.armor_client import RosTransport, declared_robot_name
 from surveillance_runtime.conversions import (
     nanoseconds_of,
     point_from,
@@ -158,6 +158,7 @@ def ros_ontology(node: PatrolNode, deadlines: Deadlines) -> ArmorKnowledge:
         whereabouts,
         deadlines.answer,
         transport.is_ready,
+        declared_robot_name(node),
     )
 
 

@@ -94,6 +94,9 @@ class NavigationMotion:
         self._frames = declared_frames(node, 'map', 'odom', 'base', 'transform_tolerance')
         self._lidar = ScanReader(node, self._robot.radius, self._frames.base)
         guesses = [station.pose for station in settings.stations.values()]
+        if settings.start_pose:
+            x, y, yaw = settings.start_pose
+            guesses = [(x, y, yaw)]
         self._navigator = navigator or Navigator(
             door_segments(node), guesses=guesses, zones=place_zones(node)
         )

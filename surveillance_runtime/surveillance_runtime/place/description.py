@@ -12,6 +12,7 @@ from typing import Any
 
 from surveillance_runtime.files import FileError
 from surveillance_runtime.parameters import ParameterError, ParameterHost, parameter
+from surveillance_runtime.place.fleet import FleetMember, members_of
 from surveillance_runtime.place.floor_plan import FloorPlan
 from surveillance_runtime.place.occupancy_map import is_map_description, is_picture
 from surveillance_runtime.place.patrol_rules import PatrolRules, patrol_rules
@@ -38,11 +39,13 @@ class PlaceFile:
         place: The rooms, which doors join them, a point in each.
         plan: Walls, map, doors and markers, as far as the file has them.
         rules: What holds for single places when they are patrolled.
+        robots: The robots of the place, if it names them.
     """
 
     place: Place
     plan: FloorPlan
     rules: PatrolRules = field(default_factory=PatrolRules)
+    robots: tuple[FleetMember, ...] = ()
 
 
 def read_place_file(path: str | Path, *, radius: float = ROBOT_RADIUS) -> PlaceFile:
@@ -62,9 +65,10 @@ def read_place_file(path: str | Path, *, radius: float = ROBOT_RADIUS) -> PlaceF
             described['map_file'] = map_file_beside(file.path, name)
         plan = checked_plan(described, radius)
         rules = patrol_rules(described, plan.place.rooms)
+        robots = members_of(described, plan)
     except PlaceError as error:
         raise file.error(error.where, error.problem) from None
-    return PlaceFile(plan.place, plan, rules)
+    return PlaceFile(plan.place, plan, rules, robots)
 
 
 def described_in(path: str | Path) -> tuple[YamlFile, dict[str, Any]]:

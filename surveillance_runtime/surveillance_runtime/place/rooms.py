@@ -21,16 +21,16 @@ ZONE_TABLES = ('keep_out_zones', 'slow_zones')
 GEOMETRY_KEYS = (
     *('walls', 'doors', 'markers', 'marker_size', 'marker_dictionary', 'station', 'stations'),
     *ZONE_TABLES,
-    *('map_file', 'map_file_resolution', 'map_file_origin'),
+    *('map_file', 'map_file_resolution', 'map_file_origin', 'robots'),
 )
 PATROL_TABLES = ('thresholds', 'exploration', 'hours', 'classes')
 PATROL_KEYS = (*PATROL_TABLES, 'keep_out', 'quiet_hours', 'time_zone')
 PLACE_TABLES = (
-    *('map', 'room_positions', 'walls', 'doors', 'markers', 'stations'),
+    *('map', 'room_positions', 'walls', 'doors', 'markers', 'stations', 'robots'),
     *ZONE_TABLES,
     *PATROL_TABLES,
 )
-"""Those that hold an entry for each room, wall, door, marker or zone: `map.R1`, `map.R2`, ..."""
+"""Those that hold an entry for each room, wall, door, marker, ...: `map.R1`, `map.R2`, ..."""
 _NAME = re.compile(r'[A-Za-z_][A-Za-z0-9_-]*\Z')
 
 Position = tuple[float, float, float]

@@ -19,7 +19,7 @@ from surveillance_simulation import conversions
 from surveillance_simulation.camera.model import Camera, Conditions, covered, expose
 from surveillance_simulation.camera.mujoco_rendering import MujocoRenderer
 from surveillance_simulation.camera.rendering import Renderer
-from surveillance_simulation.feeds.sensor_feed import SENSOR_DEPTH
+from surveillance_simulation.feeds.sensor_feed import SENSOR_DEPTH, topic_of
 from surveillance_simulation.robot.robot import Robot
 
 
@@ -41,18 +41,37 @@ class CameraOptions:
     )
 
 
-class CameraFeed:
-    """The topics `camera/rgb/image_raw` and `camera/rgb/camera_info` of a simulated robot.
+class CameraSetup:
+    """What a node's parameters say of the cameras of its robots, which are all alike.
 
     Attributes:
         conditions: Light, noise and blur of the next pictures.
+        frame: The name of the camera's frame.
+        options: What does not change.
         period: Simulated seconds from picture to picture.
     """
+
+    def __init__(self, node: PatrolNode) -> None:
+        """Declare the parameters on a node."""
+        self.conditions = node.declare_fields(
+            Conditions(), prefix='camera.', on_change=self._take_conditions
+        )
+        self.frame = declared_frames(node, 'camera').camera
+        self.options = node.declare_fields(CameraOptions(), prefix='camera.')
+        self.period = 1.0 / self.options.rate
+
+    def _take_conditions(self, conditions: Conditions) -> None:
+        self.conditions = conditions
+
+
+class CameraFeed:
+    """The topics `camera/rgb/image_raw` and `camera/rgb/camera_info` of a simulated robot."""
 
     def __init__(
         self,
         node: PatrolNode,
         robot: Robot,
+        setup: CameraSetup,
         seed: int,
         changing: Any,
         stamp: Callable[[], Time],
@@ -62,6 +81,7 @@ class CameraFeed:
         Args:
             node: The node that publishes.
             robot: The robot that carries the camera.
+            setup: What the parameters say of it.
             seed: Seed of the noise.
             changing: Lock that is held while robot or world change.
             stamp: Returns the present time for the pictures.
@@ -70,29 +90,29 @@ class CameraFeed:
             PlaceError: A marker's dictionary or id does not exist.
             ImportError: MuJoCo is to render and is not installed.
         """
-        self.conditions = node.declare_fields(
-            Conditions(), prefix='camera.', on_change=self._take_conditions
-        )
-        self._frame = declared_frames(node, 'camera').camera
+        self._setup = setup
         self._robot = robot
-        options = node.declare_fields(CameraOptions(), prefix='camera.')
+        options = setup.options
         self._camera = Camera.from_field_of_view(
             options.width, options.height, math.radians(options.field_of_view)
         )
         robot.world.wall_brightness = options.wall_brightness
         take = MujocoRenderer if options.renderer == 'mujoco' else Renderer
         self._renderer: Renderer | MujocoRenderer = take(robot.world, self._camera)
-        self.period = 1.0 / options.rate
         self._next = 0.0
         self._rng = np.random.default_rng(seed)
         self._changing = changing
         self._stamp = stamp
         self._wanted = threading.Semaphore(0)
-        self._images = node.create_publisher(Image, 'camera/rgb/image_raw', SENSOR_DEPTH)
-        self._infos = node.create_publisher(CameraInfo, 'camera/rgb/camera_info', SENSOR_DEPTH)
+        self._images = node.create_publisher(
+            Image, topic_of(robot, 'camera/rgb/image_raw'), SENSOR_DEPTH
+        )
+        self._infos = node.create_publisher(
+            CameraInfo, topic_of(robot, 'camera/rgb/camera_info'), SENSOR_DEPTH
+        )
         self._stopping = node.stopping
         node.stopping.subscribe(self._wanted.release)
-        node.spawn(self._work, 'camera')
+        node.spawn(self._work, topic_of(robot, 'camera'))
 
     @property
     def is_watched(self) -> bool:
@@ -104,16 +124,13 @@ class CameraFeed:
         now = self._robot.time
         if now + 1e-9 < self._next:
             return
-        self._next = now + self.period
+        self._next = now + self._setup.period
         self.ask()
 
     def ask(self) -> None:
         """Ask for a picture if somebody looks; never blocks."""
         if self.is_watched or self._infos.get_subscription_count():
             self._wanted.release()
-
-    def _take_conditions(self, conditions: Conditions) -> None:
-        self.conditions = conditions
 
     def _work(self) -> None:
         while True:
@@ -129,10 +146,12 @@ class CameraFeed:
                 pose = self._robot.camera_pose()
                 is_covered = self._robot.lens_covered
                 stamp = self._stamp()
-            self._infos.publish(conversions.camera_info_to_ros(self._camera, self._frame, stamp))
+            self._infos.publish(
+                conversions.camera_info_to_ros(self._camera, self._setup.frame, stamp)
+            )
             if self.is_watched:
                 scene = self._renderer.ideal(pose)
                 if is_covered:
                     scene = covered(scene)
-                picture = expose(scene, self.conditions, self._rng)
-                self._images.publish(conversions.image_to_ros(picture, self._frame, stamp))
+                picture = expose(scene, self._setup.conditions, self._rng)
+                self._images.publish(conversions.image_to_ros(picture, self._setup.frame, stamp))

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import rclpy.node
+from rclpy.publisher import Publisher
 from rclpy.qos import QoSProfile
 from std_msgs.msg import Float32
 
@@ -21,7 +23,9 @@ from surveillance_interfaces.srv import (
 )
 from surveillance_runtime.place import PlaceError
 from surveillance_simulation import conversions
+from surveillance_simulation.feeds.sensor_feed import topic_of
 from surveillance_simulation.robot.robot import Robot
+from surveillance_simulation.robot.robots import Robots
 from surveillance_simulation.staging import Stage
 from surveillance_simulation.world.textures import marker_panel
 
@@ -30,12 +34,16 @@ LONGEST_SHIFT = 1000.0
 
 
 class FaultServices:
-    """Offers the services below `simulation/` on a node."""
+    """Offers the services below `simulation/` on a node.
+
+    What happens to the place is asked for there, what happens to one robot of several below its
+    name.
+    """
 
     def __init__(
         self,
         node: rclpy.node.Node,
-        robot: Robot,
+        robots: Robots,
         stage: Stage,
         changing: Any,
         on_change: Callable[[], None],
@@ -45,30 +53,37 @@ class FaultServices:
 
         Args:
             node: The node that offers them.
-            robot: The robot in its world, which they change.
-            stage: Carries out lines on both, and keeps the truth.
+            robots: The robots in their world, which they change.
+            stage: Carries out lines on them, and keeps the truth.
             changing: Lock to hold during a change.
             on_change: Called after each change.
             now: Returns the time of the nodes' clock, seconds.
         """
         self._node = node
-        self._robot = robot
+        self._world = robots.world
         self._stage = stage
         self._now = now
         self._changing = changing
         self._on_change = on_change
-        self._drained = node.create_publisher(Float32, 'battery_drain', QoSProfile(depth=10))
         for name, kind, change in (
             ('set_door', SetDoor, self._set_door),
             ('place_obstacle', PlaceObstacle, self._place_obstacle),
             ('remove_obstacle', RemoveObstacle, self._remove_obstacle),
-            ('push_robot', PushRobot, self._push_robot),
-            ('slip_odometry', SlipOdometry, self._slip_odometry),
-            ('drain_battery', DrainBattery, self._drain_battery),
             ('set_marker', SetMarker, self._set_marker),
         ):
             node.create_service(kind, f'simulation/{name}', self._answered(change))
         node.create_service(ConsoleCommand, 'simulation/stage', self._on_stage)
+        for robot in robots.robots:
+            drained = node.create_publisher(
+                Float32, topic_of(robot, 'battery_drain'), QoSProfile(depth=10)
+            )
+            for name, kind, change in (
+                ('push_robot', PushRobot, partial(_push_robot, robot)),
+                ('slip_odometry', SlipOdometry, partial(_slip_odometry, robot)),
+                ('drain_battery', DrainBattery, partial(_drain_battery, drained)),
+            ):
+                service = topic_of(robot, f'simulation/{name}')
+                node.create_service(kind, service, self._answered(change))
 
     def _answered(self, change: Callable[[Any], str]) -> Callable[[Any, Any], Any]:
         def answer(request: Any, response: Any) -> Any:
@@ -104,32 +119,16 @@ class FaultServices:
         )
 
     def _place_obstacle(self, request: PlaceObstacle.Request) -> str:
-        self._robot.world.place_obstacle(request.name, request.x, request.y, request.radius)
+        self._world.place_obstacle(request.name, request.x, request.y, request.radius)
         return f'obstacle {request.name} stands at ({request.x:.2f}, {request.y:.2f})'
 
     def _remove_obstacle(self, request: RemoveObstacle.Request) -> str:
-        self._robot.world.remove_obstacle(request.name)
+        self._world.remove_obstacle(request.name)
         self._stage.forget('thing', request.name)
         return f'obstacle {request.name} is gone'
 
-    def _push_robot(self, request: PushRobot.Request) -> str:
-        _check_shift(request.dx, request.dy, request.dyaw)
-        way = self._robot.base.push(request.dx, request.dy, request.dyaw)
-        return f'pushed by {way:.2f} m and {request.dyaw:.2f} rad'
-
-    def _slip_odometry(self, request: SlipOdometry.Request) -> str:
-        _check_shift(request.dx, request.dy, request.dyaw)
-        self._robot.base.slip(request.dx, request.dy, request.dyaw)
-        return f'odometry slipped by ({request.dx:.2f}, {request.dy:.2f}) m, {request.dyaw:.2f} rad'
-
-    def _drain_battery(self, request: DrainBattery.Request) -> str:
-        if not 0.0 <= request.percent <= 100.0:
-            raise PlaceError((), f'percent {request.percent:g}: expected 0 to 100')
-        self._drained.publish(Float32(data=float(request.percent)))
-        return f'battery drained by {request.percent:g} percent'
-
     def _set_marker(self, request: SetMarker.Request) -> str:
-        world = self._robot.world
+        world = self._world
         self._stage.forget('marker', request.name)
         if request.state != SetMarker.Request.MOVED:
             world.set_marker(request.name, request.state)
@@ -141,6 +140,25 @@ class FaultServices:
         return (
             f'marker {request.name} with id {request.id} hangs at ({marker.x:.2f}, {marker.y:.2f})'
         )
+
+
+def _push_robot(robot: Robot, request: PushRobot.Request) -> str:
+    _check_shift(request.dx, request.dy, request.dyaw)
+    way = robot.base.push(request.dx, request.dy, request.dyaw)
+    return f'pushed by {way:.2f} m and {request.dyaw:.2f} rad'
+
+
+def _slip_odometry(robot: Robot, request: SlipOdometry.Request) -> str:
+    _check_shift(request.dx, request.dy, request.dyaw)
+    robot.base.slip(request.dx, request.dy, request.dyaw)
+    return f'odometry slipped by ({request.dx:.2f}, {request.dy:.2f}) m, {request.dyaw:.2f} rad'
+
+
+def _drain_battery(drained: Publisher, request: DrainBattery.Request) -> str:
+    if not 0.0 <= request.percent <= 100.0:
+        raise PlaceError((), f'percent {request.percent:g}: expected 0 to 100')
+    drained.publish(Float32(data=float(request.percent)))
+    return f'battery drained by {request.percent:g} percent'
 
 
 def _check_shift(*numbers: float) -> None:

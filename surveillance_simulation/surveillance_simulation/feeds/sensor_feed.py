@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from builtin_interfaces.msg import Time
@@ -24,6 +25,7 @@ from surveillance_runtime.profile.record import Frames
 from surveillance_runtime.state_topics import OwnedTopic
 from surveillance_simulation import conversions
 from surveillance_simulation.robot.robot import Robot
+from surveillance_simulation.world.world import World
 
 try:
     from tf2_msgs.msg import TFMessage
@@ -36,7 +38,7 @@ SENSOR_DEPTH = 5
 
 @dataclass(frozen=True)
 class PublishedOptions:
-    """How the place is published; units as declared."""
+    """How place and robots are published; units as declared."""
 
     map_resolution: float = parameter(0.05, 'Side of a cell of the map, metres.', 0.01, 0.5)
     announce_pose: bool = parameter(
@@ -44,13 +46,39 @@ class PublishedOptions:
     )
 
 
+def topic_of(robot: Robot, name: str) -> str:
+    """Return the name of a robot's topic or service for the node that simulates it."""
+    return f'{robot.name}/{name}' if robot.name else name
+
+
 MAP_REPEAT = 5.0
 """Seconds of real time between two repetitions of the map, which is large."""
 
 
-def _lidars_of(node: PatrolNode, frames: Frames) -> list[tuple[str, str, Pose]]:
-    """Return topic, frame and mount of each lidar; one that tf_static knows is at the centre."""
-    lidars = node.declare_fields(LidarSettings(), without=('sweep',))
+@dataclass(frozen=True)
+class SensorSetup:
+    """What a node's parameters say of the sensors of its robots, which are all alike.
+
+    Attributes:
+        frames: The names of the frames.
+        lidars: Topic, frame and mount of each lidar; one that tf_static knows is at the centre.
+        published: How it is published.
+    """
+
+    frames: Frames
+    lidars: tuple[tuple[str, str, Pose], ...]
+    published: PublishedOptions
+
+    @classmethod
+    def declared(cls, node: PatrolNode) -> SensorSetup:
+        """Declare the parameters on a node."""
+        frames = declared_frames(node, 'map', 'odom', 'base', 'scans')
+        lidars = node.declare_fields(LidarSettings(), without=('sweep',))
+        published = node.declare_fields(PublishedOptions())
+        return cls(frames, tuple(_lidars_of(lidars, frames)), published)
+
+
+def _lidars_of(lidars: LidarSettings, frames: Frames) -> list[tuple[str, str, Pose]]:
     names = list(frames.scans)
     rows = np.array(lidars.mounts or [0.0] * 4 * len(lidars.scans)).reshape(-1, 4).tolist()
     return [
@@ -69,44 +97,56 @@ def _earlier(stamp: Time, seconds: float) -> Time:
     return Time(sec=nanoseconds // 10**9, nanosec=nanoseconds % 10**9)
 
 
-class SensorFeed:
-    """The topics of a robot's sensors, of the map and of simulated time."""
+class PlaceFeed:
+    """The topics of simulated time, of the map and of the doors: one of each for all robots."""
 
-    def __init__(self, node: PatrolNode, robot: Robot, *, drives_clock: bool) -> None:
+    def __init__(
+        self, node: PatrolNode, world: World, setup: SensorSetup, *, drives_clock: bool
+    ) -> None:
         """Create the topics on a node; publish the map and the doors' states."""
-        self._robot = robot
-        self._drives_clock = drives_clock
+        self._world = world
         self._clock = node.create_publisher(Clock, '/clock', 1) if drives_clock else None
-        self._odometry = node.create_publisher(Odometry, 'odom', SENSOR_DEPTH)
-        # One message for all measurements: making a new one takes longer than to publish it.
-        self._frames = declared_frames(node, 'map', 'odom', 'base', 'scans')
-        self._told_odometry = conversions.odometry_message(self._frames.odom, self._frames.base)
-        self._scans = [
-            (node.create_publisher(LaserScan, topic, SENSOR_DEPTH), frame, mount)
-            for topic, frame, mount in _lidars_of(node, self._frames)
-        ]
-        self._joints = node.create_publisher(JointState, 'joint_states', SENSOR_DEPTH)
-        self._truth = node.create_publisher(PoseStamped, 'ground_truth', SENSOR_DEPTH)
-        self._collisions = OwnedTopic(node, UInt32, 'collisions')
         self._doors = OwnedTopic(node, DoorStates, 'door_states')
         self._map = OwnedTopic(node, OccupancyGrid, 'map', repeat=MAP_REPEAT)
-        self._tf = None if TFMessage is None else node.create_publisher(TFMessage, 'tf', 10)
-        self._told_collisions = -1
-        options = node.declare_fields(PublishedOptions())
-        grid = plan_grid.draw(robot.world.plan, options.map_resolution)
-        self._map.publish(conversions.grid_to_ros(grid, self._frames.map, Time()))
+        grid = plan_grid.draw(world.plan, setup.published.map_resolution)
+        self._map.publish(conversions.grid_to_ros(grid, setup.frames.map, Time()))
         self.tell_doors()
-        if options.announce_pose:
-            self._announce_pose(node)
 
     def tell_doors(self) -> None:
         """Publish which doors are open."""
-        self._doors.publish(conversions.doors_to_ros(self._robot.world))
+        self._doors.publish(conversions.doors_to_ros(self._world))
 
-    def publish(self, stamp: Time) -> None:
-        """Publish the clock, then everything measured at this moment."""
+    def tell_time(self, stamp: Time) -> None:
+        """Publish the clock, if that is this node's."""
         if self._clock is not None:
             self._clock.publish(Clock(clock=stamp))
+
+
+class SensorFeed:
+    """The topics of a robot's sensors."""
+
+    def __init__(self, node: PatrolNode, robot: Robot, setup: SensorSetup) -> None:
+        """Create the topics on a node, below the robot's name if it has one."""
+        self._robot = robot
+        topic = partial(topic_of, robot)
+        self._odometry = node.create_publisher(Odometry, topic('odom'), SENSOR_DEPTH)
+        # One message for all measurements: making a new one takes longer than to publish it.
+        self._frames = setup.frames
+        self._told_odometry = conversions.odometry_message(self._frames.odom, self._frames.base)
+        self._scans = [
+            (node.create_publisher(LaserScan, topic(name), SENSOR_DEPTH), frame, mount)
+            for name, frame, mount in setup.lidars
+        ]
+        self._joints = node.create_publisher(JointState, topic('joint_states'), SENSOR_DEPTH)
+        self._truth = node.create_publisher(PoseStamped, topic('ground_truth'), SENSOR_DEPTH)
+        self._collisions = OwnedTopic(node, UInt32, topic('collisions'))
+        self._tf = None if TFMessage is None else node.create_publisher(TFMessage, topic('tf'), 10)
+        self._told_collisions = -1
+        if setup.published.announce_pose:
+            self._announce_pose(node)
+
+    def publish(self, stamp: Time) -> None:
+        """Publish everything measured at this moment."""
         base = self._robot.base
         conversions.set_odometry(
             self._told_odometry, base.odometry, base.speed, base.turn_speed, stamp
@@ -152,7 +192,7 @@ class SensorFeed:
 
         publisher = node.create_publisher(
             PoseWithCovarianceStamped,
-            'initialpose',
+            topic_of(self._robot, 'initialpose'),
             1,
             event_callbacks=PublisherEventCallbacks(matched=on_match),
         )

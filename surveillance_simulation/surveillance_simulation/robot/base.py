@@ -81,7 +81,6 @@ class Base:
     """The robot's base in a world.
 
     Attributes:
-        pose: Where the robot really is: x, y in metres, yaw in rad, world frame.
         odometry: Where its wheels say it is; equal to the pose at the start.
         speed: Forward speed, m/s.
         turn_speed: Turning speed, rad/s, anticlockwise.
@@ -95,16 +94,18 @@ class Base:
         pose: Pose,
         model: BaseModel | None = None,
         rng: np.random.Generator | None = None,
+        robot: str = '',
     ) -> None:
-        """Put the robot into the world; without `rng` the odometry is exact."""
+        """Put the robot, by its name, into the world; without `rng` the odometry is exact."""
         self.model = model or BaseModel()
+        self._robot = robot
+        self._world = world
         self.pose = pose
         self.odometry = pose
         self.speed = 0.0
         self.turn_speed = 0.0
         self.collisions = 0
         self.travelled = 0.0
-        self._world = world
         self._rng = rng
         self._wanted = (0.0, 0.0)
         self._since_command = math.inf
@@ -112,6 +113,16 @@ class Base:
         # Nothing solid is nearer than this, so shorter ways need no check.
         self._sure = 0.0
         self._seen_version = -1
+
+    @property
+    def pose(self) -> Pose:
+        """Where the robot really is: x, y in metres, yaw in rad, world frame."""
+        return self._pose
+
+    @pose.setter
+    def pose(self, pose: Pose) -> None:
+        self._pose = pose
+        self._world.move_robot(self._robot, pose[0], pose[1], self.model.radius)
 
     def command(self, speed: float, turn_speed: float) -> None:
         """Set the wanted velocity: m/s forwards, rad/s anticlockwise; anything not finite is 0."""
@@ -172,7 +183,7 @@ class Base:
         needed = self.model.radius + PUSH_GAP
         for piece in range(1, pieces + 1):
             share = piece / pieces
-            if not self._world.is_free(x + share * dx, y + share * dy, needed):
+            if not self._world.is_free(x + share * dx, y + share * dy, needed, self._robot):
                 break
             gone = piece
         share = gone / pieces
@@ -193,8 +204,9 @@ class Base:
 
     def _free_part(self, distance: float, turn: float) -> float:
         """Return the part of a motion, 0 to 1, that ends before the robot touches something."""
-        if self._seen_version != self._world.version:
-            self._seen_version = self._world.version
+        version = self._world.changes_around(self._robot)
+        if self._seen_version != version:
+            self._seen_version = version
             self._sure = 0.0
         if abs(distance) <= self._sure or not distance:
             return 1.0
@@ -219,7 +231,7 @@ class Base:
         return low
 
     def _gap(self, pose: Pose) -> float:
-        return self._world.clearance(pose[0], pose[1]) - self.model.radius
+        return self._world.clearance(pose[0], pose[1], self._robot) - self.model.radius
 
     def _count(self, distance: float, turn: float) -> None:
         if self._rng is not None:

@@ -60,7 +60,11 @@ class Sweep:
 
 
 def scan(
-    world: World, pose: Pose, model: LidarModel, rng: np.random.Generator | None = None
+    world: World,
+    pose: Pose,
+    model: LidarModel,
+    rng: np.random.Generator | None = None,
+    robot: str = '',
 ) -> npt.NDArray[np.float32]:
     """Return the distance (rays,) along each ray in metres, infinity where nothing is in range.
 
@@ -69,6 +73,7 @@ def scan(
         pose: Where the lidar is, metres and rad.
         model: The lidar.
         rng: Source of the noise; None measures exactly.
+        robot: Whose lidar it is: it does not see its own body.
     """
     x, y, yaw = pose
     angles = model.angles + yaw
@@ -77,7 +82,7 @@ def scan(
     distance = _to_boxes(world.solid[near], x, y, direction)
     if world.surface is not None:
         distance = np.minimum(distance, world.surface.ranges(x, y, direction, model.range_max))
-    discs = world.discs
+    discs = world.discs_around(robot)
     if len(discs):
         distance = np.minimum(distance, _to_discs(discs, x, y, direction))
     if rng is not None and model.noise > 0:

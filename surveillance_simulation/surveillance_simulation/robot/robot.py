@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import numpy.typing as npt
@@ -20,7 +20,7 @@ from surveillance_simulation.world.people import People
 from surveillance_simulation.world.walks import Walks
 from surveillance_simulation.world.world import World
 
-_PHYSICS_STEP = 0.05
+PHYSICS_STEP = 0.05
 _STATE = ('x', 'y', 'yaw', 'odometry_x', 'odometry_y', 'odometry_yaw', 'time')
 """Names of the numbers of a state: metres, rad, seconds."""
 
@@ -47,20 +47,35 @@ class Robot:
         rng: np.random.Generator | None = None,
         people: People | None = None,
         physics: PhysicsModel | None = None,
+        name: str = '',
+        start: Pose | None = None,
     ) -> None:
         """Put the robot at its start; without `rng` its sensors have no errors.
+
+        Args:
+            world: The place; may hold other robots, see `robots.Robots`.
+            base_model: Its base.
+            lidar: Its lidar.
+            arm: Its arm.
+            rng: Source of all errors.
+            people: Who walks about.
+            physics: How MuJoCo moves it; None: it moves as it is told.
+            name: Its name among several robots.
+            start: Where it begins; None: where the place says.
 
         Raises:
             ImportError: There is a `physics`, and MuJoCo, which computes it, is not installed.
         """
         self.world = world
+        self.name = name
+        start = start or world.plan.start
         self.lidar = lidar or LidarModel()
         self.base: Base | PhysicsBase
         self._sweeping: SweepingLidar | None = None
         if physics is None:
-            self.base = Base(world, world.plan.start, base_model, rng)
+            self.base = Base(world, start, base_model, rng, name)
         else:
-            self.base = PhysicsBase(world, world.plan.start, base_model, physics)
+            self.base = PhysicsBase(world, start, base_model, physics)
             self._sweeping = SweepingLidar(self.base, self.lidar, rng)
         self.arm = ArmMotion(arm)
         self.walks = Walks(world)
@@ -71,16 +86,19 @@ class Robot:
 
     def advance(self, seconds: float) -> None:
         """Move on in time, in steps so short that nothing is driven through."""
-        steps = max(1, math.ceil(seconds / _PHYSICS_STEP - 1e-9))
+        steps = max(1, math.ceil(seconds / PHYSICS_STEP - 1e-9))
         for _ in range(steps):
-            if self._people is not None:
-                x, y, _ = self.base.pose
-                self._people.step(seconds / steps, (x, y), self.base.model.radius)
-                self.world.move_people(self._people.poses)
-            if self.walks:
-                self.walks.step(seconds / steps, self.base.pose[:2])
+            self.move_people(seconds / steps, [self.base.pose[:2]])
             self.base.step(seconds / steps)
         self.time += seconds
+
+    def move_people(self, seconds: float, robots: Sequence[tuple[float, float]]) -> None:
+        """Let people walk on (for at most 0.1 s) around robots at these points, metres."""
+        if self._people is not None:
+            self._people.step(seconds, robots, self.base.model.radius)
+            self.world.move_people(self._people.poses)
+        if self.walks:
+            self.walks.step(seconds, robots)
 
     @property
     def is_moving(self) -> bool:
@@ -113,7 +131,7 @@ class Robot:
         doors = self.world.plan.doors
         if not finite or time < 0.0 or any(door not in doors for door in closed):
             return False
-        if not self.world.is_free(x, y, self.base.model.radius):
+        if not self.world.is_free(x, y, self.base.model.radius, self.name):
             return False
         for door in closed:
             self.world.set_door(door, False)
@@ -137,7 +155,7 @@ class Robot:
         dx, dy, turn = mount
         cos, sin = math.cos(yaw), math.sin(yaw)
         at = (x + cos * dx - sin * dy, y + sin * dx + cos * dy, yaw + turn)
-        return scan(self.world, at, self.lidar, self._rng)
+        return scan(self.world, at, self.lidar, self._rng, self.name)
 
     def camera_pose(self) -> Array:
         """Return the transform (4, 4) from the camera's optical frame to the world, metres."""

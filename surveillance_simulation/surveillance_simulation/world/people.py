@@ -9,6 +9,7 @@ robot's own doing. People do not hinder each other.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -78,13 +79,13 @@ class People:
             dtype=float,
         ).reshape(-1, 4)
 
-    def step(self, dt: float, robot: Point, robot_radius: float) -> None:
-        """Let everybody walk on for `dt` seconds (at most 0.1) around a robot."""
+    def step(self, dt: float, robots: Sequence[Point], robot_radius: float) -> None:
+        """Let everybody walk on for `dt` seconds (at most 0.1) around robots."""
         for person in self._people:
             person.rest -= dt
             if person.rest > 0:
                 continue
-            self._walk(person, dt, robot, robot_radius)
+            self._walk(person, dt, robots, robot_radius)
             left = self._ways.left(person.goal, person.at)
             person.held_up = 0.0 if left < person.nearest else person.held_up + dt
             person.nearest = min(person.nearest, left)
@@ -94,17 +95,21 @@ class People:
             elif person.held_up >= _PATIENCE[self._model.manner]:
                 self._turn(person)
 
-    def _walk(self, person: _Person, dt: float, robot: Point, robot_radius: float) -> None:
+    def _walk(
+        self, person: _Person, dt: float, robots: Sequence[Point], robot_radius: float
+    ) -> None:
         """Take one step, if there is room for it."""
         model = self._model
         ahead = self._ways.direction(person.goal, person.at)
         reach = model.radius + robot_radius + _KEPT_GAP[model.manner]
-        before = math.dist(person.at, robot)
+        before = [math.dist(person.at, robot) for robot in robots]
         for turn in _SIDESTEPS:
             x = person.at[0] + model.speed * dt * math.cos(ahead + turn)
             y = person.at[1] + model.speed * dt * math.sin(ahead + turn)
-            after = math.dist((x, y), robot)
-            if after < reach and after < before:
+            if any(
+                math.dist((x, y), robot) < min(reach, was)
+                for robot, was in zip(robots, before, strict=True)
+            ):
                 continue
             if self._ways.is_free((x, y)):
                 person.at, person.ahead = (x, y), ahead + turn

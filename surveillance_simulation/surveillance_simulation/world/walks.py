@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -76,15 +77,17 @@ class Walks:
         """Let a person of this name walk no more; nothing happens when they did not."""
         self._walks.pop(name, None)
 
-    def step(self, dt: float, robot: Point) -> None:
-        """Let everybody walk on for `dt` seconds, but not into the robot."""
+    def step(self, dt: float, robots: Sequence[Point]) -> None:
+        """Let everybody walk on for `dt` seconds, but not into a robot."""
         for name, walk in self._walks.items():
             before = walk.done
             x, y, _ = walk.at()
             walk.done += SPEED * dt
             there = walk.at()
-            gap = math.dist(there[:2], robot)
-            if gap < _KEPT and gap < math.dist((x, y), robot):
+            if any(
+                math.dist(there[:2], robot) < min(_KEPT, math.dist((x, y), robot))
+                for robot in robots
+            ):
                 walk.done = before
                 continue
             self._world.put(person(name, *there))

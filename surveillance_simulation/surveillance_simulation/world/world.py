@@ -76,6 +76,8 @@ class World:
         self._things: dict[str, Thing] = {}
         self._lamps: dict[str, float] = {}
         self._people: boxes.Array = np.zeros((0, 4))
+        self._robots: dict[str, tuple[float, float, float]] = {}
+        self._moves: dict[str, int] = {}
         self._panels = {name: Panel(marker) for name, marker in plan.markers.items()}
         self._walls = boxes.boxes_around(plan.wall_pieces(), WALL_THICKNESS)
         self._surface = None if plan.map is None else MapSurface(plan.map.grid)
@@ -239,6 +241,22 @@ class World:
         self._discs = np.concatenate([self._standing, people[:, :3]])
         self.version += 1
 
+    def move_robot(self, robot: str, x: float, y: float, radius: float) -> None:
+        """Take where a robot's body is now: centre and radius, metres."""
+        body = (x, y, radius)
+        if self._robots.get(robot) != body:
+            self._robots[robot] = body
+            self._moves[robot] = self._moves.get(robot, 0) + 1
+
+    def discs_around(self, robot: str) -> boxes.Array:
+        """Return what a robot meets of things, people and other robots, shape as `discs`."""
+        others = [body for name, body in self._robots.items() if name != robot]
+        return np.concatenate([self._discs, others]) if others else self._discs
+
+    def changes_around(self, robot: str) -> int:
+        """Count the changes of all that a robot can meet."""
+        return self.version + sum(n for name, n in self._moves.items() if name != robot)
+
     def set_lamp(self, place: str, brightness: float) -> None:
         """Turn the lamp of a place.
 
@@ -287,14 +305,21 @@ class World:
         self.version += 1
         self.drawn_version += 1
 
-    def clearance(self, x: float, y: float) -> float:
-        """Return the distance from a point to the nearest solid surface, 0 inside one, metres."""
+    def clearance(self, x: float, y: float, robot: str = '') -> float:
+        """Return the distance from a point to the nearest solid surface, 0 inside one, metres.
+
+        Args:
+            x: Metres.
+            y: Metres.
+            robot: Whose own body is not met.
+        """
         nearest = float(boxes.distances(self._solid, x, y).min(initial=math.inf))
         if self._surface is not None:
             nearest = min(nearest, self._surface.clearance(x, y))
-        if len(self._discs):
-            centre = np.hypot(self._discs[:, 0] - x, self._discs[:, 1] - y)
-            nearest = min(nearest, float((centre - self._discs[:, 2]).min()))
+        discs = self.discs_around(robot)
+        if len(discs):
+            centre = np.hypot(discs[:, 0] - x, discs[:, 1] - y)
+            nearest = min(nearest, float((centre - discs[:, 2]).min()))
         return max(nearest, 0.0)
 
     def wall_clearance(self, x: float, y: float) -> float:
@@ -303,9 +328,9 @@ class World:
         surface = math.inf if self._surface is None else self._surface.clearance(x, y)
         return float(min(closed, surface))
 
-    def is_free(self, x: float, y: float, radius: float) -> bool:
-        """Tell whether a disc touches nothing."""
-        return self.clearance(x, y) > radius
+    def is_free(self, x: float, y: float, radius: float, robot: str = '') -> bool:
+        """Tell whether a disc touches nothing; the body of `robot` is not met."""
+        return self.clearance(x, y, robot) > radius
 
     def place_at(self, x: float, y: float) -> str | None:
         """Return the place that a point (metres) lies in, None outside of every place."""

@@ -2,6 +2,7 @@
 
 - `partition`: groups of places and how many robots each has, a function of the map and the number;
 - `assignment`: `choose(graph, robots, name, now)`, what one robot does next, and why;
+- `traffic`: `right_of_way`, who goes first through what is too narrow for two;
 - `docks`: slots at the docks that do not overlap;
 - `simulation`: a fleet in simulated time.
 """
@@ -12,6 +13,7 @@ from patrol_policy.fleet.assignment import (
     Assignment,
     FleetChoice,
     FleetError,
+    FleetOutlook,
     FleetRobot,
     FleetSettings,
     Share,
@@ -20,6 +22,7 @@ from patrol_policy.fleet.assignment import (
 )
 from patrol_policy.fleet.docks import ChargeNeed, DockSlot, dock_slots
 from patrol_policy.fleet.partition import FleetPlan, Group, exact_wait, fleet_plan
+from patrol_policy.fleet.traffic import Intention, Layout, RightOfWay, right_of_way
 
 __all__ = [
     'Assignment',
@@ -27,14 +30,19 @@ __all__ = [
     'DockSlot',
     'FleetChoice',
     'FleetError',
+    'FleetOutlook',
     'FleetPlan',
     'FleetRobot',
     'FleetSettings',
     'Group',
+    'Intention',
+    'Layout',
+    'RightOfWay',
     'Share',
     'assign',
     'choose',
     'dock_slots',
     'exact_wait',
     'fleet_plan',
+    'right_of_way',
 ]

@@ -15,7 +15,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime, tzinfo
 
 import numpy as np
@@ -76,6 +76,43 @@ class FleetRobot:
     runs_until: float | None = None
     charge_seconds: float = 0.0
     taken_out: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class FleetOutlook:
+    """What one robot of a fleet knows of all when it decides.
+
+    Attributes:
+        name: Its own name.
+        robots: What is known of each, itself included.
+        graph: The map with the same times for all, whatever each robot has learned of its legs.
+        settings: How the work is shared.
+    """
+
+    name: str
+    robots: Sequence[FleetRobot]
+    graph: PatrolGraph
+    settings: FleetSettings = field(default_factory=lambda: FleetSettings())
+
+    def choose(self, now: float, visited_at: Mapping[str, float]) -> FleetChoice:
+        """Choose by the facts of the robots that doors join with this one.
+
+        Raises:
+            FleetError: The facts do not fit together.
+        """
+        near = [robot for robot in self.robots if robot.place in self.graph.index]
+        stops = self.graph.index.keys()
+        # A share of another map counts for nothing.
+        near = [
+            robot
+            if robot.share is None or set(robot.share.tour) <= stops
+            else replace(robot, share=None)
+            for robot in near
+        ]
+        docks = tuple(dock for dock in self.settings.docks if dock in stops)
+        near = [robot if robot.dock in docks else replace(robot, dock=None) for robot in near]
+        settings = replace(self.settings, docks=docks)
+        return choose(self.graph, near, self.name, now, settings, visited_at)
 
 
 @dataclass(frozen=True)

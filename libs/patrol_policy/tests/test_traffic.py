@@ -1,0 +1,119 @@
+"""Right of way: one robot on each narrow way, one in each narrow block, and nobody stuck."""
+
+from __future__ import annotations
+
+import random
+
+import pytest
+
+from patrol_policy.fleet import Intention, Layout, right_of_way
+
+STAR = {
+    'R1': ['C1'],
+    'R2': ['C1'],
+    'R3': ['C2'],
+    'C1': ['R1', 'R2', 'C2'],
+    'C2': ['R3', 'C1'],
+}
+
+
+def test_of_two_at_one_door_the_older_wish_goes_first() -> None:
+    layout = Layout.of(STAR, ())
+    wishes = [Intention('b', 'R1', 'C1', 5.0), Intention('a', 'C1', 'R1', 7.0)]
+    assert right_of_way(wishes, 'b', STAR, layout).go
+    told = right_of_way(wishes, 'a', STAR, layout)
+    assert not told.go
+    assert told.because == 'b goes first on the way C1 - R1'
+    moving = [Intention('b', 'R1', 'C1', 9.0, is_moving=True), wishes[1]]
+    assert right_of_way(moving, 'a', STAR, layout).because == 'b is on the way C1 - R1'
+
+
+def test_in_a_wide_door_nobody_waits() -> None:
+    layout = Layout.of(STAR, ['C1 R1'])
+    wishes = [Intention('b', 'R1', 'C1', 5.0, is_moving=True), Intention('a', 'C1', 'R1', 7.0)]
+    assert right_of_way(wishes, 'a', STAR, layout).go
+
+
+def test_who_only_stays_in_a_narrow_place_leaves_for_one_who_wants_it() -> None:
+    layout = Layout.of(['C1', 'C2'], ())
+    wishes = [Intention('a', 'R1'), Intention('b', 'C1', 'R1', 3.0)]
+    told = right_of_way(wishes, 'a', STAR, layout)
+    assert (told.go, told.place) == (True, 'C1')
+    assert told.because == 'b wants to R1, and R1 is narrow'
+    assert right_of_way(wishes, 'b', STAR, layout).because == 'R1 is narrow, and a is in R1'
+    charging = [Intention('a', 'R1', is_fixed=True), wishes[1]]
+    assert right_of_way(charging, 'a', STAR, layout).place == 'R1'
+
+
+def test_a_robot_without_an_intention_is_named() -> None:
+    with pytest.raises(ValueError, match='c has no intention'):
+        right_of_way([Intention('a', 'R1')], 'c', STAR, Layout())
+
+
+def tree(rng: random.Random, count: int) -> dict[str, list[str]]:
+    neighbours: dict[str, list[str]] = {'p0': []}
+    for number in range(1, count):
+        other = f'p{rng.randrange(number)}'
+        neighbours[f'p{number}'] = [other]
+        neighbours[other].append(f'p{number}')
+    return neighbours
+
+
+def way(neighbours: dict[str, list[str]], start: str, goal: str) -> str:
+    """Return the first step of the only way in a tree."""
+    seen, queue = {start}, [(start, '')]
+    for at, first in queue:
+        if at == goal:
+            return first
+        for other in neighbours[at]:
+            if other not in seen:
+                seen.add(other)
+                queue.append((other, first or other))
+    raise AssertionError(goal)
+
+
+@pytest.mark.parametrize('seed', range(30))
+def test_on_random_trees_everybody_reaches_every_goal(seed: int) -> None:
+    rng = random.Random(seed)
+    neighbours = tree(rng, rng.randrange(4, 12))
+    places = sorted(neighbours)
+    wide = {place for place in places if rng.random() < 0.4} | {'p0'}
+    layout = Layout.of(wide, ())
+    names = ['a', 'b', 'c', 'd'][: rng.randrange(2, 5)]
+    at = {name: rng.choice(sorted(wide)) for name in names}
+    goal = {name: at[name] for name in names}
+    since = dict.fromkeys(names, 0.0)
+    moving: dict[str, tuple[str, float]] = {}
+    reached = dict.fromkeys(names, 0)
+    stays = dict.fromkeys(names, 0.0)
+    for step in range(3000):
+        now = float(step)
+        for name, (to, until) in list(moving.items()):
+            if until <= now:
+                at[name] = to
+                del moving[name]
+        for name in rng.sample(names, len(names)):
+            if name in moving:
+                continue
+            if at[name] == goal[name]:
+                if now < stays[name]:
+                    pass
+                else:
+                    reached[name] += 1
+                    goal[name], since[name] = rng.choice(places), now
+                    stays[name] = now + rng.randrange(20)
+
+            def intention(each: str) -> Intention:
+                if each in moving:
+                    return Intention(each, at[each], moving[each][0], since[each], is_moving=True)
+                heading = '' if at[each] == goal[each] else way(neighbours, at[each], goal[each])
+                return Intention(each, at[each], heading, since[each])
+
+            told = right_of_way([intention(each) for each in names], name, neighbours, layout)
+            if told.go and told.place != at[name]:
+                moving[name] = (told.place, now + rng.randrange(1, 6))
+        ways = [frozenset((at[name], to)) for name, (to, _) in moving.items()]
+        assert len(ways) == len(set(ways)), 'two on one narrow way'
+        narrow = [at[name] for name in names if at[name] not in wide]
+        assert len(narrow) == len(set(narrow)), 'two in one narrow place'
+    assert min(reached.values()) > 20

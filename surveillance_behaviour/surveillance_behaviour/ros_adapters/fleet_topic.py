@@ -1,0 +1,176 @@
+"""The topic `fleet_robots`, on which the robots of a fleet tell each other their facts."""
+
+from __future__ import annotations
+
+import math
+import time
+from dataclasses import dataclass
+
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+
+from patrol_policy.fleet import FleetRobot, FleetSettings, Intention, Layout, Share
+from surveillance_behaviour.fleet import FleetFacts, FleetKnowledge
+from surveillance_interfaces.msg import FleetRobot as FleetRobotMessage
+from surveillance_runtime.node import PatrolNode
+from surveillance_runtime.parameters import parameter
+
+FLEET_TOPIC = 'fleet_robots'
+FLEET_QOS = QoSProfile(
+    depth=200,
+    reliability=ReliabilityPolicy.RELIABLE,
+    durability=DurabilityPolicy.VOLATILE,
+)
+"""Not latched: what a robot said last is repeated each second, and a late joiner soon hears it."""
+REPEAT = 1.0
+"""Seconds of the mission's time between two signs of life."""
+MOST_STOPS = 10_000
+
+
+@dataclass(frozen=True)
+class FleetParameters:
+    """What a node that decides for one robot of several is told."""
+
+    fleet: bool = parameter(
+        False, 'Whether the patrol is shared with other robots, by the topic fleet_robots.'
+    )
+    silent_after: float = parameter(
+        10.0,
+        'A robot of the fleet that was not heard for so long has no share, s.',
+        0.5,
+        3600.0,
+        name='fleet_silent_after',
+    )
+    wide_places: tuple[str, ...] = parameter(
+        (), 'Places in which two robots can pass.', of=str, name='traffic.wide_places'
+    )
+    wide_ways: tuple[str, ...] = parameter(
+        (),
+        'Pairs of places, as `A B`, whose door two robots can pass side by side.',
+        of=str,
+        name='traffic.wide_ways',
+    )
+
+
+def fleet_of(node: PatrolNode, robot: str, docks: tuple[str, ...]) -> FleetKnowledge | None:
+    """Declare the parameters and join the fleet; None: the robot is alone.
+
+    Args:
+        node: The node that decides.
+        robot: Its robot's name.
+        docks: The places with a charging station.
+    """
+    settings = node.declare_fields(FleetParameters())
+    if not settings.fleet:
+        return None
+
+    def now() -> float:
+        return float(1e-9 * node.get_clock().now().nanoseconds)
+
+    publisher = node.create_publisher(FleetRobotMessage, FLEET_TOPIC, FLEET_QOS)
+
+    def publish(facts: FleetFacts) -> None:
+        message = message_of(facts)
+        message.stamp = node.get_clock().now().to_msg()
+        publisher.publish(message)
+
+    knowledge = FleetKnowledge(
+        robot,
+        FleetSettings(silent_after=settings.silent_after, docks=docks),
+        Layout.of(settings.wide_places, settings.wide_ways),
+        publish,
+        time.monotonic,
+    )
+
+    def on_message(message: FleetRobotMessage) -> None:
+        try:
+            facts = facts_of(message)
+        except ValueError as error:
+            node.get_logger().error(f'{FLEET_TOPIC}: {error}')
+            return
+        knowledge.hear(facts, now())
+
+    told: set[str] = set()
+
+    def on_period() -> None:
+        knowledge.repeat()
+        standing = knowledge.standing(now())
+        for name, text in standing.items():
+            node.incidents.begin(('robot', name), text)
+        for name in told - standing.keys():
+            node.incidents.end(('robot', name))
+        told.clear()
+        told.update(standing)
+
+    node.create_subscription(FleetRobotMessage, FLEET_TOPIC, on_message, FLEET_QOS)
+    node.create_timer(REPEAT, on_period)
+    return knowledge
+
+
+def message_of(facts: FleetFacts) -> FleetRobotMessage:
+    """Return a robot's facts as a message, without stamp."""
+    robot, intention = facts.robot, facts.intention
+    return FleetRobotMessage(
+        robot=robot.name,
+        place=robot.place,
+        since=robot.since,
+        tour=[] if robot.share is None else list(robot.share.tour),
+        stop='' if robot.share is None else robot.share.stop,
+        dock=robot.dock or '',
+        charging_until=_number(robot.charging_until),
+        runs_until=_number(robot.runs_until),
+        charge_seconds=robot.charge_seconds,
+        taken_out=robot.taken_out,
+        heading_to=intention.heading_to,
+        wanted_since=intention.since,
+        is_moving=intention.is_moving,
+        visited=list(facts.visits),
+        visited_at=[float(at) for at in facts.visits.values()],
+    )
+
+
+def facts_of(message: FleetRobotMessage) -> FleetFacts:
+    """Return the facts of a message.
+
+    Raises:
+        ValueError: A number is not finite, or lists do not fit together.
+    """
+    numbers = (message.since, message.charge_seconds, message.wanted_since, *message.visited_at)
+    if not all(map(math.isfinite, numbers)):
+        raise ValueError(f'{message.robot or "a robot"} tells a time that is not finite')
+    if len(message.visited) != len(message.visited_at):
+        raise ValueError(
+            f'{message.robot}: {len(message.visited_at)} times for {len(message.visited)} places'
+        )
+    if max(len(message.tour), len(message.visited)) > MOST_STOPS:
+        raise ValueError(f'{message.robot}: more places than any map has')
+    tour = tuple(message.tour)
+    share = Share(tour, message.stop) if message.stop in tour else None
+    robot = FleetRobot(
+        message.robot,
+        message.place,
+        since=message.since,
+        share=share,
+        charging_until=_maybe(message.charging_until),
+        dock=message.dock or None,
+        runs_until=_maybe(message.runs_until),
+        charge_seconds=message.charge_seconds,
+        taken_out=message.taken_out,
+    )
+    intention = Intention(
+        message.robot,
+        message.place,
+        message.heading_to,
+        message.wanted_since,
+        message.is_moving,
+        is_fixed=bool(message.dock) and not message.heading_to,
+    )
+    visits = dict(zip(message.visited, message.visited_at, strict=True))
+    return FleetFacts(robot, intention, visits)
+
+
+def _number(value: float | None) -> float:
+    return math.nan if value is None or not math.isfinite(value) else value
+
+
+def _maybe(value: float) -> float | None:
+    return value if math.isfinite(value) else None

@@ -1,0 +1,113 @@
+"""The parts of a fleet's run: what is there once, what each robot has."""
+
+from __future__ import annotations
+
+import itertools
+from pathlib import Path
+
+import pytest
+
+from launcher.run import Run
+from launcher.run_configuration import configuration, profile_of
+from launcher.team import parts
+from surveillance_runtime.files import FileError
+from surveillance_runtime.place import read_place_file
+
+CONFIG = Path(__file__).resolve().parents[2] / 'config'
+PLACE = CONFIG / 'seven_rooms.yaml'
+
+
+def team(run: Run):
+    return parts(run, CONFIG, profile_of(CONFIG, run))
+
+
+def place_with(tmp_path: Path, robots: str) -> Path:
+    path = tmp_path / 'place.yaml'
+    path.write_text(PLACE.read_text() + f'    robots:\n{robots}')
+    return path
+
+
+def names(part) -> set[str]:
+    return {node.name for node in part.everyone}
+
+
+def test_one_robot_has_one_part_without_a_namespace():
+    (part,) = team(Run())
+    assert (part.robot, part.run.namespace, part.renamed) == ('', None, ())
+
+
+def test_a_fleet_shares_ontology_map_and_simulator():
+    shared, first, second = team(Run(robots=2, namespace='house', record='runs', web=True))
+    assert {'armor_server', 'ontology_map_builder', 'simulator', 'mission_page'} == names(shared)
+    assert shared.run.namespace == 'house'
+    assert (first.run.namespace, second.run.namespace) == ('house/robot1', 'house/robot2')
+    assert names(first) == names(second)
+    assert {'robot_behavior', 'motion_controller', 'collision_monitor'} <= names(first)
+    assert {'mission_recorder', 'battery_controller'} <= names(first)
+    assert ('map', '/house/map') in first.renamed
+    assert ('armor_interface_srv', '/house/armor_interface_srv') in first.renamed
+
+
+def test_each_robot_is_told_its_name_and_where_it_starts():
+    run = Run(robots=3)
+    shared, *robots = team(run)
+    starts = {}
+    for part in robots:
+        merged = configuration(CONFIG, part.run, fleet=part.entries)
+        name = f'/{part.robot}/motion_controller'
+        settings = merged.resolve('motion_controller', name)
+        assert settings['robot_name'].value == part.robot
+        starts[part.robot] = settings['start_pose'].value
+        behaviour = merged.resolve('robot_behavior', f'/{part.robot}/robot_behavior')
+        assert behaviour['fleet'].value is True
+        # The points of the others are in front of a door.
+        assert set(behaviour['traffic.wide_places'].value) == {'C1', 'E', 'R1', 'R2'}
+    assert starts['robot1'] == [5.0, 10.0, 0.0]
+    for one, other in itertools.combinations(starts.values(), 2):
+        assert abs(one[0] - other[0]) + abs(one[1] - other[1]) > 0.9
+    told = configuration(CONFIG, shared.run, fleet=shared.entries).resolve('simulator')
+    assert told['robots.robot2.start'].value == starts['robot2']
+
+
+def test_a_place_names_its_robots(tmp_path):
+    path = place_with(
+        tmp_path,
+        '      anna: {start: [10.0, 8.0, 0.0], dock: E}\n'
+        '      bert: {start: [4.0, 9.0, 1.5], profile: nav2}\n'.replace(', profile: nav2', ''),
+    )
+    _shared, anna, bert = team(Run(place=path))
+    assert (anna.robot, bert.robot) == ('anna', 'bert')
+    merged = configuration(CONFIG, anna.run, fleet=anna.entries)
+    assert merged.resolve('robot_behavior', '/anna/robot_behavior')['recharge_rooms'].value == ['E']
+    with pytest.raises(ValueError, match=r'--robots 3: place.yaml has 2: anna, bert'):
+        team(Run(place=path, robots=3))
+
+
+@pytest.mark.parametrize(
+    ('robots', 'problem'),
+    [
+        ('      anna: {start: [10.0, 8.0]}\n', r'robots.anna.start: expected \[x, y, yaw\]'),
+        ('      anna: {dock: E}\n', 'robots.anna: has no start'),
+        ('      anna: {start: [0.0, 0.0, 0.0]}\n', r'\(0, 0\) lies in no room'),
+        ('      anna: {start: [10.0, 8.0, 0.0], dok: E}\n', "dok: unknown, expected 'dock'|dock"),
+        ('      anna: {start: [10.0, 8.0, 0.0], dock: R1}\n', 'no room with a station'),
+        ('      R1: {start: [10.0, 8.0, 0.0]}\n', 'is the name of a room'),
+    ],
+)
+def test_a_wrong_robot_costs_one_line(tmp_path, robots, problem):
+    with pytest.raises(FileError, match=problem) as told:
+        read_place_file(place_with(tmp_path, robots))
+    assert '\n' not in str(told.value)
+
+
+def test_only_and_without_name_robots_and_their_nodes():
+    assert [part.robot for part in team(Run(robots=2, only=('robot2',)))] == ['robot2']
+    (shared,) = team(Run(robots=2, only=('shared',)))
+    assert names(shared) == {'armor_server', 'ontology_map_builder', 'simulator'}
+    (one,) = team(Run(robots=2, only=('robot1/planner_controller',)))
+    assert names(one) == {'planner_controller'}
+    left = team(Run(robots=2, without=('robot1', 'armor_server')))
+    assert [part.robot for part in left] == ['', 'robot2']
+    assert 'armor_server' not in names(left[0])
+    with pytest.raises(ValueError, match=r"'robot9'.*expected"):
+        team(Run(robots=2, only=('robot9',)))
