@@ -246,11 +246,22 @@ def _service(argv: list[str]) -> int:
 
 
 def _setup(argv: list[str]) -> int:
-    CommandParser(
+    parser = CommandParser(
         prog=f'{PROGRAM} setup', description='Sets up .venv for the other commands.'
-    ).parse_args(argv)
-    environment = _environment(())
-    if environment is not None:
+    )
+    either = parser.add_mutually_exclusive_group()
+    either.add_argument(
+        '--wheels', type=Path, metavar='DIR', help='install from this folder, without internet'
+    )
+    either.add_argument(
+        '--collect', type=Path, metavar='DIR', help='fill a folder for --wheels, then end'
+    )
+    options = parser.parse_args(argv)
+    environment = _environment((), options.wheels)
+    if environment is not None and options.collect is not None:
+        environment.collect(options.collect)
+        print(f'collected in {options.collect}: python3 launch.py setup --wheels DIR')
+    elif environment is not None:
         environment.prepare()
         print(f'ready: {environment.python}')
     return 0
@@ -311,7 +322,7 @@ def _package_command(name: str, argv: list[str]) -> int:
     return carry_out(argv)
 
 
-def _environment(extras: Sequence[str]) -> Environment | None:
+def _environment(extras: Sequence[str], wheels: Path | None = None) -> Environment | None:
     """Return the environment to run in; None where an installed ROS with this workspace is
     active.
     """
@@ -322,7 +333,7 @@ def _environment(extras: Sequence[str]) -> Environment | None:
             'ROS 2 Jazzy is active in this shell, but this workspace is not built. Build it:\n'
             f'{system.colcon_advice(CHECKOUT)}\nor use a shell without ROS.'
         )
-    return Environment(CHECKOUT, extras)
+    return Environment(CHECKOUT, extras, wheels)
 
 
 def _enter(argv: list[str], extras: Sequence[str] = ()) -> None:

@@ -125,6 +125,22 @@ def requirements(checkout: Path, extras: Iterable[str]) -> list[str]:
     return [line for line in wanted if line.partition('=')[0] not in LIBRARIES]
 
 
+def _build_requirements(folder: Path) -> list[str]:
+    found = tomllib.loads((folder / 'pyproject.toml').read_text(encoding='utf-8'))
+    return list(found['build-system']['requires'])
+
+
+def _sound_wheels(folder: Path) -> Path:
+    if not folder.is_dir():
+        raise ValueError(f'--wheels {folder}: expected a folder of wheels')
+    if not any(folder.glob('*.whl')):
+        raise ValueError(
+            f'--wheels {folder}: no wheel (*.whl) in it: fill it on a machine with internet by '
+            f'{" ".join(COMMAND)} setup --collect {folder}'
+        )
+    return folder.absolute()
+
+
 def _project(folder: Path) -> dict[str, Any]:
     found = tomllib.loads((folder / 'pyproject.toml').read_text(encoding='utf-8'))
     return dict(found['project'])
@@ -161,10 +177,17 @@ class Environment:
     Args:
         checkout: the folder with the packages.
         extras: groups of optional dependencies from `pyproject.toml`, beside what is already there.
+        wheels: A folder of wheels to install from, in place of the package index; see `collect`.
+
+    Raises:
+        ValueError: There are no wheels in the folder.
     """
 
-    def __init__(self, checkout: Path = CHECKOUT, extras: Sequence[str] = ()) -> None:
+    def __init__(
+        self, checkout: Path = CHECKOUT, extras: Sequence[str] = (), wheels: Path | None = None
+    ) -> None:
         self.checkout = checkout
+        self.wheels = None if wheels is None else _sound_wheels(wheels)
         self._wanted_extras = tuple(extras)
         complete_ones = (each for each in self._folders() if self._complete(each))
         self.venv = next(complete_ones, checkout / _FIRST)
@@ -259,6 +282,37 @@ class Environment:
                 self._set_up(lock)
                 self._settle()
 
+    def collect(self, folder: Path) -> None:
+        """Put the wheels of all that the set-up needs into a folder, for machines without internet.
+
+        They are those of this kind of machine, this interpreter, and the extras set up here.
+
+        Raises:
+            NotNowError: A step failed.
+        """
+        self.prepare()
+        folder.mkdir(parents=True, exist_ok=True)
+        sources = [self.checkout / INTERFACES, *self._lacking_messages()]
+        # Each build has requirements of its own; they need not agree with those of another one.
+        lists = [
+            requirements(self.checkout, Journal.read(self.venv).extras),
+            *(_build_requirements(source) for source in sources),
+        ]
+        with self._alone() as lock:
+            for number, needed in enumerate(filter(None, lists), 1):
+                words = self._pip('wheel', '--prefer-binary', '-w', str(folder.absolute()), *needed)
+                title = 'Python packages' if number == 1 else 'tools that build the messages'
+                with (
+                    Step(number, len(lists), title) as step,
+                    _Command(self, words, lock) as command,
+                ):
+                    command.watch(step)
+
+    def _lacking_messages(self) -> list[Path]:
+        """Return the sources of messages that an installed ROS has and the wheels lack."""
+        found = (self.checkout / INTERFACES).glob('*/pyproject.toml')
+        return [file.parent for file in sorted(found)]
+
     def drop_missing_middleware(self, environ: MutableMapping[str, str]) -> list[str]:
         """Take a middleware that is not installed out of an environment; rcl would exit with 102.
 
@@ -331,10 +385,8 @@ class Environment:
             self._remove_half_installed()
             if INTERFACES_STEP in steps:
                 shutil.rmtree(wheels, ignore_errors=True)
-                own = self.checkout / INTERFACES
-                # Below it: messages that an installed ROS has and the wheels lack.
-                lacking = (file.parent for file in sorted(own.glob('*/pyproject.toml')))
-                sources = [str(folder) for folder in (own, *lacking)]
+                folders = [self.checkout / INTERFACES, *self._lacking_messages()]
+                sources = [str(folder) for folder in folders]
                 # The compilers work while the packages are fetched: they need none of them.
                 build = start(self._pip('wheel', '-v', '--no-deps', '-w', str(wheels), *sources))
             if step := steps.get(PACKAGES_STEP):
@@ -534,6 +586,9 @@ class _Command:
         self._log = environment.venv / 'setup.log'
         # pip would compile all of every package, which takes as long as to unpack it.
         environ = {**clean_environ(), 'PIP_COMPILE': '0'}
+        self._wheels = environment.wheels
+        if self._wheels is not None:  # the builds, which pip isolates, hear it in this way alone
+            environ |= {'PIP_NO_INDEX': '1', 'PIP_FIND_LINKS': str(self._wheels)}
         if _KEPT_IN in environ:  # pip builds in temporary folders: what it left there would stay
             environ['PYTHONDONTWRITEBYTECODE'] = '1'
         self._process = subprocess.Popen(
@@ -576,6 +631,9 @@ class _Command:
             reason = 'the package index was not trusted (TLS certificate): is a proxy in between?'
         elif any('No space left' in line or 'Errno 28' in line for line in output):
             reason = f'no space left for {self._log.parent}, which takes {SPACE // 10**6} MB'
+        elif self._wheels is not None and 'No matching distribution' in reason:
+            lacks = reason.rpartition(' ')[2]
+            reason = f'{self._wheels} has no wheel that fits {lacks} and this machine'
         elif any(word in line for line in output for word in ('NewConnectionError', 'resolve')):
             reason += ' (is this machine online?)'
         return f'the set-up stopped: {reason} (more in {self._log}); the next start continues'

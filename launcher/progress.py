@@ -28,6 +28,8 @@ _STEPS = tuple(
 )
 """Lines of pip, apt and the build, and what each says of progress."""
 _PLAIN_EVERY = 15.0
+_SILENT = 10.0
+"""Seconds without a line of output after which that is said."""
 
 
 def describe(line: str) -> str:
@@ -49,7 +51,7 @@ class Step:
         self._shown = 0.0
 
     def __enter__(self) -> Step:
-        self._start = self._shown = time.monotonic()
+        self._start = self._shown = self._heard = time.monotonic()
         if self._live:
             self._draw('...')
         else:
@@ -58,6 +60,7 @@ class Step:
 
     def feed(self, line: str) -> None:
         """Take one line of the step's output."""
+        self._heard = time.monotonic()
         if detail := describe(line):
             self._detail = detail
         self.tick()
@@ -65,11 +68,14 @@ class Step:
     def tick(self) -> None:
         """Redraws; called about four times a second also when there is no output."""
         now = time.monotonic()
+        silent = now - self._heard
+        words = [self._detail] if self._detail else []
+        words += [f'nothing new for {silent:.0f} s'] if silent >= _SILENT else []
         if self._live:
-            self._draw(f'{now - self._start:4.0f} s  {self._detail}')
+            self._draw(f'{now - self._start:4.0f} s  {", ".join(words)}')
         elif now - self._shown >= _PLAIN_EVERY:
             self._shown = now
-            detail = f', {self._detail}' if self._detail else ''
+            detail = f', {", ".join(words)}' if words else ''
             self._print(f'{self._head}: {now - self._start:.0f} s{detail}')
 
     def __exit__(

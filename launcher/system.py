@@ -153,8 +153,9 @@ def install_packages(packages: Sequence[str]) -> None:
 
 def _as_root(packages: Sequence[str]) -> str:
     """Return what a person types to install packages."""
-    command = f'apt-get install -y {" ".join(packages)}'
-    return f'sudo {command}' if shutil.which('sudo') else f"su -c '{command}'   (as root)"
+    # The lists of packages of a machine just set up are empty.
+    command = f'apt-get update && apt-get install -y {" ".join(packages)}'
+    return f"sudo sh -c '{command}'" if shutil.which('sudo') else f"su -c '{command}'"
 
 
 def _privilege() -> list[str] | None:

@@ -9,6 +9,7 @@ import shutil
 import signal
 import subprocess
 import sys
+import zipfile
 from pathlib import Path
 
 import pytest
@@ -65,9 +66,10 @@ PREPARE = """
 import sys
 from pathlib import Path
 from launcher.environment import Environment
-environment = Environment(Path(sys.argv[1]))
+wheels, collected = (Path(word) if word else None for word in (*sys.argv[2:], '', '')[:2])
 try:
-    environment.prepare()
+    environment = Environment(Path(sys.argv[1]), wheels=wheels)
+    environment.prepare() if collected is None else environment.collect(collected)
 except ValueError as error:
     sys.exit(str(error))
 print('ready', environment.ready())
@@ -76,7 +78,10 @@ print('ready', environment.ready())
 
 @pytest.fixture(scope='module')
 def checkout(tmp_path_factory):
-    folder = tmp_path_factory.mktemp('checkout')
+    return made(tmp_path_factory.mktemp('checkout'))
+
+
+def made(folder: Path) -> Path:
     (folder / 'pyproject.toml').write_text(PROJECT)
     interfaces = folder / INTERFACES
     interfaces.mkdir()
@@ -90,9 +95,9 @@ def environ(**more: str) -> dict[str, str]:
     return {**clean_environ(), 'PYTHONPATH': str(ROOT), **more}
 
 
-def prepare(checkout: Path, **more: str) -> subprocess.CompletedProcess[str]:
+def prepare(checkout: Path, *words: str, **more: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
-        [sys.executable, '-c', PREPARE, str(checkout)],
+        [sys.executable, '-c', PREPARE, str(checkout), *words],
         env=environ(**more),
         capture_output=True,
         text=True,
@@ -227,6 +232,28 @@ def test_another_interpreter_gets_an_environment_of_its_own(checkout):
     assert '[1/3] virtual environment' in done.stdout
     assert value(checkout, journal.parent) == before
     assert prepare(checkout).stdout == 'ready True\n'
+
+
+def test_a_machine_without_internet_is_set_up_from_a_folder_of_wheels(tmp_path):
+    lab, wheels = made(tmp_path), tmp_path / 'wheels'
+    assert prepare(lab, str(wheels)).stderr == f'--wheels {wheels}: expected a folder of wheels\n'
+    wheels.mkdir()
+    assert f'setup --collect {wheels}' in prepare(lab, str(wheels)).stderr
+    with zipfile.ZipFile(wheels / 'tiny-1-py3-none-any.whl', 'w') as wheel:
+        wheel.writestr('tiny.py', '')
+        wheel.writestr('tiny-1.dist-info/METADATA', 'Metadata-Version: 2.1\nName: tiny\nVersion: 1')
+        wheel.writestr('tiny-1.dist-info/WHEEL', 'Wheel-Version: 1.0\nTag: py3-none-any')
+        wheel.writestr('tiny-1.dist-info/RECORD', '')
+    project = lab / 'pyproject.toml'
+    project.write_text(PROJECT.replace('"pip"', '"tiny==1"'))
+    assert 'ready True' in prepare(lab, str(wheels)).stdout
+    assert list(lab.glob('.venv/lib/*/site-packages/tiny.py'))
+    # What the set-up needs is gathered from wherever pip finds it.
+    there = {'PIP_NO_INDEX': '1', 'PIP_FIND_LINKS': str(wheels)}
+    assert prepare(lab, '', str(tmp_path / 'gathered'), **there).returncode == 0
+    assert [path.name for path in (tmp_path / 'gathered').iterdir()] == ['tiny-1-py3-none-any.whl']
+    project.write_text(PROJECT.replace('"pip"', '"tiny==2"'))
+    assert f'{wheels} has no wheel that fits tiny==2' in prepare(lab, str(wheels)).stderr
 
 
 def test_compiled_modules_are_kept_where_python_may_not_write_them_beside_the_sources(tmp_path):

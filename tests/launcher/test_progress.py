@@ -63,6 +63,18 @@ def test_a_step_that_printed_nothing_yet_ends_its_line_with_the_time(monkeypatch
     assert stream.getvalue().splitlines()[1] == '[1/3] environment: 0 s'
 
 
+def test_a_step_that_hears_nothing_says_for_how_long_and_of_what(monkeypatch):
+    now = iter([0.0, 1.0, 2.0, 25.0, 40.0, 41.0])
+    monkeypatch.setattr('launcher.progress.time.monotonic', lambda: next(now))
+    stream = io.StringIO()
+    with Step(1, 3, 'packages', stream) as step:
+        step.feed('Downloading numpy-2.0-cp311.whl')
+        step.tick()
+    assert stream.getvalue().splitlines()[1] == (
+        '[1/3] packages: 25 s, downloading numpy, nothing new for 24 s'
+    )
+
+
 def test_a_step_elsewhere_prints_a_line_at_its_start_and_its_end():
     stream = io.StringIO()
     with contextlib.suppress(RuntimeError), Step(2, 3, 'interfaces', stream) as step:

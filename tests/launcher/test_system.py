@@ -22,12 +22,12 @@ HERE = ('Linux', 'x86_64', 'glibc', (3, 12))
 CHECKOUT = Path('/somewhere/surveillance')
 
 
-@pytest.mark.parametrize(('sudo', 'typed'), [(True, 'sudo apt-get'), (False, "su -c 'apt-get")])
+@pytest.mark.parametrize(('sudo', 'typed'), [(True, "sudo sh -c '"), (False, "su -c '")])
 def test_who_may_not_install_is_told_what_this_machine_has(monkeypatch, sudo, typed):
     there = {'apt-get'} | ({'sudo'} if sudo else set())
     monkeypatch.setattr(shutil, 'which', lambda name: name if name in there else None)
     monkeypatch.setattr(system, '_privilege', lambda: None)
-    with pytest.raises(ValueError, match=f'  {typed} install -y g\\+\\+'):
+    with pytest.raises(ValueError, match=f'  {typed}apt-get update && apt-get install -y g\\+\\+'):
         system.install_packages(['g++'])
 
 
