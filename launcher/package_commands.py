@@ -21,6 +21,10 @@ COMMANDS = {
         'surveillance_operator.watch_command:console',
         'one prompt for a running mission: answers, doors, rooms, why, go',
     ),
+    'fleet': (
+        'surveillance_operator.fleet_command',
+        'show the robots of a fleet; pause, go, stop, release, out, in for one or all',
+    ),
     'doctor': (
         'surveillance_operator.doctor_command',
         'say what a mission awaits of a robot, what comes, and what is missing',

@@ -72,6 +72,11 @@ def start_nodes(context: LaunchContext) -> list[Node]:
     """
     given = {each.name: LaunchConfiguration(each.name).perform(context) for each in ARGUMENTS}
     mode, behaviour = given['mode'], given['behaviour']
+    if given['robots']:
+        raise ParameterError(
+            f'robots {given["robots"]!r}: python3 launch.py --robots starts a fleet; here one '
+            'robot is started at a time, see docs/fleet.md'
+        )
     config = Path(get_package_share_directory('surveillance_behaviour'), 'config')
     robot = read_profile(find_profile(config, given['robot']))
     namespace = given['namespace'] or robot.profile.namespace

@@ -540,6 +540,14 @@ class WorldModel:
                 return robot.name
         return ''
 
+    def take_out(self, out: bool) -> str:
+        """Take this robot out of the fleet's patrol, or put it back; return what was done."""
+        assert self.fleet is not None
+        self.fleet.tell(taken_out=out, share=None)
+        if out:
+            return f'{self.fleet.name} is taken out: the others have its places'
+        return f'{self.fleet.name} patrols again'
+
     def dock_is_taken(self) -> bool:
         """Return whether another robot of the fleet charges where this one is."""
         if self.fleet is None or self.world is None or self.place != self.world.place:

@@ -254,3 +254,18 @@ def test_a_robot_that_stands_on_its_way_is_told_of() -> None:
     }
     air.now = 100.0
     assert first.fleet.standing(100.0) == {'robot2': 'robot2 has not been heard for 30 s'}
+
+
+def test_a_robot_is_taken_out_and_put_back() -> None:
+    air, (first, second) = patrol(2)
+    air.run(100.0)
+    assert second.model.take_out(True) == 'robot2 is taken out: the others have its places'
+    begin = len(second.visits)
+    air.run(300.0)
+    # What it was on its way to it still reaches.
+    assert len(second.visits) <= begin + 1
+    assert second.decisions[-1].reason == 'no place is mine: robot2 is taken out'
+    assert {where for at, where in first.visits if at > 130.0} == set(first.world.rooms)
+    second.model.take_out(False)
+    air.run(100.0)
+    assert len(second.visits) > begin + 3

@@ -99,3 +99,11 @@ def test_the_cause_of_the_failure_is_that_of_the_incident() -> None:
         watchdog.look(replace(MOVING, now=3.0))
         assert told[-1].over
         assert told[-1].cause == cause
+
+
+def test_a_decision_to_stay_is_no_silence() -> None:
+    watchdog, told = watch()
+    still = replace(MOVING, state='CHOOSE_NEXT_ROOM', staying='robot2 goes first')
+    for second in range(60):
+        watchdog.look(replace(still, now=float(second)))
+    assert not told

@@ -84,6 +84,7 @@ class Mission:
         pending: What was decided and not yet begun.
         failure: What did not work last, until something did.
         astray: Whether it has left its place and not arrived anywhere since.
+        staying: Why it was decided to stay where it is for a while; empty: it was not.
         explored: Seconds for which it explored its place since it came there; inf: it is done.
         docking: Whether a drive to a recharge room ends at its station, not at the room's point.
     """
@@ -108,6 +109,7 @@ class Mission:
         self.pending: Decision | None = None
         self.failure: Failure | None = None
         self.astray = False
+        self.staying = ''
         self.explored = 0.0
         self.docking = False
         # Where it starts in a recharge room, it starts at the station.
@@ -173,7 +175,10 @@ class Mission:
             if decision.reason != said:
                 said = decision.reason
                 self.say(said)
-            if not self.clock.sleep(decision.stay or QUIET_SECONDS, interrupt):
+            self.staying = decision.reason if decision.stay else ''
+            slept = self.clock.sleep(decision.stay or QUIET_SECONDS, interrupt)
+            self.staying = ''
+            if not slept:
                 raise CallInterruptedError
             now = self.now()
             decision = reasoner.decide(now, interrupt, avoided, to_charge=to_charge)

@@ -49,6 +49,7 @@ class Seen:
         must_charge: Why the charge will not do for more than the way home; empty: it will.
         closed: The doors that are closed.
         place: Where the robot was last known to be.
+        staying: Why it was decided to stay; empty: it was not.
     """
 
     now: float
@@ -64,6 +65,7 @@ class Seen:
     must_charge: str = ''
     closed: Sequence[str] = ()
     place: str = ''
+    staying: str = ''
 
 
 class PurposeWatch:
@@ -132,7 +134,7 @@ class PurposeWatch:
 
 def _goes_on(before: Seen, seen: Seen) -> bool:
     """Tell whether something has happened, or somebody knows why not."""
-    if seen.held or seen.waiting:
+    if seen.held or seen.waiting or seen.staying:
         return True
     if (before.state, before.steps) != (seen.state, seen.steps):
         return True

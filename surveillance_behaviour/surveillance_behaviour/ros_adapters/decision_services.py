@@ -12,6 +12,7 @@ from typing import Any
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.parameter import Parameter
+from std_srvs.srv import SetBool
 
 from patrol_policy.decision import DecisionSettings
 from patrol_policy.world import Decision
@@ -181,6 +182,14 @@ def offer_decision_services(
             response.message = str(error)
         return response
 
+    if world_model.fleet is not None:
+
+        def on_take_out(request: Any, response: Any) -> Any:
+            response.message, response.success = world_model.take_out(request.data), True
+            node.get_logger().info(response.message)
+            return response
+
+        node.create_service(SetBool, 'take_out', on_take_out)
     group = ReentrantCallbackGroup()
     node.create_service(WhyNot, 'why_not', on_why_not, callback_group=group)
     node.create_service(GoTo, 'go_to', on_go_to, callback_group=group)

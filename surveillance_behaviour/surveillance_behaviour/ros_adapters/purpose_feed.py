@@ -101,6 +101,7 @@ class PurposeFeed:
                 mission.ports.reasoner.why_charge(),
                 self._closed,
                 mission.place,
+                mission.staying,
             )
         )
 
