@@ -73,6 +73,7 @@ class OntologyMapBuilder(PatrolNode):
         fleet = tuple(
             dict.fromkeys(key.partition('.')[0] for key in self.parameters_under('robots'))
         )
+        self._fleet = fleet
         robot = fleet[0] if fleet else ROBOT
         if place is not None:
             try:
@@ -135,7 +136,10 @@ class OntologyMapBuilder(PatrolNode):
             (SetDoor, 'set_door', self._on_set_door),
         ):
             self.create_service(kind, f'ontology_map/{name}', callback, callback_group=group)
-        StateSubscription(self, OntologyMap, 'ontology_map/build_map', self._on_build_map)
+        # Each robot of a fleet tells what it found: a topic of one owner each.
+        for prefix in ('', *(f'{robot}/' for robot in self._fleet)):
+            topic = f'{prefix}ontology_map/build_map'
+            StateSubscription(self, OntologyMap, topic, self._on_build_map)
 
     def on_stop(self) -> None:
         """End the worker."""

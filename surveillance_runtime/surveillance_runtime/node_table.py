@@ -129,7 +129,7 @@ _SHARED_NAMES = (
     *(
         f'ontology_map/{name}'
         for name in (
-            *('reference_name', 'built', 'room_position', 'build_map'),
+            *('reference_name', 'built', 'room_position'),
             *('add_room', 'remove_room', 'set_door'),
         )
     ),

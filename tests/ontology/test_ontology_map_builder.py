@@ -340,3 +340,31 @@ def test_a_server_that_dies_and_comes_back_gets_the_map_again(
     graph.until(lambda: armor.utils.get_all_refs() and armor.query.check_ind_exists('C1'))
     assert call('reference_name').name == 'surveillance'
     graph.until(lambda: armor.query.objectprop_b2_ind('connectedTo', 'E') == ['C1', 'C2'])
+
+
+def test_robots_of_a_fleet_share_the_map_and_each_has_its_own_place(
+    graph: Any, armor: ArmorClient, call: Caller
+) -> None:
+    graph.add(ArmorServer)
+    start = [0.0, 0.0, 0.0]
+    graph.add(
+        OntologyMapBuilder, parameters={'robots.anna.start': start, 'robots.bert.start': start}
+    )
+    rooms = [room('E', ('A', 'D1')), room('A', ('E', 'D1'), ('B', 'D2')), room('B', ('A', 'D2'))]
+    for robot, found in (('anna', rooms[:2]), ('bert', rooms[1:])):
+        topic = f'{robot}/ontology_map/build_map'
+        publisher = graph.node.create_publisher(OntologyMap, topic, STATE_QOS)
+        publisher.publish(OntologyMap(places=found, robot_room=found[0].name))
+    assert call('reference_name').name == 'surveillance'
+    graph.until(lambda: call('room_position', room_name='B').valid)
+    graph.until(lambda: call('room_position', room_name='E').valid)
+    PatrolOntology(armor, 'anna').record_place('E', 1)
+    PatrolOntology(armor, 'bert').record_place('A', 1)
+    graph.until(lambda: PatrolOntology(armor, 'anna').reachable() == {'A'})
+    assert PatrolOntology(armor, 'bert').reachable() == {'B', 'E'}
+    first = PatrolOntology(armor, 'anna').snapshot(1000.0, ['URGENT'], visits={'E': 1000.0})
+    # A visit of one is known to the other, and neither is taken for the robot of the seeds.
+    second = PatrolOntology(armor, 'bert').snapshot(1001.0, ['URGENT'], threshold=240.0)
+    assert (first.place, second.place) == ('E', 'A')
+    assert second.visited_at['E'] == 1000.0
+    assert armor.query.ind_b2_class('ROBOT') == ['anna', 'bert']
