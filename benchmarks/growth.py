@@ -148,7 +148,6 @@ def measure_map(name: str, places: int) -> tuple[str, str]:
         seconds.append(time.process_time() - start)
         gone, come, _ = patrol.step()
         kb.change([one for one in come if _is_clock(one)], [one for one in gone if _is_clock(one)])
-        patrol.now += 1
     if kb.unsupported:
         raise SystemExit(f'{name}: {kb.unsupported[0]}')
     return f'{seconds[0] * 1e3:.1f}', f'{statistics.median(seconds[1:]) * 1e3:.2f}'

@@ -928,7 +928,10 @@ class KnowledgeBase:
             else:
                 self._rebuild(engine)
         elif told.added or told.removed:
-            self._update(engine, partial(engine.update, *told.settle()))
+            added, removed = told.settle()
+            if self._completion is not None:
+                self._completion.expect(added, removed)
+            self._update(engine, partial(engine.update, added, removed))
 
     def _fits(self, engine: Engine) -> bool:
         """Tell whether the program was made for every complex class and negated property that was

@@ -99,7 +99,11 @@ class Engine:
         self._removed: dict[Fact, None] = {}
         self._split_happened = False
         self.proofs = ProofSearch(self.asserted)
+        # Facts found by cases, until the next update, and until `release_cases`.
         self._by_cases: set[Fact] = set()
+        self._by_lasting_cases: set[Fact] = set()
+        self._released: list[Fact] = []
+        self._with_cases: set[Predicate] = set()
         self._cases = Predicate('class', 'found by cases')
         self.changed: dict[Fact, bool] | None = None
         self.renamed = False
@@ -548,6 +552,9 @@ class Engine:
         if self._by_cases:
             self._overdeleted += map(self.current, self._by_cases)
             self._by_cases.clear()
+        if self._released:
+            self._overdeleted += map(self.current, self._released)
+            self._released.clear()
         self._restate_differences(added, removed, splitting)
         for axiom in removed:
             if equality.members:
@@ -643,15 +650,13 @@ class Engine:
             self._touched.update(dict.fromkeys(one.members))
         self._queue += [(self._nothing, x) for x in first.members if x in second.members]
 
-    def take_from_cases(self, facts: Iterable[Axiom] | None) -> None:
+    def take_from_cases(self, facts: Iterable[Axiom] | None, lasting: bool = False) -> None:
         """Add facts that reasoning by cases found; they hold until the next `update`.
 
         Args:
             facts: Class and property assertions and who is the same; None for a contradiction.
+            lasting: They hold until the update after `release_cases`; none says who is the same.
         """
-        if not self._cases.supports:
-            for predicate in dict.fromkeys((self._cases, *self.program.predicates())):
-                predicate.supports.append((self._case_supports(predicate), BY_CASES))
         found: list[Fact] = []
         if facts is None:
             found.append((self._nothing, NOTHING))
@@ -660,6 +665,7 @@ class Engine:
         sames = [axiom for axiom in axioms if isinstance(axiom, SameIndividual)]
         if sames:
             mark = self._cases, NOTHING
+            self._let_cases_support(self._cases)
             self._by_cases.add(mark)
             self._queue.append(mark)
             self._propagate()
@@ -669,13 +675,26 @@ class Engine:
                 self._requests[Merge(first, other, None, (mark,))] = None
         self._propagate()
         found += filter(None, map(self.fact_of, axioms))
-        self._by_cases.update(found)
+        for predicate in {fact[0] for fact in found}:
+            self._let_cases_support(predicate)
+        (self._by_lasting_cases if lasting else self._by_cases).update(found)
         self._queue += found
         self._propagate()
 
+    def release_cases(self) -> None:
+        """Have the next update take back what lasting cases led to."""
+        self._released += self._by_lasting_cases
+        self._by_lasting_cases.clear()
+
+    def _let_cases_support(self, predicate: Predicate) -> None:
+        if predicate not in self._with_cases:
+            self._with_cases.add(predicate)
+            predicate.supports.append((self._case_supports(predicate), BY_CASES))
+
     def _case_supports(self, predicate: Predicate) -> Callable[..., Iterator[Premises]]:
         def supports(*arguments: object) -> Iterator[Premises]:
-            if (predicate, *arguments) in self._by_cases:
+            fact = (predicate, *arguments)
+            if fact in self._by_cases or fact in self._by_lasting_cases:
                 yield ()
 
         return supports

@@ -37,7 +37,12 @@ from owl_reasoner.reasoner.clauses import (
 from owl_reasoner.reasoner.consequence_based.classification import Classification
 from owl_reasoner.reasoner.difference import clique
 from owl_reasoner.reasoner.engine import Engine
-from owl_reasoner.reasoner.hypertableau.entailment import CaseReasoner, entails
+from owl_reasoner.reasoner.hypertableau.entailment import MOST_STEPS, CaseReasoner, entails
+from owl_reasoner.reasoner.hypertableau.incremental import (
+    ChangeHistory,
+    IncrementalCases,
+    is_plain,
+)
 from owl_reasoner.reasoner.hypertableau.rule_joins import MOST_TRIED, compared
 from owl_reasoner.reasoner.joins import compile_call
 from owl_reasoner.reasoner.normal_form import is_positive
@@ -45,6 +50,12 @@ from owl_reasoner.reasoner.property_chains import chains_take_cases
 from owl_reasoner.reasoner.value_sets import EVERY, ValueSet, point
 
 _MOST_ASSERTIONS = 20_000
+_PAUSE = 20
+"""Changes for which no models are kept, where those of the last change were of no use."""
+_MOST_UNSERVING = 2
+"""Models that were of no use for a second change, one after the other, before there are none."""
+_LEAST_STEPS = 10_000
+"""Steps that a model which is kept may take in any case."""
 _MOST_COMPARED = 20_000
 """Where so many values are possible, those that are known leave one."""
 
@@ -79,6 +90,18 @@ class Completion:
         # One sentence for each axiom that is not fully used; None where cases were not needed.
         self._left_out: tuple[str, ...] | None = None
         self.seconds = 0.0
+        self._history = ChangeHistory()
+        # Models that stay between changes, and whether the last change admits some.
+        self._kept: IncrementalCases | None = None
+        self._may_keep = False
+        # Changes for which none are made; changes that the present models served; how many
+        # models served none, one after the other.
+        self._pause = self._served = self._unserving = 0
+        # The steps of the last reasoning by cases that began from nothing.
+        self._steps = 0
+        # The pairs of classes that reasoning by cases last added.
+        self._pairs: list[tuple[str, str]] = []
+        engine.release_cases()
 
     @cached_property
     def _open(self) -> OpenCases:
@@ -91,6 +114,24 @@ class Completion:
         if self._left_out is not None:
             return self._left_out
         return tuple(dict.fromkeys([*self._program.unsupported, *self._open.sentences()]))
+
+    def expect(self, added: Iterable[Axiom], removed: Iterable[Axiom]) -> None:
+        """Take in a change of assertions before the engine does."""
+        added, removed = tuple(added), tuple(removed)
+        self._history.note(removed)
+        self._pause = max(0, self._pause - 1)
+        self._may_keep = not self._pause and is_plain(added) and is_plain(removed)
+        if self._kept is not None and (
+            self._engine.equality.members or not self._kept.take(added, removed)
+        ):
+            self._give_up_kept()
+
+    def _give_up_kept(self) -> None:
+        self._unserving = 0 if self._served > 0 else self._unserving + 1
+        if self._unserving == _MOST_UNSERVING:
+            self._pause, self._unserving = _PAUSE, 0
+        self._kept, self._served = None, 0
+        self._engine.release_cases()
 
     def run(self, axioms: Iterable[Axiom]) -> None:
         """Add what follows from everything that is asserted now."""
@@ -105,8 +146,38 @@ class Completion:
             self._left_out = (*self._native, 'the assertions: too many for reasoning by cases')
             return
         began = engine.budget.now()
-        self._run_cases(assertions)
+        if not self._run_kept(assertions):
+            reasoner = CaseReasoner([*self._schema, *assertions], budget=engine.budget)
+            self._run_cases(reasoner)
+            self._steps = reasoner.steps
         self.seconds = engine.budget.now() - began
+
+    def _run_kept(self, assertions: list[Axiom]) -> bool:
+        """Reason with models that stay between changes; False where there are none."""
+        engine = self._engine
+        if self._kept is None and self._may_keep and not engine.equality.members:
+            self._may_keep = False
+            self._history.forget()
+            # What lasts may, without the rest, have models that are harder to find.
+            most = min(MOST_STEPS, _LEAST_STEPS + 10 * self._steps)
+            kept = IncrementalCases(self._schema, assertions, self._history, most, engine.budget)
+            if not kept.build(self._is_known):
+                self._pause = _PAUSE
+            else:
+                self._kept, self._served = kept, -1
+                new = [fact for fact in kept.lasting if not self._is_known(fact)]
+                engine.take_from_cases(new, lasting=True)
+        if self._kept is None:
+            return False
+        if not engine.equality.members:
+            self._run_cases(self._kept)
+            if self._kept.is_usable:
+                self._served += 1
+                return True
+        # Who is the same is split with every change; nothing that lasts may rest on it.
+        self._give_up_kept()
+        engine.update((), ())
+        return False
 
     def cause(self) -> str:
         """Return an axiom by which cases are needed, as text; 'the ontology' where several are."""
@@ -120,9 +191,8 @@ class Completion:
         origin = next((one for one in origins if one is not None), None)
         return 'the ontology' if origin is None else axiom_text(origin)
 
-    def _run_cases(self, assertions: list[Axiom]) -> None:
+    def _run_cases(self, reasoner: CaseReasoner | IncrementalCases) -> None:
         engine = self._engine
-        reasoner = CaseReasoner([*self._schema, *assertions], budget=engine.budget)
         if not reasoner.consistent():
             engine.take_from_cases(None)
             self._forget_classes()
@@ -132,9 +202,10 @@ class Completion:
             known = self._classification
             # Where the individuals took all steps, classes are not compared at all.
             self._stands = not reasoner.names_individuals and not reasoner.stopped
-            found = reasoner.hierarchy(known.classes(), known.below_by_itself)
-            known.complete(list(found))
-            self._compared = True
+            pairs = list(reasoner.hierarchy(known.classes(), known.below_by_itself))
+            if pairs != self._pairs or not self._compared:
+                known.complete(pairs)
+            self._pairs, self._compared = pairs, True
             self._class_gaps, self._classes_stopped = reasoner.class_gaps, reasoner.stopped
         self._report(
             {**reasoner.gaps, **self._class_gaps}, reasoner.stopped or self._classes_stopped

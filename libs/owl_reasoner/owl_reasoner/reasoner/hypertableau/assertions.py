@@ -31,20 +31,24 @@ class AssertionWriter:
 
     def __init__(self, rules: CaseRules, gaps: dict[str, None]) -> None:
         self._rules, self._gaps = rules, gaps
+        self._names: tuple[str, ...] = ()
 
     def prepare(self, axioms: Iterable[Axiom]) -> list[Prepared]:
         """Return the assertions among axioms, prepared, and the declarations of individuals."""
-        return [
+        found = [
             self.prepared(axiom)
             for axiom in axioms
             if isinstance(axiom, ax.Assertion)
             or (isinstance(axiom, ax.Declaration) and axiom.kind == 'individual')
         ]
+        declared = [axiom.iri for axiom, _ in found if isinstance(axiom, ax.Declaration)]
+        # Every model begins alike: with the same individuals under the same numbers.
+        self._names = (*declared, *self._rules.nominal_of)
+        return found
 
     def begin(self, model: CaseModel, axioms: Sequence[Prepared]) -> None:
         """State all assertions in a model in which nothing is stated."""
-        declared = [axiom.iri for axiom, _ in axioms if isinstance(axiom, ax.Declaration)]
-        for name in (*declared, *self._rules.nominal_of):
+        for name in self._names:
             model.individual(name)
         if not axioms:
             model.somebody()

@@ -10,15 +10,15 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator
 from functools import partial
 
-from owl_reasoner.owl.axiom_text import axiom_text
 from owl_reasoner.owl.axioms import Axiom
 from owl_reasoner.reasoner.answers import Unknown
 from owl_reasoner.reasoner.budget import Budget
 from owl_reasoner.reasoner.clauses import StoppedError, UnsupportedError
-from owl_reasoner.reasoner.hypertableau.assertions import AssertionWriter, Prepared
+from owl_reasoner.reasoner.hypertableau.assertions import AssertionWriter
 from owl_reasoner.reasoner.hypertableau.class_comparison import ClassComparison
 from owl_reasoner.reasoner.hypertableau.clauses import CaseRules
 from owl_reasoner.reasoner.hypertableau.denials import Denial, denials
+from owl_reasoner.reasoner.hypertableau.fact_questions import FactQuestions
 from owl_reasoner.reasoner.hypertableau.model_facts import ModelFacts
 from owl_reasoner.reasoner.hypertableau.search import CaseSearch
 
@@ -64,10 +64,18 @@ class CaseReasoner:
         self._axioms = self._writer.prepare(axioms)
         self._search = CaseSearch(self._rules, most_steps)
         self._facts = ModelFacts(self._rules, self._search)
+        self._questions = FactQuestions(
+            self._search, self._facts, self._writer, self.gaps, self._budget
+        )
         self._base = self._search.mark()
         self._consistent: bool | None = None
         # Whether the search has the model that `consistent` found, and the steps it took.
         self._has_model, self._cost = False, 0
+
+    @property
+    def steps(self) -> int:
+        """How many facts were added so far."""
+        return self._search.model.steps
 
     # --- questions ---
 
@@ -90,19 +98,9 @@ class CaseReasoner:
             self._cost = self._search.model.steps - before
         return self._consistent
 
-    def _is_possible(self, denial: Prepared | None = None) -> bool:
-        """Tell whether an assertion holds in some model, which is left in the tables."""
-        search = self._search
-        try:
-            if denial is not None:
-                state = partial(self._writer.state, search.model, *denial)
-                if not search.attempt(state):
-                    return False
-            found = search.solve()
-        except StoppedError:
-            self.stopped = True
-            return True
-        self.gaps.update(search.gaps)
+    def _is_possible(self) -> bool:
+        found = self._questions.is_possible()
+        self.stopped |= self._questions.stopped
         return found
 
     # --- everything that follows about individuals ---
@@ -127,19 +125,9 @@ class CaseReasoner:
                 yield fact
         candidates = self._held_by_others(candidates, 1000 + 3 * self._cost)
         search.undo(self._base)
-        while candidates and not self.stopped:
-            fact = next(iter(candidates))
-            del candidates[fact]
-            self._budget.at_work = partial(axiom_text, fact)
-            ((denial,),) = denials(fact)
-            if self._is_possible(self._writer.prepared(denial)):
-                held = {other for other, _ in self._facts.all()}
-                candidates = {other: None for other in candidates if other in held}
-                search.undo(self._base)
-            else:
-                yield fact
-                search.undo(self._base)
-                self._keep(fact)
+        yield from self._questions.following(candidates)
+        self._base = search.mark()
+        self.stopped |= self._questions.stopped
 
     def _held_by_others(self, candidates: dict[Axiom, None], most: int) -> dict[Axiom, None]:
         """Return those facts of the present model that models with other choices have as well.
@@ -172,16 +160,6 @@ class CaseReasoner:
             pass
         search.forget_models()
         return candidates
-
-    def _keep(self, fact: Axiom) -> None:
-        """Let further searches begin with a fact that follows."""
-        stated = partial(self._writer.state, self._search.model, *self._writer.prepared(fact))
-        try:
-            self._search.attempt(stated)
-            self._search.settle()
-        except StoppedError:
-            self.stopped = True
-        self._base = self._search.mark()
 
     # --- the class hierarchy ---
 

@@ -45,6 +45,7 @@ class CaseModel:
         values: The values of each individual.
         props, sets, owner: Each value's properties, the set it is in, and whose it is.
         holding: The values that are known, by what they are; those that are not, by None.
+        gone: Nodes that are taken away, with who stands for them now and by which choices.
         roots: Unnamed individuals that a named one counts, by what they are counted as.
         having: Whoever has a concept, a value by a data property or somebody by a role, for those
             that rules about named individuals ask for; some are gone, or have it no more.
@@ -65,7 +66,7 @@ class CaseModel:
         self.holding: dict[Value | None, dict[int, None]] = {None: {}}
         self.roots: dict[Any, int] = {}
         self._groups: dict[int, dict[int, Choices]] = {}
-        self._gone: dict[int, tuple[int | None, Choices]] = {}
+        self.gone: dict[int, tuple[int | None, Choices]] = {}
         self.having: dict[Asked, dict[int, None]] = {one: {} for one in rules.asked}
         self._individuals: dict[str, int] = {}
         self._numbers = count(1)
@@ -102,6 +103,10 @@ class CaseModel:
         self.queue.clear()
         self.recount.clear()
         self.revalue.clear()
+
+    def changed_since(self, mark: int) -> Iterator[tuple[dict[Any, Any], Any]]:
+        """Yield the entries, as pairs of table and key, that changed since a state."""
+        return ((table, key) for table, key, _ in self._trail[mark:])
 
     @contextmanager
     def at_most(self, steps: int) -> Iterator[None]:
@@ -194,7 +199,7 @@ class CaseModel:
 
     def find(self, node: int) -> tuple[int | None, Choices]:
         """Return who stands for a node now (None: nobody), and by which choices."""
-        choices, current, gone = 0, node, self._gone
+        choices, current, gone = 0, node, self.gone
         while current in gone:
             following, more = gone[current]
             choices |= more
@@ -207,11 +212,11 @@ class CaseModel:
 
     def is_gone(self, node: int) -> bool:
         """Tell whether an individual or value is taken away, or another one stands for it."""
-        return node in self._gone
+        return node in self.gone
 
     def alive(self) -> Iterator[int]:
         """Return every individual that is there, in the order they came."""
-        return (x for x in self.labels if x not in self._gone)
+        return (x for x in self.labels if x not in self.gone)
 
     # --- facts ---
 
@@ -298,6 +303,10 @@ class CaseModel:
             total |= choices
         return total
 
+    def groups_of(self, node: int) -> dict[int, Choices]:
+        """Return the sets of different nodes that a node is in."""
+        return self._groups[node]
+
     def count_of_differences(self, node: int) -> int:
         """Return in how many sets of different nodes a node is."""
         return len(self._groups[node])
@@ -318,7 +327,7 @@ class CaseModel:
         apart = self.different(kept, gone)
         if apart is not None:
             raise ClashError(choices | apart)
-        self.put(self._gone, gone, (kept, choices))
+        self.put(self.gone, gone, (kept, choices))
         for group, more in self._groups[gone].items():
             if group not in self._groups[kept]:
                 self.put(self._groups[kept], group, more | choices)
@@ -363,9 +372,9 @@ class CaseModel:
 
     def _prune(self, x: int, parent: int, choices: Choices) -> None:
         """Take away an unnamed individual and those that were made for it."""
-        if self.parent[x] != parent or x in self._gone:
+        if self.parent[x] != parent or x in self.gone:
             return
-        self.put(self._gone, x, (None, choices))
+        self.put(self.gone, x, (None, choices))
         for child in tuple(self.children[x]):
             self._prune(child, x, choices)
         for other in self.out[x]:

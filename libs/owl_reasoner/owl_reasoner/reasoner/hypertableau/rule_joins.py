@@ -208,7 +208,7 @@ class CaseJoins:
                 if named is None:
                     return
                 choices = named
-            yield match._replace(given={**match.given, term: node}, choices=match.choices | choices)
+            yield _Match({**match.given, term: node}, match.choices | choices, match.against)
         elif is_value:
             yield from self._equal(match, match.given[term], node)
         elif match.given[term] == node:
@@ -283,7 +283,7 @@ class CaseJoins:
             for x in starts:
                 for bound in self._bind(match, atom.terms[0], x):
                     for y, choices in self._ends(atom, x, None if end is None else end[0]):
-                        more = bound._replace(choices=bound.choices | choices)
+                        more = _Match(bound.given, bound.choices | choices, bound.against)
                         yield from self._bind(more, atom.terms[1], y)
 
     def _ends(
@@ -374,12 +374,16 @@ class CaseJoins:
         terms = atom.terms[1:] if solving else atom.terms
         values: dict[Term, Value] = {}
         unknown: list[Term] = []
-        choices = match.choices
+        choices, given, sets = match.choices, match.given, self._model.sets
         for term in terms:
             if isinstance(term, Constant):
                 values[term] = term.value
                 continue
-            there, more = self._set(match.given[term])
+            node = given[term]
+            if isinstance(node, _Known):
+                values[term] = node.value
+                continue
+            there, more = sets[node]
             if there.only is None:
                 unknown.append(term)
             else:
@@ -390,11 +394,10 @@ class CaseJoins:
             yield from self._open_computed(atom, match, unknown, values)
         elif solving:
             assert atom.solve is not None
-            for value in atom.solve(*(values[term] for term in terms)):
-                given = {**match.given, first: _Known(value)}
-                yield match._replace(given=given, choices=choices)
-        elif atom.holds(*(values[term] for term in terms)):
-            yield match._replace(choices=choices)
+            for value in atom.solve(*[values[term] for term in terms]):
+                yield _Match({**given, first: _Known(value)}, choices, match.against)
+        elif atom.holds(*[values[term] for term in terms]):
+            yield _Match(given, choices, match.against)
 
     def _open_computed(
         self, atom: ComputedAtom, match: _Match, unknown: list[Term], values: dict[Term, Value]

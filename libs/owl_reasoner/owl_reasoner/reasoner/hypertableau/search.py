@@ -127,22 +127,32 @@ class CaseSearch:
         self._signs.clear()
 
     def differ_from_model(self) -> None:
-        """Have later models choose what the present one does not, where they can.
+        """Have later models choose what the present one does not, where they can."""
+        self.avoid(self.chosen())
 
-        What named individuals are in both does not depend on the choices that differ. Choices that
-        are held stay as they are.
+    def chosen(self) -> set[tuple[type, Alternative]]:
+        """Return what the present model chose.
+
+        What named individuals are in a model that chooses otherwise, too, does not depend on the
+        choices that differ. Choices that are held stay as they are.
         """
+        found: set[tuple[type, Alternative]] = set()
         for choice in self._stack[self._held :]:
             chosen = choice.alternatives[choice.place]
-            self._avoided.add((type(chosen), chosen))
+            found.add((type(chosen), chosen))
         if self._held:
-            return
+            return found
         model = self.model
         for x in model.alive():
             if model.names[x]:
                 for concept, choices in model.labels[x].items():
                     if choices:
-                        self._avoided.add((Has, Has(x, concept)))
+                        found.add((Has, Has(x, concept)))
+        return found
+
+    def avoid(self, chosen: Iterable[tuple[type, Alternative]]) -> None:
+        """Choose last what others chose, until `forget_models`."""
+        self._avoided.update(chosen)
 
     def forget_models(self) -> None:
         """Choose in the order of what failed least again."""
@@ -506,6 +516,10 @@ class CaseSearch:
     def _expand(self) -> bool:
         """Add the individuals that are still needed; whether there were any."""
         model = self.model
+        if not self._needs and not self._put_off:
+            # Whoever is blocked has needs that wait: nobody is.
+            self.blocked = {}
+            return False
         self.blocked = self._find_blocked()
         progress = False
         for x, concept in tuple(self._needs):
