@@ -26,6 +26,7 @@ from owl_reasoner.knowledge_base import Changes, KnowledgeBase
 from owl_reasoner.owl.axiom_text import axiom_text
 from owl_reasoner.owl.axioms import Axiom
 from owl_reasoner.reasoner.budget import ReasoningBudgetError
+from owl_reasoner.reasoner.explanation import Explanation
 
 LONG_BACKLOG = 500
 """Changes since the last reasoning from which on the next counts as slow."""
@@ -291,6 +292,24 @@ class Reference:
     def _taken_since(self, before: int) -> str:
         count = self.quarantined - before
         return '; '.join(self.quarantine[-count:]) if count else ''
+
+    def explain(self, fact: Axiom | None) -> Explanation | None:
+        """Return why a fact holds (None: the contradiction), within the limits of reasoning.
+
+        Raises:
+            TooHardError: It takes too long, or was cancelled; what is derived stays.
+        """
+        if not self.dropped:
+            self.cancel.clear()
+        seconds = self.limits.of(self.base, len(self.kb))
+        try:
+            if fact is None:
+                return self.kb.explain_inconsistency(
+                    seconds, self.cancel, memory=self.limits.memory
+                )
+            return self.kb.explain(fact, seconds, self.cancel, memory=self.limits.memory)
+        except ReasoningBudgetError as error:
+            raise TooHardError(str(error)) from None
 
     @property
     def is_slow(self) -> bool:

@@ -15,6 +15,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, TypeAlias
@@ -174,7 +175,7 @@ def justify(
     schema: Iterable[Axiom],
     assumed: tuple[Axiom, ...] = (),
     until: float = math.inf,
-    clock: Callable[[], float] = time.monotonic,
+    budget: Budget | None = None,
 ) -> tuple[Axiom, ...]:
     """Return a smallest set of axioms from which a goal follows (Junker, "QuickXplain", AAAI 2004).
 
@@ -184,13 +185,16 @@ def justify(
         likely: Axioms that a proof uses; with the schema they are tried first.
         schema: The axioms that are not about individuals.
         assumed: Axioms that are there in any case.
-        until: Time by the clock after which axioms that are not needed may be left in.
-        clock: A steady clock, in seconds.
+        until: Time by the budget's clock after which axioms that are not needed may be left in.
+        budget: What all reasoning for it may use.
+
+    Raises:
+        ReasoningBudgetError: A limit of the budget was passed.
     """
-    fixed = list(assumed)
+    fixed, budget = list(assumed), budget or Budget()
 
     def enough(chosen: Iterable[Axiom]) -> bool:
-        return follows((*fixed, *chosen), goal)
+        return follows((*fixed, *chosen), goal, budget)
 
     declared = [axiom for axiom in schema if isinstance(axiom, Declaration)]
     used = list(dict.fromkeys(axiom for axiom in likely if axiom not in fixed))
@@ -202,20 +206,24 @@ def justify(
             fixed = list(assumed)
             if not enough(candidates):
                 candidates = [*declared, *candidates]
-            return tuple(_fewest(candidates, enough, lambda: clock() > until))
+            return tuple(_fewest(candidates, enough, lambda: budget.now() > until))
     return ()
 
 
-def follows(axioms: Iterable[Axiom], goal: Axiom | None) -> bool:
-    """Tell whether a fact, or with None a contradiction, follows from axioms."""
+def follows(axioms: Iterable[Axiom], goal: Axiom | None, budget: Budget | None = None) -> bool:
+    """Tell whether a fact, or with None a contradiction, follows from axioms.
+
+    Raises:
+        ReasoningBudgetError: A limit of the budget was passed.
+    """
     axioms = list(axioms)
-    found = entails(axioms, goal)
+    found = entails(axioms, goal, budget)
     if not isinstance(found, Unknown):
         return found
     # What follows for everything follows for an individual that no axiom names.
     asked = () if goal is None else entities_of(goal)
     kb = KnowledgeBase('', [*axioms, *(Declaration(kind, name) for kind, name in asked)])
-    consistent = kb.reason()
+    consistent = kb._reason_within(budget or Budget())
     return not consistent if goal is None else consistent and kb.holds(goal)
 
 
@@ -685,25 +693,59 @@ class KnowledgeBase:
         finally:
             self._budget.finish()
 
-    def explain(self, fact: Axiom) -> Explanation | None:
+    def explain(
+        self,
+        fact: Axiom,
+        timeout: float = math.inf,
+        cancel: Cancel | None = None,
+        *,
+        memory: float = math.inf,
+        steps: float = math.inf,
+    ) -> Explanation | None:
         """Return why a fact holds; None when it is neither asserted nor derived.
 
         A fact is a class, property, same- or different-individuals assertion, or a subclass axiom
-        between named classes.
+        between named classes. The limits are those of `reason`; what is derived stays.
+
+        Raises:
+            ReasoningBudgetError: A limit was passed, or `cancel` said so.
         """
         if fact in self._told.axioms:
             return Explanation(axiom_text(fact), 'asserted', axioms=(fact,))
-        if self._usable is None or not self.holds(fact):
-            return None
-        return self._explained(fact)
+        with self._limited(timeout, cancel, memory, steps):
+            if self._usable is None or not self.holds(fact):
+                return None
+            return self._explained(fact)
 
-    def explain_inconsistency(self) -> Explanation | None:
+    def explain_inconsistency(
+        self,
+        timeout: float = math.inf,
+        cancel: Cancel | None = None,
+        *,
+        memory: float = math.inf,
+        steps: float = math.inf,
+    ) -> Explanation | None:
         """Return why the ontology contradicts itself; None where the last `reason` found it does
         not.
+
+        Raises:
+            ReasoningBudgetError: A limit, as of `reason`, was passed, or `cancel` said so.
         """
         if self._engine is None or self._consistent:
             return None
-        return self._explained(None)
+        with self._limited(timeout, cancel, memory, steps):
+            return self._explained(None)
+
+    @contextmanager
+    def _limited(
+        self, timeout: float, cancel: Cancel | None, memory: float, steps: float
+    ) -> Iterator[None]:
+        """Apply limits to all that reasons inside of the context."""
+        self._budget.begin(timeout, cancel, None, memory, steps)
+        try:
+            yield
+        finally:
+            self._budget.finish()
 
     def explain_absence(self, fact: Axiom) -> Absence | None:
         """Return what a class or property assertion that does not hold lacks; None where it holds,
@@ -721,7 +763,7 @@ class KnowledgeBase:
         needed, fewest = self._justified(goal, proof)
         if proof is not None and not set(proof.sources()) <= set(needed):
             alone = KnowledgeBase(self.iri, needed)
-            alone.reason()
+            alone._reason_within(self._budget)
             proof = alone._proof(goal, alone._schema_axioms)
         if proof is None or proof.because == BY_CASES:
             return self._listed(text, needed, fewest)
@@ -738,23 +780,36 @@ class KnowledgeBase:
         reasons = Reasons(self._engine, schema_axioms)
         return reasons.of_inconsistency() if goal is None else reasons.of_fact(goal)
 
-    def justification(self, fact: Axiom | None) -> tuple[Axiom, ...]:
+    def justification(
+        self,
+        fact: Axiom | None,
+        timeout: float = math.inf,
+        cancel: Cancel | None = None,
+        *,
+        memory: float = math.inf,
+        steps: float = math.inf,
+    ) -> tuple[Axiom, ...]:
         """Return the fewest asserted axioms to which a fact is owed: without any of them it would
         not follow from the others.
 
         Args:
             fact: As for `explain`; None asks for a contradiction.
+            timeout, cancel, memory, steps: The limits, as of `reason`.
 
         Returns:
             The axioms; none where the fact does not hold. Once `patience` has passed, there may be
             more than it needs.
+
+        Raises:
+            ReasoningBudgetError: A limit was passed, or `cancel` said so.
         """
         if fact in self._told.axioms:
             return (fact,)
-        holds = not self.consistent if fact is None else self.holds(fact)
-        if not holds or self._engine is None:
-            return ()
-        return self._justified(fact, self._proof(fact, lambda *_: ()))[0]
+        with self._limited(timeout, cancel, memory, steps):
+            holds = not self.consistent if fact is None else self.holds(fact)
+            if not holds or self._engine is None:
+                return ()
+            return self._justified(fact, self._proof(fact, lambda *_: ()))[0]
 
     def _justified(
         self, goal: Axiom | None, proof: Explanation | None
@@ -763,14 +818,14 @@ class KnowledgeBase:
         until = self._clock() + self.patience
         likely = proof.sources() if proof else ()
         needed = justify(
-            self._told.axioms, goal, likely, self._told.schema, until=until, clock=self._clock
+            self._told.axioms, goal, likely, self._told.schema, (), until, self._budget
         )
         return needed, self._clock() <= until
 
     def _schema_axioms(self, assumed: tuple[Axiom, ...], goal: Axiom | None) -> tuple[Axiom, ...]:
         """Return the axioms about classes and properties by which assumptions imply something."""
         schema = self._told.schema
-        found = justify([*schema, *assumed], goal, (), schema, assumed)
+        found = justify([*schema, *assumed], goal, (), schema, assumed, budget=self._budget)
         return tuple(axiom for axiom in found if axiom not in assumed)
 
     def _listed(self, text: str, axioms: tuple[Axiom, ...], fewest: bool) -> Explanation:
@@ -882,6 +937,12 @@ class KnowledgeBase:
             raise
         finally:
             budget.finish()
+
+    def _reason_within(self, budget: Budget) -> bool:
+        """Reason for the first time, within limits that somebody else applies."""
+        self._budget = budget
+        self._bring_up_to_date()
+        return self._consistent
 
     def _give_up_derived(self, before: Engine | None, changes: Unsettled) -> None:
         """Forget an engine that an error left in the middle of its work."""

@@ -18,6 +18,8 @@ from owl_reasoner.owl.expressions import Literal, Variable
 from owl_reasoner.owl.vocabulary import SWRLB
 from owl_reasoner.reasoner.budget import Progress
 
+from .patrol_map import n, seven_rooms
+
 A, B, N, T, R, LOG, J = 'x:A', 'x:B', 'x:N', 'x:T', 'x:r', 'x:log', 'x:i'
 _V = [Variable(f'urn:v{number}') for number in range(5)]
 
@@ -211,3 +213,17 @@ def test_an_error_of_another_kind_leaves_it_usable(monkeypatch: pytest.MonkeyPat
             kb.reason()
     assert kb.reason()
     assert kb.types(J) == {A, B, N}
+
+
+def test_an_explanation_ends_at_its_limits_and_leaves_what_is_derived() -> None:
+    kb = seven_rooms()
+    fact = ClassAssertion(n('CORRIDOR'), n('C1'))
+    for ask in (kb.explain, kb.justification):
+        with pytest.raises(ReasoningBudgetError) as told:
+            ask(fact, steps=100)
+        assert told.value.limit == 'steps'
+        with pytest.raises(ReasoningBudgetError):
+            ask(fact, cancel=lambda: True)
+        assert kb.holds(fact)
+        assert not kb.stale
+        assert ask(fact)

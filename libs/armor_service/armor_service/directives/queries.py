@@ -188,9 +188,9 @@ def _object_properties(ref: Reference, ind: str) -> DirectiveResponse:
     '`owl:sameAs(a, b)`: first an English sentence, then the derivation as a tree.',
 )
 def _explain(_: ArmorService, ref: Reference, fact: str) -> DirectiveResponse:
-    with ref.held() as kb:
+    with ref.held():
         asked = _full_fact('QUERY EXPLAIN', ref, fact)
-        explanation = kb.explain(asked)
+        explanation = ref.explain(asked)
         unknown = _unknown(ref, *entities_of(asked)) if explanation is None else ''
     if explanation is None:
         reason = f': {unknown}' if unknown else ''
@@ -248,8 +248,8 @@ def _closable(ref: Reference, fact: Fact, absence: Absence) -> list[str]:
     summary='Why the ontology contradicts itself, in the form of QUERY EXPLAIN; else nothing.',
 )
 def _explain_inconsistency(_: ArmorService, ref: Reference) -> DirectiveResponse:
-    with ref.held() as kb:
-        explanation = kb.explain_inconsistency()
+    with ref.held():
+        explanation = ref.explain(None)
     if explanation is None:
         return DirectiveResponse(error_description=f'{ref.name} is consistent')
     return DirectiveResponse(queried_objects=[explanation.sentence(), explanation.tree()])
