@@ -25,9 +25,14 @@ from launcher.environment import LIBRARIES, PACKAGES  # noqa: E402
 
 SITE = CHECKOUT / 'build' / 'site'
 TOOLS = ['mkdocs-material>=9.5,<10', 'mkdocstrings[python]>=0.26,<2']
-START = {'index.md': 'Start', 'your_building.md': 'Your building', 'your_robot.md': 'Your robot'}
+START = {
+    'index.md': 'Start',
+    'tutorial.md': 'Tutorial',
+    'your_building.md': 'Your building',
+    'your_robot.md': 'Your robot',
+}
 HOW_TO = ('running', 'watching', 'fleet', 'long_runs', 'operator', 'security')
-FROM = ('from_armor', 'from_smach', 'from_yasmin')
+FROM = ('from_armor', 'from_smach', 'from_yasmin', 'from_patrolling_sim')
 CONFIG = """\
 site_name: Surveillance robot
 docs_dir: pages

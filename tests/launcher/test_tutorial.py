@@ -1,0 +1,83 @@
+"""The tutorial and the pages for newcomers: their files are written and their commands run."""
+
+from __future__ import annotations
+
+import re
+import shlex
+import signal
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from tests.launcher.conftest import ROOT, USER_ENVIRON, Started
+
+PROCESS = ROOT / 'tests' / 'launcher' / 'mission_process.py'
+ELSEWHERE = ('git clone', 'python3 launch.py\n', 'benchmarks/')
+"""Commands that other tests run: a clone, a mission without end, a benchmark."""
+
+
+def blocks(page: str) -> list[tuple[str, str]]:
+    """Return the language and text of each block of a page of the docs."""
+    text = (ROOT / 'docs' / page).read_text(encoding='utf-8')
+    return re.findall(r'^```(\w+)\n(.*?)^```', text, re.M | re.S)
+
+
+def words_of(line: str, folder: Path) -> list[str]:
+    """Return what Python gets to run a command of a page in a folder."""
+    _, *words = shlex.split(line)
+    if words[0] != 'launch.py':
+        return words
+    words = [str(ROOT / word) if word.startswith('config/') else word for word in words[1:]]
+    return [str(PROCESS), str(folder / 'runs'), *words]
+
+
+def carried_out(line: str, folder: Path) -> str:
+    """Run a command of a page in a folder; return what it prints."""
+    done = subprocess.run(
+        [sys.executable, *words_of(line, folder)],
+        cwd=folder,
+        env=USER_ENVIRON,
+        capture_output=True,
+        text=True,
+        timeout=200,
+        check=False,
+    )
+    assert done.returncode == 0, (line, done.stdout[-2000:], done.stderr)
+    return done.stdout
+
+
+@pytest.mark.parametrize('page', ['tutorial.md', 'from_patrolling_sim.md'])
+def test_the_page_does_what_it_says(
+    page: str,
+    tmp_path: Path,
+    start: Callable[..., Started],
+    ros_domain: int,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    said = ''
+    for language, text in blocks(page):
+        file = re.match(r'# (\S+?)(, below .*)?\n', text)
+        if file is not None:
+            path = tmp_path / file[1]
+            before = path.read_text() if file[2] else ''
+            path.write_text(before + text)
+        if language == 'python':
+            assert file is not None
+            said += carried_out(f'python {file[1]}', tmp_path)
+        elif language == 'sh' and not any(word in text for word in ELSEWHERE):
+            for line in text.splitlines():
+                if '--for' in line:
+                    mission = start(*words_of(line, tmp_path), '--domain', str(ros_domain))
+                    mission.until('arrived in (Lab|Kitchen)')
+                    assert mission.end(signal.SIGINT)[0] == 0
+                elif not line.startswith('.venv/bin/python'):
+                    said += carried_out(line, tmp_path)
+    if page == 'tutorial.md':
+        assert (tmp_path / 'flat.png').exists()
+        assert "beside a laboratory: ['Hall', 'Lab']" in said
+    else:
+        assert re.search(r'shortest tour 48 s, longest idleness 4\d s', said)
