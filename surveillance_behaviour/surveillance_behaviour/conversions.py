@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+
+from patrol_policy.promises import LATER, NEVER, UNKNOWN, WITHIN, Promise
 from patrol_policy.world import Decision
 from surveillance_behaviour.map_from_markers.assembly import PlaceNote
 from surveillance_interfaces.msg import Decision as DecisionMessage
@@ -31,6 +34,65 @@ def decision_message(decision: Decision, sequence: int, stamp: Any) -> DecisionM
         scores=[float(value) for value in decision.scores.values()],
         stay=float(decision.stay),
     )
+
+
+_LEVELS = {
+    WITHIN: DiagnosticStatus.OK,
+    LATER: DiagnosticStatus.WARN,
+    NEVER: DiagnosticStatus.ERROR,
+    UNKNOWN: DiagnosticStatus.STALE,
+}
+
+
+def promises_message(
+    promises: Sequence[Promise], hours: Mapping[str, str], stamp: Any
+) -> DiagnosticArray:
+    """Return what can be kept of the places: a status each, with the hours of those that have some.
+
+    The level is OK within the threshold, WARN later, ERROR never, STALE where it is not known; the
+    values are ``threshold`` and ``wait`` in seconds, and ``hours``.
+    """
+    message = DiagnosticArray()
+    message.header.stamp = stamp
+    for each in promises:
+        values = {'threshold': f'{each.threshold:g}', 'wait': f'{each.wait:g}'}
+        values['hours'] = hours.get(each.place, '')
+        message.status.append(
+            DiagnosticStatus(
+                level=_LEVELS[each.verdict],
+                name=each.place,
+                message=each.words,
+                values=[KeyValue(key=key, value=value) for key, value in values.items()],
+            )
+        )
+    return message
+
+
+def promises_from(message: DiagnosticArray) -> tuple[tuple[Promise, ...], dict[str, str]]:
+    """Return what can be kept of the places, and the hours of those that have some.
+
+    Raises:
+        ValueError: There are more than any map has, or a value is none.
+    """
+    if len(message.status) > MOST_CANDIDATES:
+        raise ValueError(f'{len(message.status)} promises: expected at most {MOST_CANDIDATES}')
+    verdicts = {level: verdict for verdict, level in _LEVELS.items()}
+    found, hours = [], {}
+    for each in message.status:
+        values = {entry.key: entry.value for entry in each.values}
+        try:
+            threshold, wait = float(values['threshold']), float(values['wait'])
+            verdict = verdicts[each.level]
+        except (KeyError, ValueError):
+            raise ValueError(
+                f'promise of {each.name!r}: expected a level and numbers threshold and wait'
+            ) from None
+        if not (threshold >= 0.0 and wait >= 0.0):
+            raise ValueError(f'promise of {each.name!r}: expected times of 0 or more')
+        found.append(Promise(each.name, verdict, threshold, wait, each.message))
+        if values.get('hours'):
+            hours[each.name] = values['hours']
+    return tuple(found), hours
 
 
 def decision_from(message: DecisionMessage) -> Decision:

@@ -12,6 +12,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
+from patrol_policy.promises import Promise
 from patrol_policy.world import Decision
 from state_machines import Interrupt
 from state_machines.exceptions import CallError
@@ -82,6 +83,11 @@ class Reasoner(Protocol):
     @property
     def places(self) -> frozenset[str]:
         """All places of the map, as far as is known."""
+
+    @property
+    def promised(self) -> tuple[Promise, ...]:
+        """What can be kept of each place, as far as is known."""
+        return ()
 
     def begin(self, now: float, interrupt: Interrupt) -> str:
         """Look at the map for the first time; where the robot is."""

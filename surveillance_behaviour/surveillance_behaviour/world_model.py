@@ -71,6 +71,7 @@ class WorldModel:
             None: by the times that are told.
         rules: What holds for single places.
         tell: Told what can be kept of the places, at the start and when that changes.
+        promise: Given the same for each place, whenever what it rests on changes.
         rates: How fast stations charge, by their places, percent per second: what is taken for
             true until it was seen.
         fleet: The robots that share the patrol; None: this one is alone.
@@ -84,6 +85,7 @@ class WorldModel:
         places: All places of the map when it was last looked at, within reach or not.
         graph: The part of the map that can be reached.
         world: What was known at the last look; None: there was none.
+        promised: What can be kept of each place, as was found last.
     """
 
     def __init__(
@@ -102,6 +104,7 @@ class WorldModel:
         rates: Mapping[str, float] | None = None,
         fleet: FleetKnowledge | None = None,
         settle: Callable[[Interrupt], None] = lambda interrupt: None,
+        promise: Callable[[tuple[Promise, ...]], None] = lambda found: None,
     ) -> None:
         self.settings = settings
         self.fleet = fleet
@@ -133,6 +136,8 @@ class WorldModel:
         self._warn = warn
         self._rules = rules or PatrolRules()
         self._tell = tell
+        self._promise = promise
+        self.promised: tuple[Promise, ...] = ()
         self._curves = {place: ChargeCurve.even(rate) for place, rate in (rates or {}).items()}
         self._told: dict[str, str] = {}
         self._told_about: object = None
@@ -382,7 +387,8 @@ class WorldModel:
         if about == self._told_about:
             return
         self._told_about = about
-        found = self.promises(world)
+        found = self.promised = self.promises(world)
+        self._promise(found)
         told = verdicts(found)
         if any(self._told.get(place, '') != verdict for place, verdict in told.items()):
             self._told = {**self._told, **told}

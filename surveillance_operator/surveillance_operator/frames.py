@@ -67,6 +67,24 @@ def _decision(snapshot: Snapshot) -> Any:
     return {**vars(decision), **more}
 
 
+def _promises(snapshot: Snapshot) -> Any:
+    return {
+        each.place: {
+            'verdict': each.verdict,
+            'threshold': _seconds(each.threshold),
+            'wait': _seconds(each.wait),
+            'words': each.words,
+            'hours': snapshot.hours.get(each.place, ''),
+        }
+        for each in snapshot.promises
+    }
+
+
+def _seconds(value: float) -> float | None:
+    """Return seconds as JSON has them; None: without an end."""
+    return None if math.isinf(value) else round(value, 1)
+
+
 def _status(snapshot: Snapshot) -> Any:
     status = snapshot.status
     return status and {**vars(status), 'whereabouts': status.whereabouts}
@@ -172,6 +190,7 @@ PARTS: Mapping[str, tuple[tuple[str, ...], Callable[[Snapshot], Any]]] = {
     ),
     'status': (('status',), _status),
     'decision': (('decision', 'number'), _decision),
+    'promises': (('promises', 'hours'), _promises),
     'battery': (
         ('battery', 'battery_low'),
         lambda s: None if s.battery is None else {'level': s.battery, 'low': s.battery_low},

@@ -5,16 +5,22 @@ from __future__ import annotations
 import argparse
 import math
 import sys
+import time
 from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 
+from patrol_policy.battery import Battery, ChargeCurve, Draw
+from patrol_policy.decision import LONGEST_THRESHOLD, DecisionSettings
 from patrol_policy.graph import PatrolGraph
+from patrol_policy.promises import WITHIN, Promise, promises
+from patrol_policy.promises import lines as promise_lines
+from patrol_policy.world import World
 from surveillance_behaviour.mission import mission_log
 from surveillance_ontology.patrol_ontology import checked_names
 from surveillance_runtime.command_line import EXIT_BAD_INPUT, CommandParser
 from surveillance_runtime.files import RECORD, FileError
-from surveillance_runtime.place import Place, PlaceError, read_place_file
+from surveillance_runtime.place import Place, PlaceError, PlaceFile, read_place_file
 from surveillance_runtime.place.drawing import Run, draw_place
 from surveillance_runtime.place.filter_masks import write_filter_masks
 from surveillance_runtime.place.floor_plan import FloorPlan
@@ -62,6 +68,52 @@ def facts(plan: FloorPlan) -> str:
     else:
         parts.append(f'tour {tour.length:.1f} m (none is shorter than {tour.bound:.1f} m)')
     return ' · '.join(parts)
+
+
+def promised(
+    file: PlaceFile, threshold: float, battery_seconds: float | None, now: float
+) -> tuple[Promise, ...]:
+    """Return what can be kept of a place's rooms.
+
+    Legs take what the way over the doors takes at the speed that a robot is given before it has
+    driven any.
+
+    Args:
+        file: The place.
+        threshold: Seconds after which a room without its own is URGENT.
+        battery_seconds: How long a charge lasts; None: the battery does not matter.
+        now: Seconds since 1970: which hours it is.
+    """
+    place, rules = file.place, file.rules
+    settings = DecisionSettings(recharge_rooms=place.recharge_rooms)
+    metres = graph_over_doors(file.plan).leg_seconds
+    legs = {
+        room: {other: length / settings.speed for other, length in ways.items()}
+        for room, ways in metres.items()
+    }
+    graph = PatrolGraph(legs, settings.exploration_seconds, rules.exploration)
+    world = World(
+        place=place.start,
+        now=now,
+        reachable=tuple(graph.leg_seconds[place.start]),
+        classes={
+            room: frozenset(('ROOM', *['CORRIDOR'] * (len(doors) > 1)))
+            for room, doors in place.rooms.items()
+        },
+        visited_at={},
+        graph=graph,
+        since=now,
+        threshold=threshold,
+        own_thresholds=rules.thresholds,
+        openings=rules.calendar.at(now),
+        rules=settings.rules.classes,
+    )
+    battery = Battery()
+    if battery_seconds is not None:
+        rates = {room: s.rate / 60.0 for room, s in file.plan.stations.items() if s.rate}
+        curves = {room: ChargeCurve.even(rate) for room, rate in rates.items()}
+        battery = Battery(100.0, draw=Draw(100.0 / battery_seconds), curves=curves)
+    return promises(world, battery, settings, sorted(place.rooms))
 
 
 def run_of(events: Sequence[mission_log.Event], place: Place, source: str) -> Run:
@@ -168,11 +220,34 @@ def _parse(argv: Sequence[str] | None) -> argparse.Namespace:
         metavar='FOLDER',
         help="write the place's zones as masks of Nav2's costmap filters",
     )
+    parser.add_argument(
+        '--threshold',
+        type=_positive,
+        metavar='SECONDS',
+        help='say which rooms can be visited within this time, or within their own in the file',
+    )
+    parser.add_argument(
+        '--charge-lasts',
+        type=_positive,
+        metavar='SECONDS',
+        help='and with a battery of which a full charge lasts so long',
+    )
     return parser.parse_args(argv)
 
 
+def _positive(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not 0.0 < value <= LONGEST_THRESHOLD:
+        raise argparse.ArgumentTypeError(f'got {text!r}, expected seconds above 0, at most 1e9')
+    return value
+
+
 def _draw(options: argparse.Namespace) -> list[str]:
-    plan = read_place_file(options.place).plan
+    file = read_place_file(options.place)
+    plan = file.plan
     try:
         checked_names(plan.place)
     except PlaceError as error:
@@ -197,6 +272,13 @@ def _draw(options: argparse.Namespace) -> list[str]:
                 f'expected the record of a run through {", ".join(plan.place.rooms)}'
             )
         lines.append(f'{options.record}: {run.summary}')
+        told = mission_log.last_promises(mission_log.read(record))
+        lines += [str(each['words']) for each in told if each.get('verdict') != WITHIN]
+    elif options.threshold is not None:
+        found = promised(file, options.threshold, options.charge_lasts, time.time())
+        lines += promise_lines(found)
+    elif options.charge_lasts is not None:
+        raise ValueError('--charge-lasts: expected --threshold, too')
     title = options.place.stem.replace('_', ' ')
     picture = draw_place(plan, title[:1].upper() + title[1:], facts(plan), run)
     try:

@@ -162,6 +162,7 @@ def _page(folder: Path, events: Sequence[Event], drawn: str, bound: float | None
             f'{_clock(begin - start)}. What came before is in {RECORD}.*.gz.</p>'
         )
     body.append(drawn)
+    body.append(_promises(events))
     body.append('<h2>Idleness</h2>')
     body.append(_idleness(events, summary, threshold, begin, end))
     for title, name, number, columns, is_open in (
@@ -189,6 +190,22 @@ def _page(folder: Path, events: Sequence[Event], drawn: str, bound: float | None
         f'<title>Mission {escape(folder.name)}</title><style>{_STYLE}</style></head>'
         f'<body><main>{"".join(body)}<p>Written {made}.</p></main></body></html>\n'
     )
+
+
+def _promises(events: Sequence[Event]) -> str:
+    """Return what was said last of what can be kept of each place."""
+    found = mission_log.last_promises(events)
+    if not found:
+        return ''
+    kept = sum(each.get('verdict') == 'within' for each in found)
+    rows = [
+        [str(each.get(key, '')) for key in ('place', 'verdict', 'words')]
+        for each in found[:MOST_LINES]
+    ]
+    head = f'What could be kept ({kept} of {len(found)} places within their thresholds)'
+    opened = '' if kept == len(found) else ' open'
+    table = _table(['place', 'verdict', 'in words'], rows)
+    return f'<details{opened}><summary>{head}</summary>{table}</details>'
 
 
 def _incidents(folder: Path) -> str:

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from patrol_policy.promises import Promise
 from patrol_policy.world import Decision
 from surveillance_runtime.place.floor_plan import Segment
 from surveillance_runtime.place.occupancy_grid import Grid
@@ -157,6 +158,7 @@ class Snapshot:
         restarts: How often a node was seen to start again.
         status: The latest `mission_status`, kept when its node ends.
         decision, number: The latest decision, and its number.
+        promises, hours: What can be kept of each place, and the hours of those that have some.
         battery, battery_low: Percent, and whether that is low.
         grid: The map.
         positions: A point in each place, metres.
@@ -206,6 +208,8 @@ class Snapshot:
     status: Status | None = None
     decision: Decision | None = None
     number: int = 0
+    promises: tuple[Promise, ...] = ()
+    hours: Mapping[str, str] = field(default_factory=dict)
     battery: float | None = None
     battery_low: bool = False
     grid: Grid | None = None

@@ -25,7 +25,7 @@ from sensor_msgs.msg import JointState, LaserScan, PointCloud2
 from std_msgs.msg import Bool, String, UInt8
 
 from armor_service.facts import ShortFact, parse_fact
-from surveillance_behaviour.conversions import decision_from
+from surveillance_behaviour.conversions import decision_from, promises_from
 from surveillance_interfaces.action import Control, FollowPath, ScanSurroundings
 from surveillance_interfaces.msg import (
     Decision,
@@ -437,6 +437,11 @@ def _feedback(action: str, kind: Any, read: Callable[[Any, Snapshot], Fields]) -
     return Topic(name, message, lambda m, old: read(m.feedback, old), _NEWEST)
 
 
+def _on_promises(message: DiagnosticArray, _: Snapshot) -> Fields:
+    promises, hours = promises_from(message)
+    return {'promises': promises, 'hours': hours}
+
+
 def _on_machine(message: FsmStatus, _: Snapshot) -> dict[str, Any]:
     waiting = tuple(f'{each.path}: {each.outcome} -> {each.to_state}' for each in message.questions)
     return {'active': tuple(message.active), 'paused': message.paused, 'waiting': waiting}
@@ -445,6 +450,7 @@ def _on_machine(message: FsmStatus, _: Snapshot) -> dict[str, Any]:
 TOPICS: tuple[Topic, ...] = (
     Topic('mission_status', MissionStatus, _sets('status', status_from)),
     Topic('decision', Decision, lambda m, _: {'decision': decision_from(m), 'number': m.sequence}),
+    Topic('promises', DiagnosticArray, _on_promises),
     Topic('battery_level', UInt8, _sets('battery', percent_from)),
     Topic('battery_low', Bool, lambda m, _: {'battery_low': m.data}),
     Topic('stopped', Bool, lambda m, _: {'stopped': m.data}),

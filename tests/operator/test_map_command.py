@@ -63,6 +63,20 @@ def test_it_draws_a_place_and_says_what_it_is(
         assert len(picture.getcolors(picture.size[0] * picture.size[1]) or ()) > 20
 
 
+def test_it_says_which_rooms_cannot_be_visited_in_time(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    place = [str(CONFIG / 'seven_rooms.yaml'), '-o', str(tmp_path / 'place.png')]
+    assert map_command.main([*place, '--threshold', '60']) == 0
+    first, *rest = capsys.readouterr().out.splitlines()[1:-1]
+    assert re.fullmatch(r'\d of 7 places can be visited within their thresholds.*', first)
+    assert re.search(r'R1.*: visited every \d+ s .* later than its threshold of 60 s', rest[-1])
+    assert map_command.main([*place, '--threshold', '400', '--charge-lasts', '40']) == 0
+    told = capsys.readouterr().out
+    assert re.search(r'never visited, out takes \d+ s and home \d+ s', told)
+    assert map_command.main([*place, '--charge-lasts', '40']) == 2
+
+
 def test_the_tour_of_a_place_is_measured_over_the_doors() -> None:
     plan = read_world(CONFIG / 'seven_rooms.yaml').plan
     graph = map_command.graph_over_doors(plan)

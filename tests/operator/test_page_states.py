@@ -180,6 +180,27 @@ def test_an_event_has_its_time_of_the_day_in_old_recordings_too(hub: Hub, viewer
     viewer.until(lambda: viewer.text('#events') == '12:00:00left A11:59:58arrived in A')
 
 
+def test_what_cannot_be_kept_of_each_place_is_shown_with_its_hours(
+    hub: Hub, viewer: Viewer
+) -> None:
+    show(hub, viewer, 'begins')
+    told = {
+        'A': {'verdict': 'within', 'threshold': 60, 'wait': 50, 'words': 'A: in time', 'hours': ''},
+        'B': {
+            'verdict': 'never',
+            'threshold': None,
+            'wait': None,
+            'words': 'B: never visited',
+            'hours': 'daily 08:00-18:00',
+        },
+    }
+    hub.show_parts({'promises': told}, 0.0, whole=False)
+    line = '1 of 2 places can be visited within their thresholds'
+    viewer.until(lambda: viewer.text('#promises-line') == line)
+    viewer.js('document.getElementById("promises").open = true')
+    assert viewer.text('#promises-list') == 'B: never visited (daily 08:00-18:00)A: in time'
+
+
 def test_no_name_becomes_markup_and_each_is_read(hub: Hub, viewer: Viewer) -> None:
     show(hub, viewer, 'hostile')
     viewer.until(lambda: viewer.count('[data-place]') == len(HOSTILE))

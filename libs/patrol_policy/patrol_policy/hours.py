@@ -190,6 +190,11 @@ class Calendar:
     keep_out: frozenset[str] = frozenset()
     zone: tzinfo | None = None
 
+    def in_words(self) -> dict[str, str]:
+        """Return the hours of each place that has some, as they were written."""
+        never = dict.fromkeys(self.keep_out, 'never: a keep-out place')
+        return {place: hours.text for place, hours in self.hours.items()} | never
+
     def at(self, now: float) -> Openings:
         """Return what holds now.
 

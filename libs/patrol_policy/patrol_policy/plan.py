@@ -260,6 +260,11 @@ class Plan:
             return self._outcome.settled
         return max((self._outcome.waits[place] for place in self.rules.wanted), default=0.0)
 
+    @property
+    def repeats(self) -> bool:
+        """Whether it is proven what the course comes to: it leads back to where it was."""
+        return self._outcome.back is not None
+
     def settled_waits(self) -> list[float]:
         """Return for each place the wait from visit to visit that the course leaves, seconds.
 
@@ -276,7 +281,9 @@ class Plan:
             rules.go(state, stop)
         seen: dict[int, float] = {}
         for stop in (*outcome.walk[begin:], *outcome.walk[begin:]):
-            rules.go(state, stop)
+            # From the end to the beginning there need be no door.
+            for step in rules.path(state.place, stop):
+                rules.go(state, step)
             place = rules.places[stop]
             if place in seen:
                 known = 0.0 if math.isinf(waits[place]) else waits[place]

@@ -25,6 +25,8 @@ from patrol_policy.world import World
 WITHIN, LATER, NEVER, UNKNOWN = 'within', 'later', 'never', 'unknown'
 SLIGHTLY = 1.25
 """What waits up to so many thresholds is late by little: drives are not that exact."""
+MOST_NAMES = 8
+"""So many places are named of those of which the same is said."""
 ROUNDING = 0.05
 """Seconds by which a wait may be above the threshold and counts as within it."""
 
@@ -63,12 +65,13 @@ def promises(
     names = sorted({*world.graph.places, *places} | world.openings.closed.keys())
     energy = energy_of(asked, battery, settings)
     waits: dict[str, float] = {}
-    cut = ''
+    cut, proven = '', False
     if settings.policy == 'tour' and world.place in asked.graph.index:
         seen = {place: classes_of(world, place) for place in world.classes}
         plan = plan_of(replace(asked, classes=seen), energy)
         waits = dict(zip(plan.places, plan.settled_waits(), strict=True))
-        cut = plan.cut
+        cut = plan.cut or 'none of the ways that were looked at leads there'
+        proven = plan.repeats
     found = []
     for place in names:
         threshold = asked.threshold_of(place)
@@ -76,6 +79,12 @@ def promises(
         wait = waits.get(place, math.inf)
         if never:
             found.append(Promise(place, NEVER, threshold, math.inf, f'{place}: {never}'))
+        elif math.isinf(wait) and proven:
+            words = (
+                f'{place}: never visited, as the rules always have other places before it, and it '
+                'never becomes URGENT'
+            )
+            found.append(Promise(place, NEVER, threshold, wait, words))
         elif math.isinf(wait):
             why = cut or f'the policy {settings.policy} plans nothing ahead'
             words = f'{place}: it is not known when it is visited, {why}'
@@ -137,21 +146,37 @@ def _remedy(place: str, world: World, energy: Energy) -> str:
     return '; no second station within reach would do'
 
 
-def summary(found: Sequence[Promise]) -> str:
-    """Return the promises in one sentence for a log, those that cannot be kept in full."""
+def lines(found: Sequence[Promise]) -> list[str]:
+    """Return the promises in words: a sentence for all, then those that cannot be kept in full.
+
+    What is late by little is part of the first one: a place that the rules let the robot enter only
+    when it is URGENT never is in time. Places of which the same is to be said share a line.
+    """
     if not found:
-        return 'there are no places to visit'
-    within = [each.place for each in found if each.verdict == WITHIN]
+        return ['there are no places to visit']
     slightly = [each for each in found if _slightly_later(each)]
-    rest = [each.words for each in found if each.verdict != WITHIN and each not in slightly]
-    if not rest and not slightly:
-        return f'all {len(within)} places can be visited within their thresholds'
-    kept = f'{len(within)} of {len(found)} places can be visited within their thresholds'
+    rest = [each for each in found if each.verdict != WITHIN and each not in slightly]
+    count = len(found) - len(rest)
+    kept = f'all {count}' if not rest else f'{count} of {len(found)}'
+    first = f'{kept} places can be visited within their thresholds'
     if slightly:
         most = max(100.0 * (each.wait / each.threshold - 1.0) for each in slightly)
-        names = ', '.join(each.place for each in slightly)
-        rest = [f'{names} up to {most:.0f} % later than theirs', *rest]
-    return f'{kept}; {"; ".join(rest)}'
+        first += f' or little later ({_named(slightly)} up to {most:.0f} %)'
+    alike: dict[str, list[Promise]] = {}
+    for each in rest:
+        alike.setdefault(each.words.removeprefix(f'{each.place}: '), []).append(each)
+    return [first, *(f'{_named(several)}: {words}' for words, several in alike.items())]
+
+
+def _named(found: Sequence[Promise]) -> str:
+    names = [each.place for each in found]
+    more = f' and {len(names) - MOST_NAMES} more' if len(names) > MOST_NAMES else ''
+    return ', '.join(names[:MOST_NAMES]) + more
+
+
+def summary(found: Sequence[Promise]) -> str:
+    """Return the promises in one sentence for a log; see `lines`."""
+    return '; '.join(lines(found))
 
 
 def verdicts(found: Sequence[Promise]) -> dict[str, str]:

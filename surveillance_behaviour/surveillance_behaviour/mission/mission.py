@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 
 from patrol_policy.battery import Battery
 from patrol_policy.decision import QUIET, RECHARGE, REQUEST, DecisionSettings
+from patrol_policy.promises import Promise
 from patrol_policy.world import Decision
 from state_machines import Clock, Interrupt
 from state_machines.clock import elapsed_of
@@ -119,6 +120,7 @@ class Mission:
         self._started: float | None = None
         self._noted_places: frozenset[str] = frozenset()
         self._noted_threshold = 0.0
+        self._noted_promises: tuple[Promise, ...] = ()
         self._record_complaint = ''
 
     # The way of the mission.
@@ -196,7 +198,25 @@ class Mission:
             changed = {'urgency_threshold': threshold}
         fields = {'place': decision.place, 'rule': decision.rule, 'reason': decision.reason}
         self.note('decision', **fields, **changed)
+        self._note_promises()
         return decision
+
+    def _note_promises(self) -> None:
+        """Record what can be kept of the places, once its verdicts have changed."""
+        found = self.ports.reasoner.promised
+        before = {each.place: each.verdict for each in self._noted_promises}
+        if {each.place: each.verdict for each in found} != before:
+            self._noted_promises = found
+            self.note(
+                'promises',
+                places=[
+                    {
+                        name: None if isinstance(value, float) and math.isinf(value) else value
+                        for name, value in vars(each).items()
+                    }
+                    for each in found
+                ],
+            )
 
     def _notice_place(self, interrupt: Interrupt) -> None:
         """Record where the robot stands, if a drive ended elsewhere than it was to.

@@ -16,7 +16,8 @@ and the event's own fields::
 
 A start, and a decision under another threshold than the last one, has ``urgency_threshold``,
 seconds. The ``path`` was planned; ``driven`` is where the robot was, where the motion controller
-tells it.
+tells it. ``promises`` says what can be kept of each place: ``place``, ``verdict``, ``words``, and
+``threshold`` and ``wait`` in seconds, null where they have no end.
 
 A record of a month stays small to read: a file that has grown to :data:`SEGMENT_BYTES` is packed as
 ``FILE.0001.gz``, ``FILE.0002.gz``, ..., and the new one begins with a ``snapshot`` of all that was
@@ -55,6 +56,7 @@ EVENTS: Mapping[str, tuple[str, ...]] = {
     'visit': ('place', 'distance'),
     'decision': ('place', 'rule', 'reason'),
     'recharge': ('place', 'seconds'),
+    'promises': ('places',),
     'failure': ('what', 'reason'),
     'end': (),
     'snapshot': ('account',),
@@ -415,6 +417,15 @@ def on_present_clock(times: Mapping[str, float], before: float, now: float) -> d
     if is_other_simulation(before, now):
         return {name: at for name, at in times.items() if at <= now}
     return {name: at - max(0.0, before - now) for name, at in times.items()}
+
+
+def last_promises(events: Iterable[Event]) -> list[dict[str, Any]]:
+    """Return what was said last of what can be kept, one mapping for each place; may be empty."""
+    found: list[dict[str, Any]] = []
+    for event in events:
+        if event.name == 'promises' and isinstance(places := event.fields['places'], list):
+            found = [each for each in places if isinstance(each, dict) and 'words' in each]
+    return found
 
 
 def account_of(events: Iterable[Event]) -> Account:

@@ -9,12 +9,14 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
+from diagnostic_msgs.msg import DiagnosticArray
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.parameter import Parameter
 from std_srvs.srv import SetBool
 
 from patrol_policy.decision import DecisionSettings
+from patrol_policy.promises import Promise
 from patrol_policy.world import Decision
 from state_machines import Interrupt
 from state_machines.exceptions import CallError
@@ -81,6 +83,9 @@ def world_model_of(
         log.warn(experience.problem)
     generator = random.Random(memory.random_seed if memory.random_seed >= 0 else None)
     topic = OwnedTopic(node, DecisionMessage, 'decision')
+    promises_topic = OwnedTopic(node, DiagnosticArray, 'promises')
+    rules = described_patrol_rules(node)
+    hours = rules.calendar.in_words()
     count, logged = 0, ''
 
     def announce(decision: Decision) -> None:
@@ -104,6 +109,10 @@ def world_model_of(
     def settle(interrupt: Interrupt) -> None:
         interrupt.wait(SETTLE)
 
+    def promise(found: tuple[Promise, ...]) -> None:
+        stamp = node.get_clock().now().to_msg()
+        promises_topic.publish(conversions.promises_message(found, hours, stamp))
+
     world_model = WorldModel(
         settings,
         ontology,
@@ -114,11 +123,12 @@ def world_model_of(
         lambda w: log.warn(w),
         announce,
         elapsed,
-        described_patrol_rules(node),
+        rules,
         lambda sentence: log.info(sentence),
         {place: station.rate / 60.0 for place, station in stations.items() if station.rate},
         fleet,
         settle,
+        promise,
     )
     world_model.learn_draw(elapsed)
     return world_model

@@ -5,7 +5,10 @@ from __future__ import annotations
 import threading
 import time
 
+from diagnostic_msgs.msg import DiagnosticArray
+
 from patrol_policy.decision import ANY, RECHARGE
+from patrol_policy.promises import Promise
 from patrol_policy.world import Decision
 from state_machines import Interrupt
 from state_machines.exceptions import CallError, CallInterruptedError
@@ -44,13 +47,23 @@ class ReasonClient(Reasoner):
         self._places: frozenset[str] = frozenset()
         self._told = threading.Condition()
         self._decision: Decision | None = None
+        self._promised: tuple[Promise, ...] = ()
         self._reason = ServiceCaller(node, Reason, 'reason')
         StateSubscription(node, DecisionMessage, 'decision', self._on_decision, owner='reasoner')
+        StateSubscription(node, DiagnosticArray, 'promises', self._on_promises, owner='reasoner')
 
     def _on_decision(self, message: DecisionMessage) -> None:
         with self._told:
             self._decision = conversions.decision_from(message)
             self._told.notify_all()
+
+    def _on_promises(self, message: DiagnosticArray) -> None:
+        self._promised, _ = conversions.promises_from(message)
+
+    @property
+    def promised(self) -> tuple[Promise, ...]:
+        """What the reasoner said last of what can be kept."""
+        return self._promised
 
     @property
     def places(self) -> frozenset[str]:

@@ -2,7 +2,7 @@
 import {$, h, timeOfDay} from './dom.js';
 import {MapView} from './map.js';
 import {drawMachine, lightMachine} from './machine.js';
-import {drawStrips} from './time.js';
+import {drawStrips, showPromises} from './time.js';
 import {Why} from './why.js';
 import {showHealth} from './health.js';
 import {Control} from './control.js';
@@ -68,7 +68,7 @@ function present() {
 }
 
 const MOST_TRAIL = 600;
-const MAP_PARTS = ['status', 'grid', 'places', 'regions', 'links', 'doors', 'plan', 'scan', 'obstacles', 'pose', 'trail', 'mission', 'markers', 'others'];
+const MAP_PARTS = ['status', 'grid', 'places', 'regions', 'links', 'doors', 'plan', 'scan', 'obstacles', 'pose', 'trail', 'mission', 'markers', 'others', 'promises'];
 const SHOW = {
   present: [['grid', 'places', 'machine', 'mission', 'health'], present],
   header: [['status', 'mission', 'battery'], header],
@@ -88,7 +88,8 @@ const SHOW = {
     $('release').hidden = !state.stopped;
   }],
   control: [['places', 'doors', 'mission', 'requests', 'health'], () => control.show()],
-  strips: [['history', 'places', 'mission'], () => drawStrips($('strips'), state, now())],
+  promises: [['promises'], () => showPromises(state)],
+  strips: [['history', 'places', 'mission', 'promises'], () => drawStrips($('strips'), state, now())],
   map: [MAP_PARTS, (parts) => map.show(state, parts, now())],
 };
 

@@ -1,5 +1,5 @@
 // A strip for each place's idleness, one for the battery, one for what happened, over the last hour.
-import {h, s, age, names, wait} from './dom.js';
+import {$, h, s, age, limit, names, wait} from './dom.js';
 
 const HOUR = 3600, W = 600, H = 30;
 const SIGNS = {recharge: '⚡', failure: '✗', recovery: '↻', help: '?'};
@@ -43,7 +43,7 @@ export function drawStrips(root, state, now) {
   }
   const waits = places.map((place) => wait(state, place, now));
   const since = Math.max(now - HOUR, Math.min(now - 60, ...waits.map(({seconds}) => now - seconds), ...[history.visits[0], history.battery[0]].filter(Boolean).map(([at]) => at)));
-  const threshold = mission?.threshold;
+  const threshold = Math.max(0, ...places.map((place) => limit(state, place) ?? 0));
   const top = 1.5 * (threshold || Math.max(60, ...waits.map(({seconds}) => seconds)));
   const x = (at) => Math.round(10 * W * Math.max(0, (at - since) / (now - since))) / 10;
   const y = (idle) => Math.round(10 * (H - H * Math.min(1, Math.max(0, idle) / top))) / 10;
@@ -52,9 +52,10 @@ export function drawStrips(root, state, now) {
     const visits = (visited[place] ?? []).map(([at]) => at);
     const known = state.places[place].visited;
     if (known !== null && !visits.some((at) => Math.abs(at - known) < 1)) visits.push(known);
-    const limit = threshold ? s('path', {class: 'limit', d: `M0 ${y(threshold)}H${W}`}) : '';
+    const own = limit(state, place);
+    const line = own ? s('path', {class: 'limit', d: `M0 ${y(own)}H${W}`}) : '';
     const {strip, value} = drawn.get(place);
-    strip.replaceChildren(s('path', {class: 'fill', d: sawtooth(visits.sort((a, b) => a - b), since, now, x, y)}), limit);
+    strip.replaceChildren(s('path', {class: 'fill', d: sawtooth(visits.sort((a, b) => a - b), since, now, x, y)}), line);
     value.textContent = waits[number].text;
     value.classList.toggle('over', waits[number].late);
   });
@@ -65,8 +66,23 @@ export function drawStrips(root, state, now) {
   drawMarks(drawn.get('events').strip, history.marks.filter(([at]) => at > since), (at) => x(at) / W);
   drawn.get('events').value.textContent = String(history.marks.filter(([at]) => at > since).length);
   root.querySelector('#axis-start').textContent = `${age(now - since)} ago`;
-  const dashed = threshold ? `dashed: threshold ${age(threshold)} · ` : '';
+  const usual = mission?.threshold;
+  const dashed = usual ? `dashed: threshold ${age(usual)}, or the place's own · ` : '';
   root.querySelector('#strip-note').textContent = `${dashed}⚡ recharge · ✗ failure · ↻ recovery · ? help`;
+}
+
+// What can be kept of each place, those that cannot first.
+export function showPromises({promises}) {
+  const order = ['never', 'later', 'unknown', 'within'];
+  const found = names(promises).sort((a, b) => order.indexOf(promises[a].verdict) - order.indexOf(promises[b].verdict));
+  const kept = found.filter((name) => promises[name].verdict === 'within').length;
+  $('promises').hidden = !found.length;
+  $('promises-line').textContent = `${kept} of ${found.length} places can be visited within their thresholds`;
+  $('promises-line').classList.toggle('warn', found.some((name) => promises[name].verdict === 'never'));
+  $('promises-list').replaceChildren(...found.map((name) => {
+    const {verdict, words, hours} = promises[name];
+    return h('li', {class: verdict === 'never' ? 'warn' : null}, words, hours ? h('small', {}, ` (${hours})`) : null);
+  }));
 }
 
 // Marks that would cover each other are one, with a sign for each kind.
