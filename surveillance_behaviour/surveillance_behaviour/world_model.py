@@ -14,7 +14,7 @@ import contextlib
 import math
 import random
 import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 from patrol_policy.battery import Battery, ChargeCurve
@@ -72,6 +72,7 @@ class WorldModel:
         rules: What holds for single places.
         tell: Told what can be kept of the places, at the start and when that changes.
         promise: Given the same for each place, whenever what it rests on changes.
+        stations: Where the stations are, by their places: x, y, metres.
         rates: How fast stations charge, by their places, percent per second: what is taken for
             true until it was seen.
         fleet: The robots that share the patrol; None: this one is alone.
@@ -105,6 +106,7 @@ class WorldModel:
         fleet: FleetKnowledge | None = None,
         settle: Callable[[Interrupt], None] = lambda interrupt: None,
         promise: Callable[[tuple[Promise, ...]], None] = lambda found: None,
+        stations: Mapping[str, Sequence[float]] | None = None,
     ) -> None:
         self.settings = settings
         self.fleet = fleet
@@ -137,6 +139,7 @@ class WorldModel:
         self._rules = rules or PatrolRules()
         self._tell = tell
         self._promise = promise
+        self._stations = stations or {}
         self.promised: tuple[Promise, ...] = ()
         self._curves = {place: ChargeCurve.even(rate) for place, rate in (rates or {}).items()}
         self._told: dict[str, str] = {}
@@ -156,11 +159,20 @@ class WorldModel:
             experience.draw.draw,
             experience.sent_to_charge,
             {**self._curves, **experience.charge.curves()},
+            self._approaches(),
         )
         if battery.sent_to_charge and battery.charged_enough(self.settings.battery):
             experience.sent_to_charge = ''
             return replace(battery, sent_to_charge='')
         return battery
+
+    def _approaches(self) -> dict[str, float]:
+        """Return the seconds from the points of recharge rooms to their stations."""
+        return {
+            place: math.dist(self._positions[place][:2], pose[:2]) / self.settings.speed
+            for place, pose in self._stations.items()
+            if place in self._positions
+        }
 
     def _passed(self, now: float) -> float:
         """Return the time that durations are measured by: the date may be set."""

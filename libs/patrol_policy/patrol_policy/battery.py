@@ -86,6 +86,7 @@ class Battery:
         sent_to_charge: Why the robot was sent to charge and has not been charged since; empty: it
             was not.
         curves: How fast each station charges, by its place.
+        approaches: Seconds of driving from the points of places to their stations, where known.
     """
 
     level: float | None = None
@@ -93,6 +94,7 @@ class Battery:
     draw: Draw = Draw()
     sent_to_charge: str = ''
     curves: Mapping[str, ChargeCurve] = field(default_factory=dict)
+    approaches: Mapping[str, float] = field(default_factory=dict)
 
     def charged_enough(self, limits: BatteryLimits) -> bool:
         """Return whether the robot may leave the station."""
@@ -144,10 +146,12 @@ class Station:
     Attributes:
         place: The place it stands in.
         curve: How fast it charges.
+        approach: Seconds of driving from the place's point to it.
     """
 
     place: str
     curve: ChargeCurve = ChargeCurve()
+    approach: float = 0.0
 
 
 class Energy:
@@ -165,6 +169,7 @@ class Energy:
         draw: Percent per second away from a station.
         full: The level that a charge ends at, percent.
         stations: The index of the place of each station.
+        approach: For each station, the seconds from its place's point to it.
         drive: For each station, the seconds of driving to it from each place.
         least: The level that the robot must have left in each place, percent.
         home_seconds: Seconds of driving from each place to the nearest station.
@@ -187,10 +192,24 @@ class Energy:
         self.index = graph.index
         self.draw, self.full = draw.rate, limits.stop_recharge
         self.stations = [graph.index[station.place] for station in usable]
-        self.drive = [graph.drive_home([station.place])[0] for station in usable]
-        seconds, leads_to = graph.drive_home([station.place for station in usable])
+        self.approach = [station.approach for station in usable]
+        self.drive = [
+            [away + station.approach for away in graph.drive_home([station.place])[0]]
+            for station in usable
+        ]
+        nearest = [
+            min(range(len(usable)), key=lambda n: self.drive[n][place], default=-1)
+            for place in range(len(graph.places))
+        ]
+        seconds = [
+            self.drive[number][place] if number >= 0 else math.inf
+            for place, number in enumerate(nearest)
+        ]
         self.home_seconds = seconds
-        self.home = [self.stations.index(s) if s >= 0 else -1 for s in leads_to]
+        self.home = [
+            number if math.isfinite(away) else -1
+            for number, away in zip(nearest, seconds, strict=True)
+        ]
         self.least = [
             math.inf
             if not math.isfinite(away)
@@ -203,8 +222,9 @@ class Energy:
         ]
         self._tables = [[curve.seconds(low, self.full) for low in range(101)] for curve in curves]
         out = [math.inf] * len(seconds)
-        for station in self.stations:
-            out = [min(*pair) for pair in zip(out, graph.row(station).tolist(), strict=True)]
+        for station, approach in zip(self.stations, self.approach, strict=True):
+            ways = (graph.row(station) + approach).tolist()
+            out = [min(*pair) for pair in zip(out, ways, strict=True)]
         self.out_seconds = out
         self.within_range = [
             self.full - self.draw * away >= least

@@ -200,7 +200,7 @@ def energy_of(world: World, battery: Battery, settings: DecisionSettings) -> Ene
     if battery.level is None or battery.draw.rate <= 0.0:
         return None
     stations = [
-        Station(place, battery.curves.get(place, ChargeCurve()))
+        Station(place, battery.curves.get(place, ChargeCurve()), battery.approaches.get(place, 0.0))
         for place in sorted(settings.recharge_rooms)
         if place in world.graph.index and place not in world.avoided
     ]

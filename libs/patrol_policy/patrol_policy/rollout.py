@@ -343,7 +343,7 @@ class RuleMap:
             number = stop - self.count
             seconds = energy.drive[number][state.place]
             state.level -= energy.draw * seconds
-            seconds += energy.charge_seconds(number, state.level)
+            seconds += energy.charge_seconds(number, state.level) + energy.approach[number]
             state.level = max(state.level, energy.full)
         elif energy:
             state.level -= energy.draw * seconds

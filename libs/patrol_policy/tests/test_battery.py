@@ -35,6 +35,19 @@ def test_what_must_be_left_is_what_driving_home_takes() -> None:
     assert not energy.within_range[graph.index['R4']]
 
 
+def test_a_station_far_from_its_places_point_costs_the_way_there_and_back() -> None:
+    graph, limits, draw = seven_rooms(), BatteryLimits(0, 90, 5), Draw(1.0)
+    near = Energy(graph, [Station('E')], draw, 0.0, limits)
+    far = Energy(
+        graph, [Station('E', approach=20.0), Station('C2', approach=500.0)], draw, 0, limits
+    )
+    at = graph.index['R4']
+    assert far.home_seconds[at] == pytest.approx(near.home_seconds[at] + 20.0)
+    assert far.least[at] == pytest.approx(near.least[at] + 20.0)
+    assert far.out_seconds[at] == pytest.approx(near.out_seconds[at] + 20.0)
+    assert [far.stations[number] for number in far.home] == [graph.index['E']] * 7
+
+
 def test_the_level_of_the_seeds_stays_the_floor() -> None:
     graph = seven_rooms()
     energy = Energy(graph, [Station('E')], Draw(0.1), 0.0, BatteryLimits(20, 90, 5))

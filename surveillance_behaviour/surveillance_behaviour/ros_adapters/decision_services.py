@@ -129,6 +129,7 @@ def world_model_of(
         fleet,
         settle,
         promise,
+        {place: station.pose for place, station in stations.items()},
     )
     world_model.learn_draw(elapsed)
     return world_model
