@@ -22,7 +22,7 @@ from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 
 from launch import LaunchContext, LaunchDescription
-from surveillance_runtime.configuration import Configuration, Entry
+from surveillance_runtime.configuration import Configuration, Entry, Layer
 from surveillance_runtime.files import RECORD, RECORDING
 from surveillance_runtime.launch_protocol import EXIT_CANNOT_START, EXIT_NOT_NOW
 from surveillance_runtime.node_table import Node as NodeOfTable
@@ -42,6 +42,8 @@ from surveillance_runtime.run_parameters import (
     full_name,
     mode_entries,
     page_entries,
+    place_file,
+    place_name,
     record_entries,
     run_layers,
     simulator_entries,
@@ -88,13 +90,14 @@ def start_nodes(context: LaunchContext) -> list[Node]:
         monitored=robot.profile.is_monitored,
     )
     names = [node.name for node in nodes]
+    at = Path(given['map']) if given['map'] else None
     folder = Path(tempfile.mkdtemp(prefix='surveillance-'))
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
     merged = Configuration(
         run_layers(
             config,
             behaviour,
-            place=Path(given['map']) if given['map'] else None,
+            place=at,
             robot=robot,
             files=[Path(given['params'])] if given['params'] else [],
             options=[
@@ -106,7 +109,11 @@ def start_nodes(context: LaunchContext) -> list[Node]:
         )
     )
     merged.check()
-    merged.place('simulator', full_name(namespace, 'simulator'))
+    place = merged.place('simulator', full_name(namespace, 'simulator'))
+    # The store of the ontology outlives the launch, and the next one may be in another building.
+    named = place_name(place_file(config, behaviour, at), place)
+    entry = for_node('armor_server', 'place', named, 'the place')
+    merged = Configuration((Layer(entry.origin, (entry,)), *merged.layers))
     nodes = (*nodes, *_observers(given))
     renamed = [*_remaps(given['remap']), *remappings(robot.profile, names, mode)]
     files = write_parameters(folder, namespace, merged, nodes)

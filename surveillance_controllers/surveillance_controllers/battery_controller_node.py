@@ -17,6 +17,7 @@ from typing import Any, TextIO
 
 from geometry_msgs.msg import PoseWithCovarianceStamped
 from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.qos import QoSProfile
 from sensor_msgs.msg import BatteryState
 from std_msgs.msg import Bool, Float32, UInt8
 from std_srvs.srv import Empty
@@ -237,7 +238,15 @@ class RobotBattery:
             owner='motion_controller',
         )
         node.create_subscription(JointTrajectory, 'arm/joint_trajectory', self._on_trajectory, 1)
-        node.create_subscription(Float32, 'battery_drain', self._on_drain, 10)
+        StateSubscription(
+            node,
+            Float32,
+            'battery_drain',
+            self._on_drain,
+            each=True,
+            qos=QoSProfile(depth=10),
+            owner='simulator',
+        )
         node.create_timer(settings.update_period, self._update)
 
     def why_not_charging(self, asked_at: float) -> str | None:

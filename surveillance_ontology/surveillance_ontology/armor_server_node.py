@@ -6,6 +6,7 @@ first reasoning) goes to a worker thread, so that other clients are not kept wai
 
 from __future__ import annotations
 
+import re
 import sys
 import time
 from collections.abc import Callable
@@ -31,6 +32,7 @@ from surveillance_ontology.conversions import changes_to_ros, fill_response, req
 from surveillance_ontology.patrol_ontology import DATA
 from surveillance_runtime.launch_protocol import NotNowError
 from surveillance_runtime.node import PatrolNode
+from surveillance_runtime.parameters import ParameterError
 from surveillance_runtime.process import run_node
 from surveillance_runtime.qos import STATE_QOS
 from surveillance_runtime.waiting import AwaitedWork
@@ -238,12 +240,27 @@ def _service(node: PatrolNode, keep: bool) -> ArmorService:
     stored = node.parameter(
         'store',
         'auto' if keep else 'none',
-        'Directory that keeps references and their changes over a restart; auto: one for '
-        "this domain and name in the user's state folder; none: keep nothing.",
+        'Directory that keeps references and their changes over a restart; auto: one for this '
+        "domain, name and place in the user's state folder; none: keep nothing.",
         read_only=True,
     )
+    place = node.parameter(
+        'place',
+        '',
+        'Name of the place whose map is kept, part of the name of a store that is `auto`: another '
+        'place has another store. Empty: one store for all.',
+        read_only=True,
+    )
+    if not re.fullmatch(r'[\w-]*', place):
+        raise ParameterError(
+            f'{node.get_name()}: parameter place {place!r}: expected letters, digits, _ and -'
+        )
     log = node.get_logger()
-    folder = _own_folder(node) if stored == 'auto' else Path(stored).expanduser()
+    folder = _own_folder(node, place) if stored == 'auto' else Path(stored).expanduser()
+    if stored == 'auto' and place and not folder.exists():
+        others = [each.name for each in folder.parent.glob(f'{_own_folder(node, "").name}*')]
+        told = f', beside {", ".join(sorted(others))}' if others else ''
+        log.info(f'place {place}: it has a store of its own, which is new{told}')
     try:
         store = None if stored in ('', 'none') else Store(folder)
         service = ArmorService(settings, log.info, log.warn, store)
@@ -255,9 +272,10 @@ def _service(node: PatrolNode, keep: bool) -> ArmorService:
         raise NotNowError(f'{node.get_name()}: parameter store: {error}') from None
 
 
-def _own_folder(node: PatrolNode) -> Path:
+def _own_folder(node: PatrolNode, place: str) -> Path:
     name = node.get_fully_qualified_name().strip('/').replace('/', '.')
-    return state_folder() / 'armor' / f'{node.context.get_domain_id()}.{name}'
+    own = f'{node.context.get_domain_id()}.{name}' + (f'.{place}' if place else '')
+    return state_folder() / 'armor' / own
 
 
 def main(args: list[str] | None = None) -> int:

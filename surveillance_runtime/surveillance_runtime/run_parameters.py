@@ -7,6 +7,9 @@ installed ROS use this alike, so that a robot gets the same values from both.
 
 from __future__ import annotations
 
+import hashlib
+import json
+import re
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
@@ -19,6 +22,7 @@ from surveillance_runtime.configuration import (
     resolved_text,
 )
 from surveillance_runtime.node_table import NODES, Node
+from surveillance_runtime.place import Place
 from surveillance_runtime.profile import ProfileFile, profile_layer
 from surveillance_runtime.run_options import MUJOCO
 
@@ -31,6 +35,23 @@ PLACES = {'surveillance': 'seven_rooms.yaml', 'patrol': 'patrol_world.yaml'}
 def place_file(config: Path, behaviour: str, place: Path | None = None) -> Path:
     """Return the file of the place: the one that is asked for, else the behaviour's own."""
     return (place or config / PLACES[behaviour]).resolve()
+
+
+def place_name(file: Path, place: Place | None) -> str:
+    """Return a name for a place, by which what is kept of it is told from another one's.
+
+    Two places differ in the name of their file, or in their rooms and doors: what an ontology has
+    of a place. A room that is moved is the same room.
+
+    Args:
+        file: The file of the place.
+        place: What it describes; None: nothing but parameters.
+    """
+    stem = re.sub(r'\W', '_', file.stem)
+    if place is None:
+        return stem
+    doors = sorted((room, sorted(doors)) for room, doors in place.rooms.items())
+    return f'{stem}_{hashlib.sha256(json.dumps(doors).encode()).hexdigest()[:8]}'
 
 
 def run_layers(

@@ -24,7 +24,7 @@ from surveillance_runtime.parameters import ParameterError
 from tests.launcher.conftest import ROOT
 
 SOURCE = ROOT / 'surveillance_behaviour' / 'launch' / 'surveillance.launch.py'
-PER_RUN = {'record', 'console', 'ontologies_folder', 'store', 'state_file'}
+PER_RUN = {'record', 'console', 'ontologies_folder', 'store', 'place', 'state_file'}
 
 
 @dataclasses.dataclass
@@ -165,6 +165,24 @@ def test_its_arguments_are_options_of_launch_py(start, tmp_path):
     assert in_physics['simulator']['engine'] == 'mujoco'
     with pytest.raises(FileError, match=r"--robot 'turtlebot3_burgr'.*'turtlebot3_burger'"):
         start(robot='turtlebot3_burgr')
+
+
+def test_each_place_has_a_store_of_its_own(start, tmp_path):
+    """The ontology outlives a launch, and the next one may be in another building."""
+    moved, further = tmp_path / 'it' / 'seven_rooms.yaml', tmp_path / 'office' / 'seven_rooms.yaml'
+    for copy, name in ((moved, 'seven_rooms'), (further, 'office')):
+        copy.parent.mkdir()
+        copy.write_text((ROOT / 'config' / f'{name}.yaml').read_text())
+    office = str(ROOT / 'config' / 'office.yaml')
+    by_place = [
+        {node.name: settings(node) for node in start(**given)}['armor_server']['place']
+        for given in ({}, {'map': str(moved)}, {'map': office}, {'map': str(further)})
+    ]
+    assert by_place[0] == by_place[1]
+    assert len(set(by_place)) == 3
+    assert [name.rpartition('_')[0] for name in by_place] == [
+        *('seven_rooms', 'seven_rooms', 'office', 'seven_rooms')
+    ]
 
 
 def test_a_node_that_cannot_start_ends_the_launch_and_another_one_does_not(start):

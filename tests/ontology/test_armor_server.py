@@ -23,6 +23,7 @@ from surveillance_ontology.armor_client import (
 from surveillance_ontology.armor_server_node import ArmorServer
 from surveillance_runtime.launch_protocol import NotNowError
 from surveillance_runtime.node import PatrolNode
+from surveillance_runtime.parameters import ParameterError
 
 
 def test_directives_travel_both_ways(graph: Any, tmp_path: Path) -> None:
@@ -218,6 +219,24 @@ def test_a_stored_ontology_outlives_its_server(graph: Any, tmp_path: Path) -> No
     graph.add(ArmorServer, {'store': str(tmp_path / 'store')})
     assert reach(armor) == ['C1', 'C2']
     assert armor.utils.get_ref_client() == 'test'
+
+
+def test_a_store_belongs_to_a_place(
+    graph: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv('XDG_STATE_HOME', str(tmp_path))
+    said = graph.said()
+    armor = ArmorClient(graph.node, 'test', 'map', timeout=60.0)
+    for place, rooms in (('seven_rooms', ['E']), ('office', []), ('seven_rooms', ['E'])):
+        server = graph.add(ArmorServer, {'store': 'auto', 'place': place})
+        armor.utils.load_ref_from_file(ONTOLOGY, IRI, mounted=True)
+        if place == 'seven_rooms':
+            armor.manipulation.add_ind_to_class('E', 'ROOM')
+        assert armor.query.ind_b2_class('ROOM') == rooms
+        graph.remove(server)
+    graph.until(lambda: any('place office: it has a store of its own' in each for each in said))
+    with pytest.raises(ParameterError, match=r"place '\.\./x': expected letters"):
+        graph.add(ArmorServer, {'place': '../x'})
 
 
 def test_a_change_that_is_under_way_at_a_stop_is_kept(

@@ -112,3 +112,26 @@ def test_more_than_one_second_publisher_is_named_once_each(graph: Any) -> None:
         node = graph.node if name == 'one' else owner
         node.create_publisher(UInt8, 'level', STATE_QOS).publish(UInt8(data=value))
     graph.until(lambda: any('incident [topic level, warning]' in line for line in said))
+
+
+def test_the_first_of_two_other_programs_is_believed_and_the_second_named(graph: Any) -> None:
+    """Neither repeats nor answers, as map_server, which was started first."""
+    server = graph.add(PatrolNode, name='map_server').create_publisher(UInt8, 'map', STATE_QOS)
+    server.publish(UInt8(data=1))
+    maps: list[Any] = []
+    node = graph.add(PatrolNode, name='reader')
+    StateSubscription(node, UInt8, 'map', maps.append)
+    graph.until(lambda: maps)
+    stranger = graph.add(PatrolNode, name='stranger')
+    publisher = stranger.create_publisher(UInt8, 'map', STATE_QOS)
+    for number in (7, 8, 9):  # also one that goes on speaking
+        publisher.publish(UInt8(data=number))
+        publisher.wait_for_all_acked()
+    graph.until(lambda: ('topic', 'map') in node.incidents.open())
+    (_, told), *_ = [each for each in node.health.findings() if 'map' in each[1]]
+    assert told == 'map is published by /stranger, too: /map_server is believed'
+    server.publish(UInt8(data=2))
+    graph.until(lambda: maps[-1].data == 2)
+    graph.drop(stranger)
+    graph.until(lambda: ('topic', 'map') not in node.incidents.open())
+    assert [each.data for each in maps] == [1, 2]
