@@ -383,7 +383,12 @@ class _Body:
             JointTrajectory, topic('arm/joint_trajectory'), self._on_trajectory, 1
         )
         StateSubscription(
-            node, Bool, topic('arm/at_rest'), self._on_arm_rest, owner=topic('arm_controller')
+            node,
+            Bool,
+            topic('arm/at_rest'),
+            self._on_arm_rest,
+            owner=topic('arm_controller'),
+            only=True,
         )
         node.create_subscription(
             MarkerDetectionArray, topic('aruco_detector/detections'), self._on_detections, 10
