@@ -175,7 +175,7 @@ def test_each_place_has_a_store_of_its_own(start, tmp_path):
         copy.write_text((ROOT / 'config' / f'{name}.yaml').read_text())
     office = str(ROOT / 'config' / 'office.yaml')
     by_place = [
-        {node.name: settings(node) for node in start(**given)}['armor_server']['place']
+        str({node.name: settings(node) for node in start(**given)}['armor_server']['place'])
         for given in ({}, {'map': str(moved)}, {'map': office}, {'map': str(further)})
     ]
     assert by_place[0] == by_place[1]
