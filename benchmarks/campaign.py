@@ -17,8 +17,14 @@ after that the next visit has to come within a minute. At the end three things m
   saw once in the record and that is gone later is *lost*;
 - the ontology's `visitedAt`: later than the record's last visit is *invented*, earlier is *lost*.
 
+With `--twin` a second mission runs beside it, in a domain of its own, that nobody disturbs. The
+first one's decisions are judged by it: the legs that it drove while all its nodes were there take
+within 10 % of what the twin's take (in the median), and no place is chosen as URGENT that is not.
+With `--steps-every 60` nothing else is done than to set the clock by an hour and by a second,
+forward and back, once a minute.
+
 The exit code is 1 when something was lost or invented, or a node stayed away, or processes are left
-behind.
+behind, or decisions differ from the twin's.
 """
 
 from __future__ import annotations
@@ -54,6 +60,7 @@ from rclpy.node import Node
 from rclpy.qos import qos_profile_sensor_data
 from std_msgs.msg import UInt32
 
+from benchmarks.decisions import Comparison, SetClock, compare, legs_of, wrongly_urgent
 from benchmarks.hosts import Host, Network, may_be_made
 from benchmarks.machine_faults import SmallDisk, SteppedClock
 from state_machines.ros import ServiceCaller
@@ -86,6 +93,8 @@ ASK_PERIOD = 0.1
 """Seconds between two requests to a node that may not be there yet."""
 PATIENCE = 60.0
 """After how long a node that was hit counts as staying away, seconds."""
+STEPS_OF_CLOCK = (3600, -3600, 1, -1)
+"""By how much `--steps-every` sets the clock, seconds."""
 ROBOT = ('simulator', 'motion_controller', 'planner_controller', 'battery_controller')
 DESK = ('armor_server', 'ontology_map_builder', 'robot_behavior')
 VISIT_PATIENCE = 120.0
@@ -285,10 +294,13 @@ class Results:
     usage: dict[tuple[int, float], Usage] = field(default_factory=dict)
     seen: dict[tuple[float, str], None] = field(default_factory=dict)
     collisions: int = 0
+    urgent: list[str] = field(default_factory=list)
+    legs: Comparison | None = None
 
     def passed(self) -> bool:
-        """Tell whether nothing was lost, invented, away or left behind."""
-        return not (self.away or self.lost or self.invented or self.left_behind)
+        """Tell whether nothing was lost, invented, away, left behind or decided otherwise."""
+        wrong = self.away or self.lost or self.invented or self.left_behind or self.urgent
+        return not wrong and (self.legs is None or self.legs.passed)
 
     def rows(self) -> list[tuple[str, str]]:
         """Return the table to print."""
@@ -304,6 +316,8 @@ class Results:
             ('visits seen in the record', str(len(self.seen))),
             ('lost', _named(self.lost)),
             ('invented', _named(self.invented)),
+            ('chosen as URGENT that was not', _named(self.urgent)),
+            ('legs', 'no twin' if self.legs is None else str(self.legs)),
             ('collisions', str(self.collisions)),
             ('next visit after the machine was hit', _times(self.machine)),
             ('restarts by that', str(self.restarted)),
@@ -380,6 +394,12 @@ class Campaign:
         positions = described.place.positions
         self._positions = {name: (at[0], at[1]) for name, at in positions.items()}
         self._regions = Regions(described.plan) if described.plan.is_enclosed else None
+        self._hits: list[tuple[float, float]] = []
+        self._set_clock = SetClock()
+        self._twin: Launcher | None = None
+        if chosen.twin:
+            words = ['--behaviour', chosen.behaviour, '--record', str(scratch / 'twin')]
+            self._twin = Launcher(words, claim_domain(), scratch / 'twin.log')
         self.launcher = self._launch(())
         self._folder = self._wait_for_folder()
 
@@ -403,9 +423,15 @@ class Campaign:
         end = time.monotonic() + seconds
         self._await_all(PATIENCE)
         while time.monotonic() < end:
-            time.sleep(self._chance.uniform(1.0, self._chosen.pause))
+            every = self._chosen.steps_every
+            time.sleep(every or self._chance.uniform(1.0, self._chosen.pause))
             self._read_record()
             self._note_usage()
+            if every:
+                self._step_clock(STEPS_OF_CLOCK[self.results.hits['clock step'] % 4])
+                self.results.hits['clock step'] += 1
+                continue
+            begun = time.time()
             drawn = self._chance.random()
             if drawn < self._chosen.restarts:
                 self._kill_everything()
@@ -413,6 +439,7 @@ class Campaign:
                 self._hit_machine()
             else:
                 self._hit_nodes()
+            self._hits.append((begun, time.time()))
         self._await_all(PATIENCE)
         time.sleep(5.0)
         self._note_usage()
@@ -476,7 +503,9 @@ class Campaign:
         if self._disk is not None:
             faults['full disk'] = self._fill_disk
         if self._clock is not None:
-            faults['clock step'] = self._step_clock
+            faults['clock step'] = lambda: self._step_clock(
+                self._chance.choice((3600, 60, 5, -5, -60))
+            )
         kind = self._chance.choice(sorted(faults))
         self.results.hits[kind] += 1
         before = dict(self.launcher.processes)
@@ -508,9 +537,10 @@ class Campaign:
         time.sleep(self._chosen.freeze)
         self._disk.free()
 
-    def _step_clock(self) -> None:
+    def _step_clock(self, seconds: int) -> None:
         assert self._clock is not None
-        self._clock.step(self._chance.choice((3600, 60, 5, -5, -60)))
+        self._clock.step(seconds)
+        self._set_clock.steps.append((time.time(), float(self._clock.seconds)))
 
     def _kill_everything(self) -> None:
         self.results.hits['everything'] += 1
@@ -564,6 +594,16 @@ class Campaign:
                     f'{place} at {known:.0f} s stands in the record, {seconds} s in the ontology'
                 )
 
+        self._judge()
+
+    def _judge(self) -> None:
+        """Judge the decisions, by those of the twin where there is one."""
+        events = list(events_of(self._folder))
+        self.results.urgent = wrongly_urgent(events, self._set_clock)
+        if self._twin is not None and self._twin.folder is not None:
+            twin = legs_of(list(events_of(self._twin.folder)), SetClock())
+            self.results.legs = compare(legs_of(events, self._set_clock), twin, self._hits)
+
     def _was_there(self, place: str, at: float) -> bool:
         x, y = self._positions[place]
         regions = self._regions
@@ -579,6 +619,8 @@ class Campaign:
     def close(self) -> None:
         """Stop the mission, look for what is left of it, and leave."""
         self.launcher.end()
+        if self._twin is not None:
+            self._twin.end()
         self.results.collisions = self.watcher.collisions
         self.watcher.close()
         self.results.left_behind = list(_processes_of(self._folder))
@@ -763,10 +805,17 @@ def main(words: Sequence[str] | None = None) -> int:
     parser.add_argument('--cuts', type=int, default=2, help='with --network: cuts of 120 s')
     parser.add_argument('--machine', type=float, default=0.15, help='share of hits on the machine')
     parser.add_argument('--clock-steps', action='store_true', help='set the clock, too')
+    parser.add_argument(
+        '--twin', action='store_true', help='judge the decisions by a second mission'
+    )
+    parser.add_argument(
+        '--steps-every', type=float, default=0.0, help='only set the clock, each so many seconds'
+    )
     parser.add_argument('--freeze', type=float, default=30.0, help='how long those last, s')
     parser.add_argument('--quick', action='store_true', help='25 s of hits')
     parser.add_argument('--keep', type=Path, default=ROOT / 'runs', help='folder for the log')
     chosen = parser.parse_args(words)
+    chosen.clock_steps |= chosen.steps_every > 0.0
     if chosen.quick:
         chosen.hours, chosen.pause, chosen.freeze = 25.0 / 3600.0, 3.0, 4.0
     chosen.keep.mkdir(parents=True, exist_ok=True)

@@ -510,6 +510,78 @@ def silence(*, quick: bool) -> None:
     )
 
 
+def standstill(*, quick: bool) -> None:
+    """Time and way from a person's Stop or Pause until the robot stands, simulated seconds."""
+    from std_srvs.srv import SetBool, Trigger
+
+    rounds = 2 if quick else 10
+    stop = SetBool, 'stop', SetBool.Request(data=True), SetBool.Request(data=False)
+    rows = []
+    with stack_in_real_time() as patrol:
+        rows.append(stands_after(patrol, 'a mission, Stop', rounds, stop, stop))
+        pause, resume = ((Trigger, f'robot_behavior/fsm/{name}') for name in ('pause', 'resume'))
+        said, undone = Trigger.Request(), Trigger.Request()
+        rows.append(
+            stands_after(
+                patrol,
+                'a mission, Pause',
+                rounds,
+                (*pause, said, undone),
+                (*resume, said, undone),
+            )
+        )
+    with stack_in_real_time(('simulator', 'collision_monitor')) as patrol:
+        commands = patrol.observer.create_publisher(Twist, 'cmd_vel', 1)
+        began = time.monotonic()
+
+        def command() -> None:
+            twist = Twist()
+            twist.linear.x = 0.6 if (time.monotonic() - began) % 4.0 < 2.0 else -0.6
+            commands.publish(twist)
+
+        patrol.observer.create_timer(0.05, command)
+        rows.append(stands_after(patrol, 'a foreign cmd_vel, Stop', rounds, stop, stop))
+    print_table(
+        f'From the request until the robot stands, {rounds} times each, from 0.58 m/s or faster.',
+        ('who, what', 'm/s', 'median, s', 'longest, s', 'longest way, m'),
+        rows,
+    )
+
+
+def stands_after(
+    patrol: Stack,
+    who: str,
+    rounds: int,
+    held: tuple[Any, str, Any, Any],
+    freed: tuple[Any, str, Any, Any],
+) -> tuple[str, ...]:
+    """Have the robot stand at full speed and go on; return a row.
+
+    Args:
+        patrol: The robot.
+        who: What the row is called.
+        rounds: How often.
+        held: Type and name of the service that has it stand, and the request.
+        freed: Those that let it go on; its second request counts.
+    """
+    base, seen = patrol.robot.base, []
+    hold = patrol.observer.create_client(*held[:2])
+    free = patrol.observer.create_client(*freed[:2])
+    _await(hold.service_is_ready, 30.0)
+    _await(free.service_is_ready, 30.0)
+    for _ in range(rounds):
+        _await(lambda: base.speed >= 0.58, 120.0, pause=0.002)
+        begun, driven, top = patrol.robot.time, base.travelled, base.speed
+        hold.call_async(held[2])
+        _await(lambda: base.speed == 0.0, 30.0, pause=0.001)
+        seen.append((top, patrol.robot.time - begun, base.travelled - driven))
+        done = free.call_async(freed[3])
+        _await(done.done, 30.0)
+    speeds, times, ways = zip(*seen, strict=True)
+    figures = max(speeds), statistics.median(times), max(times), max(ways)
+    return who, *(f'{each:.2f}' for each in figures)
+
+
 IN_REAL_TIME: dict[str, dict[str, Any]] = {
     '*': {'use_sim_time': False},
     'simulator': {'speed': 1.0},
@@ -848,6 +920,7 @@ SECTIONS: dict[str, Callable[..., None]] = {
     'stack': stack,
     'pace': pace,
     'times': times,
+    'standstill': standstill,
 }
 
 

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import os
 import shlex
+import subprocess
 from collections.abc import Sequence
 from pathlib import Path
 
 from launcher import run_folder
 from launcher.alarm import Alarm, caller
-from launcher.environment import COMMAND
+from launcher.environment import COMMAND, interpreter
 from launcher.instance_lock import claim
 from launcher.log_merge import MergedLog
 from launcher.run import NOT_RECORDED, Run
@@ -28,9 +29,15 @@ from launcher.team import Part, parts
 from surveillance_behaviour.mission import mission_log
 from surveillance_runtime import node_table
 from surveillance_runtime.files import PLACE, RECORD, TIMELINE, FileError
+from surveillance_runtime.launch_protocol import EXIT_THERE, NotNowError
 from surveillance_runtime.place.writing import copy_place
 from surveillance_runtime.profile import remappings
-from surveillance_runtime.run_parameters import BEHAVIOUR_NODE, place_file, write_parameters
+from surveillance_runtime.run_parameters import (
+    BEHAVIOUR_NODE,
+    full_name,
+    place_file,
+    write_parameters,
+)
 
 NOTHING_RECORDED = 'Mission: nothing was recorded.'
 EXIT_NOTHING_DONE = 1
@@ -49,6 +56,8 @@ def run_mission(run: Run, config: Path, runs: Path, resume: Path | None = None) 
         check_clocks(merged, part.run, part.everyone)
     domain = ros_domain(run)
     claims = [held for part in team for held in claim(part.nodes, domain, part.run.namespace)]
+    if run.network:
+        _look_for_others(run, team)
     if run.record not in (None, NOT_RECORDED):
         runs = Path(run.record)
     folder, how = chosen_folder(run, runs, resume)
@@ -97,6 +106,26 @@ def run_mission(run: Run, config: Path, runs: Path, resume: Path | None = None) 
     for descriptor in claims:
         os.close(descriptor)
     return code
+
+
+def _look_for_others(run: Run, team: Sequence[Part]) -> None:
+    """Refuse to start beside a robot of the same names on another machine.
+
+    Two of one machine are told apart by their claims, without a wait.
+
+    Raises:
+        NotNowError: There is one.
+    """
+    names = [
+        full_name(part.run.namespace, node.name)
+        for part in team
+        for node in part.nodes
+        if node.name in node_table.RUN_NODES
+    ]
+    words = [interpreter(), '-P', '-m', 'surveillance_runtime.namesakes', *names]
+    found = subprocess.run(words, env=node_environ(run), stdout=subprocess.PIPE, text=True)
+    if found.returncode == EXIT_THERE:
+        raise NotNowError(found.stdout.strip())
 
 
 def chosen_folder(run: Run, runs: Path, resume: Path | None) -> tuple[Path, str]:

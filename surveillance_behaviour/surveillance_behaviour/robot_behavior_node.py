@@ -43,6 +43,7 @@ from surveillance_runtime.conversions import charging_from, seconds_of
 from surveillance_runtime.files import FileError
 from surveillance_runtime.introspection import IntrospectionServer
 from surveillance_runtime.launch_protocol import NotNowError
+from surveillance_runtime.namesakes import NamesakeWatch
 from surveillance_runtime.node import JOIN_SECONDS, PatrolNode
 from surveillance_runtime.process import run_node
 from surveillance_runtime.qos import SENSOR_QOS
@@ -95,6 +96,7 @@ class RobotBehavior(PatrolNode):
             self, self.get_name(), self.machine, '/', self._on_pause
         )
         self._introspection.start()
+        NamesakeWatch(self)
         hear_battery(self, battery)
         PurposeFeed(self, self.mission, self.machine, self._announcer, deadlines, clock.elapsed)
         StateSubscription(

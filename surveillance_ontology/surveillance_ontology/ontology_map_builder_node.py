@@ -29,6 +29,7 @@ from surveillance_ontology.conversions import room_note_from_ros
 from surveillance_ontology.map_keeper import MapKeeper, Reports, Source
 from surveillance_ontology.patrol_ontology import ROBOT, PatrolOntology, checked_names
 from surveillance_runtime.conversions import point_from, point_message
+from surveillance_runtime.namesakes import NamesakeWatch
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.parameters import ParameterError
 from surveillance_runtime.place import Place, PlaceError, described_place
@@ -39,6 +40,7 @@ from surveillance_runtime.waiting import AwaitedEvent, AwaitedWork
 
 SECONDS_PER_ROOM = 0.005
 """By which the longest wait grows with the map."""
+ARMOR_SERVICE = 'armor_interface_srv'
 PLACE_SECONDS = 2.0
 """How long an answer waits for the place of the robot once the map is built, steady seconds."""
 APART = 0.5
@@ -119,10 +121,19 @@ class OntologyMapBuilder(PatrolNode):
         self._late = self.create_timer(PLACE_SECONDS, self._on_late, clock=steady)
         self._late.cancel()
         self._serve()
+        NamesakeWatch(self)
         self._look()
 
     def _cannot_build(self, reason: str) -> None:
         """End the node; a new start helps only where the server came back without the ontology."""
+        servers = self.count_services(self.resolve_service_name(ARMOR_SERVICE))
+        if servers > 1:
+            # Another one has answered, which reads other folders.
+            reason = (
+                f'{ARMOR_SERVICE} is offered by {servers} nodes in ROS domain '
+                f'{self.context.get_domain_id()}: expected one armor_server; end the other one, or '
+                f'choose another domain or namespace ({reason})'
+            )
         self.fail(reason, unusable='unknown reference' not in reason)
 
     def _serve(self) -> None:

@@ -19,7 +19,17 @@ from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.clock import Clock, ClockType
 
 from surveillance_runtime.health import ERROR, OK, RECENT, WARN, Finding
-from surveillance_runtime.launch_protocol import BEAT, DONE, FINISHED, HEARTBEAT, RESTARTS, SLEPT
+from surveillance_runtime.launch_protocol import (
+    AGE,
+    BEAT,
+    DONE,
+    FINISHED,
+    HEARTBEAT,
+    LAUNCH,
+    RESTARTS,
+    SLEPT,
+    launch_of_process,
+)
 from surveillance_runtime.node import PatrolNode
 
 TOPIC = '/diagnostics'
@@ -131,7 +141,14 @@ class DiagnosticsThread:
 
     def _publish(self) -> None:
         late = self._lateness()
-        figures = {'restarts': str(self._restarts), 'late_ms': f'{1e3 * late:.0f}', **_process()}
+        launch, age = launch_of_process()
+        figures = {
+            'restarts': str(self._restarts),
+            'late_ms': f'{1e3 * late:.0f}',
+            **_process(),
+            LAUNCH: launch,
+            AGE: f'{age:.1f}',
+        }
         for node, publisher in self._publishers:
             name = node.get_fully_qualified_name().removeprefix('/')
             robot = node.get_namespace().strip('/') or 'surveillance_robot'

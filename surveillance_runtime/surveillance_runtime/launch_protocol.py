@@ -5,8 +5,10 @@ A process gets the descriptor of a pipe and its limits in environment variables,
 
 from __future__ import annotations
 
+import contextlib
 import os
 import signal
+import socket
 
 HEARTBEAT = 'LAUNCH_HEARTBEAT'
 """A descriptor that a process writes `UP`, `BEAT`, `SLEPT`, `FINISHED` or `DONE` to."""
@@ -18,6 +20,9 @@ MEMORY = 'LAUNCH_MEMORY'
 ONE_THREAD = dict.fromkeys(('OPENBLAS_NUM_THREADS', 'OMP_NUM_THREADS', 'MKL_NUM_THREADS'), '1')
 """Has the libraries behind NumPy and SciPy work on the calling thread alone, see `process`. They
 read it when they are loaded, before a process can say so itself."""
+
+LAUNCH, AGE = 'launch', 'launch_s'
+"""Under these names a node tells on `/diagnostics` of which launch it is, and how old that is."""
 
 UP = b'U'
 """The bulk of its start is done."""
@@ -40,5 +45,25 @@ EXIT_NOT_NOW = os.EX_TEMPFAIL
 """That of one which what its configuration names does not let start now, but perhaps later."""
 
 
+EXIT_THERE = 3
+"""That of the look for other robots, see `namesakes`: there is one."""
+
+
 class NotNowError(ValueError):
     """What is asked for cannot be had now, as an address or a file; it may be later, unchanged."""
+
+
+def launch_of_process() -> tuple[str, float]:
+    """Return who started this process, by host and process, and the seconds that that has run.
+
+    All processes of one launch have one parent: `launch.py`, `ros2 launch` or `ros2 run`.
+    """
+    parent, age = os.getppid(), 0.0
+    with contextlib.suppress(OSError, ValueError, IndexError):
+        with open('/proc/uptime', encoding='ascii') as file:
+            up = float(file.read().split()[0])
+        with open(f'/proc/{parent}/stat', encoding='utf-8') as file:
+            # Field 22 is when it began, in ticks since the machine did (proc(5)).
+            ticks = int(file.read().rpartition(') ')[2].split()[19])
+        age = up - ticks / os.sysconf('SC_CLK_TCK')
+    return f'{socket.gethostname()}, process {parent}', age
