@@ -115,6 +115,7 @@ class WorldModel:
         self._last: Snapshot | None = None
         self._cut_off = False
         self._wanted: tuple[str, float] = ('', 0.0)
+        self._waits = False
         self.experience = experience or Experience()
         self.place = ''
         self.places: frozenset[str] = frozenset()
@@ -490,7 +491,9 @@ class WorldModel:
         here, now = world.place, world.now
         goes = decision.place != here or not decision.stay
         if decision.target != self._wanted[0]:
-            self._wanted = (decision.target, now)
+            # Who waits keeps its turn, whatever it wants meanwhile.
+            self._wanted = (decision.target, self._wanted[1] if self._waits else now)
+        self._waits = False
         dock = decision.target if decision.rule == RECHARGE else None
         wish = Intention(
             fleet.name,
@@ -537,6 +540,7 @@ class WorldModel:
         return decision
 
     def _waiting(self, decision: Decision, world: World, reason: str) -> Decision:
+        self._waits = True
         return replace(
             decision,
             place=world.place,

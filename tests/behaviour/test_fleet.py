@@ -269,3 +269,15 @@ def test_a_robot_is_taken_out_and_put_back() -> None:
     second.model.take_out(False)
     air.run(100.0)
     assert len(second.visits) > begin + 3
+
+
+def test_who_waits_keeps_its_turn_when_it_wants_something_else() -> None:
+    _air, (first, second) = patrol(2)
+    way = Intention('robot2', 'R1', 'C1', 0.0, is_moving=True)
+    second.fleet.tell(place='R1', intention=way, now=0.0)
+    first.world.is_in = 'C1'
+    first.model.experience.requested = 'R1'
+    assert first.model.decide(1.0, NOBODY).rule == WAIT
+    first.model.experience.requested = 'R2'
+    assert first.model.decide(9.0, NOBODY).place == 'R2'
+    assert first.fleet.own.intention.since == 1.0
