@@ -178,6 +178,43 @@ class Routine(Protocol):
         """Charge the battery; return when the peer says it is done."""
 
 
+@dataclass(frozen=True)
+class Doubt:
+    """An alert that waits for a second look.
+
+    Attributes:
+        number: Of the event.
+        place: Where it was noticed.
+        look_from: From where to look again; None: from anywhere in the place.
+    """
+
+    number: int
+    place: str
+    look_from: Point | None = None
+
+
+class Looking(Protocol):
+    """Who knows from where a place is to be looked at, and moves the robot there."""
+
+    def viewpoints(self, place: str) -> Sequence[Point]:
+        """Return from where else than its point a place is to be looked at."""
+
+    def doubts(self, place: str) -> Sequence[Doubt]:
+        """Return the alerts in a place that wait for a second look."""
+
+    def position(self) -> Point | None:
+        """Return where the robot is; None: nobody has said."""
+
+    def has_arm(self) -> bool:
+        """Tell whether an arm turns the camera."""
+
+    def drive(self, point: Point, interrupt: Interrupt) -> None:
+        """Drive to a point in the same place."""
+
+    def turn(self, interrupt: Interrupt) -> None:
+        """Turn the arm to each of its sides, or the base once around."""
+
+
 class Announcer(Protocol):
     """Where the machine says what it does."""
 
@@ -194,7 +231,8 @@ class Announcer(Protocol):
 class Ports:
     """Whom the machines talk to.
 
-    ``motion`` serves the machine `surveillance`, ``routine`` the machine `patrol`.
+    ``motion`` serves the machine `surveillance`, ``routine`` the machine `patrol`; ``looking`` is
+    None where nobody watches.
     """
 
     ontology: Ontology
@@ -203,3 +241,4 @@ class Ports:
     reasoner: Reasoner
     motion: Motion | None = None
     routine: Routine | None = None
+    looking: Looking | None = None

@@ -27,6 +27,7 @@ from surveillance_behaviour.ros_adapters.decision_services import (
     offer_decision_services,
     world_model_of,
 )
+from surveillance_behaviour.ros_adapters.looking import RosLooking
 from surveillance_behaviour.ros_adapters.peers import (
     Deadlines,
     MissionClock,
@@ -72,6 +73,13 @@ class RobotBehavior(PatrolNode):
             'How much the robot does without asking: below high a person is asked before it leaves '
             'for a place.',
             choices=tuple(level.name.lower() for level in fsm.Autonomy),
+            read_only=True,
+        )
+        self._looks: bool = self.parameter(
+            'looks',
+            False,
+            'Whether the robot looks at each room as the node observer says, and again at alerts '
+            'that are not sure.',
             read_only=True,
         )
         choice = self.declare_live(DecisionSettings())
@@ -123,10 +131,13 @@ class RobotBehavior(PatrolNode):
         """Return the peers of the machine that runs; in `surveillance` this process decides."""
         clock = self._mission_clock
         ontology, places = ros_ontology(self, deadlines), RosPlaces(self, deadlines)
+        looking = RosLooking(self, deadlines, clock) if self._looks else None
         if self._behaviour == 'patrol':
             reasoner = ReasonClient(self, deadlines, ontology, battery)
             routine = RosRoutine(self, deadlines, battery, clock)
-            return Ports(ontology, places, self._announcer, reasoner, routine=routine)
+            return Ports(
+                ontology, places, self._announcer, reasoner, routine=routine, looking=looking
+            )
         world_model = world_model_of(
             self, settings, memory, ontology, places, battery, clock.elapsed
         )
@@ -134,7 +145,7 @@ class RobotBehavior(PatrolNode):
             self, world_model, clock.now, lambda: self.mission.recovery.avoided(self.mission.now())
         )
         motion = RosMotion(self, deadlines)
-        return Ports(ontology, places, self._announcer, world_model, motion=motion)
+        return Ports(ontology, places, self._announcer, world_model, motion=motion, looking=looking)
 
     def on_stop(self) -> None:
         """Preempts the machine, so that what it started is cancelled while messages flow."""

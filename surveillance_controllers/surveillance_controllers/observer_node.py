@@ -49,11 +49,12 @@ from surveillance_perception.marker_registry import read_registry
 from surveillance_perception.observation.answers import answered
 from surveillance_perception.observation.events import Event, EventBook, EventState
 from surveillance_perception.observation.evidence import EvidenceStore
-from surveillance_perception.observation.observations import Observation
+from surveillance_perception.observation.observations import Kind, Observation
 from surveillance_perception.observation.persons import Person, load_finder
 from surveillance_perception.observation.reference_views import ReferenceViews, Viewpoint
+from surveillance_perception.observation.viewpoints import Viewpoints
 from surveillance_perception.observation.watch_rules import DEFAULT_RULES, Level, read_watch_file
-from surveillance_perception.observation.watcher import Look, Watcher
+from surveillance_perception.observation.watcher import Look, Watcher, same_map
 from surveillance_perception.observation.ways import Ways
 from surveillance_runtime.conversions import (
     PlanarPose,
@@ -66,6 +67,7 @@ from surveillance_runtime.files import FileError, KeptFile
 from surveillance_runtime.incidents import Severity
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.parameters import ParameterError, parameter
+from surveillance_runtime.place.occupancy_grid import Grid
 from surveillance_runtime.process import run_node
 from surveillance_runtime.profile.parameters import declared_frames
 from surveillance_runtime.qos import SENSOR_QOS
@@ -154,6 +156,10 @@ class Observer(PatrolNode):
         self._places.set_positions(places)
         self._observations = self.create_publisher(String, 'observations', QoSProfile(depth=100))
         self._events = OwnedTopic(self, String, 'events')
+        self._told_viewpoints = OwnedTopic(self, String, 'viewpoints')
+        self._viewpoints: Viewpoints | None = None
+        self._grid: Grid | None = None
+        self._points = places
         self._looks = OwnedTopic(self, String, 'looks')
         self._doubts = OwnedTopic(self, String, 'doubts')
         self._doubted: list[dict[str, Any]] = []
@@ -289,8 +295,11 @@ class Observer(PatrolNode):
             grid = map_from(message, MOST_CELLS)
 
             def use() -> None:
-                self._places.set_map(grid)
                 self._watcher.use_map(grid)
+                if self._grid is None or not same_map(self._grid, grid):
+                    self._grid = grid
+                    self._places.set_map(grid)
+                    self._tell_viewpoints(grid)
 
             self._work.put(use)
 
@@ -413,6 +422,38 @@ class Observer(PatrolNode):
         image = image_from_ros(deserialize_message(serialized, Image), MOST_PIXELS)
         self._watcher.picture(np.asarray(image, np.uint8), viewpoint, stamp, markers)
 
+    def _tell_viewpoints(self, grid: Grid) -> None:
+        """Tell from where each place is to be looked at."""
+        self._viewpoints = chosen = Viewpoints(grid, self._settings.radius)
+        told = {}
+        for place, point in self._points.items():
+            floor = self._places.cells_of(place)
+            if floor is not None:
+                first = float(point[0]), float(point[1])
+                found = chosen.of_room(floor, first, self._checks(floor, grid))
+                told[place] = [[round(x, 2), round(y, 2)] for x, y in found]
+        self._told_viewpoints.publish(String(data=json.dumps(told)))
+
+    def _checks(self, floor: np.ndarray, grid: Grid) -> list[tuple[float, float]]:
+        """Return the doors of a room that the rules name."""
+        named = {each.subject for each in self._watcher.rules if each.kind == Kind.DOOR}
+        found = []
+        for name, (x1, y1, x2, y2) in self._doors.items():
+            middle = (x1 + x2) / 2, (y1 + y2) / 2
+            row, column = grid.cell_of(*middle)
+            near = floor[max(0, row - 4) : row + 5, max(0, column - 4) : column + 5]
+            if (name in named or '' in named) and near.any():
+                found.append(middle)
+        return found
+
+    def _look_from(self, event: Event) -> tuple[float, float] | None:
+        """Return from where to look again at an event; None: from anywhere in its place."""
+        floor = self._places.cells_of(event.place)
+        chosen, thing, origin = self._viewpoints, event.position, event.seen_from
+        if floor is None or chosen is None or thing is None or origin is None:
+            return None
+        return chosen.aside(floor, thing, origin)
+
     def _assess(self) -> None:
         now = self._now()
         self._watcher.assess(now)
@@ -421,7 +462,7 @@ class Observer(PatrolNode):
                 'number': each.number,
                 'place': each.place,
                 'position': each.position,
-                'seen_from': each.seen_from,
+                'look_from': self._look_from(each),
             }
             for each in self._watcher.doubts(now)
         ]

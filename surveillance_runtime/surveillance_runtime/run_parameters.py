@@ -155,6 +155,7 @@ def watch_entries(folder: Path, file: Path) -> Iterator[Entry]:
         file: The rules.
     """
     yield for_node(OBSERVER, 'watch_file', str(file.absolute()), '--watch')
+    yield for_node(BEHAVIOUR_NODE, 'looks', True, '--watch')
     kept = folder.resolve()
     yield for_node(OBSERVER, 'state_file', str(kept / f'{OBSERVER}.json'), 'this run')
     yield for_node(OBSERVER, 'evidence_folder', str(kept / 'evidence'), 'this run')

@@ -88,7 +88,7 @@ def test_a_rule_waits_until_it_lasts():
         ('person: nobody\npersistence: 0 looks', 'expected 1 look or more'),
         ('person: nobody\nconfidence: sure', 'expected a number from 0 to 1'),
         ('person: nobody\nis: nobody', "person takes no 'is'"),
-        ('person: everybody', "got 'everybody', expected 'nobody'"),
+        ('person: everybody', "got 'everybody', expected one of nobody, usual"),
     ],
 )
 def test_mistakes_are_one_line_that_says_where_and_what_was_expected(tmp_path, text, wrong):

@@ -90,6 +90,7 @@ class Round:
         views: Path | None = None,
         markers=None,
         find_persons=None,
+        verify_seconds: float = 0.0,
     ) -> None:
         self.looks: list[Look] = []
         self.told: list[Observation] = []
@@ -112,6 +113,7 @@ class Round:
                 grid, 0.22, {'D1': DOOR}, {'R1': (3.0, 2.5), 'R2': (9.0, 2.5)}
             ),
             find_persons=find_persons,
+            verify_seconds=verify_seconds,
             looked=self.looks.append,
         )
         self.watcher.use_map(room())
@@ -338,6 +340,30 @@ def test_boxes_across_a_doorway_block_the_way_until_they_are_gone():
     assert {(each.state, each.subject) for each in blocked} == {('blocked', 'D1')}
     watch.visit('R1', (4.0, 2.5), shut=False)
     assert {each.state for each in watch.book.events if each.kind == Kind.WAY} == {EventState.OVER}
+
+
+def test_an_alert_in_doubt_waits_for_a_look_from_elsewhere_or_for_its_time():
+    watch = Round(verify_seconds=30.0)
+    watch.visit('R1', HERE)
+    watch.watcher.arrive('R1', watch.time)
+    box = [(1.2, 4.2, 0.1)]
+
+    def look(at: tuple[float, float], sweeps: int) -> None:
+        for number in range(sweeps):
+            watch.time += 1.0
+            watch.watcher.sweep(at, *beams(room(), at, box, True, seed=number), watch.time)
+            if number % 2:
+                watch.watcher.assess(watch.time)
+
+    look(HERE, 8)
+    (event,) = [each for each in watch.book.events if each.kind == Kind.OBJECT]
+    assert not event.confirmed
+    assert not watch.alerts
+    assert [each.number for each in watch.watcher.doubts(watch.time)] == [event.number]
+    look((3.0, 3.5), 4)
+    assert watch.book.find(event.number).confirmed
+    assert watch.alerts[:1] == [event.number]
+    assert not watch.watcher.doubts(watch.time)
 
 
 def test_a_look_says_how_much_of_the_room_was_in_view():

@@ -14,6 +14,8 @@ from typing import Any
 
 import state_machines as fsm
 from patrol_policy.decision import RECHARGE
+from state_machines.clock import elapsed_of
+from state_machines.exceptions import CallInterruptedError
 from surveillance_behaviour.machines.shared_states import (
     FAILED,
     PREEMPTED,
@@ -25,6 +27,7 @@ from surveillance_behaviour.machines.shared_states import (
     check_path,
     follow,
 )
+from surveillance_behaviour.mission.looking import RoomLook
 from surveillance_behaviour.mission.mission import Mission
 from surveillance_behaviour.mission.recovery import Step
 from surveillance_behaviour.ports import Point, Routine
@@ -120,6 +123,33 @@ def follow_path(mission: Mission, ud: Any, interrupt: fsm.Interrupt) -> None:
     """Drive through the via points; the motion controller notes the visit."""
     distance = drive(mission, ud.target, ud.via_points, interrupt)
     mission.arrived(ud.target, distance, ud.via_points)
+
+
+class Looking(MissionState):
+    """Looks at the place, then again at what made an alert that is not sure; with an observer."""
+
+    task = 'looking'
+    ends = ('looked', BATTERY_LOW)
+
+    def __init__(self, mission: Mission) -> None:
+        super().__init__(mission)
+        self._room_look = RoomLook(mission)
+
+    def work(self, ud: Any, interrupt: fsm.Interrupt) -> str:
+        mission = self.mission
+        seconds = mission.settings.choice.exploration_seconds
+        with mission.battery.interrupting(interrupt, lambda: mission.battery.low) as either:
+            elapsed = elapsed_of(mission.clock)
+            end = elapsed() + seconds
+            self._room_look.look(seconds, either)
+            if not mission.clock.sleep(max(0.0, end - elapsed()), either):
+                raise CallInterruptedError
+            self._room_look.verify(either)
+        return 'looked'
+
+    def interrupted(self, ud: Any) -> str:
+        self.mission.say(f'battery low ({self.mission.battery.level_text()}): looking ends early')
+        return BATTERY_LOW
 
 
 class GoBack(MissionState):
@@ -227,6 +257,7 @@ def patrol_machine(mission: Mission) -> fsm.StateMachine:
     """Return the machine `patrol` with its recovery; it ends only when it is preempted."""
     machine = fsm.StateMachine([PREEMPTED])
     machine.set_name('patrol')
+    looks = mission.ports.looking is not None
     machine.set_clock(mission.clock)
     with machine:
         add('Initial', Initial(mission), start='Reasoning', failed='WaitForStart')
@@ -243,10 +274,12 @@ def patrol_machine(mission: Mission) -> fsm.StateMachine:
         add(
             'Moving',
             moving(mission, heeds_battery=True),
-            reached='Reasoning',
+            reached='Looking' if looks else 'Reasoning',
             battery_low='RechargeRoutine',
             failed='Recover',
         )
+        if looks:
+            add('Looking', Looking(mission), looked='Reasoning', battery_low='RechargeRoutine')
         add('RechargeRoutine', recharge_routine(mission), battery_full='Reasoning')
         add(
             'Recover',

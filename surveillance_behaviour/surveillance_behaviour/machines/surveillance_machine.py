@@ -11,6 +11,7 @@ from typing import Any
 
 import state_machines as fsm
 from state_machines.clock import elapsed_of
+from state_machines.exceptions import CallInterruptedError
 from surveillance_behaviour.machines.shared_states import (
     FAILED,
     PREEMPTED,
@@ -22,6 +23,7 @@ from surveillance_behaviour.machines.shared_states import (
     check_path,
     follow,
 )
+from surveillance_behaviour.mission.looking import RoomLook
 from surveillance_behaviour.mission.mission import Mission
 from surveillance_behaviour.mission.recovery import Step
 from surveillance_behaviour.ports import Point
@@ -56,7 +58,11 @@ class ChooseRoomTask(MissionState):
 
 
 class ExploreTask(MissionState):
-    """Looks around for a while; a battery that gets low ends it."""
+    """Looks around for a while; a battery that gets low ends it.
+
+    Where somebody watches the robot drives to the place's viewpoints and turns; what is left of the
+    time it waits.
+    """
 
     ends = ('explored',)
 
@@ -71,6 +77,10 @@ class ExploreTask(MissionState):
             mission.say(f'exploring {mission.place} ends early: {why()}')
         return 'explored'
 
+    def __init__(self, mission: Mission) -> None:
+        super().__init__(mission)
+        self._room_look = RoomLook(mission)
+
     def _explore(self, interrupt: fsm.Interrupt) -> bool:
         """Explore the place for what is left of its time since the last visit; whether it did."""
         mission = self.mission
@@ -79,6 +89,10 @@ class ExploreTask(MissionState):
         elapsed = elapsed_of(mission.clock)
         begin = elapsed() - min(mission.explored, seconds)
         mission.explored = 0.0
+        try:
+            self._room_look.look(begin + seconds - elapsed(), interrupt)
+        except CallInterruptedError:
+            return False
         while (left := begin + seconds - elapsed()) > 0.0:
             if not mission.clock.sleep(min(left, max(NOTE_SECONDS, seconds / 20.0)), interrupt):
                 return False
@@ -86,6 +100,26 @@ class ExploreTask(MissionState):
             mission.note('exploring', place=mission.place, seconds=explored)
         mission.explored = math.inf
         return True
+
+
+class VerifyTask(MissionState):
+    """Looks again, from elsewhere, at what made an alert that is not sure."""
+
+    ends = ('verified',)
+
+    def __init__(self, mission: Mission) -> None:
+        super().__init__(mission)
+        self._room_look = RoomLook(mission)
+
+    def work(self, ud: Any, interrupt: fsm.Interrupt) -> str:
+        with self.mission.battery.interrupting(
+            interrupt, lambda: bool(self.mission.ports.reasoner.why_charge())
+        ) as wake:
+            self._room_look.verify(wake)
+        return 'verified'
+
+    def interrupted(self, ud: Any) -> str:
+        return 'verified'
 
 
 class RechargeTask(MissionState):
@@ -186,7 +220,14 @@ def surveillance_machine(mission: Mission) -> fsm.StateMachine:
             recharge='RECHARGE_TASK',
             explore='EXPLORE_TASK',
         )
-        add('EXPLORE_TASK', ExploreTask(mission), explored='explored')
+        verifies = mission.ports.looking is not None
+        add(
+            'EXPLORE_TASK',
+            ExploreTask(mission),
+            explored='VERIFY_TASK' if verifies else 'explored',
+        )
+        if verifies:
+            add('VERIFY_TASK', VerifyTask(mission), verified='explored')
         add('RECHARGE_TASK', RechargeTask(mission), recharged='recharged', failed=FAILED)
 
     machine = fsm.StateMachine([PREEMPTED])

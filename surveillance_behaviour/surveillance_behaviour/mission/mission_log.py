@@ -53,6 +53,8 @@ EVENTS: Mapping[str, tuple[str, ...]] = {
     'start': ('machine', 'place', 'places'),
     'map': ('places',),
     'exploring': ('place', 'seconds'),
+    'viewpoint': ('place', 'point'),
+    'verify': ('place', 'number', 'found'),
     'visit': ('place', 'distance'),
     'decision': ('place', 'rule', 'reason'),
     'recharge': ('place', 'seconds'),

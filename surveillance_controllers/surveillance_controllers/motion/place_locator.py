@@ -77,11 +77,11 @@ class PlaceRegions:
         return None
 
     def cells_of(self, place: str) -> NDArray[np.bool_] | None:
-        """Return the cells of a place, shape as the map's; None where it has none."""
+        """Return the free cells of a place, shape as the map's; None where it has none."""
         region = self._region(*self._points[place]) if place in self._points else None
         if region is None:
             return None
-        cells = np.asarray(self._regions == region)
+        cells = np.asarray((self._regions == region) & self._grid.free)
         others = [name for name in self._places[region] if name != place]
         if others:
             rows, columns = np.nonzero(cells)
@@ -130,7 +130,7 @@ class PlaceLocator:
         return None if self._regions is None else self._regions.place_at(point)
 
     def cells_of(self, place: str) -> NDArray[np.bool_] | None:
-        """Return the cells of a place, shape as the map's; None where it has none."""
+        """Return the free cells of a place, shape as the map's; None where it has none."""
         return None if self._regions is None else self._regions.cells_of(place)
 
     def _divide(self) -> None:

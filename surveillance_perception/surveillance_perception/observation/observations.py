@@ -51,6 +51,7 @@ class Observation:
         robot: Who saw it.
         evidence: File with the picture or sweep, relative to the evidence's folder; or empty.
         compared_with: What it was compared with: a file, or the stamp of a reference.
+        usual: How likely this state is at its hour, 0 to 1; None: that is not known.
         seen_from: Where the robot was, map frame, metres; None where that is not known.
 
     Raises:
@@ -68,6 +69,7 @@ class Observation:
     evidence: str = ''
     compared_with: str = ''
     seen_from: tuple[float, float] | None = None
+    usual: float | None = None
 
     def __post_init__(self) -> None:
         if self.state not in STATES[self.kind]:

@@ -17,6 +17,9 @@
         places: [C1]
         severity: notice
 
+With `is: usual`, `person: usual` or `light: usual` the rule is broken by what is unusual for the
+hour, which the robot learns from its visits.
+
 A rule says how something is to be; whatever is seen of it in another state, within its hours and
 for long enough, is an event of its severity. `words` says a rule back, so that a person can check
 it.
@@ -33,6 +36,7 @@ from pathlib import Path
 from typing import Any
 
 from patrol_policy.hours import WeeklyHours
+from surveillance_perception.observation.habits import UNUSUAL_BELOW
 from surveillance_perception.observation.observations import Kind, Observation
 from surveillance_runtime.suggestions import nearest
 from surveillance_runtime.yaml_file import read_yaml_file
@@ -46,12 +50,14 @@ class Level(IntEnum):
     ALERT = 3
 
 
+USUAL = 'usual'
+"""Wanted where a person leaves it to what the robot has learned of this hour."""
 NORMAL: Mapping[Kind, tuple[str, ...]] = {
-    Kind.DOOR: ('open', 'closed', 'ajar'),
+    Kind.DOOR: ('open', 'closed', 'ajar', USUAL),
     Kind.OBJECT: ('none',),
     Kind.MARKER: ('here',),
-    Kind.PERSON: ('nobody',),
-    Kind.LIGHT: ('on', 'off'),
+    Kind.PERSON: ('nobody', USUAL),
+    Kind.LIGHT: ('on', 'off', USUAL),
     Kind.VIEW: ('clear',),
     Kind.WAY: ('free',),
 }
@@ -96,6 +102,8 @@ class WatchRule:
             return False
         if seen.confidence < self.confidence or seen.state == self.wanted:
             return False
+        if self.wanted == USUAL and (seen.usual is None or seen.usual >= UNUSUAL_BELOW):
+            return False
         if self.kind == Kind.OBJECT and seen.state == 'removed' and self.wanted == 'none':
             return False  # that something left is as the rule wants it
         return self.hours.at(moment) == 'must'
@@ -113,11 +121,13 @@ class WatchRule:
             Kind.DOOR: f'door{subject or "s"} not {self.wanted}',
             Kind.OBJECT: 'anything that was not there before',
             Kind.MARKER: f'marker{subject or "s"} not where it hangs',
-            Kind.PERSON: 'a person',
+            Kind.PERSON: 'a person, or nobody,' if self.wanted == USUAL else 'a person',
             Kind.LIGHT: f'the light not {self.wanted}',
             Kind.VIEW: 'a view that changed or is blocked',
             Kind.WAY: 'a way that is not free',
         }[self.kind]
+        if self.wanted == USUAL:
+            wrong = f'{wrong.removesuffix(" not usual")} as is unusual for the hour'
         lasting = ''
         if self.looks > 1:
             lasting = f', seen in {self.looks} looks'

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from surveillance_perception.observation.doors import Segment, read_door
-from surveillance_perception.observation.events import Event, EventBook, EventState
+from surveillance_perception.observation.events import ELSEWHERE, Event, EventBook, EventState
 from surveillance_perception.observation.evidence import EvidenceStore, sweep_picture
 from surveillance_perception.observation.floor import (
     Change,
@@ -32,6 +32,7 @@ from surveillance_perception.observation.floor import (
     changes,
     is_leaf,
 )
+from surveillance_perception.observation.habits import Habits
 from surveillance_perception.observation.motion import WalkFinder
 from surveillance_perception.observation.observations import Kind, Observation
 from surveillance_perception.observation.persons import Person, Picture
@@ -176,6 +177,7 @@ class Watcher:
         self._walks = WalkFinder()
         self._verify_seconds = verify_seconds
         self._doubts: dict[int, float] = {}
+        self._habits = Habits()
         self._persons = 0
         self._began = math.nan
         self._pictures = 0
@@ -188,7 +190,7 @@ class Watcher:
         self._normal: FloorView | None = None
         self._kept: Mapping[str, Any] = {}
         self._candidates: list[ObjectChange] = []
-        self._told: dict[tuple[str, ...], float] = {}
+        self._told: dict[tuple[str, ...], tuple[float, tuple[float, float] | None]] = {}
         self._last: tuple[tuple[float, float], Points] = ((0.0, 0.0), np.zeros((0, 2)))
         self._at: tuple[float, float] | None = None
         self._views = views or ReferenceViews()
@@ -199,7 +201,7 @@ class Watcher:
 
     def use_map(self, grid: Grid) -> None:
         """Take the map; what was normal on another one is forgotten."""
-        if self._grid is not None and _same_map(self._grid, grid):
+        if self._grid is not None and same_map(self._grid, grid):
             return
         self._grid = grid
         self._visit, self._normal, self._candidates = None, None, []
@@ -534,15 +536,20 @@ class Watcher:
     # --- what is made of it ---
 
     def _is_due(self, seen: Observation) -> bool:
-        """Tell whether a thing was not told of a moment ago."""
+        """Tell whether a thing was not told of a moment ago, or from elsewhere."""
         cell = [] if seen.position is None else [str(round(each)) for each in seen.position]
         key = (seen.kind, seen.state, seen.subject, *cell)
-        if seen.stamp - self._told.get(key, -math.inf) < SEEN_AGAIN:
-            return False
-        self._told[key] = seen.stamp
+        stamp, at = self._told.get(key, (-math.inf, None))
+        if seen.stamp - stamp < SEEN_AGAIN:
+            here = self._at
+            if at is None or here is None or math.dist(at, here) < ELSEWHERE:
+                return False
+        self._told[key] = seen.stamp, self._at
         return True
 
     def _take(self, seen: Observation, picture: Picture | None = None) -> None:
+        seen = replace(seen, usual=self._habits.usual(seen))
+        self._habits.learn(seen, self._look)
         severity, rule = severity_of(self.rules, seen, self._local(seen.stamp))
         evidence = ''
         if self._store is not None and severity:
@@ -592,6 +599,7 @@ class Watcher:
             'look': self._look,
             'markers': hung,
             'views': self._views.to_json(),
+            'habits': self._habits.to_json(),
         }
 
     def restore(self, kept: Mapping[str, Any]) -> None:
@@ -603,6 +611,7 @@ class Watcher:
         look, normal = int(kept['look']), dict(kept['normal'])
         hung = {int(number): _point(each) for number, each in kept['markers'].items()}
         self._views.restore(kept.get('views', {'views': [], 'next': 1}))
+        self._habits.restore(kept.get('habits', {}))
         self.book.restore(kept['book'])
         self._look, self._kept = look, normal
         self._markers = {**hung, **self._markers} if self._known_markers else hung
@@ -618,7 +627,8 @@ def _point(values: Sequence[float]) -> tuple[float, float, float]:
     return float(x), float(y), float(z)
 
 
-def _same_map(one: Grid, other: Grid) -> bool:
+def same_map(one: Grid, other: Grid) -> bool:
+    """Tell whether two maps are the same one, sent twice."""
     return (
         one.resolution == other.resolution
         and one.origin == other.origin

@@ -1,0 +1,137 @@
+"""Viewpoints and doubts as the node `observer` tells them, and the driving and turning for a look.
+
+`viewpoints` is JSON of the form `{"R1": [[x, y], ...]}`, `doubts` a list of alerts that wait for a
+second look. Without an observer there are none, and the robot looks nowhere.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Sequence
+from typing import Any
+
+from geometry_msgs.msg import PoseWithCovarianceStamped
+from std_msgs.msg import String
+
+from state_machines import Interrupt
+from state_machines.ros import GoalCaller, ServiceCaller
+from surveillance_behaviour.ports import Doubt, Point
+from surveillance_behaviour.ros_adapters.peers import Deadlines, MissionClock, run
+from surveillance_interfaces.action import ComputePath, Control, FollowPath
+from surveillance_interfaces.srv import MarkerRoutine
+from surveillance_runtime.conversions import (
+    point_from,
+    point_message,
+    point_messages,
+    pose_of_serialized,
+)
+from surveillance_runtime.node import PatrolNode
+from surveillance_runtime.state_topics import StateSubscription
+
+DWELL = 4.5
+"""Seconds at each pose of the arm: two pictures of the observer."""
+POSES = (
+    MarkerRoutine.Request.LEFT,
+    MarkerRoutine.Request.BACK,
+    MarkerRoutine.Request.RIGHT,
+    MarkerRoutine.Request.HOME,
+)
+
+
+class RosLooking:
+    """The observer's topics, `compute_path`, `follow_path`, `motion/controller` and `move_arm`."""
+
+    def __init__(self, node: PatrolNode, deadlines: Deadlines, clock: MissionClock) -> None:
+        self._deadlines, self._clock = deadlines, clock
+        self._planner = GoalCaller(node, ComputePath, 'compute_path')
+        self._follower = GoalCaller(node, FollowPath, 'follow_path')
+        self._turner = GoalCaller(node, Control, 'motion/controller')
+        self._arm = ServiceCaller(node, MarkerRoutine, 'move_arm')
+        self._node = node
+        self._viewpoints: dict[str, list[Point]] = {}
+        self._doubts: list[Doubt] = []
+        self._position: Point | None = None
+        StateSubscription(node, String, 'viewpoints', self._on_viewpoints)
+        StateSubscription(node, String, 'doubts', self._on_doubts)
+        StateSubscription(node, PoseWithCovarianceStamped, 'amcl_pose', self._on_pose, raw=True)
+
+    def viewpoints(self, place: str) -> Sequence[Point]:
+        """Return from where else a place is to be looked at."""
+        return list(self._viewpoints.get(place, ()))
+
+    def doubts(self, place: str) -> Sequence[Doubt]:
+        """Return the alerts in a place that wait for a second look."""
+        return [each for each in self._doubts if each.place == place]
+
+    def position(self) -> Point | None:
+        """Return where the robot is."""
+        return self._position
+
+    def has_arm(self) -> bool:
+        """Tell whether an arm turns the camera."""
+        return bool(self._node.count_services(self._node.resolve_service_name('move_arm')))
+
+    def drive(self, point: Point, interrupt: Interrupt) -> None:
+        """Drive to a point in the same place."""
+        limits, start = self._deadlines, self._position or point
+        request = ComputePath.Goal(start=point_message(start), goal=point_message(point))
+        planned = run(self._planner, request, limits.answer, limits.plan, interrupt)
+        path = [point_from(each) for each in planned.path]
+        request = FollowPath.Goal(path=point_messages(path))
+        run(self._follower, request, limits.answer, limits.move, interrupt)
+
+    def turn(self, interrupt: Interrupt) -> None:
+        """Turn the arm to each of its sides, or the base once around."""
+        limits = self._deadlines
+        if not self.has_arm():
+            here = self._position
+            goal = Control.Goal(point_set=point_messages([here] if here is not None else []))
+            run(self._turner, goal, limits.answer, limits.move, interrupt)
+            return
+        for pose in POSES:
+            request = MarkerRoutine.Request(pos=pose)
+            self._arm.call(request, limits.move or 60.0, interrupt, discovery=limits.answer)
+            if pose != POSES[-1] and not self._clock.sleep(DWELL, interrupt):
+                return
+
+    def _on_viewpoints(self, message: String) -> None:
+        told = _read(self._node, 'viewpoints', message.data, dict)
+        self._viewpoints = {
+            str(place): [_point(each) for each in points] for place, points in told.items()
+        }
+
+    def _on_doubts(self, message: String) -> None:
+        told = _read(self._node, 'doubts', message.data, list)
+        self._doubts = [
+            Doubt(
+                int(each['number']),
+                str(each['place']),
+                None if each.get('look_from') is None else _point(each['look_from']),
+            )
+            for each in told
+        ]
+
+    def _on_pose(self, serialized: bytes) -> None:
+        x, y, _ = pose_of_serialized(serialized)
+        self._position = (x, y, 0.0)
+
+
+def _point(values: Sequence[float]) -> Point:
+    x, y = values
+    point = (float(x), float(y), 0.0)
+    if not all(map(math.isfinite, point)):
+        raise ValueError(f'expected finite numbers, got {values}')
+    return point
+
+
+def _read(node: PatrolNode, topic: str, text: str, kind: type) -> Any:
+    """Return what a topic tells; empty where it is something else."""
+    try:
+        told = json.loads(text)
+    except ValueError:
+        told = None
+    if not isinstance(told, kind):
+        node.get_logger().warn(f'{topic}: expected a JSON {kind.__name__}', once=True)
+        return kind()
+    return told

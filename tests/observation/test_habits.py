@@ -1,0 +1,79 @@
+"""What is usual at an hour: a door of office hours and a state without habits, over a month."""
+
+from __future__ import annotations
+
+import json
+from datetime import UTC, datetime, timedelta
+
+import numpy as np
+
+from surveillance_perception.observation.habits import Habits, PeriodicState
+from surveillance_perception.observation.observations import Kind, Observation
+from surveillance_perception.observation.watch_rules import rule_from
+
+MONDAY = datetime(2026, 3, 2, tzinfo=UTC)
+
+
+def is_open(moment: datetime) -> bool:
+    return moment.weekday() < 5 and 8 <= moment.hour < 18
+
+
+def door(moment: datetime, state: str) -> Observation:
+    return Observation(Kind.DOOR, state, 'R1', 'D1', stamp=moment.timestamp())
+
+
+def month_of_visits(habits: Habits) -> None:
+    random = np.random.default_rng(5)
+    for number in range(800):
+        moment = MONDAY + timedelta(hours=float(random.uniform(0, 28 * 24)))
+        habits.learn(door(moment, 'open' if is_open(moment) else 'closed'), number)
+
+
+def test_a_door_of_office_hours_is_unusual_when_it_is_open_at_night():
+    habits = Habits()
+    month_of_visits(habits)
+    week = MONDAY + timedelta(weeks=5)
+    night, noon = week + timedelta(hours=26), week + timedelta(hours=36)
+    assert habits.usual(door(night, 'open')) < 0.1
+    assert habits.usual(door(night, 'closed')) > 0.9
+    assert habits.usual(door(noon, 'open')) > 0.7
+    sunday_noon = week + timedelta(days=6, hours=12)
+    assert habits.usual(door(sunday_noon, 'open')) < 0.35
+    hours = [week + timedelta(hours=each + 0.5) for each in range(168)]
+    wrong = [
+        each
+        for each in hours
+        if habits.usual(door(each, 'open' if is_open(each) else 'closed')) < 0.1
+    ]
+    assert len(wrong) <= 2, 'what is as always is not unusual'
+
+
+def test_a_rule_is_broken_by_what_is_unusual_alone():
+    habits = Habits()
+    rule = rule_from({'door': 'D1', 'is': 'usual', 'severity': 'notice'})
+    night = MONDAY + timedelta(weeks=5, hours=26)
+    seen = door(night, 'open')
+    assert not rule.broken_by(seen, night), 'nothing was learned yet'
+    month_of_visits(habits)
+    known = Observation(Kind.DOOR, 'open', 'R1', 'D1', stamp=seen.stamp, usual=habits.usual(seen))
+    assert rule.broken_by(known, night)
+    assert rule.words() == 'always door D1 as is unusual for the hour is a NOTICE'
+
+
+def test_what_has_no_habit_is_never_unusual():
+    random, state = np.random.default_rng(2), PeriodicState()
+    for _ in range(400):
+        state.learn(bool(random.random() < 0.5), float(random.uniform(0, 28 * 86400)))
+    found = [state.probability(3600.0 * hour) for hour in range(168)]
+    assert 0.2 < min(found) <= max(found) < 0.8
+
+
+def test_nothing_is_said_after_a_few_visits_and_what_was_learned_outlives_a_restart():
+    habits, again = Habits(), Habits()
+    for number in range(30):
+        habits.learn(door(MONDAY + timedelta(hours=number), 'closed'), number)
+    assert habits.usual(door(MONDAY, 'open')) is None
+    month_of_visits(habits)
+    again.restore(json.loads(json.dumps(habits.to_json())))
+    moment = MONDAY + timedelta(weeks=5, hours=26)
+    assert again.usual(door(moment, 'open')) == habits.usual(door(moment, 'open'))
