@@ -17,6 +17,8 @@ from surveillance_behaviour.ports import Looking, Point
 
 SETTLE = 4.0
 """Seconds for which the robot stands at a viewpoint, so that sweeps and pictures are compared."""
+BASE_TURN, ARM_TURN = 12.0, 30.0
+"""So long the first turn of the base, or of the arm, is taken to last, seconds."""
 DETOUR = 1.3
 """A way in a room is so much longer than the straight line."""
 LONGEST_DETOUR = 10.0
@@ -34,7 +36,7 @@ class RoomLook:
 
     def __init__(self, mission: Mission) -> None:
         self._mission = mission
-        self._turn_seconds = 12.0
+        self._turn_seconds = 0.0
         self._looked_again: set[int] = set()
 
     def look(self, seconds: float, interrupt: Interrupt) -> None:
@@ -107,7 +109,9 @@ class RoomLook:
 
     def _turn(self, looking: Looking, seconds: float, drives: bool, interrupt: Interrupt) -> bool:
         """Turn the camera all around if there is time; return whether it did."""
-        if seconds < self._turn_seconds or not (drives or looking.has_arm()):
+        has_arm = looking.has_arm()
+        needed = self._turn_seconds or (ARM_TURN if has_arm else BASE_TURN)
+        if seconds < needed or not (drives or has_arm):
             return False
         elapsed = elapsed_of(self._mission.clock)
         began = elapsed()

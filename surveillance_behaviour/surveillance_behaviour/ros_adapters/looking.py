@@ -15,7 +15,7 @@ from geometry_msgs.msg import PoseWithCovarianceStamped
 from std_msgs.msg import String
 
 from state_machines import Interrupt
-from state_machines.ros import GoalCaller, ServiceCaller
+from state_machines.ros import CallError, GoalCaller, ServiceCaller
 from surveillance_behaviour.ports import Doubt, Point
 from surveillance_behaviour.ros_adapters.peers import Deadlines, MissionClock, run
 from surveillance_interfaces.action import ComputePath, Control, FollowPath
@@ -29,6 +29,8 @@ from surveillance_runtime.conversions import (
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.state_topics import StateSubscription
 
+ARM_DEADLINE = 60.0
+"""Within which the arm is at a pose, seconds of real time."""
 DWELL = 4.5
 """Seconds at each pose of the arm: two pictures of the observer."""
 POSES = (
@@ -91,7 +93,11 @@ class RosLooking:
             return
         for pose in POSES:
             request = MarkerRoutine.Request(pos=pose)
-            self._arm.call(request, limits.move or 60.0, interrupt, discovery=limits.answer)
+            answer = self._arm.call(
+                request, limits.move or ARM_DEADLINE, interrupt, discovery=limits.answer
+            )
+            if not answer.success:
+                raise CallError(f'{self._arm.name}: {answer.message}')
             if pose != POSES[-1] and not self._clock.sleep(DWELL, interrupt):
                 return
 

@@ -108,8 +108,11 @@ class PurposeFeed:
     def _explained(self, state: str) -> float:
         """Return for how long a state may be silent, seconds."""
         name, settings = state.upper(), self._mission.settings
-        if 'EXPLORE' in name:
-            return settings.choice.exploration_seconds
+        if 'EXPLORE' in name or 'LOOKING' in name:
+            drives = DRIVE_RECOVERY if self._mission.ports.looking is not None else 0.0
+            return settings.choice.exploration_seconds + drives
+        if 'VERIFY' in name:
+            return DRIVE_RECOVERY
         if any(part in name for part in ('MOV', 'POINTING', 'CONTROLLING', 'RETURN', 'GOBACK')):
             # Where nobody measures the pose, a move takes as long as a person or chance says.
             measured = self._pose is not None and self._node.count_publishers('amcl_pose')

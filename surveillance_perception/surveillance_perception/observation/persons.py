@@ -179,7 +179,8 @@ def _windows(width: int, height: int) -> list[tuple[int, int, int, int]]:
     rest = max(width, height) - side
     whole = (0, 0, width, height)
     starts = sorted({0, rest // 2, rest})
-    if rest < 0.1 * side:
+    # A square that would be enlarged shows nothing new, and lines of text like persons.
+    if rest < 0.1 * side or side < SIDE:
         return [whole]
     if width >= height:
         return [whole, *((start, 0, side, side) for start in starts)]

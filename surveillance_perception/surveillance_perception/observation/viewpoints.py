@@ -121,7 +121,7 @@ class Viewpoints:
         seen[rows[open_], columns[open_]] = True
         # Beams far out are a few cells apart.
         around = slice(rows.min(), rows.max() + 1), slice(columns.min(), columns.max() + 1)
-        seen[around] |= ndimage.binary_closing(seen[around], np.ones((3, 3)))
+        seen[around] |= ndimage.binary_closing(seen[around], np.ones((3, 3), np.bool_))
         return seen
 
     def _candidates(self, floor: Mask) -> list[Spot]:

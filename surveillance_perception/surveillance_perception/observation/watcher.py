@@ -67,6 +67,8 @@ LOOKED = 0.6
 """Share of a place's floor that must have been in view before nobody is said to be there."""
 LOOKED_SECONDS = 5.0
 """And for so long."""
+BESIDE_DOOR = 0.3
+"""A point so far from a door is in the place on its side, metres."""
 BEHIND = 0.3
 """Depth of what stands in a way, metres."""
 MARKER_MOVED = 0.3
@@ -79,6 +81,7 @@ class _Door:
     readings: deque[tuple[str, float]] = field(default_factory=lambda: deque(maxlen=READINGS))
     told: str = ''
     told_at: float = -math.inf
+    place: str = ''
 
 
 class Rooms(Protocol):
@@ -206,6 +209,8 @@ class Watcher:
         self._grid = grid
         self._visit, self._normal, self._candidates = None, None, []
         self._ways = None if self._ways_of is None else self._ways_of(grid)
+        for door in self._doors.values():
+            door.place = ''
         if self._kept:
             self._normal = _unpacked(self._kept, grid)
 
@@ -310,7 +315,26 @@ class Watcher:
             return
         sure = float(np.mean([sure for each, sure in door.readings if each == state]))
         door.told, door.told_at = state, stamp
-        self._take(Observation(Kind.DOOR, state, self._place, name, middle, sure, stamp))
+        place = self._place_of_door(door)
+        self._take(Observation(Kind.DOOR, state, place, name, middle, sure, stamp))
+
+    def _place_of_door(self, door: _Door) -> str:
+        """Return the smaller of the two places that a door joins, which is the one it closes."""
+        if self._rooms is None:
+            return self._place
+        if not door.place:
+            x1, y1, x2, y2 = door.segment
+            scale = BESIDE_DOOR / max(math.dist(door.segment[:2], door.segment[2:]), 1e-9)
+            across = (y1 - y2) * scale, (x2 - x1) * scale
+            sizes = {}
+            for sign in (1.0, -1.0):
+                side = (x1 + x2) / 2 + sign * across[0], (y1 + y2) / 2 + sign * across[1]
+                place = self._rooms.place_at(side)
+                floor = None if place is None else self._rooms.cells_of(place)
+                if place is not None and floor is not None:
+                    sizes[place] = int(floor.sum())
+            door.place = min(sizes, key=lambda each: sizes[each], default='')
+        return door.place or self._place
 
     def assess(self, stamp: float) -> None:
         """Compare what this visit saw so far with what is normal."""
