@@ -68,7 +68,7 @@ def test_a_box_follows_from_the_anchor_and_lies_within_the_picture():
     assert shown[0].shape == (1, 224, 224, 3)
     assert shown[0].min() == -1.0
     assert shown[0].max() == 1.0
-    assert len(shown) == 4
+    assert len(shown) == 1, 'squares of so small a picture would be enlarged'
 
 
 def test_what_is_missing_or_wrong_is_one_line(tmp_path: Path, monkeypatch):
