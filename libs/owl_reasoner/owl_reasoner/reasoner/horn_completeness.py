@@ -117,6 +117,8 @@ class Completion:
 
     def expect(self, added: Iterable[Axiom], removed: Iterable[Axiom]) -> None:
         """Take in a change of assertions before the engine does."""
+        if self._kept is None and not self.seconds:
+            return  # Most ontologies never take cases: their changes cost nothing here.
         added, removed = tuple(added), tuple(removed)
         self._history.note(removed)
         self._pause = max(0, self._pause - 1)
