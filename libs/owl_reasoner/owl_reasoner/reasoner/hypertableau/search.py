@@ -14,9 +14,9 @@ IJCAR 2010.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from itertools import combinations
-from typing import Any, NamedTuple, TypeAlias
+from typing import NamedTuple
 
+from owl_reasoner.reasoner.hypertableau.blocking import Blocking
 from owl_reasoner.reasoner.hypertableau.clauses import (
     ANYBODY,
     CaseRules,
@@ -24,21 +24,18 @@ from owl_reasoner.reasoner.hypertableau.clauses import (
     EdgeRule,
     Heads,
 )
+from owl_reasoner.reasoner.hypertableau.counting import Counting
 from owl_reasoner.reasoner.hypertableau.model import (
     Alternative,
     CaseModel,
     Choices,
     ClashError,
     Has,
-    Root,
-    Same,
     still_open,
     total,
 )
 from owl_reasoner.reasoner.hypertableau.rule_joins import CaseJoins
 from owl_reasoner.reasoner.hypertableau.values import CaseValues
-
-_Conditions: TypeAlias = 'tuple[frozenset[int], list[tuple[frozenset[int], frozenset[int]]]]'
 
 
 class _Choice:
@@ -74,7 +71,6 @@ class CaseSearch:
 
     Attributes:
         model: What was found.
-        blocked: Unnamed individuals in the model that are what an earlier one is.
         depends: Whether the last contradiction rests on choices that are held.
     """
 
@@ -83,27 +79,27 @@ class CaseSearch:
         self.model = CaseModel(rules, most_steps)
         self._values = CaseValues(self.model, self._either)
         self._named = CaseJoins(self.model, self._either)
+        self._blocking = Blocking(self.model)
+        self._counting = Counting(self.model, self._either)
         self.gaps = self._values.gaps
         self._named.gaps = self.gaps
         self.depends = False
-        self.blocked: dict[int, int] = {}
         self._stack: list[_Choice] = []
         self._held = 0
         self._failures: dict[int, int] = {}
-        # Disjunctions by number; `_next` tells which was not looked at yet, `_put_off` has those
-        # about individuals that needed no choice; for those in `_chosen` one was made.
+        # Disjunctions by number; `_next` tells which was not looked at yet.
         self._open: dict[int, _Either | _Always] = {}
         self._next = {'first': 0, 'end': 0}
-        self._put_off: dict[int, tuple[int, ...]] = {}
-        self._chosen: dict[int, None] = {}
         # Individuals and the concepts for which they may need others.
         self._needs: dict[tuple[int, int], None] = {}
         self._stated: dict[tuple[tuple[type, Alternative], ...], bool] = {}
-        self._signs: dict[int, frozenset[int]] = {}
-        self._known_conditions: dict[tuple[frozenset[int], tuple[int, ...]], _Conditions] = {}
         # What earlier models chose, which `differ_from_models` has this one choose last.
         self._avoided: set[tuple[type, Alternative]] = set()
-        self._functional: dict[int, Count] = {limit.role: limit for limit in rules.functional}
+
+    @property
+    def blocked(self) -> dict[int, int]:
+        """Unnamed individuals in the model that are what an earlier one is."""
+        return self._blocking.blocked
 
     # --- asking for a model ---
 
@@ -124,7 +120,7 @@ class CaseSearch:
 
     def _back_to(self, mark: int) -> None:
         self.model.undo(mark)
-        self._signs.clear()
+        self._blocking.forget()
 
     def differ_from_model(self) -> None:
         """Have later models choose what the present one does not, where they can."""
@@ -201,7 +197,7 @@ class CaseSearch:
                 x, _ = recount.popitem()
                 budget.tick()
                 if not is_gone(x):
-                    self._count_all(x)
+                    self._counting.count(x)
             elif revalue:
                 x, _ = revalue.popitem()
                 if not is_gone(x):
@@ -231,17 +227,17 @@ class CaseSearch:
             number = following['first']
             put(following, 'first', number + 1)
             x = self._subject(number)
-            if x is not None and self._needs_no_choice(x):
-                put(self._put_off, x, (*self._put_off.get(x, ()), number))
+            if x is not None and self._blocking.needs_no_choice(x):
+                put(self._blocking.put_off, x, (*self._blocking.put_off.get(x, ()), number))
             elif self._decide(number):
                 return True
         return False
 
     def _resume(self) -> bool:
         """Look again at the disjunctions about an individual that is not blocked after all."""
-        for x, numbers in tuple(self._put_off.items()):
+        for x, numbers in tuple(self._blocking.put_off.items()):
             if x not in self.blocked:
-                self.model.drop(self._put_off, x)
+                self.model.drop(self._blocking.put_off, x)
                 for number in numbers[1:]:
                     self._append(self._open[number])
                 self._decide(numbers[0])
@@ -298,7 +294,7 @@ class CaseSearch:
             # What failed often is tried late, as HermiT does.
             left.sort(key=self._order)
             if x is not None:
-                self.model.put(self._chosen, x, None)
+                self.model.put(self._blocking.chosen, x, None)
             self._stack.append(_Choice(self.mark(), left, choices))
             choices |= 1 << len(self._stack) - 1
         left[0].apply(self.model, choices)
@@ -410,7 +406,7 @@ class CaseSearch:
             self._fire(rule, y, x)
         for one, way in ((x, role), (y, -role)):
             limited = not rules.at_most.keys().isdisjoint(model.labels[one])
-            if limited or way in self._functional:
+            if limited or way in self._counting.functional:
                 model.recount[one] = None
         self._named.on_relation(x, role, y)
 
@@ -428,106 +424,23 @@ class CaseSearch:
         if theirs is not None:
             self._one_of(rule.heads, x, y, mine | theirs | roles[rule.role])
 
-    # --- counting ---
-
-    def _related(self, x: int, counted: Count) -> list[int]:
-        """Return who counts for an individual."""
-        labels = self.model.labels
-        return [
-            y
-            for y, roles in self.model.out[x].items()
-            if counted.role in roles and counted.concept in labels[y]
-        ]
-
-    def _reasons(self, x: int, counted: Count, y: int) -> Choices:
-        """Return the choices by which somebody counts for an individual."""
-        return self.model.out[x][y][counted.role] | self.model.labels[y][counted.concept]
-
-    def _count_all(self, x: int) -> None:
-        model, rules = self.model, self.rules
-        # Ontologies have thousands of functional properties, an individual a few of them.
-        roles = dict.fromkeys(role for roles in model.out[x].values() for role in roles)
-        limits = [(self._functional[role], 0) for role in roles if role in self._functional]
-        for concept in rules.at_most.keys() & model.labels[x].keys():
-            limits.append((rules.at_most[concept], model.labels[x][concept]))
-        for limit, choices in limits:
-            self._limit(x, limit, choices)
-            if model.is_gone(x):
-                return
-
-    def _limit(self, x: int, limit: Count, choices: Choices) -> None:
-        model = self.model
-        related = self._related(x, limit)
-        if model.parent[x] is None:
-            unnamed = [y for y in related if model.parent[y] not in (None, x)]
-            for y in unnamed:
-                self._introduce(x, limit, y, choices, len(unnamed))
-            if model.is_gone(x) or any(map(model.is_gone, related)):
-                model.recount[x] = None
-                return
-        if len(related) <= limit.n:
-            return
-        related.sort(key=lambda y: (-model.count_of_differences(y), y))
-        chosen = related[: limit.n + 1]
-        for y in chosen:
-            choices |= self._reasons(x, limit, y)
-        pairs: list[Alternative] = []
-        for one, other in combinations(chosen, 2):
-            apart = model.different(one, other)
-            if apart is None:
-                pairs.append(Same(one, other))
-            else:
-                choices |= apart
-        self._either(pairs, choices)
-
-    def _introduce(self, x: int, limit: Count, y: int, choices: Choices, waiting: int) -> None:
-        """Make an unnamed individual that a named one counts one of so many.
-
-        ``waiting``: How many such there are. Each of them may take a number that none has yet, and
-        it is open which.
-        """
-        options: list[Alternative] = []
-        for number in range(limit.n):
-            key = (x, limit, number)
-            options.append(Root(y, key))
-            waiting -= key not in self.model.roots
-            if not waiting:
-                break
-        self._either(options, choices | self._reasons(x, limit, y))
-
-    def _is_met(self, x: int, needed: Count) -> bool:
-        found, different = self._related(x, needed), self.model.different
-
-        def extend(chosen: list[int], place: int) -> bool:
-            self.model.budget.tick()
-            if len(chosen) == needed.n:
-                return True
-            for next_place in range(place, len(found) - (needed.n - len(chosen)) + 1):
-                y = found[next_place]
-                fits = all(different(one, y) is not None for one in chosen)
-                if fits and extend([*chosen, y], next_place + 1):
-                    return True
-            return False
-
-        return extend([], 0)
-
     # --- individuals that must exist ---
 
     def _expand(self) -> bool:
         """Add the individuals that are still needed; whether there were any."""
         model = self.model
-        if not self._needs and not self._put_off:
+        if not self._needs and not self._blocking.put_off:
             # Whoever is blocked has needs that wait: nobody is.
-            self.blocked = {}
+            self._blocking.blocked = {}
             return False
-        self.blocked = self._find_blocked()
+        self._blocking.look()
         progress = False
         for x, concept in tuple(self._needs):
             if x in self.blocked:
                 continue
             model.drop(self._needs, (x, concept))
             needed = self.rules.at_least[concept]
-            if not model.is_gone(x) and not self._is_met(x, needed):
+            if not model.is_gone(x) and not self._counting.is_met(x, needed):
                 self._create(x, needed, model.labels[x][concept])
                 progress = True
         return progress
@@ -545,114 +458,3 @@ class CaseSearch:
         for y in made:
             model.relate(x, needed.role, y, choices)
             model.concept(y, needed.concept, choices)
-
-    # --- blocking ---
-
-    def _find_blocked(self) -> dict[int, int]:
-        """Return the unnamed individuals that need no successors, and in whose place they are."""
-        model = self.model
-        found: dict[int, int] = {}
-        seen: dict[Any, int] = {}
-        cores = {y: None for y in self._chosen if y not in self._put_off}
-        for x in model.alive():
-            model.budget.tick()
-            parent = model.parent[x]
-            if parent is None:
-                continue
-            if parent in found:
-                found[x] = found[parent]
-                cores.pop(x, None)
-                continue
-            if x in self._put_off:
-                core = self._core_blocker(x, found, cores)
-                if core is not None:
-                    found[x] = core
-                continue
-            if self._is_its_own(x):
-                continue
-            sign: Any = self._sign(x)
-            if self.rules.is_pairwise:
-                roles = model.out[parent].get(x, {})
-                sign = sign, self._sign(parent), frozenset(roles)
-            first = seen.setdefault(sign, x)
-            if first != x:
-                found[x] = first
-                cores.pop(x, None)
-        return found
-
-    def _is_its_own(self, x: int) -> bool:
-        """Tell whether an individual was made for a named one, and so is nobody else.
-
-        The other may be related to that named individual as well, which numbers, and roles that
-        exclude each other, may not allow of one.
-        """
-        parent, rules = self.model.parent[x], self.rules
-        assert parent is not None
-        return self.model.parent[parent] is None and (rules.is_pairwise or bool(rules.disjoint))
-
-    def _needs_no_choice(self, x: int) -> bool:
-        """Tell whether an individual seems to be blocked, or its parent is."""
-        if self.rules.has_inverse:
-            return False
-        is_known = x in self._put_off or self.model.parent[x] in self.blocked
-        return is_known or self._core_blocker(x, self.blocked, self._chosen) is not None
-
-    def _core_blocker(self, x: int, blocked: dict[int, int], cores: Iterable[int]) -> int | None:
-        """Return an earlier individual, of these, that is all that x is, and that x may be."""
-        model, put_off, nominals = self.model, self._put_off, self.rules.nominals.keys()
-        own, known = model.labels[x].keys(), self.blocked.get(x)
-        parent = model.parent[x]
-        assert parent is not None
-        if self._is_its_own(x):
-            return None
-        unwanted, conditions = self._conditions(self._sign(parent), tuple(model.out[parent][x]))
-        # Many are alike: what is not found in one of them is not looked for in the others.
-        unlike: set[frozenset[int]] = set()
-        for y in cores if known is None else (known, *cores):
-            if y in blocked or y in put_off or y >= x or model.is_gone(y):
-                continue
-            sign = self._sign(y)
-            if sign in unlike:
-                continue
-            unlike.add(sign)
-            other = model.labels[y].keys()
-            # Nobody is like a named individual: it would be that individual.
-            if not own <= other or not nominals.isdisjoint(other):
-                continue
-            model.step()
-            if not unwanted & other <= own:
-                continue
-            for body, heads in conditions:
-                if body <= other and heads.isdisjoint(other):
-                    break
-            else:
-                return y
-        return None
-
-    def _conditions(self, above: frozenset[int], roles: tuple[int, ...]) -> _Conditions:
-        """Return what is asked of whoever is related, by these roles, to one with these concepts.
-
-        Returns:
-            Concepts that are counted, of which there may be no more; and pairs: who has all these
-            concepts must have one of those.
-        """
-        found = self._known_conditions.get((above, roles))
-        if found is None:
-            limits = [limit for one, limit in self.rules.at_most.items() if one in above]
-            pairs = [
-                (rule.ys, frozenset(head for place, head in rule.heads if place))
-                for role in roles
-                for rule in self.rules.by_role.get(role, ())
-                if rule.xs <= above
-                and not any(head in above for place, head in rule.heads if not place)
-            ]
-            unwanted = frozenset(limit.concept for limit in limits if limit.role in roles)
-            found = self._known_conditions[above, roles] = unwanted, pairs
-        return found
-
-    def _sign(self, x: int) -> frozenset[int]:
-        """Return the concepts of an individual, which only grow until something is taken back."""
-        known, labels = self._signs.get(x), self.model.labels[x]
-        if known is None or len(known) < len(labels):
-            known = self._signs[x] = frozenset(labels)
-        return known
