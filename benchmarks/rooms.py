@@ -9,6 +9,10 @@ Bormann et al., "Room Segmentation: Survey, Implementation, and Analysis" (ICRA 
 that survey's; "matched" is the share of true rooms that a found one overlaps (intersection over
 union) by at least 0.7. The peer: distance transform, the threshold with most components as seeds,
 watershed.
+
+`--doors` prints how many of the openings between true rooms are found: a line that was drawn
+between two rooms, free in the map and wide enough for the robot, counts as found if the middle of a
+proposed door lies within 0.5 m of it; a proposed door with no such line within 0.5 m is false.
 """
 
 from __future__ import annotations
@@ -27,10 +31,13 @@ from skimage.segmentation import watershed
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from surveillance_runtime.map_rooms import segment
+from surveillance_runtime.map_rooms import propose, segment
 from surveillance_runtime.place.occupancy_grid import Grid
+from surveillance_runtime.place.occupancy_map import OccupancyMap
 
 FREE = 205
+RADIUS = 0.22
+NEAR = 0.5
 SMALLEST = 400
 TRUTH = '_gt_segmentation.png'
 Image = NDArray[np.uint8]
@@ -39,11 +46,47 @@ Labels = NDArray[np.int32]
 
 def ours(image: Image, resolution: float) -> Labels:
     """Return the project's rooms of a picture, in the picture's order of rows."""
+    cells = occupancy(image)[::-1]
+    return segment(Grid(np.ascontiguousarray(cells), resolution)).labels[::-1]
+
+
+def occupancy(image: Image) -> NDArray[np.int8]:
+    """Return the cells of a picture."""
     cells = np.full(image.shape, -1, np.int8)
     cells[image > FREE] = 0
     cells[image < 255 * 0.35] = 100
-    cells = cells[::-1]
-    return segment(Grid(np.ascontiguousarray(cells), resolution)).labels[::-1]
+    return cells
+
+
+def true_doors(image: Image, drawn: Image, truth: Labels) -> list[NDArray[np.float64]]:
+    """Return the openings between true rooms at 0.05 m: the pixels of each drawn line, x and y."""
+    line = ((drawn <= 230) & (image > FREE)).astype(np.uint8)
+    line = np.asarray(cv2.morphologyEx(line, cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8)))
+    count, pieces = cv2.connectedComponents(line, connectivity=8)
+    away = cv2.distanceTransform((image > FREE).astype(np.uint8), cv2.DIST_L2, 5)
+    found = []
+    for piece in range(1, count):
+        mask = pieces == piece
+        around = cv2.dilate(mask.astype(np.uint8), np.ones((7, 7), np.uint8)) > 0
+        rooms = set(np.unique(truth[around]).tolist()) - {0}
+        # The robot has room at its freest pixel.
+        if len(rooms) >= 2 and away[mask].max() * 0.05 > RADIUS:
+            found.append(np.argwhere(mask)[:, ::-1].astype(float))
+    return found
+
+
+def door_scores(image: Image, drawn: Image, truth: Labels) -> tuple[int, int, int, int]:
+    """Return how many true doors there are and are found, how many proposed and how many false."""
+    building = OccupancyMap(Path('map.yaml'), occupancy(image), 0.05, (0.0, 0.0, 0.0))
+    placed = propose(building, RADIUS).parameters.get('doors', {})
+    own = np.array([row[:2] for row in placed.values()]).reshape(-1, 2) / 0.05
+    own[:, 1] = image.shape[0] - own[:, 1]
+    lines = true_doors(image, drawn, truth)
+    gaps = np.array([[np.hypot(*(line - door).T).min() for line in lines] for door in own]).reshape(
+        len(own), len(lines)
+    )
+    near = gaps <= NEAR / 0.05
+    return len(lines), int(near.any(axis=0).sum()), len(own), int((~near.any(axis=1)).sum())
 
 
 def peer(image: Image, resolution: float) -> Labels:
@@ -124,16 +167,22 @@ def main() -> int:
     parser.add_argument('folder', type=Path)
     parser.add_argument('--turned', action='store_true', help='other resolutions and directions')
     parser.add_argument('--quick', action='store_true', help='the first three maps')
+    parser.add_argument('--doors', action='store_true', help='the doors, too')
     parser.add_argument('--each', action='store_true', help='a line for each map')
     options = parser.parse_args()
     names = sorted(path.name.removesuffix(TRUTH) for path in options.folder.glob('*' + TRUTH))
     methods: dict[str, Callable[[Image, float], Labels]] = {'watershed': peer, 'ours': ours}
     results: dict[tuple[str, str, str], list[tuple[float, ...]]] = {}
+    doors: dict[str, list[tuple[int, ...]]] = {}
     for name in names[:3] if options.quick else names:
         drawn: Any = cv2.imread(str(options.folder / (name + TRUTH)), cv2.IMREAD_GRAYSCALE)
         truth = true_rooms(drawn)
         for kind, ending in (('empty', '.png'), ('furnished', '_furnitures.png')):
             image: Any = cv2.imread(str(options.folder / (name + ending)), cv2.IMREAD_GRAYSCALE)
+            if options.doors:
+                doors.setdefault(kind, []).append(door_scores(image, drawn, truth))
+                if options.each:
+                    print(name, kind, 'doors', *doors[kind][-1])
             for variant, side, other, true in variants(image, truth, options.turned):
                 for method, find in methods.items():
                     begin = time.perf_counter()
@@ -154,6 +203,12 @@ def main() -> int:
         print(
             f'{kind:10} {variant:14} {method:10} {recall:6.3f} {precision:9.3f} {matched:7.3f} '
             f'{seconds:8.2f}'
+        )
+    for kind, counts in doors.items():
+        true_, found, proposed, false = np.sum(counts, axis=0)
+        print(
+            f'{kind:10} doors: {found} of {true_} found ({found / true_:.1%}), '
+            f'{false} of {proposed} false ({false / proposed:.1%})'
         )
     return 0
 

@@ -31,6 +31,7 @@ from surveillance_runtime.run_parameters import (
     full_name,
     mode_entries,
     page_entries,
+    place_file,
     record_entries,
     run_layers,
     simulator_entries,
@@ -109,7 +110,7 @@ def _merged(
         chosen=[*fleet, *(_folders_of(folder.resolve()) if folder is not None else ())],
         files=[*files, *(Path(file) for file in (more.files if more else ()))],
         options=[
-            *_option_entries(run, folder),
+            *_option_entries(config, run, folder),
             *_unmonitored(config, run),
         ],
     )
@@ -139,12 +140,12 @@ def _folders_of(folder: Path) -> Iterator[Entry]:
     yield for_node('simulator', 'truth_file', str(folder / TRUTH), 'this run')
 
 
-def _option_entries(run: Run, folder: Path | None) -> Iterator[Entry]:
+def _option_entries(config: Path, run: Run, folder: Path | None) -> Iterator[Entry]:
     """Yield what the options say as parameters, for the nodes that they concern."""
     yield from simulator_entries(run.simulator)
     if folder is not None:
         yield from record_entries(folder / RECORD)
-        yield from _observer_entries(run, folder)
+        yield from _observer_entries(config, run, folder)
     if run.stage is not None:
         yield stage_entry(run.stage)
     # Without one that was asked for, the mode is what the parameter files say.
@@ -153,7 +154,7 @@ def _option_entries(run: Run, folder: Path | None) -> Iterator[Entry]:
         yield from mode_entries(run.mode, prompts=run.mode != 'MANUAL' or folder is None)
 
 
-def _observer_entries(run: Run, folder: Path) -> Iterator[Entry]:
+def _observer_entries(config: Path, run: Run, folder: Path) -> Iterator[Entry]:
     """Yield what the recorder and the page are told."""
     yield for_node(RECORDER, 'folder', str(folder / RECORDING), 'this run')
     yield for_node(RECORDER, 'keep', float(run.keep), '--keep')
@@ -161,7 +162,11 @@ def _observer_entries(run: Run, folder: Path) -> Iterator[Entry]:
         yield from watch_entries(folder, run.watch)
     if run.has_page:
         yield from page_entries(
-            folder, control=run.web_control, address=run.web_address, origin=run.web_origin
+            folder,
+            control=run.web_control,
+            address=run.web_address,
+            origin=run.web_origin,
+            place=place_file(config, run.behaviour, run.place),
         )
 
 

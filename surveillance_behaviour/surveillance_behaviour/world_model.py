@@ -151,6 +151,12 @@ class WorldModel:
         self._checked_seconds = 0.0
         self._checked_rules: tuple[str, ...] = ()
 
+    def take_rules(self, rules: PatrolRules) -> None:
+        """Take what holds for single places, and ask for the places' points anew."""
+        self._rules = rules
+        self._positions = {}
+        self._graph_key = None
+
     def battery(self) -> Battery:
         """Return what a decision knows of the battery now."""
         monitor, experience = self._battery, self.experience

@@ -15,7 +15,7 @@ restarts of this node too, until a person releases it. The topic `stopped` tells
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -44,7 +44,8 @@ from surveillance_runtime.conversions import pose_of_serialized, stamp_of_serial
 from surveillance_runtime.graph_check import endpoints_of
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.parameters import parameter
-from surveillance_runtime.place.zones import Zones
+from surveillance_runtime.place.zones import Zones, zones_from
+from surveillance_runtime.place_changes import follow_place
 from surveillance_runtime.process import run_node
 from surveillance_runtime.profile.check_up import Awaited, findings
 from surveillance_runtime.profile.parameters import declared_frames, robot_footprint
@@ -149,6 +150,7 @@ class CollisionMonitor(PatrolNode):
         frames = declared_frames(self, 'base')
         self._zones = place_zones(self)
         self._pose: tuple[Pose, float] | None = None
+        follow_place(self, self._take_place)
         self._lidar = ScanReader(self, self._settings.radius, frames.base)
         self._wanted = Velocity()
         self._seen: dict[str, Scan] = {}
@@ -188,6 +190,9 @@ class CollisionMonitor(PatrolNode):
         self._wanted = Velocity(speed, turn)
         self._base.hear('cmd_vel')
         self._base.command(self._allowed())
+
+    def _take_place(self, described: Mapping[str, Any]) -> None:
+        self._zones = zones_from(described)
 
     def _on_pose(self, serialized: bytes) -> None:
         with conversions.refusing(self, 'amcl_pose'):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -244,20 +245,42 @@ class NavigationSettings:
     )
 
 
+def door_segments_of(described: Mapping[str, Any]) -> dict[str, Segment]:
+    """Return where the doors are that a place's parameters describe.
+
+    Raises:
+        ValueError: A door is not four numbers.
+    """
+    doors = described.get('doors') or {}
+    for name, values in doors.items():
+        if not _are_numbers(values, 4):
+            raise ValueError(f'doors.{name}: got {values}, expected [x, y, yaw, width]')
+    return {name: Door(name, *values).segment for name, values in doors.items()}
+
+
+def positions_of(described: Mapping[str, Any]) -> dict[str, Points]:
+    """Return the places' points that a place's parameters describe.
+
+    Raises:
+        ValueError: A position is not two or three numbers.
+    """
+    points = described.get('room_positions') or {}
+    for name, values in points.items():
+        if not (_are_numbers(values, 2) or _are_numbers(values, 3)):
+            raise ValueError(f'room_positions.{name}: got {values}, expected [x, y]')
+    return {name: np.array([*at, 0.0][:3], dtype=float) for name, at in points.items()}
+
+
 def door_segments(node: PatrolNode) -> dict[str, Segment]:
     """Declare and read the doors of the place, `doors.NAME: [x, y, yaw, width]`.
 
     Raises:
         ParameterError: A door is not four numbers.
     """
-    segments = {}
-    for name, values in node.parameters_under('doors').items():
-        if not _are_numbers(values, 4):
-            raise ParameterError(
-                f'parameter doors.{name}: got {values}, expected [x, y, yaw, width]'
-            )
-        segments[name] = Door(name, *values).segment
-    return segments
+    try:
+        return door_segments_of({'doors': node.parameters_under('doors')})
+    except ValueError as error:
+        raise ParameterError(f'parameter {error}') from None
 
 
 def place_zones(node: PatrolNode) -> Zones:
@@ -278,12 +301,10 @@ def place_positions(node: PatrolNode) -> dict[str, Points]:
     Raises:
         ParameterError: A position is not two or three numbers.
     """
-    positions = {}
-    for name, values in node.parameters_under('room_positions').items():
-        if not (_are_numbers(values, 2) or _are_numbers(values, 3)):
-            raise ParameterError(f'parameter room_positions.{name}: got {values}, expected [x, y]')
-        positions[name] = np.array([*values, 0.0][:3], dtype=float)
-    return positions
+    try:
+        return positions_of({'room_positions': node.parameters_under('room_positions')})
+    except ValueError as error:
+        raise ParameterError(f'parameter {error}') from None
 
 
 def _are_numbers(values: object, count: int) -> bool:

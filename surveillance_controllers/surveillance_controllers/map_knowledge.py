@@ -70,6 +70,10 @@ class MapKnowledge:
         """Take points of places, so that the map builder need not be asked for them."""
         self._known.update(positions)
 
+    def replace_known(self, positions: Mapping[str, Points]) -> None:
+        """Take the points of all places of a place that was changed."""
+        self._known = dict(positions)
+
     # --- what the map builder knows ---
 
     def find_position(self, place: str, interrupt: Interrupt) -> Points | None:

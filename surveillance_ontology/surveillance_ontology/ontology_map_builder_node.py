@@ -7,18 +7,29 @@ contradicts itself is built anew, too. Where the robot is, and what it visited, 
 
 from __future__ import annotations
 
+import json
 import math
 import sys
 import time
 from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.clock import Clock, ClockType
 from rclpy.event_handler import SubscriptionEventCallbacks
+from std_msgs.msg import String
 
 from surveillance_interfaces.msg import FactChanges, OntologyMap
-from surveillance_interfaces.srv import AddRoom, ReferenceName, RemoveRoom, RoomPosition, SetDoor
+from surveillance_interfaces.srv import (
+    AddRoom,
+    ConsoleCommand,
+    ReferenceName,
+    RemoveRoom,
+    RoomPosition,
+    SetDoor,
+)
 from surveillance_ontology.armor_client import (
     CHANGES_QOS,
     CHANGES_TOPIC,
@@ -29,13 +40,18 @@ from surveillance_ontology.conversions import room_note_from_ros
 from surveillance_ontology.map_keeper import MapKeeper, Reports, Source
 from surveillance_ontology.patrol_ontology import ROBOT, PatrolOntology, checked_names
 from surveillance_runtime.conversions import point_from, point_message
+from surveillance_runtime.files import in_one_line, replace_text
 from surveillance_runtime.namesakes import NamesakeWatch
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.parameters import ParameterError
-from surveillance_runtime.place import Place, PlaceError, described_place
-from surveillance_runtime.place.stations import AT_STATION, described_stations
+from surveillance_runtime.place import Place, PlaceError, described_place, description_of
+from surveillance_runtime.place.patrol_rules import patrol_rules
+from surveillance_runtime.place.rooms import place_from
+from surveillance_runtime.place.stations import AT_STATION, described_stations, stations_of
+from surveillance_runtime.place.zones import zones_from
+from surveillance_runtime.place_changes import TOPIC, described_in_text
 from surveillance_runtime.process import run_node
-from surveillance_runtime.state_topics import StateSubscription
+from surveillance_runtime.state_topics import OwnedTopic, StateSubscription
 from surveillance_runtime.waiting import AwaitedEvent, AwaitedWork
 
 SECONDS_PER_ROOM = 0.005
@@ -120,6 +136,12 @@ class OntologyMapBuilder(PatrolNode):
         self._built_at: float | None = None
         self._late = self.create_timer(PLACE_SECONDS, self._on_late, clock=steady)
         self._late.cancel()
+        self._changed_place = OwnedTopic(self, String, TOPIC)
+        # As it reads again what was kept: lists instead of tuples.
+        self._given = None if place is None else json.loads(json.dumps(description_of(place)))
+        file = source.state_file
+        self._place_file = Path(file).with_suffix('.place.json') if file else None
+        self._tell_kept_place()
         self._serve()
         NamesakeWatch(self)
         self._look()
@@ -145,6 +167,8 @@ class OntologyMapBuilder(PatrolNode):
             (AddRoom, 'add_room', self._on_add_room),
             (RemoveRoom, 'remove_room', self._on_remove_room),
             (SetDoor, 'set_door', self._on_set_door),
+            # Its line is the place's parameters as JSON.
+            (ConsoleCommand, 'set_place', self._on_set_place),
         ):
             self.create_service(kind, f'ontology_map/{name}', callback, callback_group=group)
         # Each robot of a fleet tells what it found: a topic of one owner each.
@@ -229,6 +253,59 @@ class OntologyMapBuilder(PatrolNode):
         return await self._edit(
             lambda place: place.with_door(door, is_open=is_open), done, response
         )
+
+    async def _on_set_place(self, request: Any, response: Any) -> Any:
+        """Take the parameters of a place that somebody has changed."""
+        try:
+            described = described_in_text(request.line)
+            wanted = checked_names(place_from(described))
+            patrol_rules(described, wanted.rooms)
+            zones_from(described)
+            if stations_of(described, wanted.positions, wanted.start) != self._stations:
+                raise PlaceError(
+                    ('stations',),
+                    'are read at the start: expected them as they were; start the mission again',
+                )
+        except ValueError as error:
+            response.answer = str(error)
+            return response
+
+        def change(place: Place) -> Place:
+            return replace(wanted, closed=place.closed & wanted.doors.keys())
+
+        response.answer = await self._work.run(lambda: self._keeper.edit(change))
+        response.accepted = not response.answer
+        if response.accepted:
+            rooms, doors = len(wanted.rooms), len(wanted.doors)
+            response.answer = f'the mission has the place now: {rooms} rooms, {doors} doors'
+            self._tell_place(request.line)
+            self._keep_place(request.line)
+        return response
+
+    def _tell_place(self, text: str) -> None:
+        self._changed_place.publish(String(data=text))
+
+    def _keep_place(self, text: str) -> None:
+        """Keep a changed place over a restart of this process."""
+        if self._place_file is None:
+            return
+        kept = {'described': self._given, 'text': text}
+        try:
+            replace_text(self._place_file, json.dumps(kept))
+        except OSError as error:
+            self.get_logger().warn(f'the changed place is not kept: {in_one_line(error)}')
+
+    def _tell_kept_place(self) -> None:
+        """Tell again which place an earlier process was given, if it began with the same."""
+        if self._place_file is None or not self._place_file.exists():
+            return
+        try:
+            kept = json.loads(self._place_file.read_text('utf-8'))
+            if kept['described'] == self._given:
+                described_in_text(kept['text'])
+                self._tell_place(kept['text'])
+        except (OSError, ValueError, KeyError, TypeError) as error:
+            self.get_logger().warn(f'the changed place that was kept is not used: {error!r:.120}')
 
     async def _edit(self, change: Callable[[Place], Place], done: str, response: Any) -> Any:
         problem = await self._work.run(lambda: self._keeper.edit(change))

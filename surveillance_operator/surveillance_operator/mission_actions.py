@@ -46,6 +46,7 @@ from surveillance_runtime.configuration import argument_value, declared
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.parameters import shown
 from surveillance_runtime.place import problem_in_name
+from surveillance_runtime.place_changes import description_text
 from surveillance_runtime.suggestions import nearest
 
 _DISCOVERY = 2.0
@@ -69,6 +70,7 @@ _KINDS: Mapping[str, Any] = {
     'simulation/drain_battery': DrainBattery,
     'simulation/stage': ConsoleCommand,
     'observer/command': ConsoleCommand,
+    'ontology_map/set_place': ConsoleCommand,
     'ontology_map/add_room': AddRoom,
     'ontology_map/remove_room': RemoveRoom,
     'ontology_map/reference_name': ReferenceName,
@@ -150,6 +152,13 @@ class MissionActions:
     def remove_room(self, name: str) -> str:
         """Remove a place from the map and the ontology."""
         return self._told('ontology_map/remove_room', room_name=_name(name))
+
+    def set_place(self, described: Mapping[str, Any]) -> str:
+        """Have the mission go on in a place that was changed; its parameters as in its file."""
+        answer = self._call('ontology_map/set_place', line=description_text(described))
+        if not answer.accepted:
+            raise ValueError(answer.answer)
+        return str(answer.answer)
 
     def go_to(self, place: str) -> str:
         """Send the robot to a place next; an empty one calls it home."""

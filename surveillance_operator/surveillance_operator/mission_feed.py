@@ -41,6 +41,7 @@ from surveillance_runtime.conversions import clean_texts, pose_from, seconds_of
 from surveillance_runtime.diagnostics import STALE_AFTER
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.place.floor_plan import Door
+from surveillance_runtime.place_changes import follow_place
 from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
 
 LOOK_PERIOD = 0.5
@@ -282,12 +283,21 @@ class _Facts:
         self._list = ServiceCaller(node, ListParameters, f'{PLANNER}/list_parameters')
         self._get = ServiceCaller(node, GetParameters, f'{PLANNER}/get_parameters')
         self._get_behaviour = ServiceCaller(node, GetParameters, f'{BEHAVIOUR}/get_parameters')
+        follow_place(node, self._take_place)
         self._armor: ArmorClient | None = None
         self._places: set[str] = set()
         self._without_position: set[str] = set()
         self._questions = (self._ask_doors, self._ask_behaviour, self._ask_reference)
         self._unanswered = set(self._questions)
         self._asking = False
+
+    def _take_place(self, described: Mapping[str, Any]) -> None:
+        """Take doors and points of a place that was changed."""
+        lines = {
+            name: Door(name, *row).segment for name, row in (described.get('doors') or {}).items()
+        }
+        self._without_position |= self._places
+        self._update(lambda old: replace(old, door_lines=lines))
 
     def forget(self) -> None:
         """Ask anew: another mission may have another map."""

@@ -11,22 +11,32 @@ import threading
 import time
 from collections.abc import Sequence
 from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import Image as ImageMessage
 
+from state_machines.exceptions import CallError
 from state_machines.files import read_file
+from surveillance_ontology.patrol_ontology import checked_names
 from surveillance_operator.images import ANNOTATED, PLAIN, jpeg_from
 from surveillance_operator.mission_actions import MissionActions
 from surveillance_operator.mission_feed import MissionFeed
 from surveillance_operator.page.hub import Hub
 from surveillance_operator.page.server import Action, Page
+from surveillance_operator.place_page.desk import PlaceDesk
 from surveillance_operator.polled_subscription import PolledSubscription
 from surveillance_runtime import parameter_checks
+from surveillance_runtime.files import FileError
 from surveillance_runtime.launch_protocol import NotNowError
 from surveillance_runtime.node import PatrolNode
+from surveillance_runtime.parameters import parameter
+from surveillance_runtime.place.writing import copy_place
+from surveillance_runtime.place_editor import PlaceEditor
 from surveillance_runtime.process import run_node
+from surveillance_runtime.robot_base import robot_radius
 
 POLL_PERIOD = 0.015
 """Least seconds between two looks at the topics while somebody looks at the page."""
@@ -37,6 +47,21 @@ PATIENCE = 4.0
 is older than this is not shown as if it were new."""
 IDLE_SECONDS = 5.0
 """After this time without a question nobody listens to the camera any more."""
+
+
+@dataclass(frozen=True)
+class PlaceSettings:
+    """The place that can be edited on the page."""
+
+    radius: float = robot_radius()
+    place_file: str = parameter(
+        '',
+        'File of the place, which the page may change with `control`; empty: none.',
+        read_only=True,
+    )
+    place_copy: str = parameter(
+        '', "The run's own copy of it, written anew with it; empty: none.", read_only=True
+    )
 
 
 class MissionPage(PatrolNode):
@@ -69,13 +94,16 @@ class MissionPage(PatrolNode):
             read_only=True,
         )
         self._hub = Hub()
+        files = self.declare_fields(PlaceSettings())
         self._camera = Camera(self)
         self._actions = MissionActions(self)
+        desk = self._desk(files) if control and files.place_file else None
         try:
             self.page = Page(
                 self._hub,
-                questions=self._questions(),
-                actions=self._offered_actions() if control else {},
+                questions=self._questions() | (desk.questions if desk else {}),
+                actions=(self._offered_actions() if control else {})
+                | (desk.actions if desk else {}),
                 picture=self._camera.jpeg,
                 host=host,
                 port=port,
@@ -104,6 +132,25 @@ class MissionPage(PatrolNode):
         while not self.stopping.wait(1.0):
             self._hub.show(self._feed.see())
             self._camera.rest()
+
+    def _desk(self, files: PlaceSettings) -> PlaceDesk | None:
+        """Let the place be edited; None, with a warning, where its file cannot be."""
+        path, copy = Path(files.place_file), files.place_copy
+
+        def tell(editor: PlaceEditor) -> str:
+            try:
+                if copy:
+                    copy_place(path, Path(copy))
+                return self._actions.set_place(editor.whole())
+            except (ValueError, CallError) as error:
+                return f'but the running mission keeps the place that it has: {error}'
+
+        try:
+            editor = PlaceEditor(path, radius=files.radius, more_checks=checked_names)
+        except FileError as error:
+            self.get_logger().warn(f'the place cannot be edited: {error}')
+            return None
+        return PlaceDesk(editor, tell)
 
     def _questions(self) -> dict[str, Action]:
         actions = self._actions

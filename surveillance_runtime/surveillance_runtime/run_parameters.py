@@ -21,6 +21,7 @@ from surveillance_runtime.configuration import (
     file_layer,
     resolved_text,
 )
+from surveillance_runtime.files import PLACE
 from surveillance_runtime.node_table import NODES, Node
 from surveillance_runtime.place import Place
 from surveillance_runtime.profile import ProfileFile, profile_layer
@@ -123,7 +124,12 @@ def record_entries(record: Path) -> Iterator[Entry]:
 
 
 def page_entries(
-    folder: Path, *, control: bool, address: str | None, origin: str | None
+    folder: Path,
+    *,
+    control: bool,
+    address: str | None,
+    origin: str | None,
+    place: Path | None = None,
 ) -> Iterator[Entry]:
     """Yield what the page is told: who may control the robot, and where it is served.
 
@@ -132,11 +138,15 @@ def page_entries(
         control: Whether it has controls.
         address: Of the form HOST:PORT; None: the usual one.
         origin: What browsers know it by; None: its address.
+        place: The place's file, to be edited there; None: it is not.
 
     Raises:
         ValueError: The address is none.
     """
     yield for_node(PAGE, 'control', control, '--web-control')
+    if place is not None:
+        yield for_node(PAGE, 'place_file', str(place.resolve()), 'this run')
+        yield for_node(PAGE, 'place_copy', str(folder.resolve() / PLACE), 'this run')
     # In a file, so that a page that is started again keeps it, and no peer can ask for it.
     yield for_node(PAGE, 'token_file', str(folder.resolve() / 'page_token'), 'this run')
     if address is not None:

@@ -30,8 +30,9 @@ from surveillance_interfaces.msg import Decision as DecisionMessage
 from surveillance_interfaces.srv import GoTo, WhyNot
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.parameters import parameter
-from surveillance_runtime.place.patrol_rules import described_patrol_rules
+from surveillance_runtime.place.patrol_rules import described_patrol_rules, patrol_rules
 from surveillance_runtime.place.stations import Station, described_stations
+from surveillance_runtime.place_changes import follow_place
 from surveillance_runtime.state_topics import OwnedTopic
 from surveillance_runtime.waiting import AwaitedWork
 
@@ -132,6 +133,7 @@ def world_model_of(
         {place: station.pose for place, station in stations.items()},
     )
     world_model.learn_draw(elapsed)
+    follow_place(node, lambda described: world_model.take_rules(patrol_rules(described)))
     return world_model
 
 

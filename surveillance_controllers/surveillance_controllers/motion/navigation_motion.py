@@ -27,8 +27,10 @@ from surveillance_controllers.controller_parameters import (
     MotionSettings,
     NavigationSettings,
     door_segments,
+    door_segments_of,
     place_positions,
     place_zones,
+    positions_of,
 )
 from surveillance_controllers.geometry import Points, Pose, Scan, point_of
 from surveillance_controllers.map_knowledge import MapKnowledge
@@ -55,6 +57,8 @@ from surveillance_runtime.conversions import (
 )
 from surveillance_runtime.graph_check import InputWatch
 from surveillance_runtime.node import PatrolNode
+from surveillance_runtime.place.zones import zones_from
+from surveillance_runtime.place_changes import follow_place
 from surveillance_runtime.profile.check_up import awaited
 from surveillance_runtime.profile.parameters import declared_frames
 from surveillance_runtime.profile.record import RobotProfile, Topics
@@ -127,6 +131,8 @@ class NavigationMotion:
         knowledge.assume(positions)
         # The places that come and go change what the robot's place can be.
         knowledge.follow_places(self._set_positions)
+        self._knowledge = knowledge
+        follow_place(node, self._take_place)
         self._hold = Hold(node, self._on_hold)
         StateSubscription(node, OccupancyGrid, 'map', self._on_map, owner='simulator')
         StateSubscription(node, DoorStates, 'door_states', self._on_doors, owner='simulator')
@@ -235,6 +241,14 @@ class NavigationMotion:
         """Take the places: a point in each."""
         with self._lock:
             self._navigator.set_positions(positions)
+
+    def _take_place(self, described: Mapping[str, Any]) -> None:
+        positions = positions_of(described)
+        self._knowledge.replace_known(positions)
+        with self._lock:
+            self._navigator.take_place(
+                door_segments_of(described), zones_from(described), positions
+            )
 
     def _find_another_path(self, drive: Drive, goal: Points, run: GoalRun) -> None:
         """Ask the planner, and give the drive what it answers."""

@@ -162,6 +162,23 @@ class Navigator:
         self._places.set_positions(positions)
         self._candidate = None
 
+    def take_place(
+        self,
+        doors: Mapping[str, Segment],
+        zones: Zones,
+        positions: Mapping[str, ArrayLike],
+    ) -> None:
+        """Take a place that was changed: its doors, its zones and a point in each room."""
+        self._doors, self._zones = dict(doors), zones
+        self._places = PlaceLocator(self._doors.values())
+        self._places.set_positions(positions)
+        if self._grid is not None:
+            self._places.set_map(self._grid)
+        self._candidate = None
+        closed, self._closed = self._closed, self._closed & self._doors.keys()
+        if closed != self._closed:
+            self._redraw()
+
     def believe(self, pose: Pose) -> None:
         """Take where the robot is said to be."""
         self._believed = pose

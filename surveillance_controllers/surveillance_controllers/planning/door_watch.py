@@ -52,6 +52,10 @@ class DoorWatch:
         keep_up(node, 'door watch', self._news, self._catch_up, RETRY_PERIOD)
         StateSubscription(node, DoorStates, 'door_states', self._on_states, owner='simulator')
 
+    def take_segments(self, segments: Mapping[str, Segment]) -> None:
+        """Take where the doors are now: the place was changed."""
+        self._segments = dict(segments)
+
     def rooms_of(self, interrupt: Interrupt) -> dict[str, set[str]]:
         """Return the places that each door leads into; empty while the ontology does not say.
 

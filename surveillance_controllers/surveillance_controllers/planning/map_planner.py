@@ -7,6 +7,7 @@ import math
 import threading
 from collections.abc import Collection, Iterable, Mapping
 from itertools import combinations, pairwise
+from typing import Any
 
 import numpy as np
 from geometry_msgs.msg import PoseWithCovarianceStamped
@@ -17,7 +18,11 @@ from sensor_msgs.msg import PointCloud2
 from state_machines import Interrupt
 from state_machines.ros import GoalAbortedError, GoalRun
 from surveillance_controllers import conversions
-from surveillance_controllers.controller_parameters import door_segments, place_zones
+from surveillance_controllers.controller_parameters import (
+    door_segments,
+    door_segments_of,
+    place_zones,
+)
 from surveillance_controllers.geometry import Points, Pose, point_of
 from surveillance_controllers.map_knowledge import MapKnowledge
 from surveillance_controllers.planning.door_watch import DoorWatch
@@ -33,6 +38,9 @@ from surveillance_runtime.conversions import (
     values_from_cloud,
 )
 from surveillance_runtime.node import PatrolNode
+from surveillance_runtime.place.occupancy_grid import Grid
+from surveillance_runtime.place.zones import zones_from
+from surveillance_runtime.place_changes import follow_place
 from surveillance_runtime.state_topics import StateSubscription
 
 
@@ -58,9 +66,11 @@ class NavigationPlanning:
         self._lock = threading.Lock()
         self._has_map = Interrupt()
         self._planner: GridPlanner | None = None
+        self._grid: Grid | None = None
         self._obstacles: tuple[Points, NDArray[np.bool_] | None] = np.zeros((0, 2)), None
         self._pose: Pose | None = None
         StateSubscription(node, OccupancyGrid, 'map', self._on_map, owner='simulator')
+        follow_place(node, self._take_place)
         owner = 'motion_controller'
         StateSubscription(node, PointCloud2, 'obstacles', self._on_obstacles, owner=owner)
         StateSubscription(
@@ -123,10 +133,21 @@ class NavigationPlanning:
     def _on_map(self, message: OccupancyGrid) -> None:
         with conversions.refusing(self._node, 'map'):
             grid = conversions.grid_from(message)
-            planner = GridPlanner(grid, self._parameters, self._segments, self._zones)
-            with self._lock:
-                self._planner = planner
-            self._has_map.set()
+            self._grid = grid
+            self._plan_anew()
+
+    def _plan_anew(self) -> None:
+        assert self._grid is not None
+        planner = GridPlanner(self._grid, self._parameters, self._segments, self._zones)
+        with self._lock:
+            self._planner = planner
+        self._has_map.set()
+
+    def _take_place(self, described: Mapping[str, Any]) -> None:
+        self._segments, self._zones = door_segments_of(described), zones_from(described)
+        self._doors.take_segments(self._segments)
+        if self._grid is not None:
+            self._plan_anew()
 
     def _on_obstacles(self, message: PointCloud2) -> None:
         with conversions.refusing(self._node, 'obstacles'):

@@ -157,6 +157,16 @@ class PlaceEditor:
         """Return the file as it is to be: what is not changed keeps its comments and its order."""
         return updated_text(self._text, self.now.described, self.now.renamed)
 
+    def whole(self) -> dict[str, Any]:
+        """Return all parameters of the place as it is, the map's file by its absolute path."""
+        return self._whole(self.now.described)
+
+    def _whole(self, described: Mapping[str, Any]) -> dict[str, Any]:
+        whole = dict(described)
+        if isinstance(name := whole.get('map_file'), str) and name:
+            whole['map_file'] = map_file_beside(self.path, name)
+        return whole
+
     def save(self) -> str:
         """Write the file.
 
@@ -218,9 +228,7 @@ class PlaceEditor:
     def _moment(
         self, described: dict[str, Any], renamed: Mapping[tuple[str, str], str], said: str
     ) -> Moment:
-        whole = dict(described)
-        if isinstance(name := whole.get('map_file'), str) and name:
-            whole['map_file'] = map_file_beside(self.path, name)
+        whole = self._whole(described)
         plan = FloorPlan.from_parameters(whole, self._map)
         regions = Regions(plan)
         check_passable(plan, self._radius)
