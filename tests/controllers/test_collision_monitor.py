@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from geometry_msgs.msg import PoseWithCovarianceStamped, Twist
 from sensor_msgs.msg import LaserScan
+from std_msgs.msg import String
 
 from surveillance_controllers import collision_monitor_node
 from surveillance_controllers.collision_monitor_node import (
@@ -154,3 +155,9 @@ def test_no_command_enters_a_keep_out_zone_or_is_fast_in_a_slow_one(graph: Any) 
     graph.until(lambda: at(1.74) < 0.1)
     graph.until(lambda: at(-2.0) == pytest.approx(0.2))
     graph.until(lambda: at(0.0) == 0.5)
+    # Somebody took the zones away, on the page.
+    places = graph.node.create_publisher(String, 'place', STATE_QOS)
+    places.publish(String(data='{"map": {}}'))
+    graph.until(lambda: at(1.74) == 0.5)
+    places.publish(String(data='{"keep_out_zones": {"Z": [1]}}'))
+    graph.until(lambda: at(-2.0) == 0.5)

@@ -349,3 +349,15 @@ def test_a_drive_obeys_zones(flat: Any) -> None:
     assert fastest > 0.2, 'outside it drives on faster'
     assert navigator.task.state is State.WAITING, 'the zone stands in the way'
     assert 2.2 - true[0] >= 0.22
+
+
+def test_a_place_that_was_changed_divides_the_map_anew(flat: Any, navigator: Navigator) -> None:
+    navigator.move((2.0, 1.5, 0.0))
+    navigator.see(flat.scan((2.0, 1.5, 0.0)), 0.0)
+    assert navigator.place == 'A'
+    doors = {'D1': flat.DOOR, 'D2': (1.2, 0.0, 1.2, 3.1)}
+    points = {**flat.POSITIONS, 'A': (0.6, 1.5), 'C': (2.0, 1.5)}
+    navigator.take_place(doors, zones_from({}), points)
+    for step in range(5):
+        navigator.see(flat.scan((2.0, 1.5, 0.0)), 0.1 * (step + 1))
+    assert navigator.place == 'C'

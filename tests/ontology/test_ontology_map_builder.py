@@ -6,12 +6,14 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from std_msgs.msg import String
 
 from libs.armor_service.tests.seven_rooms import SEVEN_ROOMS, reach
 from state_machines.ros import ServiceCaller
 from surveillance_interfaces.msg import OntologyMap, OntologyPlace, RoomConnection
 from surveillance_interfaces.srv import (
     AddRoom,
+    ConsoleCommand,
     ReferenceName,
     RemoveRoom,
     RoomPosition,
@@ -27,6 +29,7 @@ from surveillance_ontology.ontology_map_builder_node import OntologyMapBuilder
 from surveillance_ontology.patrol_ontology import PatrolOntology
 from surveillance_runtime.conversions import point_message
 from surveillance_runtime.parameters import ParameterError
+from surveillance_runtime.place_changes import described_in_text, description_text
 from surveillance_runtime.qos import STATE_QOS
 
 PLACE: dict[str, Any] = {
@@ -53,6 +56,7 @@ class Caller:
             'add_room': AddRoom,
             'remove_room': RemoveRoom,
             'set_door': SetDoor,
+            'set_place': ConsoleCommand,
         }
         self._kinds = kinds
         self._callers = {
@@ -342,6 +346,52 @@ def test_a_server_that_dies_and_comes_back_gets_the_map_again(
     graph.until(lambda: armor.query.objectprop_b2_ind('connectedTo', 'E') == ['C1', 'C2'])
 
 
+def test_a_place_that_was_changed_is_taken_told_and_kept(
+    graph: Any, armor: ArmorClient, call: Caller, tmp_path: Path
+) -> None:
+    graph.add(ArmorServer)
+    described: dict[str, Any] = {
+        'map': {room: list(doors) for room, doors in SEVEN_ROOMS.items()},
+        'room_positions': {room: [float(i), 1.5] for i, room in enumerate(SEVEN_ROOMS)},
+        'robot_room': 'E',
+        'recharge_rooms': ['E'],
+    }
+    given = {**PLACE, 'state_file': str(tmp_path / 'state.json')}
+    builder = graph.add(OntologyMapBuilder, given)
+    told = graph.listen(String, 'place', STATE_QOS)
+    call('reference_name')
+    # R1 has another name, and R2 is cut in two.
+    described['map']['kitchen'] = described['map'].pop('R1')
+    described['room_positions']['kitchen'] = described['room_positions'].pop('R1')
+    described['map']['R5'], described['room_positions']['R5'] = ['D8'], [2.5, 3.5]
+    described['map']['R2'] = ['D2', 'D8']
+    described['keep_out_zones'] = {'Z': [0.0, 9.0, 1.0, 9.0, 1.0, 10.0]}
+    answer = call('set_place', line=description_text(described))
+    assert (answer.accepted, answer.answer) == (
+        True,
+        'the mission has the place now: 8 rooms, 8 doors',
+    )
+    assert not armor.query.check_ind_exists('R1')
+    assert armor.query.objectprop_b2_ind('connectedTo', 'R5') == ['R2']
+    assert call('room_position', room_name='kitchen').valid
+    graph.until(lambda: bool(told))
+    assert described_in_text(told[-1].data) == described
+    for change, words in (
+        ({'map': {}}, 'map: expected rooms'),
+        ({'hours': {'R2': 'noon'}}, 'hours.R2: '),
+        ({'keep_out_zones': {'Z': [1]}}, 'keep_out_zones.Z: '),
+        ({'station': [3.0, 3.0, 0.0]}, 'stations: are read at the start'),
+    ):
+        refused = call('set_place', line=description_text({**described, **change}))
+        assert not refused.accepted
+        assert words in refused.answer
+    assert 'expected a JSON object' in call('set_place', line='[1]').answer
+    # A builder that is started again tells it again.
+    graph.remove(builder)
+    told.clear()
+    graph.add(OntologyMapBuilder, given)
+    graph.until(lambda: bool(told))
+    assert call('room_position', room_name='kitchen').valid
 def test_robots_of_a_fleet_share_the_map_and_each_has_its_own_place(
     graph: Any, armor: ArmorClient, call: Caller
 ) -> None:
