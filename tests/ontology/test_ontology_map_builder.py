@@ -392,6 +392,8 @@ def test_a_place_that_was_changed_is_taken_told_and_kept(
     graph.add(OntologyMapBuilder, given)
     graph.until(lambda: bool(told))
     assert call('room_position', room_name='kitchen').valid
+
+
 def test_robots_of_a_fleet_share_the_map_and_each_has_its_own_place(
     graph: Any, armor: ArmorClient, call: Caller
 ) -> None:
