@@ -122,8 +122,9 @@ class MissionPage(PatrolNode):
         self.spawn(self._tick, 'page')
 
     def on_stop(self) -> None:
-        """End the server."""
-        self.page.stop()
+        """End the server, if there is one: its port may be taken."""
+        if hasattr(self, 'page'):
+            self.page.stop()
 
     def _period(self) -> float:
         return POLL_PERIOD if self._hub.viewers else IDLE_PERIOD
