@@ -515,21 +515,15 @@ def standstill(*, quick: bool) -> None:
     from std_srvs.srv import SetBool, Trigger
 
     rounds = 2 if quick else 10
-    stop = SetBool, 'stop', SetBool.Request(data=True), SetBool.Request(data=False)
+    stop, release = ((SetBool, 'stop', SetBool.Request(data=on)) for on in (True, False))
     rows = []
     with stack_in_real_time() as patrol:
-        rows.append(stands_after(patrol, 'a mission, Stop', rounds, stop, stop))
-        pause, resume = ((Trigger, f'robot_behavior/fsm/{name}') for name in ('pause', 'resume'))
-        said, undone = Trigger.Request(), Trigger.Request()
-        rows.append(
-            stands_after(
-                patrol,
-                'a mission, Pause',
-                rounds,
-                (*pause, said, undone),
-                (*resume, said, undone),
-            )
+        rows.append(stands_after(patrol, 'a mission, Stop', rounds, stop, release))
+        pause, resume = (
+            (Trigger, f'robot_behavior/fsm/{name}', Trigger.Request())
+            for name in ('pause', 'resume')
         )
+        rows.append(stands_after(patrol, 'a mission, Pause', rounds, pause, resume))
     with stack_in_real_time(('simulator', 'collision_monitor')) as patrol:
         commands = patrol.observer.create_publisher(Twist, 'cmd_vel', 1)
         began = time.monotonic()
@@ -540,7 +534,7 @@ def standstill(*, quick: bool) -> None:
             commands.publish(twist)
 
         patrol.observer.create_timer(0.05, command)
-        rows.append(stands_after(patrol, 'a foreign cmd_vel, Stop', rounds, stop, stop))
+        rows.append(stands_after(patrol, 'a foreign cmd_vel, Stop', rounds, stop, release))
     print_table(
         f'From the request until the robot stands, {rounds} times each, from 0.58 m/s or faster.',
         ('who, what', 'm/s', 'median, s', 'longest, s', 'longest way, m'),
@@ -552,8 +546,8 @@ def stands_after(
     patrol: Stack,
     who: str,
     rounds: int,
-    held: tuple[Any, str, Any, Any],
-    freed: tuple[Any, str, Any, Any],
+    held: tuple[Any, str, Any],
+    freed: tuple[Any, str, Any],
 ) -> tuple[str, ...]:
     """Have the robot stand at full speed and go on; return a row.
 
@@ -562,7 +556,7 @@ def stands_after(
         who: What the row is called.
         rounds: How often.
         held: Type and name of the service that has it stand, and the request.
-        freed: Those that let it go on; its second request counts.
+        freed: Those that let it go on.
     """
     base, seen = patrol.robot.base, []
     hold = patrol.observer.create_client(*held[:2])
@@ -575,7 +569,7 @@ def stands_after(
         hold.call_async(held[2])
         _await(lambda: base.speed == 0.0, 30.0, pause=0.001)
         seen.append((top, patrol.robot.time - begun, base.travelled - driven))
-        done = free.call_async(freed[3])
+        done = free.call_async(freed[2])
         _await(done.done, 30.0)
     speeds, times, ways = zip(*seen, strict=True)
     figures = max(speeds), statistics.median(times), max(times), max(ways)
