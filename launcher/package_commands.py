@@ -29,6 +29,7 @@ COMMANDS = {
         'surveillance_operator.doctor_command',
         'say what a mission awaits of a robot, what comes, and what is missing',
     ),
+    'urdf': ('surveillance_operator.urdf_command', "print a robot's description as a URDF"),
     'replay': ('surveillance_operator.replay', 'show a recorded mission in a browser'),
     'report': ('surveillance_operator.report', 'write what a mission did into one HTML file'),
     'map': ('surveillance_operator.map_command', 'check a place and draw it as a picture'),

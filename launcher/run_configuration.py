@@ -21,6 +21,7 @@ from surveillance_runtime.files import RECORD, RECORDING, TRUTH, FileError
 from surveillance_runtime.profile import (
     ProfileFile,
     RobotProfile,
+    check_behaviour,
     find_profile,
     read_profile,
     unmonitored_entries,
@@ -68,6 +69,7 @@ def configuration(
         merged.check()
         merged.place('simulator', full_name(run.namespace, 'simulator'))
         _check_behaviour(merged, run)
+        check_behaviour(profile_of(config, run), run.behaviour)
     except FileError as error:
         raise ValueError(f'parameter file {error}') from None
     return merged

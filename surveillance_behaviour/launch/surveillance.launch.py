@@ -29,6 +29,7 @@ from surveillance_runtime.node_table import Node as NodeOfTable
 from surveillance_runtime.node_table import find, select
 from surveillance_runtime.parameters import ParameterError
 from surveillance_runtime.profile import (
+    check_behaviour,
     find_profile,
     read_profile,
     remappings,
@@ -81,6 +82,7 @@ def start_nodes(context: LaunchContext) -> list[Node]:
         )
     config = Path(get_package_share_directory('surveillance_behaviour'), 'config')
     robot = read_profile(find_profile(config, given['robot']))
+    check_behaviour(robot, behaviour)
     namespace = given['namespace'] or robot.profile.namespace
     nodes = select(
         mode,

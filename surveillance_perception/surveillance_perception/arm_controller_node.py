@@ -12,7 +12,6 @@ from nav_msgs.msg import Odometry
 from rclpy.callback_groups import ReentrantCallbackGroup
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, Header
-from trajectory_msgs.msg import JointTrajectory
 
 from marker_detection.fusion import FusedPositions
 from state_machines.ros import GoalAbortedError, GoalRun, GoalServer, work_aside
@@ -22,6 +21,7 @@ from surveillance_interfaces.srv import MarkerRoutine, PointCamera
 from surveillance_perception.arm.driver import ArmDriver
 from surveillance_perception.arm.kinematics import ArmMotionError, in_base, look_at
 from surveillance_perception.arm.scan import View, scan
+from surveillance_perception.arm_commands import ArmCommands
 from surveillance_perception.conversions import (
     base_pose_from_ros,
     fuse_views,
@@ -127,11 +127,11 @@ class ArmController(PatrolNode):
         self._base: tuple[str, np.ndarray] | None = None
         self._rest_since: float | None = None
         self._stamps = StampOffset('aruco_detector/detections')
-        self._trajectories = self.create_publisher(JointTrajectory, 'arm/joint_trajectory', 10)
+        commands = ArmCommands(self)
         self._at_rest = OwnedTopic(self, Bool, 'arm/at_rest')
         self._driver = ArmDriver(
             ARM,
-            lambda motion: self._trajectories.publish(trajectory_to_ros(motion, ARM.names)),
+            lambda motion: commands.send(trajectory_to_ros(motion, ARM.names)),
             self._now,
             self._tell_rest,
         )

@@ -14,6 +14,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.subscription import Subscription
 
 from surveillance_runtime.conversions import seconds_of
+from surveillance_runtime.incidents import Severity
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.profile.check_up import Awaited, Endpoint, Heard, Seen, findings
 from surveillance_runtime.qos import SENSOR_QOS
@@ -133,4 +134,4 @@ class InputWatch:
         seen = endpoints_of(self._node)
         for topic in late:
             if lines := list(findings(self._wanted[topic], seen, now - self._since[topic])):
-                self._node.incidents.begin(('robot', topic), '; '.join(lines))
+                self._node.incidents.begin(('robot', topic), '; '.join(lines), Severity.ALARM)

@@ -10,6 +10,7 @@ import numpy.typing as npt
 from builtin_interfaces.msg import Time
 from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped, TransformStamped
 from nav_msgs.msg import OccupancyGrid, Odometry
+from scipy.spatial.transform import Rotation
 from sensor_msgs.msg import CameraInfo, Image, JointState, LaserScan
 from std_msgs.msg import Header
 
@@ -23,6 +24,7 @@ from surveillance_runtime.conversions import (
 from surveillance_runtime.place.floor_plan import Marker
 from surveillance_runtime.place.occupancy_grid import Grid
 from surveillance_runtime.place.rooms import Pose as PlanePose
+from surveillance_runtime.profile.description import FixedFrame
 from surveillance_simulation.camera.model import Camera, Picture
 from surveillance_simulation.robot.lidar import LidarModel
 from surveillance_simulation.world.world import World
@@ -69,6 +71,27 @@ def transform_to_ros(pose: PlanePose, frame: str, child: str, stamp: Time) -> Tr
     message = TransformStamped(header=Header(frame_id=frame, stamp=stamp), child_frame_id=child)
     message.transform.translation.x, message.transform.translation.y = pose[0], pose[1]
     message.transform.rotation = pose_message(pose).orientation
+    return message
+
+
+def matrix_to_ros(matrix: npt.NDArray[np.floating], frame: str, child: str) -> TransformStamped:
+    """Convert a frame in another one, shape (4, 4), metres, to a transform message."""
+    message = TransformStamped(header=Header(frame_id=frame), child_frame_id=child)
+    moved = message.transform.translation
+    moved.x, moved.y, moved.z = (float(each) for each in matrix[:3, 3])
+    turned = Rotation.from_matrix(matrix[:3, :3]).as_quat()
+    rotation = message.transform.rotation
+    rotation.x, rotation.y, rotation.z, rotation.w = (float(each) for each in turned)
+    return message
+
+
+def fixed_frame_to_ros(frame: FixedFrame, stamp: Time) -> TransformStamped:
+    """Convert a frame that does not move to a transform message."""
+    matrix = np.eye(4)
+    matrix[:3, :3] = Rotation.from_euler('xyz', frame.rpy).as_matrix()
+    matrix[:3, 3] = frame.xyz
+    message = matrix_to_ros(matrix, frame.parent, frame.name)
+    message.header.stamp = stamp
     return message
 
 

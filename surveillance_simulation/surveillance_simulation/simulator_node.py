@@ -151,7 +151,8 @@ class Simulator(PatrolNode):
         self._next_measurement = self.robots.time + self._measurement_period
         if rate.speed:
             rate = replace(rate, step=min(rate.step, OBEYS_WITHIN * rate.speed))
-        sensors, cameras = SensorSetup.declared(self), CameraSetup(self)
+        sensors = SensorSetup.declared(self, physics)
+        cameras = CameraSetup(self, sensors.frames.camera)
         self._place = PlaceFeed(self, world, sensors, drives_clock=self._drives_clock)
         rate = replace(rate, look_window=cameras.period + rate.step)
         self._rate = ClockRate(rate, time.monotonic(), len(starts))

@@ -8,8 +8,11 @@ from surveillance_runtime.incidents import Incidents
 
 def test_a_silent_topic_is_named_once_until_it_speaks() -> None:
     lines: list[str] = []
-    silence = SilenceWatch(Incidents(lambda told: lines.append(told.line())), 0.0)
-    silence.hear('map', 1.0)
+    silence = SilenceWatch(Incidents(lambda told: lines.append(told.line())))
+    # What never came is told elsewhere, once.
+    silence.look(1000.0)
+    assert not lines
+    silence.hear('scan', 0.0)
     for second in range(30):
         silence.hear('odom', float(second))
         silence.look(float(second))

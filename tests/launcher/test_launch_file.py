@@ -163,6 +163,8 @@ def test_its_arguments_are_options_of_launch_py(start, tmp_path):
     assert 'simulator' not in [node.name for node in start(simulator='none')]
     in_physics = {node.name: settings(node) for node in start(simulator='mujoco')}
     assert in_physics['simulator']['engine'] == 'mujoco'
+    with pytest.raises(FileError, match=r'turtlebot3_burger.yaml:\d+: arm: none, but'):
+        start(mode='ROBOT', robot='turtlebot3_burger', behaviour='patrol')
     with pytest.raises(FileError, match=r"--robot 'turtlebot3_burgr'.*'turtlebot3_burger'"):
         start(robot='turtlebot3_burgr')
 

@@ -7,6 +7,7 @@ import json
 import math
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -15,7 +16,7 @@ from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped, Twist
 from nav_msgs.msg import OccupancyGrid, Odometry
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import CameraInfo, Image, JointState, LaserScan
-from std_msgs.msg import Float32, UInt32
+from std_msgs.msg import Float32, String, UInt32
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from surveillance_controllers import conversions as received
@@ -337,3 +338,42 @@ def test_time_stands_while_the_mission_is_at_work(graph: Any) -> None:
     graph.until(lambda: node.robot.time == pytest.approx(until))
     waits.publish(Time(sec=until + 2))
     graph.until(lambda: node.robot.time == pytest.approx(until + 2))
+
+
+def test_its_frames_are_one_tree_as_tf_wants_it(graph: Any) -> None:
+    tf2 = pytest.importorskip('tf2_msgs.msg')
+    simulator(graph, **{'robot.frames.base': 'base_footprint'})
+    moving = graph.listen(tf2.TFMessage, 'tf', SENSOR_QOS)
+    fixed = graph.listen(tf2.TFMessage, 'tf_static', STATE_QOS)
+    described = graph.listen(String, 'robot_description', STATE_QOS)
+    seen: list[Any] = [
+        graph.listen(kind, topic, SENSOR_QOS)
+        for kind, topic in (
+            (Odometry, 'odom'),
+            (LaserScan, 'scan'),
+            (Image, 'camera/rgb/image_raw'),
+        )
+    ]
+    graph.until(lambda: fixed and described and len(moving) > 3 and all(seen))
+    transforms = [*fixed[0].transforms, *moving[0].transforms]
+    parents = {each.child_frame_id: each.header.frame_id for each in transforms}
+    # Each frame has one parent, and all lead to the odometry's.
+    assert len(parents) == len(transforms)
+    for message in seen:
+        frame, passed = message[0].header.frame_id, 0
+        while frame in parents and passed < 9:
+            frame, passed = parents[frame], passed + 1
+        assert frame == 'odom'
+    assert parents['base_link'] == 'base_footprint'
+    for each in transforms:
+        q = each.transform.rotation
+        assert math.hypot(q.x, q.y, q.z, q.w) == pytest.approx(1.0)
+        assert not each.child_frame_id.startswith('/')
+    stamps = [seconds_of(message.transforms[0].header.stamp) for message in moving]
+    assert stamps == sorted(stamps)
+    # The camera looks forwards: its optical z axis is the robot's x axis.
+    camera = next(each for each in transforms if 'camera' in each.child_frame_id)
+    q = camera.transform.rotation
+    assert 2 * (q.x * q.z + q.w * q.y) == pytest.approx(1.0, abs=0.2)
+    urdf = ElementTree.fromstring(described[0].data)
+    assert {link.attrib['name'] for link in urdf.iter('link')} >= set(parents) - {'base_footprint'}

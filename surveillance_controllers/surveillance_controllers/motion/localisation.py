@@ -84,6 +84,8 @@ class LocalisationParameters:
         top_step: Odometry that jumps further than this between two readings is not believed, m.
         top_turn: Likewise, rad.
         near: Radius of the first search around the last pose, metres.
+        at_once: A better pose within this distance is taken at once, metres; a farther one is
+            followed first.
         lattice: Distance of the poses that a search tries, metres.
         headings: How many headings a search tries at each.
         body: Radius within which the robot cannot overlap anything, metres.
@@ -122,6 +124,7 @@ class LocalisationParameters:
     top_step: float = 0.3
     top_turn: float = 0.6
     near: float = 2.5
+    at_once: float = 1.0
     lattice: float = 0.25
     headings: int = 24
     body: float = 0.15
@@ -391,7 +394,7 @@ class Localiser:
         """Tell whether a push or a slip may have brought the robot there."""
         p = self.parameters
         turned = abs(angle_between(self.pose[2], pose[2]))
-        return math.dist(pose[:2], self.pose[:2]) <= p.near and turned <= p.same_way
+        return math.dist(pose[:2], self.pose[:2]) <= p.at_once and turned <= p.same_way
 
     def _is_better(self, found: tuple[Pose, float], agreement: float) -> bool:
         p = self.parameters

@@ -148,7 +148,7 @@ class NavigationMotion:
         )
         self._lidar.subscribe(self._on_scan)
         node.create_subscription(PoseWithCovarianceStamped, 'initialpose', self._on_initial_pose, 1)
-        self._silence = SilenceWatch(node.incidents, time.monotonic())
+        self._silence = SilenceWatch(node.incidents)
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         node.create_timer(1.0, lambda: self._silence.look(time.monotonic()), clock=steady)
 
@@ -329,7 +329,6 @@ class NavigationMotion:
     def _on_map(self, message: OccupancyGrid) -> None:
         with conversions.refusing(self._node, 'map'):
             grid = conversions.grid_from(message)
-            self._silence.hear('map', time.monotonic())
             with self._lock:
                 self._navigator.set_map(grid)
 

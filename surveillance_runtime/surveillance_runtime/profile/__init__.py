@@ -2,7 +2,7 @@
 
 `record` is the profile as a record whose fields carry their own checks, `reading` reads one from a
 file `robot.yaml`, `use` says what it means to the nodes of a run (parameters and names of topics),
-`description` draws it as a URDF. No ROS in here.
+`description` draws it as a URDF, `nav2_parameters` lays it over Nav2's own file. No ROS in here.
 """
 
 from surveillance_runtime.profile.reading import (
@@ -13,12 +13,18 @@ from surveillance_runtime.profile.reading import (
     read_profile,
 )
 from surveillance_runtime.profile.record import RobotProfile
-from surveillance_runtime.profile.use import profile_layer, remappings, unmonitored_entries
+from surveillance_runtime.profile.use import (
+    check_behaviour,
+    profile_layer,
+    remappings,
+    unmonitored_entries,
+)
 
 __all__ = [
     'BUILT_IN',
     'ProfileFile',
     'RobotProfile',
+    'check_behaviour',
     'find_profile',
     'profile_layer',
     'profile_names',

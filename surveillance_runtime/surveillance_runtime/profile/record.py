@@ -19,6 +19,8 @@ from surveillance_runtime.robot_base import ROBOT_DECELERATION, ROBOT_RADIUS
 COMMAND_TYPES = ('Twist', 'TwistStamped')
 BATTERY_SOURCES = ('model', 'topic')
 ARMS = ('built_in', 'none')
+ARM_TYPES = ('JointTrajectory', 'FollowJointTrajectory')
+"""A topic, and ros2_control's action."""
 _NAME = re.compile(r'[~/]?[A-Za-z_]\w*(/[A-Za-z_]\w*)*\Z', re.ASCII)
 _FRAME = re.compile(r'/?[A-Za-z_][\w/.-]*\Z', re.ASCII)
 
@@ -108,8 +110,8 @@ class Topics:
     )
     arm: str = parameter(
         'arm/joint_trajectory',
-        "trajectory_msgs/JointTrajectory for the arm: ros2_control's joint_trajectory_controller "
-        'takes it on its own topic joint_trajectory.',
+        "trajectory_msgs/JointTrajectory for the arm, on ros2_control's topic joint_trajectory; "
+        'with types.arm FollowJointTrajectory the name of its action follow_joint_trajectory.',
         check=topic_name,
     )
 
@@ -122,6 +124,12 @@ class Types:
         'Twist',
         'Type of the velocity that the base takes; that of `wanted` is Twist.',
         choices=COMMAND_TYPES,
+    )
+    arm: str = parameter(
+        'JointTrajectory',
+        'How the arm takes its motions on `topics.arm`: as a topic, or as an action of '
+        "ros2_control's controller, as MoveIt uses it.",
+        choices=ARM_TYPES,
     )
 
 

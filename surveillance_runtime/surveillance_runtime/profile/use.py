@@ -6,6 +6,7 @@ from collections.abc import Collection, Iterator
 from typing import Any
 
 from surveillance_runtime.configuration import Entry, Layer
+from surveillance_runtime.files import FileError
 from surveillance_runtime.parameters import specs_of
 from surveillance_runtime.profile.reading import ProfileFile
 from surveillance_runtime.profile.record import RobotProfile
@@ -40,6 +41,8 @@ _PARAMETERS = {
     'wheels.turn_speed': ('simulator:base.turn_speed',),
     'wheels.acceleration': ('simulator:base.acceleration',),
     'wheels.turn_acceleration': ('simulator:base.turn_acceleration',),
+    'types.arm': ('arm_controller:robot.arm_type',),
+    'topics.arm': ('arm_controller:robot.arm_action',),
     'battery.source': ('battery_controller:source.source',),
     'battery.full': ('battery_controller:source.full',),
     'battery.voltages': ('battery_controller:source.voltages',),
@@ -79,6 +82,20 @@ def _of_commands(file: ProfileFile) -> Iterator[Entry]:
     origin = file.profile.origins.get('types.command', f'{file.path} (by default)')
     for node in (MONITOR, 'simulator'):
         yield Entry(f'/**/{node}', 'robot.command_type', file.profile.types.command, origin)
+
+
+def check_behaviour(file: ProfileFile, behaviour: str) -> None:
+    """Make sure that a robot can do what a behaviour asks of it.
+
+    Raises:
+        FileError: It has no arm, and the behaviour looks around with one.
+    """
+    if behaviour == 'patrol' and file.profile.arm == 'none':
+        origin = file.profile.origins.get('arm', str(file.path))
+        raise FileError(
+            f'{origin}: arm: none, but --behaviour patrol looks for markers with a camera on an '
+            'arm: expected --behaviour surveillance, or a robot with an arm'
+        )
 
 
 def unmonitored_entries(file: ProfileFile, nodes: Collection[str]) -> Iterator[Entry]:

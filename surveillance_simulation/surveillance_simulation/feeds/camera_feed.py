@@ -14,7 +14,6 @@ from sensor_msgs.msg import CameraInfo, Image
 
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.parameters import parameter
-from surveillance_runtime.profile.parameters import declared_frames
 from surveillance_simulation import conversions
 from surveillance_simulation.camera.model import Camera, Conditions, covered, expose
 from surveillance_simulation.camera.mujoco_rendering import MujocoRenderer
@@ -51,12 +50,12 @@ class CameraSetup:
         period: Simulated seconds from picture to picture.
     """
 
-    def __init__(self, node: PatrolNode) -> None:
-        """Declare the parameters on a node."""
+    def __init__(self, node: PatrolNode, frame: str) -> None:
+        """Declare the parameters on a node; `frame` is the camera's."""
         self.conditions = node.declare_fields(
             Conditions(), prefix='camera.', on_change=self._take_conditions
         )
-        self.frame = declared_frames(node, 'camera').camera
+        self.frame = frame
         self.options = node.declare_fields(CameraOptions(), prefix='camera.')
         self.period = 1.0 / self.options.rate
 

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
 from builtin_interfaces.msg import Time
-from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped
+from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped, TransformStamped
 from nav_msgs.msg import OccupancyGrid, Odometry
 from rclpy.event_handler import PublisherEventCallbacks
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState, LaserScan
-from std_msgs.msg import UInt32
+from std_msgs.msg import String, UInt32
 
 from surveillance_interfaces.msg import DoorStates
 from surveillance_runtime.conversions import nanoseconds_of
@@ -20,10 +20,13 @@ from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.parameters import parameter
 from surveillance_runtime.place import plan_grid
 from surveillance_runtime.place.rooms import Pose
+from surveillance_runtime.profile.description import description, fixed_frames
 from surveillance_runtime.profile.parameters import LidarSettings, declared_frames
-from surveillance_runtime.profile.record import Frames
+from surveillance_runtime.profile.record import Body, Frames, Lidars, RobotProfile, Wheels
+from surveillance_runtime.qos import STATE_QOS
 from surveillance_runtime.state_topics import OwnedTopic
 from surveillance_simulation import conversions
+from surveillance_simulation.physics.model import PhysicsModel
 from surveillance_simulation.robot.robot import Robot
 from surveillance_simulation.world.world import World
 
@@ -63,19 +66,34 @@ class SensorSetup:
         frames: The names of the frames.
         lidars: Topic, frame and mount of each lidar; one that tf_static knows is at the centre.
         published: How it is published.
+        physics: The robots' bodies.
     """
 
     frames: Frames
     lidars: tuple[tuple[str, str, Pose], ...]
     published: PublishedOptions
+    physics: PhysicsModel
 
     @classmethod
-    def declared(cls, node: PatrolNode) -> SensorSetup:
+    def declared(cls, node: PatrolNode, physics: PhysicsModel) -> SensorSetup:
         """Declare the parameters on a node."""
-        frames = declared_frames(node, 'map', 'odom', 'base', 'scans')
+        frames = declared_frames(node, 'map', 'odom', 'base', 'scans', 'camera')
         lidars = node.declare_fields(LidarSettings(), without=('sweep',))
         published = node.declare_fields(PublishedOptions())
-        return cls(frames, tuple(_lidars_of(lidars, frames)), published)
+        return cls(frames, tuple(_lidars_of(lidars, frames)), published, physics)
+
+    def profile(self, radius: float) -> RobotProfile:
+        """Return what is known of a robot of this radius, metres, as its profile."""
+        physics = self.physics
+        mounts = [value for _, _, mount in self.lidars for value in (*mount, 0.0)]
+        wheels = replace(Wheels(), separation=physics.wheel_separation, radius=physics.wheel_radius)
+        return replace(
+            RobotProfile(),
+            frames=replace(self.frames, scans=tuple(frame for _, frame, _ in self.lidars)),
+            body=Body(radius, physics.footprint, physics.height),
+            lidars=Lidars(tuple(mounts), height=physics.lidar_height),
+            wheels=wheels,
+        )
 
 
 def _lidars_of(lidars: LidarSettings, frames: Frames) -> list[tuple[str, str, Pose]]:
@@ -141,6 +159,9 @@ class SensorFeed:
         self._truth = node.create_publisher(PoseStamped, topic('ground_truth'), SENSOR_DEPTH)
         self._collisions = OwnedTopic(node, UInt32, topic('collisions'))
         self._tf = None if TFMessage is None else node.create_publisher(TFMessage, topic('tf'), 10)
+        self._camera_at: TransformStamped | None = None
+        self._camera_moved = True
+        self._describe(node, setup)
         self._told_collisions = -1
         if setup.published.announce_pose:
             self._announce_pose(node)
@@ -156,7 +177,7 @@ class SensorFeed:
             transform = conversions.transform_to_ros(
                 base.odometry, self._frames.odom, self._frames.base, stamp
             )
-            self._tf.publish(TFMessage(transforms=[transform]))
+            self._tf.publish(TFMessage(transforms=[transform, self._camera_frame(stamp)]))
         for publisher, frame, mount in self._scans:
             if publisher.get_subscription_count():
                 sweep = self._robot.measure(mount)
@@ -179,6 +200,31 @@ class SensorFeed:
         if base.collisions != self._told_collisions:
             self._told_collisions = base.collisions
             self._collisions.publish(UInt32(data=base.collisions))
+
+    def _camera_frame(self, stamp: Time) -> TransformStamped:
+        """Return where the arm holds the camera."""
+        arm, now = self._robot.arm, self._robot.time
+        if self._camera_at is None or self._camera_moved or arm.is_moving(now):
+            matrix = arm.arm.camera_frame(arm.positions(now))
+            self._camera_at = conversions.matrix_to_ros(
+                matrix, self._frames.base, self._frames.camera
+            )
+            self._camera_moved = arm.is_moving(now)
+        self._camera_at.header.stamp = stamp
+        return self._camera_at
+
+    def _describe(self, node: PatrolNode, setup: SensorSetup) -> None:
+        """Publish the robot's description, and its frames that do not move."""
+        profile, topic = (
+            setup.profile(self._robot.base.model.radius),
+            partial(topic_of, self._robot),
+        )
+        self._description = node.create_publisher(String, topic('robot_description'), STATE_QOS)
+        self._description.publish(String(data=description(profile)))
+        if TFMessage is not None:
+            self._static = node.create_publisher(TFMessage, topic('tf_static'), STATE_QOS)
+            fixed = [conversions.fixed_frame_to_ros(each, Time()) for each in fixed_frames(profile)]
+            self._static.publish(TFMessage(transforms=fixed))
 
     def _announce_pose(self, node: PatrolNode) -> None:
         def on_match(matched: object) -> None:
