@@ -1,5 +1,8 @@
 """The alarm: reads the nodes' incidents from their log lines, and calls a person when it is time.
 
+A call is a line of the log, the argument of the command of `--alarm`, and news for the sinks of
+`--notify` (`surveillance_operator.notify`).
+
 Each incident is also kept as a line of the run's `incidents.jsonl`, for the report.
 """
 
@@ -15,20 +18,32 @@ from pathlib import Path
 
 from launcher.log_merge import MergedLog
 from surveillance_runtime.files import INCIDENTS, LineFile
-from surveillance_runtime.incidents import Cause, Incident, IncidentBook, Severity, Told, read_line
+from surveillance_runtime.incidents import (
+    Call,
+    Cause,
+    Incident,
+    IncidentBook,
+    Severity,
+    Told,
+    read_line,
+)
 
 LAUNCHER = 'launch'
 QUIET_AGAIN = 600.0
 """A node that died again and again, and has not for this long, is well again, seconds."""
 
 
-def caller(alarm: str, log: MergedLog) -> Callable[[str], None]:
-    """Return what calls somebody: it says so in the log, and runs the user's command with one line
-    as its argument.
+def caller(
+    alarm: str, log: MergedLog, tell: Callable[[Call], object] = lambda _: None
+) -> Callable[[Call], None]:
+    """Return what calls somebody: it says so in the log, runs the user's command with one line as
+    its argument, and tells the sinks.
     """
 
-    def call(text: str) -> None:
+    def call(told: Call) -> None:
+        text = told.text
         log.warn(f'alarm: {text}')
+        tell(told)
         if not alarm:
             return
         try:
@@ -49,14 +64,14 @@ class Alarm:
     """Keeps the book of a run's incidents on a thread of its own.
 
     Args:
-        call: Calls somebody, with one line.
+        call: Calls somebody.
         folder: Of the run; None: incidents are not kept.
         now: Steady time, seconds.
     """
 
     def __init__(
         self,
-        call: Callable[[str], object],
+        call: Callable[[Call], object],
         folder: Path | None = None,
         now: Callable[[], float] = time.monotonic,
     ) -> None:

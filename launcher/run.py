@@ -219,6 +219,13 @@ class Run:
         metavar='COMMAND',
         help='run this when the robot needs a person; the last argument says why',
     )
+    notify: Path | None = _option(
+        '--notify',
+        group=_PROCESSES,
+        type=Path,
+        metavar='FILE',
+        help='whom else to tell: webhooks, MQTT, e-mail, commands (notify.yaml)',
+    )
     network: bool = _switch(
         '--network',
         'talk to nodes on other machines, which can then control the robot (default: only this '
@@ -319,6 +326,15 @@ class Run:
             raise ValueError(f'--alarm {self.alarm!r}: {error}') from None
         if alarm and shutil.which(alarm[0]) is None:
             raise ValueError(f'--alarm {self.alarm!r}: {alarm[0]!r} cannot be run')
+        if self.notify is not None:
+            from surveillance_operator.notify.settings import read_notify_file
+            from surveillance_operator.notify.sinks import sink_of
+
+            try:
+                for sink in read_notify_file(self.notify):
+                    sink_of(sink)
+            except (FileError, ValueError) as error:
+                raise ValueError(f'--notify {error}') from None
 
     def nodes(self, *, monitored: bool = True) -> tuple[node_table.Node, ...]:
         """Return the nodes that work; without what monitors a base that others monitor."""

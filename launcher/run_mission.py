@@ -92,11 +92,19 @@ def run_mission(run: Run, config: Path, runs: Path, resume: Path | None = None) 
     if run.network:
         log.say('nodes of other machines are heard: see docs/security.md')
     log.say(f'watch it in a second terminal: {watch_command(run)}')
-    alarm = Alarm(caller(run.alarm, log), folder)
+    outbox, tell = None, None
+    if run.notify is not None:
+        from surveillance_operator.notify.pipeline import notifier
+
+        robot = (run.namespace or '').strip('/') or 'Robot1'
+        outbox, tell = notifier(run.notify, folder, robot, log.warn)
+    alarm = Alarm(caller(run.alarm, log, tell or (lambda _: None)), folder)
     log.listen(alarm.hear)
     supervisor = Supervisor(programs, log, on_trouble=alarm.trouble, on_restart=alarm.restarted)
     code = _supervised(run, team, supervisor, folder, log)
     alarm.close()
+    if outbox is not None:
+        outbox.close()
     for part in team:
         for line in what_to_look_at(part.folder(folder)):
             log.plain(line)

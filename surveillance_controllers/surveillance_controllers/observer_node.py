@@ -12,7 +12,7 @@ import math
 import queue
 import time
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from functools import partial
@@ -47,6 +47,7 @@ from surveillance_ontology.patrol_ontology import LONGEST_THRESHOLD, ROBOT
 from surveillance_perception.conversions import image_from_ros
 from surveillance_perception.marker_registry import read_registry
 from surveillance_perception.observation.answers import answered
+from surveillance_perception.observation.day_book import DayBook
 from surveillance_perception.observation.events import Event, EventBook, EventState
 from surveillance_perception.observation.evidence import EvidenceStore
 from surveillance_perception.observation.observations import Kind, Observation
@@ -127,6 +128,9 @@ class ObserverSettings:
     peer_timeout: float = parameter(
         10.0, 'How long map builder and ontology may take to answer, s of real time.', 0.1, 3600.0
     )
+    evidence_days: float = parameter(
+        30.0, 'Pictures that are older are deleted, days.', 0.01, 36_500.0
+    )
     radius: float = robot_radius()
     camera: bool = parameter(True, 'Whether pictures are looked at.')
     persons: bool = parameter(
@@ -171,6 +175,8 @@ class Observer(PatrolNode):
         self.sweeps = 0
         self._told: dict[int, EventState] = {}
         self._book = EventBook(told=self._on_event)
+        self._pictures = self._store()
+        self._days = DayBook(datetime.fromtimestamp)
         self._watcher = Watcher(
             self._rules(tuple(places)),
             self._book,
@@ -184,12 +190,12 @@ class Observer(PatrolNode):
             ways_of=lambda grid: Ways(grid, self._settings.radius, self._doors, places),
             find_persons=self._person_finder(),
             looked=self._on_look,
-            store=self._store(),
+            store=self._pictures,
             views=self._views(),
             verify_seconds=self._settings.verify_seconds,
         )
         self._kept = KeptFile(self._settings.state_file, 'starting without it')
-        self._complain(self._kept.read(self._watcher.restore))
+        self._complain(self._kept.read(self._restore))
         for rule in self._watcher.rules:
             self.get_logger().info(f'watching: {rule.words()}')
         self._scans: deque[tuple[float, Scan]] = deque(maxlen=10)
@@ -260,7 +266,11 @@ class Observer(PatrolNode):
         if not folder:
             return None
         try:
-            return EvidenceStore(Path(folder), round(1e6 * self._settings.evidence_megabytes))
+            return EvidenceStore(
+                Path(folder),
+                round(1e6 * self._settings.evidence_megabytes),
+                self._settings.evidence_days,
+            )
         except OSError as error:
             self._complain(f'evidence_folder {folder}: {error.strerror}; no picture is kept')
             return None
@@ -472,10 +482,18 @@ class Observer(PatrolNode):
         self._publish_events()
 
     def _keep(self) -> None:
+        if self._pictures is not None:
+            self._pictures.forget_old(self._now())
         if self._kept:
-            self._complain(self._kept.write(self._watcher.state()))
+            state = {**self._watcher.state(), 'days': self._days.to_json()}
+            self._complain(self._kept.write(state))
+
+    def _restore(self, kept: Mapping[str, Any]) -> None:
+        self._watcher.restore(kept)
+        self._days.restore(kept.get('days', {}))
 
     def _on_observation(self, seen: Observation) -> None:
+        self._days.take(seen)
         self._observations.publish(String(data=json.dumps(seen.to_json())))
 
     def _on_look(self, look: Look) -> None:
@@ -493,6 +511,8 @@ class Observer(PatrolNode):
             self.incidents.end(_cause(event), f'{event.words()}')
 
     def _on_alert(self, event: Event) -> None:
+        if self._pictures is not None:
+            self._pictures.describe(event.number, json.dumps(event.to_json()))
         self.incidents.begin(_cause(event), f'{event.words()} ({event.rule})', Severity.ALARM)
 
     def _publish_events(self) -> None:

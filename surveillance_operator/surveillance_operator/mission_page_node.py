@@ -28,6 +28,7 @@ from surveillance_operator.page.hub import Hub
 from surveillance_operator.page.server import Action, Page
 from surveillance_operator.place_page.desk import PlaceDesk
 from surveillance_operator.polled_subscription import PolledSubscription
+from surveillance_operator.sightings import Sightings
 from surveillance_runtime import parameter_checks
 from surveillance_runtime.files import FileError
 from surveillance_runtime.launch_protocol import NotNowError
@@ -93,6 +94,14 @@ class MissionPage(PatrolNode):
             'File with the token, made if missing; empty: a new one.',
             read_only=True,
         )
+        evidence_folder = self.parameter(
+            'evidence_folder',
+            '',
+            "The observer's pictures, for whoever may look; beyond this machine people in them are "
+            'blurred. Empty: none are shown.',
+            read_only=True,
+        )
+        self._sightings = Sightings(self, evidence_folder)
         self._hub = Hub()
         files = self.declare_fields(PlaceSettings())
         self._camera = Camera(self)
@@ -105,6 +114,7 @@ class MissionPage(PatrolNode):
                 actions=(self._offered_actions() if control else {})
                 | (desk.actions if desk else {}),
                 picture=self._camera.jpeg,
+                evidence=lambda name, leaves: self._sightings.picture(name, blur=leaves),
                 host=host,
                 port=port,
                 origin=origin,
@@ -164,6 +174,7 @@ class MissionPage(PatrolNode):
             'facts': lambda place: {'ok': True, 'facts': actions.facts(place)},
             'explain': lambda fact: {'ok': True, 'lines': actions.explain(fact)},
             'why_not': why_not,
+            'sightings': self._sightings.listed,
         }
 
     def _offered_actions(self) -> dict[str, Action]:
@@ -181,6 +192,7 @@ class MissionPage(PatrolNode):
             'threshold': actions.set_threshold,
             'policy': actions.set_policy,
             'command': actions.command,
+            'event': actions.event,
         }
 
 

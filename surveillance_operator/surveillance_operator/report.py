@@ -326,9 +326,22 @@ def _clock(seconds: float) -> str:
 def main(argv: Sequence[str] | None = None) -> int:
     """Write the report of a run and say where; the exit code is 2 for bad input."""
     parser = run_parser('report', 'Writes what a mission did into one HTML file.')
+    parser.add_argument(
+        '--day',
+        metavar='DAY',
+        help='instead, what the observer saw on a day: 2026-03-01, today, yesterday, or last',
+    )
+    parser.add_argument(
+        '--sharp', action='store_true', help='with --day: do not blur people in its pictures'
+    )
     options = parser.parse_args(argv)
     try:
         folder = find_run(options.run, options.runs)
+        if options.day is not None:
+            from surveillance_operator.day_report import write_day  # its pictures take time
+
+            print(write_day(folder, options.day, blur=not options.sharp))
+            return 0
         try:
             for line in bag.repair(folder / RECORDING):
                 print(line)

@@ -172,16 +172,32 @@ class _Open:
     ending: str = ''
 
 
+class Call(NamedTuple):
+    """A person is called.
+
+    Attributes:
+        text: One line.
+        incident: What for.
+        number: The how manieth call for it, from 1.
+        over: Whether it is over.
+    """
+
+    text: str
+    incident: Incident
+    number: int
+    over: bool
+
+
 class IncidentBook:
     """All incidents of a mission, and when somebody is to be called.
 
     Args:
-        call: Called with one line for a person.
+        call: Called with each call.
         note: Called with each incident that has begun, and again when it has ended.
     """
 
     def __init__(
-        self, call: Callable[[str], object], note: Callable[[Incident], object] = lambda _i: None
+        self, call: Callable[[Call], object], note: Callable[[Incident], object] = lambda _i: None
     ) -> None:
         self._call = call
         self._note = note
@@ -249,7 +265,7 @@ class IncidentBook:
         since = f' (for {_span(now - incident.began)} now)' if each.calls else ''
         each.next_call = now + min(FIRST_AGAIN * 2.0**each.calls, LONGEST_AGAIN)
         each.calls += 1
-        self._call(incident.text + since)
+        self._call(Call(incident.text + since, incident, each.calls, over=False))
 
     def _finish(self, each: _Open, now: float) -> None:
         incident = replace(each.incident, ended=now)
@@ -258,7 +274,8 @@ class IncidentBook:
         if each.calls:
             lasted = _span(now - incident.began)
             ending = f': {each.ending}' if each.ending != incident.text else ''
-            self._call(f'all clear after {lasted}: {incident.text}{ending}')
+            text = f'all clear after {lasted}: {incident.text}{ending}'
+            self._call(Call(text, incident, each.calls, over=True))
 
 
 def _span(seconds: float) -> str:

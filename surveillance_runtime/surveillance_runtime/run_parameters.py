@@ -168,7 +168,8 @@ def watch_entries(folder: Path, file: Path) -> Iterator[Entry]:
     yield for_node(BEHAVIOUR_NODE, 'looks', True, '--watch')
     kept = folder.resolve()
     yield for_node(OBSERVER, 'state_file', str(kept / f'{OBSERVER}.json'), 'this run')
-    yield for_node(OBSERVER, 'evidence_folder', str(kept / 'evidence'), 'this run')
+    for node in (OBSERVER, PAGE):
+        yield for_node(node, 'evidence_folder', str(kept / 'evidence'), 'this run')
 
 
 def stage_entry(file: Path) -> Entry:

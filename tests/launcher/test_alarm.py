@@ -7,7 +7,7 @@ import threading
 from pathlib import Path
 
 from launcher.alarm import Alarm
-from surveillance_runtime.incidents import SETTLED
+from surveillance_runtime.incidents import SETTLED, Call
 
 
 class Clock:
@@ -22,9 +22,9 @@ def test_an_incident_is_called_kept_and_cleared(tmp_path: Path) -> None:
     clock, calls = Clock(), []
     called = threading.Condition()
 
-    def call(text: str) -> None:
+    def call(told: Call) -> None:
         with called:
-            calls.append(text)
+            calls.append(told.text)
             called.notify_all()
 
     alarm = Alarm(call, tmp_path, clock)

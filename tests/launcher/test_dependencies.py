@@ -23,9 +23,10 @@ DISTRIBUTIONS = {
     'PIL': 'pillow',
     're2': 'google-re2',
     'ruamel': 'ruamel.yaml',
+    'paho': 'paho-mqtt',
 }
 # Looked for at run time and done without when absent: an installed ROS has them.
-OPTIONAL = {'tf2_msgs', 'nav2_msgs', 'mujoco', 'launch', 'launch_ros'}
+OPTIONAL = {'tf2_msgs', 'nav2_msgs', 'mujoco', 'launch', 'launch_ros', 'ai_edge_litert'}
 # Known to type checkers alone.
 TYPES = {'_typeshed'}
 # With rclpy[fastrtps] and common_interfaces.

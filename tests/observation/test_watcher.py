@@ -152,7 +152,7 @@ def test_a_box_that_appears_is_an_event_with_a_picture_until_it_is_gone(tmp_path
     assert math.dist(event.position, (1.5, 1.5)) < 0.2
     assert watch.alerts
     picture = cv2.imread(str(tmp_path / event.evidence[0]))
-    assert picture.shape == (360, 360, 3)
+    assert picture.shape == (360, 724, 3)  # before, and now
     watch.visit('R2', (9.0, 2.5))
     assert watch.book.events[0].state == EventState.OPEN, 'its spot was not in view'
     watch.visit('R1', HERE)

@@ -208,3 +208,25 @@ def test_a_viewer_gets_everything_and_then_what_changed(page: Page) -> None:
 def test_an_address_that_is_taken_is_one_line(page: Page) -> None:
     with pytest.raises(OSError, match=f'127.0.0.1:{page.port}: Address already in use'):
         Page(Hub(), questions={}, actions={}, port=page.port)
+
+
+def test_pictures_are_for_whoever_may_look_and_beyond_this_machine_blurred() -> None:
+    asked: list[tuple[str, bool]] = []
+
+    def picture(name: str, leaves: bool) -> bytes | None:
+        asked.append((name, leaves))
+        return b'jpeg' if name == 'a.jpg' else None
+
+    here = Page(Hub(), questions={}, actions={}, evidence=picture, port=0)
+    away = Page(Hub(), questions={}, actions={}, evidence=picture, host='0.0.0.0', port=0)
+    for each in (here, away):
+        each.start()
+    try:
+        assert ask(here, 'GET', '/evidence/a.jpg') == (200, 'jpeg')
+        assert ask(here, 'GET', '/evidence/b.jpg')[0] == 404
+        assert ask(away, 'GET', '/evidence/a.jpg')[0] == 403
+        assert ask(away, 'GET', f'/evidence/a.jpg?token={away.token}') == (200, 'jpeg')
+    finally:
+        for each in (here, away):
+            each.stop()
+    assert asked == [('a.jpg', False), ('b.jpg', False), ('a.jpg', True)]

@@ -25,7 +25,7 @@ def alarm(cause: Cause = D1, text: str = 'D1 is closed', *, over: bool = False) 
 def book() -> tuple[IncidentBook, list[str], list[Incident]]:
     calls: list[str] = []
     notes: list[Incident] = []
-    return IncidentBook(calls.append, notes.append), calls, notes
+    return IncidentBook(lambda call: calls.append(call.text), notes.append), calls, notes
 
 
 def test_an_hour_long_incident_calls_five_times_and_once_that_all_is_well() -> None:

@@ -66,6 +66,7 @@ class Page:
         questions: Answered to whoever may look, by name.
         actions: Done for whoever may act, by name; none without control.
         picture: The camera's image as JPEG, or None when there is none.
+        evidence: A kept picture by name as JPEG, or None; told whether it leaves this machine.
         host, port: Where to listen; port 0 takes any.
         origin: What browsers know the page by behind a proxy, as ``https://robot.example.org``;
             empty: there is no proxy.
@@ -87,6 +88,7 @@ class Page:
         questions: Mapping[str, Action],
         actions: Mapping[str, Action],
         picture: Callable[[], bytes | None] = lambda: None,
+        evidence: Callable[[str, bool], bytes | None] = lambda _name, _leaves: None,
         host: str = '127.0.0.1',
         port: int = 8080,
         origin: str = '',
@@ -98,6 +100,7 @@ class Page:
         self._hub = hub
         self._questions, self._actions = questions, actions
         self._picture = picture
+        self._evidence_of = evidence
         self._replay = replay
         self._front = front
         self.token = token or secrets.token_urlsafe(24)
@@ -114,6 +117,7 @@ class Page:
             Route('/edit', self._edit),
             Route('/events', self._events),
             Route('/camera.jpg', self._camera),
+            Route('/evidence/{name}', self._evidence),
             Route('/ask/{name}', self._ask),
             Route('/act/{name}', self._act, methods=['POST']),
             Mount('/static', StaticFiles(directory=STATIC)),
@@ -212,6 +216,13 @@ class Page:
         image = await run_in_threadpool(self._picture)
         if image is None:
             return Response(status_code=204)
+        return Response(image, media_type='image/jpeg')
+
+    async def _evidence(self, request: Request) -> Response:
+        name = request.path_params['name']
+        image = await run_in_threadpool(self._evidence_of, name, not self._is_local)
+        if image is None:
+            return PlainTextResponse('no such picture', 404)
         return Response(image, media_type='image/jpeg')
 
     async def _ask(self, request: Request) -> Response:

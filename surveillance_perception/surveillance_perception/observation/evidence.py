@@ -21,6 +21,16 @@ AROUND = 3.0
 SCALE = 60.0
 """Pixels for a metre."""
 _NAME = re.compile(r'(\d)_(\d{13})_.*')
+_DESCRIBED = re.compile(r'event_(\d+)\.json')
+MOST_DESCRIBED = 500
+"""So many events are described in the folder, those of the highest numbers."""
+DAY = 86400.0
+
+
+def is_sweep(name: str) -> bool:
+    """Tell whether a file shows a map with a sweep of the lidar, and no camera's picture."""
+    match = _NAME.fullmatch(name)
+    return match is not None and name[len('0_0000000000000_') :].startswith('sweep-')
 
 
 class EvidenceStore:
@@ -29,13 +39,17 @@ class EvidenceStore:
     Args:
         folder: Made when missing.
         most_bytes: What all files may take together.
+        most_days: What is older is deleted, days.
 
     Raises:
         OSError: The folder cannot be made or read.
     """
 
-    def __init__(self, folder: Path, most_bytes: int = 300_000_000) -> None:
+    def __init__(
+        self, folder: Path, most_bytes: int = 300_000_000, most_days: float = 30.0
+    ) -> None:
         self._folder = folder
+        self._days = most_days
         self._most = most_bytes
         folder.mkdir(parents=True, exist_ok=True)
         self._sizes = {
@@ -61,7 +75,7 @@ class EvidenceStore:
         except OSError:
             return ''  # the disk is full: what was seen counts without a picture
         self._sizes[name] = len(data)
-        self._prune()
+        self._prune(stamp)
         return name if name in self._sizes else ''
 
     @property
@@ -69,13 +83,63 @@ class EvidenceStore:
         """Bytes of all files."""
         return sum(self._sizes.values())
 
-    def _prune(self) -> None:
+    def describe(self, number: int, event: str) -> None:
+        """Keep an event as JSON beside its pictures, for whoever tells people of it."""
+        path = self._folder / f'event_{number}.json'
+        part = path.with_suffix('.part')
+        try:
+            part.write_text(event, 'utf-8')
+            part.replace(path)
+            for each in self._folder.glob('event_*.json'):
+                match = _DESCRIBED.fullmatch(each.name)
+                if match is not None and int(match[1]) <= number - MOST_DESCRIBED:
+                    each.unlink(missing_ok=True)
+        except OSError:
+            return  # the disk is full: the alarm counts without it
+
+    def forget_old(self, stamp: float) -> None:
+        """Delete what is older than it may become.
+
+        Args:
+            stamp: Now, seconds since 1970.
+        """
+        for name in [each for each in self._sizes if int(each[2:15]) < oldest(stamp, self._days)]:
+            del self._sizes[name]
+            (self._folder / name).unlink(missing_ok=True)
+
+    def _prune(self, stamp: float) -> None:
+        self.forget_old(stamp)
         total = self.total
         for name in sorted(self._sizes, key=lambda each: (each[0], each[2:15])):
             if total <= self._most:
                 return
             total -= self._sizes.pop(name)
             (self._folder / name).unlink(missing_ok=True)
+
+
+def oldest(stamp: float, days: float) -> int:
+    """Return the time of the oldest file that is kept, milliseconds since 1970."""
+    return round(1000.0 * (stamp - days * DAY))
+
+
+def side_by_side(before: NDArray[np.uint8], now: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """Return two pictures beside each other, of the height of the second, with their names on them.
+
+    Args:
+        before: Grey or BGR: how it looks normally.
+        now: Grey or BGR.
+    """
+    rows = now.shape[0]
+    shown = []
+    for picture, word in ((before, 'before'), (now, 'now')):
+        colour = cv2.cvtColor(picture, cv2.COLOR_GRAY2BGR) if picture.ndim == 2 else picture.copy()
+        size = max(1, round(colour.shape[1] * rows / colour.shape[0])), rows
+        colour = cv2.resize(colour, size, interpolation=cv2.INTER_AREA)
+        for thick, value in ((4, 255), (1, 0)):
+            cv2.putText(colour, word, (8, 22), cv2.FONT_HERSHEY_SIMPLEX, 0.6, (value,) * 3, thick)
+        shown.append(colour)
+    line = np.full((rows, 4, 3), 255, np.uint8)
+    return np.asarray(np.hstack([shown[0], line, shown[1]]), np.uint8)
 
 
 def sweep_picture(

@@ -23,7 +23,7 @@ from scipy import ndimage
 
 from surveillance_perception.observation.doors import Segment, read_door
 from surveillance_perception.observation.events import ELSEWHERE, Event, EventBook, EventState
-from surveillance_perception.observation.evidence import EvidenceStore, sweep_picture
+from surveillance_perception.observation.evidence import EvidenceStore, side_by_side, sweep_picture
 from surveillance_perception.observation.floor import (
     Change,
     FloorView,
@@ -491,7 +491,7 @@ class Watcher:
                 compared_with=f'{known.stamp:.0f}',
             )
             if self._is_due(observation):
-                self._take(observation, grey)
+                self._take(observation, grey, known.picture)
 
     def _look_for_persons(self, picture: Picture, stamp: float) -> None:
         found = [] if self._find_persons is None else self._find_persons(picture)
@@ -571,16 +571,22 @@ class Watcher:
         self._told[key] = seen.stamp, self._at
         return True
 
-    def _take(self, seen: Observation, picture: Picture | None = None) -> None:
+    def _take(
+        self, seen: Observation, picture: Picture | None = None, before: Picture | None = None
+    ) -> None:
+        """Take an observation, with a picture of it and of how it looks normally."""
         seen = replace(seen, usual=self._habits.usual(seen))
         self._habits.learn(seen, self._look)
         severity, rule = severity_of(self.rules, seen, self._local(seen.stamp))
-        evidence = ''
+        evidence = kind = ''
         if self._store is not None and severity:
             if picture is None and seen.position is not None and self._grid is not None:
-                picture = sweep_picture(self._grid, seen.position, *self._last)
+                picture, kind = self._met_picture(seen.position, self._grid), 'sweep-'
+                before = self._normal_picture(seen.position)
             if picture is not None:
-                what = f'{seen.kind}-{seen.subject or seen.place}-{seen.state}'
+                if before is not None:
+                    picture = side_by_side(before, picture)
+                what = f'{kind}{seen.kind}-{seen.subject or seen.place}-{seen.state}'
                 evidence = self._store.keep(picture, what, severity, seen.stamp)
         seen = replace(seen, robot=self._robot, evidence=evidence, seen_from=self._at)
         self._tell(seen)
@@ -609,6 +615,20 @@ class Watcher:
                 del self._doubts[number]
                 self._alert(event)
         return [each for each in map(self.book.find, self._doubts) if each is not None]
+
+    def _met_picture(self, middle: tuple[float, float], grid: Grid) -> Picture:
+        """Return the map around a point with what beams met in this visit."""
+        sensor, ends = self._last
+        if self._visit is not None:
+            ends = np.concatenate([ends, _middles(self._visit.view().occupied, grid)])
+        return sweep_picture(grid, middle, sensor, ends)
+
+    def _normal_picture(self, middle: tuple[float, float]) -> Picture | None:
+        """Return the map around a point with what normally stands there; None: nothing is known."""
+        if self._normal is None or self._grid is None:
+            return None
+        ends = _middles(self._normal.occupied, self._grid)
+        return sweep_picture(self._grid, middle, self._last[0], ends)
 
     # --- over restarts ---
 
@@ -658,6 +678,12 @@ def same_map(one: Grid, other: Grid) -> bool:
         and one.origin == other.origin
         and np.array_equal(one.cells, other.cells)
     )
+
+
+def _middles(mask: Mask, grid: Grid) -> Points:
+    """Return the middles of the cells of a mask, (n, 2), map frame, metres."""
+    cells = np.argwhere(mask)
+    return grid.centres_of(cells) if len(cells) else np.zeros((0, 2))
 
 
 def _packed(view: FloorView) -> dict[str, Any]:

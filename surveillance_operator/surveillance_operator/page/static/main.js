@@ -7,6 +7,7 @@ import {Why} from './why.js';
 import {showHealth} from './health.js';
 import {Control} from './control.js';
 import {Replay} from './replay.js';
+import {Watching} from './watching.js';
 
 const root = document.documentElement;
 const state = {};
@@ -169,3 +170,4 @@ present();
 connect();
 setInterval(() => { listen(); map.tick(state, now()); drawStrips($('strips'), state, now()); }, 1000);
 setInterval(camera, 700);
+if (!replaying) new Watching(may, now);

@@ -1,0 +1,103 @@
+"""What the observer has noticed, for the page: its events, and the pictures of them."""
+
+from __future__ import annotations
+
+import re
+import threading
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+from std_msgs.msg import String
+
+from state_machines.files import parse_json
+from surveillance_runtime.node import PatrolNode
+from surveillance_runtime.state_topics import StateSubscription
+
+MOST_BYTES = 4_000_000
+"""A message that is longer is not read."""
+_PICTURE = re.compile(r'\d_\d{13}_[A-Za-z0-9-]{1,60}\.jpg\Z')
+_ANSWERED = ('normal', 'acknowledged', 'false alarm')
+
+
+class Sightings:
+    """Follows the observer's events.
+
+    Args:
+        node: The node that listens.
+        folder: The observer's pictures; empty: none are shown.
+    """
+
+    def __init__(self, node: PatrolNode, folder: str) -> None:
+        self._node = node
+        self._folder = Path(folder) if folder else None
+        self._lock = threading.Lock()
+        self._events: list[dict[str, Any]] = []
+        self._heard = False
+        StateSubscription(node, String, 'events', self._on_events)
+
+    def listed(self) -> dict[str, Any]:
+        """Return all events, the newest first, and how many were false alarms."""
+        with self._lock:
+            events, heard = self._events, self._heard
+        told = [each for each in events if each.get('severity', 0) >= 3]
+        false = sum(each.get('state') == 'false alarm' for each in told)
+        answered = sum(each.get('state') in _ANSWERED for each in told)
+        return {
+            'ok': True,
+            'watching': heard,
+            'events': events,
+            'alerts': len(told),
+            'answered': answered,
+            'false': false,
+        }
+
+    def picture(self, name: str, *, blur: bool) -> bytes | None:
+        """Return one of the observer's pictures as JPEG; None where there is none of that name.
+
+        Args:
+            name: As an event has it.
+            blur: Whether it leaves this machine: then people in it are blurred.
+        """
+        if self._folder is None or not _PICTURE.match(name):
+            return None
+        try:
+            return _shown(self._folder / name, blur=blur)
+        except OSError:
+            return None
+
+    def _on_events(self, message: String) -> None:
+        try:
+            if len(message.data) > MOST_BYTES:
+                raise ValueError(f'more than {MOST_BYTES} bytes')
+            events = parse_json(message.data.encode())
+            if not isinstance(events, list) or not all(_is_event(each) for each in events):
+                raise ValueError('expected a list of events')
+        except ValueError as error:
+            self._node.get_logger().warn(f'events: {error}', throttle_duration_sec=60.0)
+            return
+        with self._lock:
+            self._events, self._heard = events, True
+
+
+def _is_event(value: Any) -> bool:
+    """Tell whether a value has what the page shows of an event, of the types it expects."""
+    if not isinstance(value, dict) or not isinstance(value.get('number'), int):
+        return False
+    texts = all(isinstance(value.get(key), str) for key in ('kind', 'seen', 'place', 'state'))
+    times = all(isinstance(value.get(key), int | float) for key in ('began', 'last'))
+    pictures = value.get('evidence', [])
+    return texts and times and isinstance(pictures, list)
+
+
+@lru_cache(64)
+def _shown(path: Path, *, blur: bool) -> bytes:
+    if not blur:
+        return path.read_bytes()
+    # It takes its time, and a page on this machine needs none of it.
+    from surveillance_perception.observation.privacy import PictureError, shareable
+
+    try:
+        return shareable(path)
+    except PictureError as error:
+        raise OSError(str(error)) from None
