@@ -38,6 +38,7 @@ from surveillance_behaviour.mission.mission_log import MissionRecord
 from surveillance_runtime import discovery
 from surveillance_runtime.command_line import page_address
 from surveillance_runtime.files import RECORD, TIMELINE
+from surveillance_runtime.incidents import Call, Cause, Incident, Severity
 from surveillance_runtime.node_table import DEFAULT_MODE
 from surveillance_runtime.profile import read_profile
 from surveillance_runtime.run_parameters import place_file, run_layers, write_parameters
@@ -272,7 +273,9 @@ def test_an_alarm_gets_one_line_as_its_last_argument(tmp_path):
     script = tmp_path / 'alarm.sh'
     script.write_text(f'printf "%s|" "$@" > {out}.new; mv {out}.new {out}\n')
     log = MergedLog(io.StringIO(), ['a'])
-    caller(f'sh {script} first', log)('waiting for help: a door is closed')
+    text = 'waiting for help: a door is closed'
+    incident = Incident('a', Cause('robot', 'help'), text, Severity.ALARM, 0.0)
+    caller(f'sh {script} first', log)(Call(text, incident, 1, over=False))
     for _ in range(1200):
         if out.exists():
             break
