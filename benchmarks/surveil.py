@@ -145,13 +145,22 @@ class Rounds:
         ends = np.stack([np.cos(angles), np.sin(angles)], axis=1) * ranges[:, None] + sensor
         self.watcher.sweep(sensor, ends, met, self.time)
 
-    def visit(self, place: str, *, looks: int = 12, pictures: int = 0) -> list[Observation]:
-        """Drive to a place and look about; return what was told on the way and there."""
+    def visit(
+        self, place: str, *, looks: int = 12, pictures: int = 0, period: float = 0.5
+    ) -> list[Observation]:
+        """Drive to a place and look about; return what was told on the way and there.
+
+        Args:
+            place: The place.
+            looks: So many sweeps are compared there.
+            pictures: So many pictures are taken there.
+            period: Between two sweeps, seconds.
+        """
         before = len(self.told)
         self.drive(self._way(place))
         here = self.at
         for each in range(looks):
-            self.advance(0.5)
+            self.advance(period)
             turn = 2 * math.pi * each / max(1, looks)
             self.sweep((*here, turn))
             if each % 4 == 3:
@@ -410,7 +419,7 @@ def measure_persons(trials: int) -> list[list[str]]:
                 break
             except ValueError:
                 continue
-        told = rounds.visit(place, looks=20)
+        told = rounds.visit(place, looks=40, period=0.2)
         walked += any(e.kind == Kind.PERSON and e.state == 'seen' for e in told)
     rows.append(['walks through, by lidar', '98 %', part(walked, trials), part(wrong, 2 * trials)])
     try:
