@@ -15,6 +15,7 @@ import argparse
 import json
 import math
 import resource
+import sys
 import tempfile
 import threading
 import time
@@ -27,6 +28,10 @@ from typing import Any
 import cv2
 import numpy as np
 from tables import table
+
+ROOT = Path(__file__).resolve().parents[1]
+if str(ROOT) not in sys.path:
+    sys.path.insert(0, str(ROOT))
 
 from launcher.alarm import Alarm
 from surveillance_operator.notify.pipeline import notifier
@@ -47,8 +52,7 @@ from surveillance_simulation.robot.robot import Robot
 from surveillance_simulation.staging import Stage
 from surveillance_simulation.world.world import World, read_world
 
-HERE = Path(__file__).resolve().parents[1]
-PLACE = HERE / 'config' / 'seven_rooms.yaml'
+PLACE = ROOT / 'config' / 'seven_rooms.yaml'
 POSE_ERROR = (0.02, math.radians(0.6))
 """Deviation of the pose that localisation tells, metres and rad."""
 STEP = 0.25
@@ -840,15 +844,15 @@ def main(argv: Sequence[str] | None = None) -> int:
     quick = options.quick
     shared = options.shared if options.shared and options.shared.is_dir() else None
     measures: dict[str, Callable[[], list[list[str]]]] = {
-        'doors': lambda: measure_doors(21 if quick else 420),
-        'things': lambda: measure_things(7 if quick else 70),
+        'doors': lambda: measure_doors(12 if quick else 420),
+        'things': lambda: measure_things(4 if quick else 70),
         'persons': lambda: measure_persons(6 if quick else 60),
         'views': lambda: measure_views(4 if quick else 30),
         'real': lambda: measure_real(shared, 40 if quick else 1000),
         'cpu': measure_cpu,
         'telling': lambda: measure_telling(3 if quick else 20),
         'month': lambda: measure_month(2 if quick else 30),
-        'week': lambda: measure_week(0.2 if quick else options.days, 3600.0),
+        'week': lambda: measure_week(0.1 if quick else options.days, 3600.0),
     }
     chosen = options.only or [name for name in names if quick or name != 'week']
     for name in chosen:
