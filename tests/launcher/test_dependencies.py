@@ -26,7 +26,15 @@ DISTRIBUTIONS = {
     'paho': 'paho-mqtt',
 }
 # Looked for at run time and done without when absent: an installed ROS has them.
-OPTIONAL = {'tf2_msgs', 'nav2_msgs', 'mujoco', 'launch', 'launch_ros', 'ai_edge_litert'}
+OPTIONAL = {
+    'tf2_msgs',
+    'nav2_msgs',
+    'control_msgs',
+    'mujoco',
+    'launch',
+    'launch_ros',
+    'ai_edge_litert',
+}
 # Known to type checkers alone.
 TYPES = {'_typeshed'}
 # With rclpy[fastrtps] and common_interfaces.

@@ -205,7 +205,13 @@ class Page:
         kind = 'replay' if self._replay else 'live'
         may_act = bool(self._actions) and (self._replay or self._has_token(request))
         may_edit = may_act and 'place' in self._questions
-        attributes = f'data-kind="{kind}" data-control="{int(may_act)}" data-edit="{int(may_edit)}"'
+        shown = {
+            'kind': kind,
+            'control': int(may_act),
+            'edit': int(may_edit),
+            'watch': int('sightings' in self._questions),
+        }
+        attributes = ' '.join(f'data-{name}="{value}"' for name, value in shown.items())
         text = text.replace('data-kind=""', attributes)
         return Response(text, media_type='text/html')
 

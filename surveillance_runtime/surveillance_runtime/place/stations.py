@@ -152,7 +152,7 @@ class _Single:
         'empty: at the point of that room. Several stand in `stations.ROOM.pose`, with '
         '`stations.ROOM.rate` (percent a minute) and `stations.ROOM.dock` beside it.',
         of=float,
-        check=lambda values: parameter_checks.pose(values) if values else None,
+        check=parameter_checks.pose_or_none,
     )
 
 

@@ -170,4 +170,4 @@ present();
 connect();
 setInterval(() => { listen(); map.tick(state, now()); drawStrips($('strips'), state, now()); }, 1000);
 setInterval(camera, 700);
-if (!replaying) new Watching(may, now);
+if (root.dataset.watch === '1') new Watching(may, now);
