@@ -9,16 +9,13 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from surveillance_runtime import parameter_checks
-from surveillance_runtime.parameters import ParameterError, parameter
+from surveillance_runtime.parameters import ParameterError, ParameterHost, parameter
 from surveillance_runtime.place.rooms import PlaceError, Pose, nested
 from surveillance_runtime.suggestions import nearest
 from surveillance_runtime.yaml_file import KeyPath
-
-if TYPE_CHECKING:
-    from surveillance_runtime.node import PatrolNode
 
 AT_STATION = '/station'
 """Behind the name of a room: its charging station, where a place is asked for by its name."""
@@ -157,7 +154,7 @@ class _Single:
 
 
 def described_stations(
-    node: PatrolNode, recharge_rooms: Sequence[str] | None = None
+    node: ParameterHost, recharge_rooms: Sequence[str] | None = None
 ) -> dict[str, Station]:
     """Declare the stations of the place, and read them.
 
