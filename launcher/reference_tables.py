@@ -127,13 +127,14 @@ class Survey:
 def survey() -> Survey:
     """Make each node and note what it declares and offers; needs a ROS environment."""
     import rclpy
-    from rclpy.logging import LoggingSeverity, set_logger_level
+    from rclpy.logging import LoggingSeverity, get_logger_effective_level, set_logger_level
     from rclpy.parameter import Parameter
 
     found = Survey()
     context = rclpy.Context()
     # The simulator publishes its map, doors and a scan when it is made.
     rclpy.init(context=context, domain_id=claim_domain())
+    told = get_logger_effective_level('')
     set_logger_level('', LoggingSeverity.FATAL)  # what they print is for whoever runs them
     here = os.getcwd()
     try:
@@ -156,6 +157,7 @@ def survey() -> Survey:
                 }
     finally:
         os.chdir(here)
+        set_logger_level('', told)
         rclpy.shutdown(context=context)
     return found
 
