@@ -79,8 +79,15 @@ def stranger(stack: Stack) -> Iterator[PatrolNode]:
         rclpy.try_shutdown(context=context)
 
 
-def say(stack: Stack, topic: str, *messages: Any) -> None:
-    """Publish messages from a node that leaves when each reader has them."""
+def say(stack: Stack, topic: str, *messages: Any, until_told: bool = False) -> None:
+    """Publish messages from a node that leaves when each reader has them.
+
+    Args:
+        stack: The mission.
+        topic: The topic's name.
+        *messages: What is said.
+        until_told: Whether it stays until an incident names the topic; that ends when it leaves.
+    """
     readers = stack.observer.count_subscribers(topic)
     with stranger(stack) as node:
         publisher = node.create_publisher(type(messages[0]), topic, STATE_QOS)
@@ -88,6 +95,8 @@ def say(stack: Stack, topic: str, *messages: Any) -> None:
         for message in messages:
             publisher.publish(message)
             publisher.wait_for_all_acked()
+        if until_told:
+            until(stack, lambda: f'topic {topic[1:]}' in incidents(stack))
 
 
 def incidents(stack: Stack) -> set[str]:
@@ -107,9 +116,8 @@ def test_a_simulated_mission_goes_on_as_its_twin(tmp_path: Path) -> None:
                 assert {'/map', '/scan', '/odom', '/amcl_pose', '/stopped'} <= topics.keys()
                 for topic, kind in sorted(topics.items()):
                     if not any(part in topic for part in OBEYED):
-                        say(stack, topic, kind(), generator.message(kind))
-                    if topic in ('/map', '/battery_level'):
-                        until(stack, lambda name=topic[1:]: f'topic {name}' in incidents(stack))
+                        told = topic in ('/map', '/battery_level')
+                        say(stack, topic, kind(), generator.message(kind), until_told=told)
             until(stack, lambda path=record: len(legs(path)) >= LEGS)
         driven.append(legs(record)[:LEGS])
     twin, disturbed = driven
