@@ -11,6 +11,7 @@ import json
 import sys
 import tempfile
 from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
@@ -19,8 +20,9 @@ if str(ROOT) not in sys.path:
     sys.path.insert(0, str(ROOT))
 
 import rclpy
+from rclpy.logging import LoggingSeverity, get_logging_severity_from_string
 
-from surveillance_runtime import node_table
+from surveillance_runtime import logging, node_table
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.process import ExecutorThread, share_clock
 from surveillance_runtime.testing import claim_domain
@@ -49,13 +51,15 @@ class Stack:
             place: The place's file.
             parameters: Further parameters by node; those of '*' are for every node.
             nodes: Only these nodes; it needs the simulator. All those of a patrol by default.
-            log_level: Of all nodes, also of others in this process from now on.
+            log_level: Of all loggers of this process until `close`.
         """
         self._folder = tempfile.TemporaryDirectory(prefix='patrol-')
         arguments = ros_arguments(place, Path(self._folder.name), parameters)
-        arguments += ['--log-level', log_level]
         self.context = rclpy.Context()
         rclpy.init(args=arguments, context=self.context, domain_id=claim_domain())
+        self._level = ExitStack()
+        severity = get_logging_severity_from_string(log_level)
+        self._level.enter_context(logging.log_level(LoggingSeverity(severity)))
         self._spinner = ExecutorThread(self.context)
         options = {'context': self.context, 'cli_args': arguments, 'use_global_arguments': False}
         self.nodes: dict[str, PatrolNode] = {}
@@ -90,6 +94,7 @@ class Stack:
         for node in reversed(self.nodes.values()):
             node.destroy_node()
         rclpy.try_shutdown(context=self.context)
+        self._level.close()
         self._folder.cleanup()
 
 

@@ -127,18 +127,23 @@ class Survey:
 def survey() -> Survey:
     """Make each node and note what it declares and offers; needs a ROS environment."""
     import rclpy
-    from rclpy.logging import LoggingSeverity, get_logger_effective_level, set_logger_level
+    from rclpy.logging import LoggingSeverity
     from rclpy.parameter import Parameter
+
+    from surveillance_runtime.logging import log_level
 
     found = Survey()
     context = rclpy.Context()
     # The simulator publishes its map, doors and a scan when it is made.
     rclpy.init(context=context, domain_id=claim_domain())
-    told = get_logger_effective_level('')
-    set_logger_level('', LoggingSeverity.FATAL)  # what they print is for whoever runs them
     here = os.getcwd()
     try:
-        with tempfile.TemporaryDirectory() as folder, redirect_stdout(io.StringIO()):
+        # What the nodes print is for whoever runs them.
+        with (
+            tempfile.TemporaryDirectory() as folder,
+            redirect_stdout(io.StringIO()),
+            log_level(LoggingSeverity.FATAL),
+        ):
             os.chdir(folder)
             for node in node_table.NODES:
                 declared: dict[str, ParameterSpec] = {}
@@ -157,7 +162,6 @@ def survey() -> Survey:
                 }
     finally:
         os.chdir(here)
-        set_logger_level('', told)
         rclpy.shutdown(context=context)
     return found
 

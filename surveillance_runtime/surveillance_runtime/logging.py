@@ -13,11 +13,12 @@ import os
 import sys
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import rclpy.impl.rcutils_logger as rcutils
-from rclpy.logging import LoggingSeverity
+from rclpy.logging import LoggingSeverity, get_logger_effective_level, set_logger_level
 
 LONGEST = 1000
 """Characters of a line; what is longer loses its middle."""
@@ -59,6 +60,20 @@ def without_controls(text: str, kept: str = '\n\t') -> str:
         else each.encode('unicode_escape').decode('ascii')
         for each in text
     )
+
+
+@contextmanager
+def log_level(severity: LoggingSeverity) -> Iterator[None]:
+    """Give all loggers of this process another level for a while.
+
+    The level is the process's, not a node's: whoever only sets it silences all that comes later.
+    """
+    before = get_logger_effective_level('')
+    set_logger_level('', severity)
+    try:
+        yield
+    finally:
+        set_logger_level('', before)
 
 
 class Allowance:
