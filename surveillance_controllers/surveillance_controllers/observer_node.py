@@ -513,7 +513,10 @@ class Observer(PatrolNode):
     def _on_alert(self, event: Event) -> None:
         if self._pictures is not None:
             self._pictures.describe(event.number, json.dumps(event.to_json()))
-        self.incidents.begin(_cause(event), f'{event.words()} ({event.rule})', Severity.ALARM)
+        # Told once: each look sees the middle of a thing elsewhere by some centimetres.
+        if _cause(event) not in self.incidents.open():
+            text = f'{event.words()} ({event.rule})'
+            self.incidents.begin(_cause(event), text, Severity.ALARM)
 
     def _publish_events(self) -> None:
         text = json.dumps([each.to_json() for each in self._book.events[:MOST_TOLD]])

@@ -53,6 +53,18 @@ def test_what_no_rule_cares_for_begins_nothing_and_ends_what_it_contradicts():
     assert book.events[0].last == 200.0
 
 
+def test_a_thing_that_was_moved_there_is_the_one_that_appeared_there():
+    book = EventBook()
+    take(book, seen())
+    take(book, seen(state='moved', position=(1.2, 2.1), stamp=110.0))
+    take(book, seen(stamp=120.0))
+    (event,) = book.events
+    assert (event.seen, event.state, event.sightings) == ('appeared', EventState.OPEN, 3)
+    take(book, seen(state='removed', stamp=130.0), severity=0)
+    assert event.number == 1
+    assert [each.state for each in book.events] == [EventState.OVER]
+
+
 def test_a_person_calls_it_normal_and_it_stays_so():
     book = EventBook()
     event = take(book, seen())

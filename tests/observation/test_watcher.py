@@ -131,6 +131,17 @@ class Round:
 HERE = (3.0, 2.5)
 
 
+def test_a_box_seen_from_all_sides_is_one_event():
+    """Behind a pillar lies floor that was never seen before the box came."""
+    watch, pillar = Round(), (2.6, 2.5, 0.15)
+    watch.visit('R1', (1.0, 2.5), boxes=[pillar])
+    for _ in range(2):
+        for at in ((1.0, 2.5), (3.0, 4.2), (4.6, 2.5), (3.0, 1.0)):
+            watch.visit('R1', at, boxes=[pillar, (3.3, 2.2, 0.2)])
+    (event,) = (each for each in watch.book.events if each.kind == Kind.OBJECT)
+    assert (event.seen, event.state) == ('appeared', EventState.OPEN)
+
+
 def test_nothing_happens_and_nothing_is_told():
     watch = Round()
     for _ in range(4):

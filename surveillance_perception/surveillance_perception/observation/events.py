@@ -281,17 +281,17 @@ class EventBook:
         # What a person called false is not told again while it is seen.
         quiet = [self._events[number] for number in self._quiet]
         going_on = [*self._going_on(), *quiet]
-        found = [each for each in going_on if each.seen == seen.state and _alike(each, seen)]
+        found = [each for each in going_on if not _contradicts(each, seen) and _alike(each, seen)]
         return max(found, key=lambda each: each.last, default=None)
 
     def _end_others(self, seen: Observation) -> None:
         """End events of the same thing in another state: a door that is open is closed no more."""
         for each in list(self._going_on()):
-            if each.seen != seen.state and _alike(each, seen) and seen.stamp > each.last:
+            if _contradicts(each, seen) and _alike(each, seen) and seen.stamp > each.last:
                 self._keep(replace(each, state=EventState.OVER, last=seen.stamp))
         for number in list(self._quiet):
             each = self._events[number]
-            if each.seen != seen.state and _alike(each, seen) and seen.stamp > each.last:
+            if _contradicts(each, seen) and _alike(each, seen) and seen.stamp > each.last:
                 self._quiet.discard(number)
 
 
@@ -308,6 +308,15 @@ def _alike(event: Event, seen: Observation) -> bool:
     if event.position is None or seen.position is None:
         return event.place == seen.place
     return math.dist(event.position, seen.position) <= SAME_PLACE
+
+
+def _contradicts(event: Event, seen: Observation) -> bool:
+    """Tell whether what was seen says that an event's thing is in another state now.
+
+    A thing that has appeared and one that was moved there both stand there.
+    """
+    there = event.kind == Kind.OBJECT and {event.seen, seen.state} <= {'appeared', 'moved'}
+    return event.seen != seen.state and not there
 
 
 def _from_elsewhere(event: Event, seen: Observation) -> bool:

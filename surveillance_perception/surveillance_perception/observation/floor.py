@@ -202,8 +202,8 @@ def changes(before: FloorView, now: FloorView) -> list[ObjectChange]:
     # It must have been seen free before: of what was never in view nobody knows.
     known_free = ndimage.binary_dilation(before.free, _WITH_CORNERS)
     new = _things(grid, now.occupied & ~stood, known_free)
-    now_free = ndimage.binary_dilation(now.free, _WITH_CORNERS)
-    gone = _things(grid, before.occupied & ~stands, now_free)
+    # Passed through itself: beside a thing that is seen from another side now the floor is free.
+    gone = _things(grid, before.occupied & ~stands, now.free)
     found = []
     for thing in gone:
         to = min(

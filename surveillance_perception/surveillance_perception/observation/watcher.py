@@ -57,6 +57,8 @@ AGREEING = 4
 FEWEST_SWEEPS = 5
 SAME_THING = 0.4
 """Two assessments mean one thing up to here, metres."""
+OTHER_SIDES = 0.6
+"""What is hidden so near to a new thing may be its other sides, metres."""
 SEEN_AGAIN = 10.0
 """What goes on is told again after this time, seconds."""
 AGREED_PICTURES = 3
@@ -401,9 +403,24 @@ class Watcher:
                 continue
             if any(math.dist(each.position, event.position) < 2 * SAME_THING for each in found):
                 continue
-            shown = now.occupied if event.seen == Change.REMOVED else now.free
-            if bool(now.grid.at(shown, *event.position)):
+            if event.seen == Change.REMOVED:
+                is_over = bool(now.grid.at(now.occupied, *event.position))
+            else:
+                # Its spot is free, and nothing stands around it that never did: a beam that grazes
+                # a thing passes through a cell of it, and its other sides may look like little.
+                is_free = bool(now.grid.at(now.free, *event.position))
+                is_over = is_free and not self._stands_anew(now, event.position)
+            if is_over:
                 self.book.end(event.number, stamp)
+
+    def _stands_anew(self, now: FloorView, position: tuple[float, float]) -> bool:
+        """Tell whether beams ended near a point where nothing is normal."""
+        assert self._normal is not None
+        rows, columns = np.nonzero(now.occupied & ~self._normal.occupied)
+        if not len(rows):
+            return False
+        centres = now.grid.centres_of(np.column_stack([rows, columns]))
+        return bool((np.hypot(*(centres - position).T) < SAME_THING).any())
 
     def _learn(self) -> None:
         """Take what was in view for the first time as normal."""
@@ -414,6 +431,19 @@ class Watcher:
             self._normal = now
             return
         new = ~self._normal.seen
+        there = [each.points for each in self._candidates if each.change != Change.REMOVED]
+        there += [
+            np.array([event.position])
+            for event in self.book.events
+            if event.kind == Kind.OBJECT and event.state not in _ENDED and event.position
+        ]
+        if there:
+            # The other sides of what is new are seen for the first time, too, and are not normal.
+            things = np.zeros_like(new)
+            cells = now.grid.cells_of(np.concatenate(there))
+            things[cells[:, 0], cells[:, 1]] = True
+            away = ndimage.distance_transform_edt(~things) * now.grid.resolution
+            new &= away > OTHER_SIDES
         self._normal = replace(
             self._normal,
             occupied=self._normal.occupied | (now.occupied & new),
