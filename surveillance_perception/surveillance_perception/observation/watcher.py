@@ -57,6 +57,8 @@ AGREEING = 4
 FEWEST_SWEEPS = 5
 SAME_THING = 0.4
 """Two assessments mean one thing up to here, metres."""
+SPOT, SPOT_FREE = 0.15, 0.8
+"""A thing is gone when so many cells are free so far around where it stood, metres."""
 OTHER_SIDES = 0.6
 """What is hidden so near to a new thing may be its other sides, metres."""
 SEEN_AGAIN = 10.0
@@ -408,10 +410,20 @@ class Watcher:
             else:
                 # Its spot is free, and nothing stands around it that never did: a beam that grazes
                 # a thing passes through a cell of it, and its other sides may look like little.
-                is_free = bool(now.grid.at(now.free, *event.position))
-                is_over = is_free and not self._stands_anew(now, event.position)
+                is_over = self._is_free(now, event.position) and not self._stands_anew(
+                    now, event.position
+                )
             if is_over:
                 self.book.end(event.number, stamp)
+
+    def _is_free(self, now: FloorView, position: tuple[float, float]) -> bool:
+        """Tell whether beams passed through nearly all of a thing's spot."""
+        row, column = now.grid.cell_of(*position)
+        reach = max(1, round(SPOT / now.grid.resolution))
+        spot = now.free[max(row - reach, 0) : row + reach + 1, max(column - reach, 0) :][
+            :, : 2 * reach + 1
+        ]
+        return bool(spot.size and spot.mean() >= SPOT_FREE)
 
     def _stands_anew(self, now: FloorView, position: tuple[float, float]) -> bool:
         """Tell whether beams ended near a point where nothing is normal."""
