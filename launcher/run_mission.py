@@ -94,9 +94,10 @@ def run_mission(run: Run, config: Path, runs: Path, resume: Path | None = None) 
     log.say(f'watch it in a second terminal: {watch_command(run)}')
     outbox, tell = None, None
     if run.notify is not None:
+        from surveillance_ontology.patrol_ontology import ROBOT
         from surveillance_operator.notify.pipeline import notifier
 
-        robot = (run.namespace or '').strip('/') or 'Robot1'
+        robot = (run.namespace or '').strip('/') or ROBOT
         outbox, tell = notifier(run.notify, folder, robot, log.warn)
     alarm = Alarm(caller(run.alarm, log, tell or (lambda _: None)), folder)
     log.listen(alarm.hear)

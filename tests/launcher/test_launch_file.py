@@ -21,18 +21,11 @@ from surveillance_runtime.configuration import Configuration, file_layer
 from surveillance_runtime.files import FileError
 from surveillance_runtime.node_table import BEHAVIOURS, MODES, find, select
 from surveillance_runtime.parameters import ParameterError
+from tests.launch_stand_ins import Argument, Configured
 from tests.launcher.conftest import ROOT
 
 SOURCE = ROOT / 'surveillance_behaviour' / 'launch' / 'surveillance.launch.py'
 PER_RUN = {'record', 'console', 'ontologies_folder', 'store', 'place', 'state_file'}
-
-
-@dataclasses.dataclass
-class Argument:
-    name: str
-    default_value: str
-    description: str
-    choices: list[str] | None = None
 
 
 @dataclasses.dataclass
@@ -49,14 +42,6 @@ class StartedNode:
     respawn: bool
     respawn_delay: float
     on_exit: Any
-
-
-@dataclasses.dataclass
-class Configured:
-    name: str
-
-    def perform(self, context: dict[str, str]) -> str:
-        return context[self.name]
 
 
 @pytest.fixture

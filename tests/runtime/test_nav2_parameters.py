@@ -16,6 +16,7 @@ import yaml
 from surveillance_runtime.parameters import ParameterError
 from surveillance_runtime.profile import read_profile
 from surveillance_runtime.profile.nav2_parameters import laid_over
+from tests.launch_stand_ins import Argument, Configured
 
 ROOT = Path(__file__).parents[2]
 NAV2: dict[str, Any] = {
@@ -73,25 +74,9 @@ def test_a_round_robot_with_two_lidars_marks_with_both(tmp_path: Path) -> None:
 
 
 @dataclasses.dataclass
-class Argument:
-    name: str
-    default_value: str
-    description: str
-    choices: list[str] | None = None
-
-
-@dataclasses.dataclass
 class Included:
     source: str
     launch_arguments: Any
-
-
-@dataclasses.dataclass
-class Configured:
-    name: str
-
-    def perform(self, context: dict[str, str]) -> str:
-        return context[self.name]
 
 
 @pytest.fixture

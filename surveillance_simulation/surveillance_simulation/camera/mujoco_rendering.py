@@ -18,10 +18,11 @@ from surveillance_runtime.place.plan_grid import solid_lines
 from surveillance_simulation.camera.lamps import LampLight
 from surveillance_simulation.camera.model import Array, Camera
 from surveillance_simulation.camera.scene import DOOR_HEIGHT, STATION_SIDE
+from surveillance_simulation.mujoco_bodies import about_z, add_thing
 from surveillance_simulation.optional_mujoco import mujoco
 from surveillance_simulation.world import textures
 from surveillance_simulation.world.textures import Texture
-from surveillance_simulation.world.things import Shape, Thing
+from surveillance_simulation.world.things import Part, Thing
 from surveillance_simulation.world.world import LEAF_THICKNESS, Panel, World
 
 _PANEL_THICKNESS = 0.004
@@ -83,7 +84,7 @@ class MujocoRenderer:
         self._model.cam_quat[0] = quaternion
         for body, each in enumerate(self._people, start=1):  # body 0 is the world
             self._model.body_pos[body] = each.x, each.y, 0.0
-            self._model.body_quat[body] = _about_z(each.yaw)
+            self._model.body_quat[body] = about_z(each.yaw)
         data = mujoco.MjData(self._model)
         mujoco.mj_forward(self._model, data)
         self._renderer.update_scene(data, camera=0)
@@ -130,9 +131,9 @@ def _model(world: World, camera: Camera) -> Any:
         _door(spec, door, world)
     for thing in world.things.values():
         if thing.kind != 'person':
-            _parts(spec.worldbody, thing)
+            add_thing(spec.worldbody, thing, _painted)
     for each in world.people:
-        _parts(spec.worldbody.add_body(), each.moved(0.0, 0.0, 0.0))
+        add_thing(spec.worldbody.add_body(), each.moved(0.0, 0.0, 0.0), _painted)
     for name, panel in world.panels.items():
         if panel.state != 'gone':
             _panel(spec, name, panel, world.plan.marker_dictionary)
@@ -195,24 +196,8 @@ def _door(spec: Any, door: Door, world: World) -> None:
         _box(spec, *leaf, 0.0, DOOR_HEIGHT, 'leaf', thickness)
 
 
-def _parts(body: Any, thing: Thing) -> None:
-    """Add the parts of a thing to a body, in whose frame the thing is given."""
-    for part in thing.parts:
-        x, y = thing.at(part)
-        half = (part.top - part.bottom) / 2
-        is_box = part.shape == Shape.BOX
-        body.add_geom(
-            type=mujoco.mjtGeom.mjGEOM_BOX if is_box else mujoco.mjtGeom.mjGEOM_CYLINDER,
-            size=[part.length / 2, part.width / 2, half] if is_box else [part.length / 2, half, 0],
-            pos=[x, y, part.bottom + half],
-            quat=_about_z(thing.yaw),
-            rgba=[*(each / 255 for each in part.colour), 1.0],
-        )
-
-
-def _about_z(yaw: float) -> list[float]:
-    """Return the quaternion (w, x, y, z) of a turn in the plane."""
-    return [math.cos(yaw / 2), 0.0, 0.0, math.sin(yaw / 2)]
+def _painted(part: Part) -> dict[str, Any]:
+    return {'rgba': [*(each / 255 for each in part.colour), 1.0]}
 
 
 def _panel(spec: Any, name: str, panel: Panel, dictionary: str) -> None:
@@ -235,6 +220,6 @@ def _add_box(
         type=mujoco.mjtGeom.mjGEOM_BOX,
         size=list(size),
         pos=list(centre),
-        quat=_about_z(yaw),
+        quat=about_z(yaw),
         material=material,
     )

@@ -19,8 +19,8 @@ from surveillance_runtime.place.floor_plan import WALL_HEIGHT, WALL_THICKNESS
 from surveillance_runtime.place.plan_grid import solid_lines
 from surveillance_runtime.place.rooms import Pose
 from surveillance_runtime.profile.parameters import robot_footprint
+from surveillance_simulation.mujoco_bodies import about_z, add_thing
 from surveillance_simulation.optional_mujoco import mujoco
-from surveillance_simulation.world.things import Shape, Thing
 from surveillance_simulation.world.world import LEAF_THICKNESS, World
 
 STEP = 0.002
@@ -118,9 +118,10 @@ def compiled(world: World, radius: float, robot: PhysicsModel, people: int) -> A
     for name in world.plan.doors:
         if (leaf := world.leaf(name)) is not None:
             _add_wall(spec, leaf, LEAF_THICKNESS if world.door_angle(name) else WALL_THICKNESS)
+    solid = {'group': SOLID, 'contype': _IN_THE_WAY, 'conaffinity': _IN_THE_WAY}
     for thing in world.things.values():
         if thing.kind != 'person':
-            _add_thing(spec.worldbody, thing)
+            add_thing(spec.worldbody, thing, lambda _: solid)
     for index in range(people):
         body = spec.worldbody.add_body(name=f'person{index}', mocap=True)
         _add_upright(body, (0.0, 0.0), 1.0, _PERSON_HEIGHT)
@@ -219,27 +220,11 @@ def _add_wall(
         type=mujoco.mjtGeom.mjGEOM_BOX,
         size=[float(along), float(across), WALL_HEIGHT / 2],
         pos=[float(x), float(y), WALL_HEIGHT / 2],
-        quat=[math.cos(yaw / 2), 0.0, 0.0, math.sin(yaw / 2)],
+        quat=about_z(yaw),
         group=SOLID,
         contype=_IN_THE_WAY,
         conaffinity=_IN_THE_WAY,
     )
-
-
-def _add_thing(body: Any, thing: Thing) -> None:
-    for part in thing.parts:
-        x, y = thing.at(part)
-        half = (part.top - part.bottom) / 2
-        is_box = part.shape == Shape.BOX
-        body.add_geom(
-            type=mujoco.mjtGeom.mjGEOM_BOX if is_box else mujoco.mjtGeom.mjGEOM_CYLINDER,
-            size=[part.length / 2, part.width / 2, half] if is_box else [part.length / 2, half, 0],
-            pos=[x, y, part.bottom + half],
-            quat=[math.cos(thing.yaw / 2), 0.0, 0.0, math.sin(thing.yaw / 2)],
-            group=SOLID,
-            contype=_IN_THE_WAY,
-            conaffinity=_IN_THE_WAY,
-        )
 
 
 def _add_upright(body: Any, at: tuple[float, float], radius: float, height: float) -> None:
