@@ -19,6 +19,7 @@ from dataclasses import replace
 
 from patrol_policy.battery import Battery, ChargeCurve
 from patrol_policy.decision import (
+    ALERT,
     RECHARGE,
     URGENT,
     WAIT,
@@ -240,7 +241,7 @@ class WorldModel:
             place=found.place,
             now=now,
             reachable=tuple(place for place in found.reachable if place in graph.index),
-            classes=self._rules.with_classes(found.classes),
+            classes=self._rules.with_classes(self._by_own_thresholds(found, now)),
             # The ontology counts whole seconds; another robot's visit may be later.
             visited_at={
                 place: max(
@@ -277,7 +278,12 @@ class WorldModel:
         visits = self.experience.visits
         try:
             self._last = self._ontology.snapshot(
-                now, classes, visits, interrupt, threshold, self._rules.thresholds
+                now,
+                classes if ALERT in classes else (*classes, ALERT),
+                visits,
+                interrupt,
+                threshold,
+                self._rules.thresholds,
             )
         except CallInterruptedError:
             raise
@@ -295,6 +301,21 @@ class WorldModel:
         self._cut_off = False
         return self._last
 
+    def _by_own_thresholds(self, found: Snapshot, now: float) -> Mapping[str, frozenset[str]]:
+        """Return the classes of places, also from an ontology that knows one threshold for all.
+
+        There, a place with a longer threshold of its own is URGENT too early. What was noticed in
+        an ALERT counts at once.
+        """
+        classes = dict(found.classes)
+        for place, limit in self._rules.thresholds.items():
+            kinds = classes.get(place, frozenset())
+            if place in found.thresholds or ALERT in kinds or place not in found.visited_at:
+                continue
+            if now - found.visited_at[place] <= limit:
+                classes[place] = kinds - {URGENT}
+        return classes
+
     def _as_known(self, last: Snapshot, here: str, now: float, threshold: float) -> Snapshot:
         """Return a snapshot of what was known and what was seen since: the map is as it was."""
         assert self.fleet is not None
@@ -304,8 +325,16 @@ class WorldModel:
                 if place in last.connections:
                     seen[place] = max(at, seen.get(place, -1.0))
         since = now if self._since is None else self._since
-        late = {place for place in last.connections if now - seen.get(place, since) > threshold} | {
-            place for place in last.connections if place not in seen
+        limits = {**self._rules.thresholds, **last.thresholds}
+        late = {
+            place
+            for place in last.connections
+            if place not in seen
+            or now - seen.get(place, since) > limits.get(place, threshold)
+            # Something was noticed there, and nobody came since.
+            or (
+                {ALERT, URGENT} <= last.classes[place] and seen[place] == last.visited_at.get(place)
+            )
         }
         classes = {
             place: (found - {URGENT}) | ({URGENT} if place in late else set())

@@ -6,9 +6,10 @@ import json
 import math
 import os
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -17,6 +18,8 @@ from state_machines import Interrupt
 from surveillance_behaviour.experience import Experience
 from surveillance_behaviour.mission.mission_log import MissionRecord
 from surveillance_behaviour.world_model import WorldModel
+from surveillance_ontology.patrol_ontology import Snapshot
+from surveillance_runtime.place.patrol_rules import PatrolRules
 
 from .scripted_world import World
 
@@ -113,6 +116,30 @@ def test_a_decision_says_which_facts_clash_while_they_do(
     assert told.decide(2.0, NOBODY).reason.endswith('; ' + clash)
     monkeypatch.undo()
     assert 'inconsistent' not in told.decide(3.0, NOBODY).reason
+
+
+def test_an_alert_is_urgent_at_once_though_its_place_has_a_longer_threshold(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    world, right = World(), World.snapshot
+    rules = PatrolRules(thresholds={'R1': 86_400.0, 'R2': 86_400.0})
+    told = WorldModel(DecisionSettings(), world, world, world.battery, rules=rules)
+
+    def snapshot(self: World, now: float, classes: Sequence[str], *args: Any) -> Snapshot:
+        assert 'ALERT' in classes
+        found = right(self, now, classes, *args)
+        # An ontology that knows one threshold for all, and something was noticed in R1.
+        noticed = {
+            'R1': frozenset({'ROOM', 'URGENT', 'ALERT'}),
+            'R2': frozenset({'ROOM', 'URGENT'}),
+        }
+        return replace(found, classes={**found.classes, **noticed})
+
+    monkeypatch.setattr(World, 'snapshot', snapshot)
+    world.is_in = 'C1'
+    decision = told.decide(2.0, NOBODY)
+    assert (decision.place, decision.rule) == ('R1', 'URGENT')
+    assert list(decision.scores) == ['R1']
 
 
 def test_a_request_is_taken_while_somebody_looks(tmp_path: Path) -> None:

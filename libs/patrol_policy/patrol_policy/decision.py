@@ -45,6 +45,8 @@ WAIT = 'wait'
 ANY = 'any'
 """The rule of a decision for which no class had a reachable member."""
 URGENT = 'URGENT'
+ALERT = 'ALERT'
+"""The class of places in which something was noticed: what makes them URGENT is not their wait."""
 DEFAULT_RULES = (URGENT, 'CORRIDOR', 'ROOM')
 
 
@@ -160,13 +162,17 @@ class DecisionSettings:
 
 
 def classes_of(world: World, place: str) -> frozenset[str]:
-    """Return the classes of a place; its own threshold and its hours say whether it is URGENT."""
+    """Return the classes of a place, as its own threshold and its hours leave them.
+
+    A place that is past its own threshold is URGENT. One that only may be visited now is not,
+    unless it is an ALERT that made it so.
+    """
     classes = world.classes.get(place, frozenset())
     if place in world.openings.optional:
-        return classes - {URGENT}
-    if place in world.own_thresholds and place in world.visited_at:
-        late = world.unvisited(place) > world.own_thresholds[place]
-        return classes | {URGENT} if late else classes - {URGENT}
+        return classes if ALERT in classes else classes - {URGENT}
+    own = world.own_thresholds.get(place)
+    if own is not None and place in world.visited_at and world.unvisited(place) > own:
+        return classes | {URGENT}
     return classes
 
 
@@ -333,7 +339,9 @@ def world_with_charge(world: World, battery: Battery) -> World:
     graph = world.graph
     if gone:
         graph = world.memory.without(graph, frozenset(gone), world.place)
-    return replace(world, level=level, own_thresholds=own, graph=graph)
+    changed = {place: classes_of(world, place) for place in own}
+    classes = {**world.classes, **changed} if changed else world.classes
+    return replace(world, level=level, own_thresholds=own, graph=graph, classes=classes)
 
 
 def _within_range(world: World, energy: Energy | None) -> World:
@@ -587,6 +595,6 @@ def _premises(place: str, world: World, rule: str) -> tuple[str, ...]:
         ),
     ]
     if rule:
-        facts.append((f'{place} is {rule}', rule in world.classes.get(place, frozenset())))
+        facts.append((f'{place} is {rule}', rule in classes_of(world, place)))
     facts.sort(key=lambda fact: fact[1])
     return tuple(f'{fact}: {"holds" if holds else "missing"}' for fact, holds in facts)

@@ -308,8 +308,9 @@ class Plan:
         for place, threshold in zip(graph.places, thresholds, strict=True):
             last = world.visited_at.get(place, world.since)
             if world.now - last <= threshold and URGENT in world.classes.get(place, ()):
-                # The ontology knows better: it was never visited.
-                last = world.now - min(threshold, world.threshold) - HALF_OPEN
+                # The ontology knows better: it was never visited, or something was noticed there.
+                limit = threshold if math.isfinite(threshold) else world.threshold
+                last = world.now - limit - HALF_OPEN
             seen.append(last)
         here = graph.index[world.place]
         if here != self._state.place:

@@ -14,7 +14,6 @@ from dataclasses import dataclass, replace
 from patrol_policy.battery import Battery, Energy
 from patrol_policy.decision import (
     DecisionSettings,
-    classes_of,
     energy_of,
     stations_within_reach,
     world_with_charge,
@@ -67,8 +66,7 @@ def promises(
     waits: dict[str, float] = {}
     cut, proven = '', False
     if settings.policy == 'tour' and world.place in asked.graph.index:
-        seen = {place: classes_of(world, place) for place in world.classes}
-        plan = plan_of(replace(asked, classes=seen), energy)
+        plan = plan_of(asked, energy)
         waits = dict(zip(plan.places, plan.settled_waits(), strict=True))
         cut = plan.cut or 'none of the ways that were looked at leads there'
         proven = plan.repeats

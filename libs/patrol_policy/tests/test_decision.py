@@ -17,6 +17,7 @@ from patrol_policy.decision import (
     why_charge,
     why_not,
 )
+from patrol_policy.hours import ALWAYS_OPEN, Openings
 from patrol_policy.policies import POLICIES
 from patrol_policy.world import PolicyMemory
 
@@ -31,6 +32,22 @@ def chosen(rules: Rules, policy: str, **changes: object) -> tuple[str, str]:
 
 def test_urgent_places_come_before_corridors() -> None:
     assert chosen(Rules(), 'oldest') == ('R2', 'URGENT')
+
+
+@pytest.mark.parametrize('hours', [ALWAYS_OPEN, Openings({}, frozenset({'E'}), {})])
+def test_an_alert_is_urgent_at_once_whatever_its_threshold_and_hours(hours: Openings) -> None:
+    calm = {place: frozenset({'ROOM'}) for place in ('R1', 'R2', 'C2')}
+    noticed = calm | {'E': frozenset({'ROOM', 'ALERT', 'URGENT'})}
+    longer = {'own_thresholds': {'E': 86_400.0}, 'openings': hours}
+    for policy in POLICIES:
+        assert chosen(Rules(), policy, classes=noticed, **longer) == ('E', 'URGENT')
+    asked = world(classes=noticed, **longer)
+    assert 'R1 is URGENT: missing' in why_not('R1', asked, Battery(), DecisionSettings()).premises
+
+
+def test_a_place_that_only_may_be_visited_is_not_urgent() -> None:
+    hours = Openings({}, frozenset({'R2'}), {})
+    assert chosen(Rules(), 'oldest', openings=hours) == ('R1', 'URGENT')
 
 
 def test_corridors_come_before_rooms() -> None:
