@@ -214,11 +214,15 @@ class Graph:
         return messages
 
     def said(self) -> list[str]:
-        """Return the list to which each line that a node logs from now on is appended.
+        """Return the list to which each line that a node logs is appended.
 
         Waiting for a line of `capfd` may last for ever: what is printed while that reads is lost.
+        A line that is said once, before the two have found each other, comes as well: rclpy keeps
+        the lines of the last ten seconds for who comes late.
         """
         from rcl_interfaces.msg import Log
+
+        from surveillance_runtime.qos import STATE_QOS
 
         lines: list[str] = []
 
@@ -226,7 +230,9 @@ class Graph:
             lines.append(line.msg)
             self.touch()
 
-        self.node.create_subscription(Log, '/rosout', arrived, 1000)
+        kept = copy.copy(STATE_QOS)
+        kept.depth = 1000
+        self.node.create_subscription(Log, '/rosout', arrived, kept)
         return lines
 
     def close(self) -> None:

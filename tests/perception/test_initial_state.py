@@ -8,7 +8,6 @@ from typing import Any
 
 import pytest
 from nav_msgs.msg import Odometry
-from rcl_interfaces.msg import Log
 from std_msgs.msg import Int32
 from std_srvs.srv import Empty
 
@@ -130,7 +129,7 @@ def test_an_arm_that_takes_a_scan_and_says_nothing_holds_nothing_up(
 ) -> None:
     monkeypatch.setattr(scan_peers, '_SILENCE', 0.1)
     robot = Robot(graph, {1: [11, 12, 13, 14, 15, 16]})
-    logged = graph.listen(Log, '/rosout')
+    logged = graph.said()
     arm = graph.add(PatrolNode, name='arm')
     over = threading.Event()
 
@@ -143,7 +142,7 @@ def test_an_arm_that_takes_a_scan_and_says_nothing_holds_nothing_up(
     graph.add(InitialState, parameters={'robot_room': 'E', 'patience': 0.1, 'dwell': 0.1})
     try:
         started = robot.start()
-        graph.until(lambda: any(each.msg.startswith('scan given up: no view') for each in logged))
+        graph.until(lambda: any(each.startswith('scan given up: no view') for each in logged))
         robot.show(17)
         graph.until(started.done)
     finally:
