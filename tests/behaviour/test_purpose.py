@@ -54,10 +54,10 @@ def test_a_word_a_charge_and_a_pause_are_no_silence() -> None:
 
 def test_few_looks_in_fast_time_are_no_silence() -> None:
     watchdog, told = watch()
-    for look in range(3):
-        watchdog.look(replace(MOVING, now=50.0 * look))
+    for look in range(10):
+        watchdog.look(replace(MOVING, now=10.0 * look))
     assert not told
-    watchdog.look(replace(MOVING, now=150.0 + PATIENCE))
+    watchdog.look(replace(MOVING, now=100.0 + PATIENCE))
     assert told
 
 

@@ -19,8 +19,9 @@ from surveillance_runtime.incidents import Incidents, Severity
 
 PATIENCE = 10.0
 """How much longer than its plan explains a mission may be silent, seconds."""
-LEAST_LOOKS = 3
-"""In fast simulated time a look is rare: nothing must have changed over so many of them."""
+LEAST_LOOKS = 10
+"""Nothing must have changed over so many looks, which are a second of real time apart: in fast
+simulated time the patience holds on both clocks, since a decision takes the computer's time."""
 MOVED = 0.05
 """A robot that is further than this from where it was, metres, or has turned by so many rad,
 moves."""
