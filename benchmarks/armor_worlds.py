@@ -99,8 +99,8 @@ def served(folder: Path, places: int, *, worlds: bool) -> Callable[[int], None]:
     assert service.execute(load).success
     built = [request('ADD IND CLASS', f'R{number}', 'ROOM') for number in range(places)]
     service.execute_list([*built, request('REASON')])
-    if service.worlds:
-        assert service.worlds.flush()
+    if service.workspace.worlds:
+        assert service.workspace.worlds.flush()
 
     def visit(number: int) -> None:
         rows = [

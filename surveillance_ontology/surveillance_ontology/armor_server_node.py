@@ -98,7 +98,7 @@ class ArmorServer(PatrolNode):
         """End the workers and queries that run."""
         for threads in self._pools:
             threads.stop()
-        self._service.sparql.close()
+        self._service.workspace.sparql.close()
 
     def destroy_node(self) -> None:
         """Close the store as well: nothing is answered any more."""
@@ -265,7 +265,7 @@ def _service(node: PatrolNode, keep: bool) -> ArmorService:
         store = None if stored in ('', 'none') else Store(folder)
         service = ArmorService(settings, log.info, log.warn, store)
         if store:
-            kept = ', '.join(service.references.names()) or 'empty'
+            kept = ', '.join(service.workspace.references.names()) or 'empty'
             log.info(f'store {folder} ({kept}); "-p store:=none" turns it off')
         return service
     except StoreError as error:

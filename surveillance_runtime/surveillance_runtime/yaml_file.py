@@ -2,16 +2,17 @@
 
 YAML's own readers take the last of two equal keys in silence, expand aliases without bound, and
 know no line once a value is read. Here the first two are errors, and every error names file and
-line. `read_yaml_file` reads any mapping, `parameters_of` the form of ROS parameter files.
+line. `read_yaml_file` reads any mapping, `read_table` a table of named entries, `parameters_of` the
+form of ROS parameter files.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import yaml
 
@@ -29,6 +30,7 @@ _NUMBERS = {
     r'|[-+]?0\d*[89]\d*\Z|[-+]?\.(inf|Inf|INF)\Z|\.(nan|NaN|NAN)\Z',
 }
 KeyPath = tuple[str, ...]
+Entry = TypeVar('Entry')
 UNREADABLE = (yaml.YAMLError, ValueError, LookupError, TypeError, AttributeError)
 """What PyYAML raises for a value; the last three for a tag like `!!int` before something else."""
 
@@ -96,6 +98,52 @@ def read_yaml_file(path: str | Path) -> YamlFile:
         raise FileError(f'{path}:1: expected a mapping, got {_kind(root)}')
     reader.lines[()] = root.start_mark.line + 1
     return YamlFile(path, reader.mapping(root, ()), reader.lines)
+
+
+class EntryError(ValueError):
+    """One key of an entry is wrong; another `ValueError` means the entry as a whole.
+
+    Attributes:
+        key: Which one.
+    """
+
+    def __init__(self, key: str, problem: str) -> None:
+        super().__init__(problem)
+        self.key = key
+
+
+def read_table(
+    path: str | Path, table: str, example: str, read: Callable[[str, Mapping[str, Any]], Entry]
+) -> list[Entry]:
+    """Read a file that holds one table: a mapping from names that a person chose to entries.
+
+    Args:
+        path: The file.
+        table: The one key at its top.
+        example: How an entry may look, for messages.
+        read: Makes something of a name and its entry; raises `ValueError` or `EntryError`.
+
+    Raises:
+        FileError: One line with file, line, what was wrong and what was expected.
+    """
+    file = read_yaml_file(path)
+    for key in file.values:
+        if key != table:
+            raise file.error((key,), f"unknown key, expected '{table}' alone")
+    entries = file.values.get(table)
+    if not isinstance(entries, Mapping) or not entries:
+        raise file.error_at((table,), f"expected '{table}:' with names, each with {example}")
+    found = []
+    for name, entry in entries.items():
+        try:
+            if not isinstance(entry, Mapping):
+                raise ValueError(f'expected a mapping such as {example}')
+            found.append(read(name, entry))
+        except EntryError as error:
+            raise file.error((table, name, error.key), str(error)) from None
+        except ValueError as error:
+            raise file.error((table, name), str(error)) from None
+    return found
 
 
 def _compose(path: Path) -> yaml.Node | None:

@@ -33,7 +33,7 @@ from typing import Any
 from surveillance_runtime.place import PlaceError
 from surveillance_runtime.place.floor_plan import Marker
 from surveillance_runtime.suggestions import nearest
-from surveillance_runtime.yaml_file import YamlFile, read_yaml_file
+from surveillance_runtime.yaml_file import EntryError, read_table
 from surveillance_simulation.robot.robot import Robot
 from surveillance_simulation.world.textures import marker_panel
 from surveillance_simulation.world.things import Thing, barrel, box, chair, person
@@ -444,38 +444,25 @@ def read_script(path: str | Path) -> list[Happening]:
     Raises:
         FileError: One line with file, line, what was wrong and what was expected.
     """
-    file = read_yaml_file(path)
-    for key in file.values:
-        if key != 'stage':
-            raise file.error((key,), "unknown key, expected 'stage'")
-    entries = file.values.get('stage')
-    if not isinstance(entries, Mapping):
-        raise file.error(('stage',), "expected names, each with 'at' and 'do'")
-    return [_happening(file, name, entry) for name, entry in entries.items()]
+    return read_table(path, 'stage', "'at' and 'do'", _happening)
 
 
-def _happening(file: YamlFile, name: str, entry: Any) -> Happening:
-    where = ('stage', name)
-    if not isinstance(entry, Mapping):
-        raise file.error(where, "expected a mapping with 'at' and 'do'")
+def _happening(name: str, entry: Mapping[str, Any]) -> Happening:
     for key in entry:
         if key not in KEYS:
-            raise file.error((*where, key), f'unknown key, expected {nearest(key, KEYS)}')
+            raise EntryError(key, f'unknown key, expected {nearest(key, KEYS)}')
     for key in ('at', 'do'):
         if key not in entry:
-            raise file.error(where, f"expected '{key}'")
+            raise ValueError(f"expected '{key}'")
     if ('for' in entry) != ('then' in entry):
-        raise file.error(where, "expected 'for' and 'then' together")
-    try:
-        times = Times.parse(str(entry['at']))
-        lines, then = _lines('do', entry['do']), _lines('then', entry.get('then', []))
-        lasts = 0.0
-        if 'for' in entry:
-            if (span := _SPAN.match(str(entry['for']))) is None:
-                raise ValueError(f"for: got {entry['for']!r}, expected such as '45 min'")
-            lasts = float(span[1]) * _UNITS[span[2]]
-    except ValueError as error:
-        raise file.error(where, str(error)) from None
+        raise ValueError("expected 'for' and 'then' together")
+    times = Times.parse(str(entry['at']))
+    lines, then = _lines('do', entry['do']), _lines('then', entry.get('then', []))
+    lasts = 0.0
+    if 'for' in entry:
+        if (span := _SPAN.match(str(entry['for']))) is None:
+            raise ValueError(f"for: got {entry['for']!r}, expected such as '45 min'")
+        lasts = float(span[1]) * _UNITS[span[2]]
     return Happening(name, times, lines, lasts, then)
 
 

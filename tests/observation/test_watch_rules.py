@@ -76,7 +76,7 @@ def test_a_rule_waits_until_it_lasts():
     ('text', 'wrong'),
     [
         ('[D1]', "expected a mapping such as 'door: D1'"),
-        ('dor: D1', "unknown key 'dor', expected 'door'"),
+        ('dor: D1', "rules.odd.dor: unknown key, expected 'door'"),
         ('is: open', 'expected one of door, object'),
         ('door: D1\nis: opn', "door D1: got 'opn', expected 'open'"),
         ('door: D1', "door D1: got '', expected one of open, closed, ajar"),
@@ -108,5 +108,5 @@ def test_a_file_of_rules_is_read_in_order(tmp_path):
         (Kind.LIGHT, 'off'),
     ]
     path.write_text('rule:\n  door: {door: D1}\n')
-    with pytest.raises(FileError, match="expected a mapping 'rules'"):
+    with pytest.raises(FileError, match="1: rule: unknown key, expected 'rules'"):
         read_watch_file(path)

@@ -158,7 +158,7 @@ def test_an_ontology_that_is_used_for_long_keeps_nobody_waiting_for_another(
     other = ArmorClient(graph.node, 'test', 'other', timeout=60.0)
     other.utils.get_all_refs()
     server_waits = (server._work, server._queries, *server._documents.values())
-    with server._service.references.find('map').lock:
+    with server._service.workspace.references.find('map').lock:
         for _ in range(5):
             graph.node.executor.create_task(ask_all)
             for request in asked:

@@ -91,7 +91,7 @@ def test_messages_round_trip(service: ArmorService, client: ArmorClient) -> None
 
 def test_every_axiom_can_be_journalled(service: ArmorService, client: ArmorClient) -> None:
     build_seven_rooms(client, False, True)
-    for axiom in service.references.find('map').kb.axioms():
+    for axiom in service.workspace.references.find('map').kb.axioms():
         assert decode(encode(axiom)) == axiom
 
 

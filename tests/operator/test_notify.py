@@ -425,7 +425,7 @@ def test_a_file_names_the_sinks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
         ({'webhook': 'https://x', 'token': 'hunter'}, 'expected token_file or token_env'),
         ({'webhook': 'https://x', 'token_env': 'NOT_SET'}, 'variable NOT_SET is not set'),
         ({'webhook': 'https://x', 'token_file': '/nowhere'}, '/nowhere: No such file'),
-        ({'webhook': 'https://x', 'topic': 'a'}, "unknown key 'topic', expected"),
+        ({'webhook': 'https://x', 'topic': 'a'}, 'sinks.a.topic: unknown key, expected'),
         ({'mqtt': 'mqtt://x', 'topic': 'a/#'}, "topic: got 'a/#', expected"),
         ({'mqtt': 'mqtt://x', 'topic': 'a', 'user': 'u'}, "expected 'user' and 'password_file'"),
         ({'email': 'nobody', 'from': 'a@b', 'smtp': 'smtp://x'}, "email: got 'nobody', expected"),

@@ -10,8 +10,8 @@ stand outside: `surveillance_ontology.armor_server_node`, `surveillance_ontology
 Modules, from the bottom: `protocol` (requests, answers), `rendering` and `facts` (texts),
 `changes` (of an ontology), `reference` (a loaded ontology), `store` (what outlives the process),
 `worlds` (the same for owlready2), `names` (mistyped ones), `access` (limits and files),
-`directives` (what each directive does), `service` (all of these together, dispatch and locks) and
-`client`.
+`workspace` (all of these: what directives act on), `directives` (what each does), `service`
+(dispatch and locks) and `client`.
 """
 
 from __future__ import annotations

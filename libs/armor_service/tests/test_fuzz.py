@@ -281,7 +281,7 @@ class Directives(RuleBasedStateMachine):
     def restart(self) -> None:
         self.service.close()
         self.start()
-        assert self.service.references.names() == sorted(self.models)
+        assert self.service.workspace.references.names() == sorted(self.models)
 
     @rule(reference=REFERENCES, ind=INDIVIDUALS, cls=CLASSES, prop=PROPS, data=DATA)
     def ask(self, reference: str, ind: str, cls: str, prop: str, data: str) -> None:

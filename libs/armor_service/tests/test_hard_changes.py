@@ -167,7 +167,7 @@ def begun(served: Served, words: str, *args: str) -> tuple[threading.Thread, lis
     """Send a directive to the hard reference; return once it reasons."""
     answers: list[object] = []
     ask = asker(served.service, 'hard')
-    ref = served.service.references.find('hard')
+    ref = served.service.workspace.references.find('hard')
     reasons = threading.Event()
     note = ref.on_reasoning
 
@@ -186,7 +186,7 @@ def begun(served: Served, words: str, *args: str) -> tuple[threading.Thread, lis
 def unbounded(served: Served) -> Served:
     """Provide the service with the hard ontology and hours for it."""
     ask = served.load('products', 'true')
-    ref = served.service.references.find('hard')
+    ref = served.service.workspace.references.find('hard')
     ref.limits = type(ref.limits)()
     ask(*HARD['products'][1])
     return served

@@ -29,7 +29,7 @@ def patrol(tmp_path: Path) -> ArmorService:
     service = ArmorService(Settings(tmp_path), lambda _: None, lambda _: None)
     client = ArmorClient('c', 'map', InProcessTransport(service))
     build_seven_rooms(client, False, True)
-    ref = service.references.find('map')
+    ref = service.workspace.references.find('map')
     ref.kb.change(read_ontology(DEFINITIONS.encode(), IRI).axioms)
     ref.reason()
     return service

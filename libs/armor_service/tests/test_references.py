@@ -217,7 +217,7 @@ def test_a_state_that_was_taken_before_the_newest_is_not_written_after_it(
     service = ArmorService(Settings(str(tmp_path)))
     ask = asker(service)
     assert ask('LOAD FILE', ONTOLOGY, IRI, 'false', 'PELLET', 'false').success
-    saving, taken, go_on = service.saving, threading.Event(), threading.Event()
+    saving, taken, go_on = service.workspace.saving, threading.Event(), threading.Event()
 
     def late(path: Path) -> threading.Lock:
         if not taken.is_set():
@@ -225,7 +225,7 @@ def test_a_state_that_was_taken_before_the_newest_is_not_written_after_it(
             assert go_on.wait(30)
         return saving(path)
 
-    monkeypatch.setattr(service, 'saving', late)
+    monkeypatch.setattr(service.workspace, 'saving', late)
     older = threading.Thread(target=ask, args=('SAVE', 'map.owl'))
     older.start()
     assert taken.wait(30)
@@ -244,13 +244,13 @@ def test_a_list_that_saves_waits_for_no_save_that_waits_for_it(
     assert asker(service)('LOAD FILE', ONTOLOGY, IRI, 'false', 'PELLET', 'false').success
     request = DirectiveRequest('me', 'map', 'SAVE', args=('map.owl',))
     waiting, answers = threading.Semaphore(0), queue.SimpleQueue[Any]()
-    saving = service.saving
+    saving = service.workspace.saving
 
     def told(path: Path) -> threading.Lock:
         waiting.release()
         return saving(path)
 
-    monkeypatch.setattr(service, 'saving', told)
+    monkeypatch.setattr(service.workspace, 'saving', told)
 
     def save(execute: Callable[[Any], Any], argument: Any) -> None:
         answers.put(execute(argument))

@@ -139,7 +139,7 @@ def test_what_may_take_long_is_not_done_at_once(service: ArmorService, ask: Ask)
 def test_a_reference_whose_reasoning_takes_long_is_reasoned_over_by_a_worker(
     service: ArmorService, ask: Ask
 ) -> None:
-    ref = service.references.find('map')
+    ref = service.workspace.references.find('map')
     ask('ADD IND CLASS', 'R1', 'ROOM')
     assert service.execute_at_once(request('REASON')) is not None
     ref.took = 2 * SLOW
@@ -151,7 +151,7 @@ def test_a_reference_whose_reasoning_takes_long_is_reasoned_over_by_a_worker(
 def test_an_ontology_that_was_dropped_meanwhile_is_asked_no_more(
     service: ArmorService, ask: Ask
 ) -> None:
-    ref = service.references.find('map')
+    ref = service.workspace.references.find('map')
     answers = []
     with ref.lock:
         asking = threading.Thread(

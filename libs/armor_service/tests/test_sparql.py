@@ -267,9 +267,9 @@ def test_a_service_that_closes_stops_its_queries(service: ArmorService, built: A
         target=lambda: answers.append(asker(service)('QUERY SPARQL', ENDLESS).error_description)
     )
     thread.start()
-    while not service.sparql.is_busy():
+    while not service.workspace.sparql.is_busy():
         thread.join(0.01)
-    service.sparql.close()
+    service.workspace.sparql.close()
     thread.join(60.0)
     assert answers == ['QUERY SPARQL: the server stops']
     assert not asker(service)('QUERY SPARQL', 'SELECT * { ?a ?b ?c }').success
@@ -320,7 +320,7 @@ def test_a_graph_that_is_kept_up_to_date_is_the_one_that_a_new_process_gets(
         ]
         seed.choice(changes)()
         kept = graph_of(client)
-        service.sparql.note('map', None)
+        service.workspace.sparql.note('map', None)
         assert kept == graph_of(client), step
     assert wholes.count(False) > 20, 'most changes were told as a difference'
     service.close()
@@ -343,7 +343,7 @@ def test_what_comes_below_a_class_that_only_individuals_named_is_told(lazy: bool
         graph_of(client)
         client.utils.apply_buffered_changes()
     kept = graph_of(client)
-    service.sparql.note('map', None)
+    service.workspace.sparql.note('map', None)
     assert kept == graph_of(client)
     service.close()
 

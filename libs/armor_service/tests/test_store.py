@@ -233,7 +233,7 @@ def test_a_snapshot_waits_for_an_ontology_in_use_and_holds_no_other_meanwhile(
     server = Server(tmp_path / 'store', compact_from=1)
     server.ask(*LOAD, 'false', '', 'false')
     server.ask(*LOAD, 'false', '', 'false', reference='used')
-    used = server.service.references.find('used')
+    used = server.service.workspace.references.find('used')
     with used.lock:
         answers: list[bool] = []
 
@@ -255,7 +255,7 @@ def test_references_that_come_and_go_while_a_snapshot_begins_are_not_mistaken(
     server = Server(tmp_path / 'store', compact_from=1)
     server.ask(*LOAD, 'false', '', 'false')
     server.ask(*LOAD, 'false', '', 'false', reference='early')
-    registry = server.service.references
+    registry = server.service.workspace.references
     held = registry.held_briefly
 
     def held_late() -> AbstractContextManager[list[Reference]]:
@@ -302,7 +302,7 @@ def test_a_journal_that_somebody_cut_costs_nothing_that_is_known(tmp_path: Path,
 
 def test_what_was_cut_from_the_journal_is_in_a_snapshot(server: Server) -> None:
     server.ask('ADD IND CLASS', 'A', 'DOOR')
-    store = server.service.store
+    store = server.service.workspace.store
     assert store is not None
     os.truncate(store.directory / 'journal-0.log', 0)
     server.ask('ADD IND CLASS', 'B', 'DOOR')

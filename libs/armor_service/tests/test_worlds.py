@@ -34,8 +34,8 @@ class Served:
             settings, print, self.notes.append, Store(self.folder / 'store')
         )
         self.ask: Ask = asker(self.service)
-        assert self.service.worlds
-        self.worlds: Worlds = self.service.worlds
+        assert self.service.workspace.worlds
+        self.worlds: Worlds = self.service.workspace.worlds
 
     def world(self) -> owlready2.World:
         """Open the World as a program beside the service does."""

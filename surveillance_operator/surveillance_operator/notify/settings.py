@@ -23,7 +23,7 @@ from typing import Any
 from urllib.parse import urlsplit
 
 from surveillance_runtime.suggestions import nearest
-from surveillance_runtime.yaml_file import read_yaml_file
+from surveillance_runtime.yaml_file import EntryError, read_table
 
 PICTURES = ('blurred', 'sharp', 'none')
 _SCHEMES = {
@@ -107,23 +107,10 @@ def read_notify_file(path: str | Path) -> list[SinkSettings]:
     Raises:
         FileError: One line with file, line, what was wrong and what was expected.
     """
-    file = read_yaml_file(path)
-    for key in file.values:
-        if key != 'sinks':
-            raise file.error((key,), "unknown key, expected 'sinks'")
-    entries = file.values.get('sinks')
-    if not isinstance(entries, Mapping) or not entries:
-        raise file.error(('sinks',), "expected names, each with 'webhook', 'mqtt', ...")
-    sinks = []
-    for name, entry in entries.items():
-        try:
-            sinks.append(sink_from(name, entry))
-        except ValueError as error:
-            raise file.error(('sinks', name), str(error)) from None
-    return sinks
+    return read_table(path, 'sinks', "'webhook: https://...'", sink_from)
 
 
-def sink_from(name: str, entry: Any) -> SinkSettings:
+def sink_from(name: str, entry: Mapping[str, Any]) -> SinkSettings:
     """Return the sink that a mapping describes.
 
     Raises:
@@ -131,8 +118,6 @@ def sink_from(name: str, entry: Any) -> SinkSettings:
     """
     if not _NAME.match(name):
         raise ValueError('expected a name of letters, digits, - and _')
-    if not isinstance(entry, Mapping):
-        raise ValueError("expected a mapping such as 'webhook: https://...'")
     stems = {key.split('_')[0] for key in entry}
     kinds = [kind for kind in _KEYS if kind in stems]
     if len(kinds) != 1:
@@ -141,11 +126,9 @@ def sink_from(name: str, entry: Any) -> SinkSettings:
     allowed = (*_KEYS[kind], 'pictures')
     for key in entry:
         if key in ('password', 'token'):
-            raise ValueError(
-                f'{key}: a secret must not stand here, expected {key}_file or {key}_env'
-            )
+            raise EntryError(key, f'a secret must not stand here, expected {key}_file or {key}_env')
         if key not in allowed:
-            raise ValueError(f'unknown key {key!r}, expected {nearest(key, allowed)}')
+            raise EntryError(key, f'unknown key, expected {nearest(key, allowed)}')
     pictures = str(entry.get('pictures', 'blurred'))
     if pictures not in PICTURES:
         raise ValueError(f'pictures: got {pictures!r}, expected {nearest(pictures, PICTURES)}')

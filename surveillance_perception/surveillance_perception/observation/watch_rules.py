@@ -39,7 +39,7 @@ from patrol_policy.hours import WeeklyHours
 from surveillance_perception.observation.habits import UNUSUAL_BELOW
 from surveillance_perception.observation.observations import Kind, Observation
 from surveillance_runtime.suggestions import nearest
-from surveillance_runtime.yaml_file import read_yaml_file
+from surveillance_runtime.yaml_file import EntryError, read_table
 
 
 class Level(IntEnum):
@@ -149,20 +149,7 @@ def read_watch_file(
     Raises:
         FileError: One line: where, what was wrong, what was expected.
     """
-    file = read_yaml_file(path)
-    entries = file.values.get('rules')
-    if not isinstance(entries, Mapping) or not entries:
-        raise file.error((), "expected a mapping 'rules' from a name to its rule")
-    for key in file.values:
-        if key != 'rules':
-            raise file.error((key,), "unknown key, expected 'rules' alone")
-    rules = []
-    for name, entry in entries.items():
-        try:
-            rules.append(rule_from(entry, places, doors))
-        except ValueError as error:
-            raise file.error(('rules', name), str(error)) from None
-    return rules
+    return read_table(path, 'rules', "'door: D1'", lambda _, entry: rule_from(entry, places, doors))
 
 
 def severity_of(
@@ -174,7 +161,9 @@ def severity_of(
     return (0, None) if worst is None else (int(worst.level), worst)
 
 
-def rule_from(entry: Any, places: Sequence[str] = (), doors: Sequence[str] = ()) -> WatchRule:
+def rule_from(
+    entry: Mapping[str, Any], places: Sequence[str] = (), doors: Sequence[str] = ()
+) -> WatchRule:
     """Return the rule that a mapping describes.
 
     Args:
@@ -185,13 +174,11 @@ def rule_from(entry: Any, places: Sequence[str] = (), doors: Sequence[str] = ())
     Raises:
         ValueError: What was wrong, and what was expected.
     """
-    if not isinstance(entry, Mapping):
-        raise ValueError("expected a mapping such as 'door: D1'")
     kinds = [key for key in entry if key in list(Kind)]
     unknown = [key for key in entry if key not in KEYS and key not in kinds]
     if unknown:
-        known = nearest(str(unknown[0]), [*Kind, *KEYS])
-        raise ValueError(f'unknown key {str(unknown[0])!r}, expected {known}')
+        known = nearest(unknown[0], [*Kind, *KEYS])
+        raise EntryError(unknown[0], f'unknown key, expected {known}')
     if len(kinds) != 1:
         raise ValueError(f'expected one of {", ".join(Kind)}, got {len(kinds)} of them')
     kind = Kind(kinds[0])

@@ -6,21 +6,19 @@ Names are local names as in other directives; ``<iri>`` stands for itself.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from armor_service.changes import AddAxiom, Change, RemoveAxiom
 from armor_service.directives.table import manipulation, query, text
 from armor_service.protocol import DirectiveError, DirectiveResponse
 from armor_service.reference import Reference, knowledge_base
 from armor_service.rendering import parse_entity, render_entity
+from armor_service.workspace import Workspace
 from owl_reasoner.documents.manchester import ManchesterParser, ManchesterWriter
 from owl_reasoner.documents.structural import PREFIXES
 from owl_reasoner.documents.xml_reading import OntologyFileError
 from owl_reasoner.owl.axioms import Axiom, Declaration, EquivalentClasses
 from owl_reasoner.owl.entities import entities_of
-
-if TYPE_CHECKING:
-    from armor_service.service import ArmorService
 
 ASKED = 'urn:asked'
 """The name of a class expression while its individuals are looked for."""
@@ -137,14 +135,14 @@ def _rule(words: str, ref: Reference, written: str) -> Axiom:
     summary='The individuals of a class expression in Manchester syntax, `ROOM and (hasDoor some '
     'DOOR)`: all is reasoned over once more, with a name for it.',
 )
-def _individuals(service: ArmorService, ref: Reference, written: str) -> DirectiveResponse:
+def _individuals(workspace: Workspace, ref: Reference, written: str) -> DirectiveResponse:
     words = 'QUERY IND EXPRESSION'
     with ref.held() as kb:
         parser = _read(words, 'class expression', lambda: _parser(ref, written))
         expression = _read(words, 'class expression', lambda: parser.whole(parser.class_expression))
         axioms, base = list(kb.axioms()), ref.base
     asked = knowledge_base(kb.iri, [*axioms, EquivalentClasses((ASKED, expression))])
-    asked.reason(service.limits.of(base, len(axioms)), memory=service.limits.memory)
+    asked.reason(workspace.limits.of(base, len(axioms)), memory=workspace.limits.memory)
     if not asked.consistent:
         return DirectiveResponse(error_description=f'{ref.name} is inconsistent')
     return DirectiveResponse(queried_objects=sorted(map(render_entity, asked.instances(ASKED))))

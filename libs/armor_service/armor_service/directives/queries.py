@@ -11,7 +11,7 @@ import json
 import re
 from collections.abc import Callable, Iterable, Iterator
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from armor_service.directives.table import (
     CLS,
@@ -41,6 +41,7 @@ from armor_service.rendering import (
     shown,
 )
 from armor_service.rendering import render_literal as _literal
+from armor_service.workspace import Workspace
 from owl_reasoner.knowledge_base import Fact
 from owl_reasoner.open_world import open_definition
 from owl_reasoner.owl.axioms import (
@@ -65,9 +66,6 @@ from owl_reasoner.owl.expressions import (
 )
 from owl_reasoner.owl.vocabulary import NOTHING, OWL, THING, local_name
 from owl_reasoner.reasoner.absence import Absence
-
-if TYPE_CHECKING:
-    from armor_service.service import ArmorService
 
 
 def _entities(iris: Iterable[str]) -> list[str]:
@@ -187,7 +185,7 @@ def _object_properties(ref: Reference, ind: str) -> DirectiveResponse:
     summary='Why a fact holds, written as `URGENT(R3)`, `connectedTo(R1, C1)` or '
     '`owl:sameAs(a, b)`: first an English sentence, then the derivation as a tree.',
 )
-def _explain(_: ArmorService, ref: Reference, fact: str) -> DirectiveResponse:
+def _explain(_: Workspace, ref: Reference, fact: str) -> DirectiveResponse:
     with ref.held():
         asked = _full_fact('QUERY EXPLAIN', ref, fact)
         explanation = ref.explain(asked)
@@ -247,7 +245,7 @@ def _closable(ref: Reference, fact: Fact, absence: Absence) -> list[str]:
     slow=True,
     summary='Why the ontology contradicts itself, in the form of QUERY EXPLAIN; else nothing.',
 )
-def _explain_inconsistency(_: ArmorService, ref: Reference) -> DirectiveResponse:
+def _explain_inconsistency(_: Workspace, ref: Reference) -> DirectiveResponse:
     with ref.held():
         explanation = ref.explain(None)
     if explanation is None:
@@ -429,8 +427,8 @@ def _sparql(words: str, form: str, **properties: Any) -> Callable[[Run], Run]:
     'All rows in one text: `{x=iri, v=5^^datatype}, {...}`.',
     differs=_SPARQL_DIFFERS,
 )
-def _rows_as_text(service: ArmorService, ref: Reference, *parts: str) -> DirectiveResponse:
-    rows = _select(service, ref, parts)
+def _rows_as_text(workspace: Workspace, ref: Reference, *parts: str) -> DirectiveResponse:
+    rows = _select(workspace, ref, parts)
     texts = [', '.join(f'{name}={value}' for name, value in row) for row in rows]
     return DirectiveResponse(queried_objects=[', '.join(f'{{{text}}}' for text in texts)])
 
@@ -440,8 +438,8 @@ def _rows_as_text(service: ArmorService, ref: Reference, *parts: str) -> Directi
     'The rows one after the other as pairs of variable and value.',
     differs=_SPARQL_DIFFERS,
 )
-def _rows_as_pairs(service: ArmorService, ref: Reference, *parts: str) -> DirectiveResponse:
-    rows = _select(service, ref, parts)
+def _rows_as_pairs(workspace: Workspace, ref: Reference, *parts: str) -> DirectiveResponse:
+    rows = _select(workspace, ref, parts)
     return DirectiveResponse(sparql_queried_objects=[item for row in rows for item in row])
 
 
@@ -451,21 +449,21 @@ def _rows_as_pairs(service: ArmorService, ref: Reference, *parts: str) -> Direct
     'left out, which the other two forms cannot show.',
     native=False,
 )
-def _rows_as_json(service: ArmorService, ref: Reference, *parts: str) -> DirectiveResponse:
-    rows = _select(service, ref, parts)
+def _rows_as_json(workspace: Workspace, ref: Reference, *parts: str) -> DirectiveResponse:
+    rows = _select(workspace, ref, parts)
     objects = [json.dumps(dict(row), ensure_ascii=False) for row in rows]
     return DirectiveResponse(queried_objects=objects)
 
 
-def _select(service: ArmorService, ref: Reference, parts: tuple[str, ...]) -> list[list[QueryItem]]:
+def _select(workspace: Workspace, ref: Reference, parts: tuple[str, ...]) -> list[list[QueryItem]]:
     if len(parts) > 4:
         raise DirectiveError(f'QUERY SPARQL: expected 1 to 4 arguments, got {len(parts)}')
     *texts, last = parts if len(parts) in (2, 4) else (*parts, '0')
-    limit = service.settings.sparql_timeout
+    limit = workspace.settings.sparql_timeout
     asked = _milliseconds(last) / 1000
     seconds = min(asked, limit) if asked > 0 else limit
     try:
-        return service.sparql.select(ref, ''.join(texts), seconds)
+        return workspace.sparql.select(ref, ''.join(texts), seconds)
     except TimeoutError:
         raise DirectiveError(
             f'QUERY SPARQL: stopped after {seconds * 1000:g} ms', timeout=True

@@ -6,7 +6,6 @@ import math
 import threading
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from armor_service.access import LOG_ENDINGS, ONTOLOGY_ENDINGS, Settings
 from armor_service.directives.table import control, flag, text, utility
@@ -24,15 +23,13 @@ from armor_service.reference import (
     knowledge_base,
 )
 from armor_service.rendering import parse_entity, shown
+from armor_service.workspace import Workspace
 from owl_reasoner import memory
 from owl_reasoner.documents.reading import read_ontology
 from owl_reasoner.documents.xml_reading import OntologyFileError
 from owl_reasoner.knowledge_base import KnowledgeBase
 from owl_reasoner.owl.axioms import Axiom
 from owl_reasoner.reasoner.budget import ReasoningBudgetError
-
-if TYPE_CHECKING:
-    from armor_service.service import ArmorService
 
 _BY_ENDING = {'.nt': 'ntriples', '.omn': 'manchester'}
 """What SAVE writes by the ending of the path."""
@@ -94,7 +91,7 @@ _WEB_DIFFERS = 'Refused unless the parameter allow_web is set.'
 )
 @utility('LOAD FILE', text('path'), *_LOAD, summary=_LOAD_SUMMARY, differs=_LOAD_DIFFERS, slow=True)
 def _load(
-    service: ArmorService,
+    workspace: Workspace,
     request: DirectiveRequest,
     source: str,
     iri: str,
@@ -104,37 +101,37 @@ def _load(
 ) -> DirectiveResponse:
     name = request.reference_name
     notes = [f'{name} is loaded already']
-    if not _rebuffer(service, request, buffered):
+    if not _rebuffer(workspace, request, buffered):
         with memory.uncollected():
-            ref, found = _read_document(service, request, source, iri, reasoner)
+            ref, found = _read_document(workspace, request, source, iri, reasoner)
             memory.settle(len(ref.kb))
         ref.buffered_manipulation, ref.buffered_reasoner = buffered, lazy
-        with service.entering:
-            entered = name not in service.references
+        with workspace.entering:
+            entered = name not in workspace.references
             if entered:
-                if service.store:
-                    service.store.loaded(ref)
-                service.register(ref)
+                if workspace.store:
+                    workspace.store.loaded(ref)
+                workspace.register(ref)
         if entered:
             notes = found
             for note in notes:
-                service.warn(f'{name}: {note}')
+                workspace.warn(f'{name}: {note}')
         else:
-            _rebuffer(service, request, buffered)
+            _rebuffer(workspace, request, buffered)
     if request.secondary:
-        _mount(service, request)
+        _mount(workspace, request)
     return DirectiveResponse(error_description='; '.join(notes))
 
 
-def _rebuffer(service: ArmorService, request: DirectiveRequest, buffered: bool) -> bool:
+def _rebuffer(workspace: Workspace, request: DirectiveRequest, buffered: bool) -> bool:
     """Give a loaded reference the buffering of a further LOAD; False when there is none."""
-    with service.references.locked_if_there(request.reference_name) as ref:
+    with workspace.references.locked_if_there(request.reference_name) as ref:
         if ref is None:
             return False
         if ref.buffered_manipulation != buffered:
-            service.check_free(ref, request.client_name)
-            if service.store:
-                service.store.buffered(ref.name, buffered)
+            workspace.check_free(ref, request.client_name)
+            if workspace.store:
+                workspace.store.buffered(ref.name, buffered)
             ref.buffer(buffered)
     return True
 
@@ -145,39 +142,39 @@ def _rebuffer(service: ArmorService, request: DirectiveRequest, buffered: bool) 
     differs='Refused with 102 while another client is mounted.',
     slow=True,
 )
-def _drop(service: ArmorService, request: DirectiveRequest) -> DirectiveResponse:
-    ref = service.references.get(request.reference_name)
+def _drop(workspace: Workspace, request: DirectiveRequest) -> DirectiveResponse:
+    ref = workspace.references.get(request.reference_name)
     if ref is None:
         return DirectiveResponse()
-    service.check_free(ref, request.client_name)
-    service.references.remove(ref)
+    workspace.check_free(ref, request.client_name)
+    workspace.references.remove(ref)
     # Whoever reasons over it ends soon, and writes nothing after this.
     ref.cancel.set()
     free = ref.lock.acquire(timeout=DROP_WITHIN)
     try:
-        if service.store:
-            service.store.dropped(ref.name)
+        if workspace.store:
+            workspace.store.dropped(ref.name)
     finally:
         if free:
             ref.lock.release()
-    if service.worlds:
-        service.worlds.drop(ref)
-    service.tell(ref.name, None)
+    if workspace.worlds:
+        workspace.worlds.drop(ref)
+    workspace.tell(ref.name, None)
     # Not yet: this directive and those that wait for the lock still refer to it.
-    release = threading.Timer(RELEASE_AFTER, _release, args=(service, ref))
+    release = threading.Timer(RELEASE_AFTER, _release, args=(workspace, ref))
     release.daemon = True
     release.start()
     return DirectiveResponse()
 
 
-def _release(service: ArmorService, ref: Reference) -> None:
+def _release(workspace: Workspace, ref: Reference) -> None:
     """Give back an ontology's memory; of a large one also that of those who know its graph."""
     if len(ref.kb) > memory.LARGE:
-        service.sparql.forget()
+        workspace.sparql.forget()
     with ref.lock:  # The last of those who found it before it was dropped.
         parts = ref.kb.give_up()
         ref.kb = KnowledgeBase(ref.kb.iri)
-    memory.release(parts, service.references.hold_more_than(memory.LARGE))
+    memory.release(parts, workspace.references.hold_more_than(memory.LARGE))
 
 
 @utility(
@@ -201,42 +198,42 @@ def _release(service: ArmorService, ref: Reference) -> None:
     '.omn Manchester syntax.',
     slow=True,
 )
-def _save(service: ArmorService, request: DirectiveRequest, path: str) -> DirectiveResponse:
+def _save(workspace: Workspace, request: DirectiveRequest, path: str) -> DirectiveResponse:
     # Late, as what LOAD WEB needs: a server that starts again is to be back at once.
     from owl_reasoner.documents.writing import write_ontology
 
-    with service.references.locked(request.reference_name) as first:
-        service.check_free(first, request.client_name)
-        chosen = path or _loaded_file(service, first)
+    with workspace.references.locked(request.reference_name) as first:
+        workspace.check_free(first, request.client_name)
+        chosen = path or _loaded_file(workspace, first)
     # While nobody waits for the reference: the disk may not answer.
-    target = service.paths.to_write(chosen, ONTOLOGY_ENDINGS)
-    with service.references.locked(request.reference_name) as ref, memory.uncollected():
-        service.check_free(ref, request.client_name)
+    target = workspace.paths.to_write(chosen, ONTOLOGY_ENDINGS)
+    with workspace.references.locked(request.reference_name) as ref, memory.uncollected():
+        workspace.check_free(ref, request.client_name)
         if ref is not first and not path:
             # Its own file is another one.
             raise DirectiveError(f'SAVE: {ref.name} was loaded again meanwhile')
-        taken = next(service.states)
+        taken = next(workspace.states)
         axioms = list(ref.kb.axioms())
         if request.primary:
             axioms = list(dict.fromkeys([*axioms, *ref.kb.facts()]))
         iri, origin = ref.kb.iri, ref.origin
     form = _BY_ENDING.get(target.suffix.lower(), origin.format)
-    with service.saving(target):
-        if taken < service.saved.get(target, 0):
+    with workspace.saving(target):
+        if taken < workspace.saved.get(target, 0):
             return DirectiveResponse()  # A newer state is there already.
         try:
             with memory.uncollected():
                 write_ontology(axioms, iri, target, form, origin.prefixes)
         except OntologyFileError as error:
             raise DirectiveError(f'SAVE: {error}') from None
-        service.saved[target] = taken
+        workspace.saved[target] = taken
     return DirectiveResponse()
 
 
-def _loaded_file(service: ArmorService, ref: Reference) -> str:
+def _loaded_file(workspace: Workspace, ref: Reference) -> str:
     if not ref.origin.file:
         raise DirectiveError(f'SAVE: {ref.name} was loaded from {ref.origin.path}; expected a path')
-    if not service.settings.overwrite_loaded:
+    if not workspace.settings.overwrite_loaded:
         raise DirectiveError(
             f'SAVE: expected a path; the parameter overwrite_loaded permits writing over '
             f'{ref.origin.file}, which was loaded'
@@ -252,18 +249,18 @@ def _loaded_file(service: ArmorService, ref: Reference) -> str:
     'the manipulation out.',
     slow=True,
 )
-def _mount(service: ArmorService, request: DirectiveRequest) -> DirectiveResponse:
+def _mount(workspace: Workspace, request: DirectiveRequest) -> DirectiveResponse:
     client, name = request.client_name, request.reference_name
     refusal = f'{client} cannot be mounted on {name}.'
-    with service.references.locked_if_there(name) as ref:
+    with workspace.references.locked_if_there(name) as ref:
         if ref is None:
             raise DirectiveError(f'{refusal} Unknown reference.', ExitCode.MOUNT_REFUSED)
         if not ref.is_free_for(client):
             problem = f'{refusal} Another client is already mounted on it.'
             raise DirectiveError(problem, ExitCode.MOUNT_REFUSED)
         note = f'{client} is mounted already' if ref.mounted == client != NOBODY else ''
-        if service.store and ref.mounted != client:
-            service.store.mounted(name, client)
+        if workspace.store and ref.mounted != client:
+            workspace.store.mounted(name, client)
         ref.mounted = client
     return DirectiveResponse(error_description=note)
 
@@ -273,20 +270,20 @@ def _mount(service: ArmorService, request: DirectiveRequest) -> DirectiveRespons
     summary='Ends MOUNT; a client that is not mounted changes nothing by it.',
     slow=True,
 )
-def _unmount(service: ArmorService, request: DirectiveRequest) -> DirectiveResponse:
-    with service.references.locked(request.reference_name) as ref:
+def _unmount(workspace: Workspace, request: DirectiveRequest) -> DirectiveResponse:
+    with workspace.references.locked(request.reference_name) as ref:
         if ref.mounted != request.client_name:
             note = f'{request.client_name} is not mounted on {ref.name}'
             return DirectiveResponse(error_description=note)
-        if service.store:
-            service.store.mounted(ref.name, NOBODY)
+        if workspace.store:
+            workspace.store.mounted(ref.name, NOBODY)
         ref.mounted = NOBODY
     return DirectiveResponse()
 
 
 @utility('GET ALL REFS', summary='The names of all references.')
-def _get_all(service: ArmorService, _: DirectiveRequest) -> DirectiveResponse:
-    return DirectiveResponse(queried_objects=service.references.names())
+def _get_all(workspace: Workspace, _: DirectiveRequest) -> DirectiveResponse:
+    return DirectiveResponse(queried_objects=workspace.references.names())
 
 
 @utility(
@@ -295,8 +292,8 @@ def _get_all(service: ArmorService, _: DirectiveRequest) -> DirectiveResponse:
     summary='The client mounted on a reference, `none` when there is none.',
     differs='An unknown reference is answered with 205.',
 )
-def _get_client(service: ArmorService, _: DirectiveRequest, name: str) -> DirectiveResponse:
-    return DirectiveResponse(queried_objects=[service.references.find(name).mounted])
+def _get_client(workspace: Workspace, _: DirectiveRequest, name: str) -> DirectiveResponse:
+    return DirectiveResponse(queried_objects=[workspace.references.find(name).mounted])
 
 
 @utility(
@@ -306,31 +303,31 @@ def _get_client(service: ArmorService, _: DirectiveRequest, name: str) -> Direct
     differs='Only to .log and .txt files below the ontologies folder; closed at 64 MiB.',
     slow=True,
 )
-def _log_file_on(service: ArmorService, _: DirectiveRequest, path: str) -> DirectiveResponse:
-    service.log.open(service.paths.to_write(path, LOG_ENDINGS))
+def _log_file_on(workspace: Workspace, _: DirectiveRequest, path: str) -> DirectiveResponse:
+    workspace.log.open(workspace.paths.to_write(path, LOG_ENDINGS))
     return DirectiveResponse()
 
 
 @utility('LOG FILE OFF', summary='Ends LOG FILE ON.', slow=True)
-def _log_file_off(service: ArmorService, _: DirectiveRequest) -> DirectiveResponse:
-    service.log.close()
+def _log_file_off(workspace: Workspace, _: DirectiveRequest) -> DirectiveResponse:
+    workspace.log.close()
     return DirectiveResponse()
 
 
 @utility('LOG SCREEN ON', summary='Writes each directive with its answer to the console.')
-def _log_screen_on(service: ArmorService, _: DirectiveRequest) -> DirectiveResponse:
-    service.log.on_screen = True
+def _log_screen_on(workspace: Workspace, _: DirectiveRequest) -> DirectiveResponse:
+    workspace.log.on_screen = True
     return DirectiveResponse()
 
 
 @utility('LOG SCREEN OFF', summary='Ends LOG SCREEN ON.')
-def _log_screen_off(service: ArmorService, _: DirectiveRequest) -> DirectiveResponse:
-    service.log.on_screen = False
+def _log_screen_off(workspace: Workspace, _: DirectiveRequest) -> DirectiveResponse:
+    workspace.log.on_screen = False
     return DirectiveResponse()
 
 
 @utility('INVALID COMMAND', summary='Always answered with 205; for tests of clients.')
-def _invalid(_: ArmorService, __: DirectiveRequest) -> DirectiveResponse:
+def _invalid(_: Workspace, __: DirectiveRequest) -> DirectiveResponse:
     raise DirectiveError('Invalid command.', ExitCode.INVALID_COMMAND)
 
 
@@ -370,20 +367,20 @@ def _seconds(text: str) -> float:
     summary='Ends the reasoning over the reference that runs, whoever asked for it. Changes stay, '
     'and nothing is derived until the next REASON.',
 )
-def _cancel(service: ArmorService, request: DirectiveRequest) -> DirectiveResponse:
-    ref = service.references.find(request.reference_name)
-    service.check_free(ref, request.client_name)
+def _cancel(workspace: Workspace, request: DirectiveRequest) -> DirectiveResponse:
+    ref = workspace.references.find(request.reference_name)
+    workspace.check_free(ref, request.client_name)
     ref.cancel.set()
     return DirectiveResponse()
 
 
 def _read_document(
-    service: ArmorService, request: DirectiveRequest, source: str, iri: str, reasoner: str
+    workspace: Workspace, request: DirectiveRequest, source: str, iri: str, reasoner: str
 ) -> tuple[Reference, list[str]]:
     """Read an ontology and reason over it.
 
     Args:
-        service: The service.
+        workspace: The workspace.
         request: LOAD FILE or LOAD WEB.
         source: Path or URL.
         iri: What local names are completed with.
@@ -404,19 +401,19 @@ def _read_document(
     found: Path | bytes
     try:
         if request.primary.upper() == 'WEB':
-            path, found = source, _fetch(source, service.settings)
+            path, found = source, _fetch(source, workspace.settings)
         else:
             with memory.collected():
-                found = service.paths.to_read(source)
+                found = workspace.paths.to_read(source)
             path = str(found)
-        limit = service.settings.max_file_bytes
-        document = read_ontology(found, base, size_limit=limit, may_read=service.paths.may_read)
+        limit = workspace.settings.max_file_bytes
+        document = read_ontology(found, base, size_limit=limit, may_read=workspace.paths.may_read)
     except OntologyFileError as error:
         raise DirectiveError(f'LOAD: {error}') from None
     if document.iri and document.iri.rstrip('#') != base:
         notes.append(f'the document is of {document.iri}, names are completed with {base}')
     begin = time.thread_time()
-    kb = _reasoned(service, base, document.axioms, reasoner, notes)
+    kb = _reasoned(workspace, base, document.axioms, reasoner, notes)
     took = (time.thread_time() - begin) / FIRST
     if not kb.consistent:
         notes.append('the ontology is inconsistent')
@@ -431,13 +428,13 @@ def _read_document(
 
 
 def _reasoned(
-    service: ArmorService, base: str, axioms: list[Axiom], reasoner: str, notes: list[str]
+    workspace: Workspace, base: str, axioms: list[Axiom], reasoner: str, notes: list[str]
 ) -> KnowledgeBase:
     if reasoner.upper() not in NATIVE:
         notes.append(f'reasoner {shown(reasoner)} is not available, the native one is used')
     kb = knowledge_base(base, axioms)
     try:
-        kb.reason(service.settings.loading_timeout, memory=service.limits.memory)
+        kb.reason(workspace.settings.loading_timeout, memory=workspace.limits.memory)
     except ReasoningBudgetError as error:
         raise DirectiveError(f'LOAD: {error}; nothing is loaded', timeout=True) from None
     return kb

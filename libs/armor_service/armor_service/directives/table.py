@@ -310,7 +310,7 @@ def query(words: str, *arguments: Argument, **properties: Any) -> Callable[[Run]
     """Enter a query: ``run(reference, *values) -> response``; see `manipulation`.
 
     ``is_consistent`` is filled in afterwards. A slow query is run without the reference's lock,
-    which it takes itself for as short as it can: ``run(service, reference, *values)``.
+    which it takes itself for as short as it can: ``run(workspace, reference, *values)``.
     """
     return _enter(Kind.QUERY, words, arguments, **properties)
 
@@ -321,7 +321,7 @@ def control(words: str, *arguments: Argument, **properties: Any) -> Callable[[Ru
 
 
 def utility(words: str, *arguments: Argument, **properties: Any) -> Callable[[Run], Run]:
-    """Enter a utility: ``run(service, request, *values) -> response``; see `manipulation`."""
+    """Enter a utility: ``run(workspace, request, *values) -> response``; see `manipulation`."""
     return _enter(Kind.UTILITY, words, arguments, **properties)
 
 
