@@ -124,6 +124,7 @@ def test_a_simulated_mission_goes_on_as_its_twin(tmp_path: Path) -> None:
     assert [leg.rule for leg in disturbed] == [leg.rule for leg in twin]
     assert {leg.goal for leg in disturbed} == {leg.goal for leg in twin}
     # Simulated time at full speed is no clockwork: on a busy machine the legs of two twins differ
-    # by a quarter. `benchmarks/campaign.py --messages` measures in real time.
+    # by up to 1.8. What believes a foreign time or pose is wrong by more: once all leg times were
+    # 20 times too long. `benchmarks/campaign.py --messages` measures in real time.
     ratio = sum(leg.seconds for leg in disturbed) / sum(leg.seconds for leg in twin)
-    assert 0.6 < ratio < 1.6
+    assert 1 / 3 < ratio < 3

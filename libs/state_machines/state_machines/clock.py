@@ -31,9 +31,9 @@ class Interrupt:
             if self._set:
                 return
             self._set = True
-            waiters = self._waiters
-            if waiters:
-                self._waiters = []
+            # A new list also for an empty one: who waits after `clear()`, while this goes on
+            # below without the lock, is not to be found here.
+            waiters, self._waiters = self._waiters, []
             callbacks = list(self._callbacks.values()) if self._callbacks else ()
         for waiter in waiters:
             waiter.release()
@@ -66,6 +66,11 @@ class Interrupt:
             waiter = threading.Lock()
             waiter.acquire()
             self._waiters.append(waiter)
+            # A signal handler may have raised the flag since it was looked at.
+            if self._set:
+                if waiter in self._waiters:
+                    self._waiters.remove(waiter)
+                return True
         # The setter releases this lock outside of its own: who wakes has nothing to wait for.
         raised = False
         try:
