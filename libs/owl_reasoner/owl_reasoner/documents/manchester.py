@@ -86,6 +86,121 @@ class _Token(NamedTuple):
     place: int
 
 
+class _Tokens:
+    """The tokens of a text and the place where a parser is; reads what is one name or value.
+
+    Args:
+        text: The text.
+        named: Gives the IRI of a name; raises ValueError.
+
+    Attributes:
+        at: The place, counted in tokens; a parser that looked ahead in vain sets it back.
+    """
+
+    def __init__(self, text: str, named: Callable[[str], str]) -> None:
+        self.named = named
+        self._text = text
+        self._all = list(self._tokenized())
+        self.at = 0
+
+    def _tokenized(self) -> Iterator[_Token]:
+        place = 0
+        while place < len(self._text):
+            match = _TOKENS.match(self._text, place)
+            if match is None:
+                raise self.error('a name', place)
+            if match.lastgroup:
+                yield _Token(match.lastgroup, match[0], place)
+            place = match.end()
+        yield _Token('end', '', len(self._text))
+
+    @property
+    def next(self) -> _Token:
+        """The token at the place."""
+        return self._all[self.at]
+
+    @property
+    def after(self) -> _Token:
+        """The token behind the next one; at the end the end itself."""
+        return self._all[min(self.at + 1, len(self._all) - 1)]
+
+    def take(self, *texts: str) -> _Token:
+        """Go past the next token and return it; `texts`: it must be one of these."""
+        token = self.next
+        if texts and token.text not in texts:
+            raise self.error(' or '.join(map(repr, texts)))
+        self.at += 1
+        return token
+
+    def error(self, expected: str, place: int | None = None) -> OntologyFileError:
+        """Return the error that something else was expected; `place`: in characters."""
+        if place is None:
+            place = self.next.place
+        shown = self._text[place : place + 20].split('\n')[0] or 'the end'
+        line = self._text.count('\n', 0, place) + 1
+        column = place - (self._text.rfind('\n', 0, place) + 1) + 1
+        return OntologyFileError(f'expected {expected}, got {shown!r}', line, column)
+
+    def is_next(self, *texts: str) -> bool:
+        """Tell whether the next token is one of some words; a text in quotes is none."""
+        token = self.next
+        return token.text in texts and token.kind in ('name', 'mark', 'keyword')
+
+    def accept(self, *texts: str) -> bool:
+        """Go past the next token if it is one of some words."""
+        if self.is_next(*texts):
+            self.at += 1
+            return True
+        return False
+
+    def iri(self, what: str = 'a name') -> str:
+        """Read a name or an IRI in brackets; `what`: for messages."""
+        token = self.next
+        if token.kind == 'iri':
+            iri = token.text[1:-1]
+            if not is_absolute(iri):
+                raise self.error('a full IRI')
+        elif token.kind in ('name', 'number'):
+            try:
+                iri = self.named(token.text)
+            except ValueError as error:
+                raise self.error(f'{what} ({error})') from None
+        else:
+            raise self.error(what)
+        self.at += 1
+        return iri
+
+    def number(self) -> int:
+        token = self.take()
+        if not token.text.isdigit() or len(token.text) > MOST_DIGITS:
+            raise self.error('a whole number', token.place)
+        return int(token.text)
+
+    def at_literal(self) -> bool:
+        return self.next.kind in ('string', 'number') or self.is_next('true', 'false')
+
+    def literal(self) -> Literal:
+        token = self.take()
+        if token.text in ('true', 'false'):
+            return Literal(token.text, XSD + 'boolean')
+        if token.kind == 'number':
+            text = token.text
+            if text[-1] in 'fF':
+                return Literal(text[:-1], XSD + 'float')
+            kind = 'double' if 'e' in text.lower() else 'decimal' if '.' in text else 'integer'
+            return Literal(text, XSD + kind)
+        if token.kind != 'string':
+            raise self.error('a value', token.place)
+        text = re.sub(r'\\(.)', r'\1', token.text[1:-1], flags=re.DOTALL)
+        if self.next.kind == 'language':
+            return Literal(text, RDF + 'langString', language_tag(self.take().text[1:]))
+        if self.accept('^^'):
+            if self.next.text in _DATATYPES:
+                return Literal(text, _DATATYPES[self.take().text])
+            return Literal(text, self.iri('a datatype'))
+        return Literal(text)
+
+
 class ManchesterParser:
     """Reads class expressions, frames and rules.
 
@@ -101,76 +216,9 @@ class ManchesterParser:
     def __init__(
         self, text: str, named: Callable[[str], str], kinds: Iterable[tuple[str, str]] = ()
     ) -> None:
-        self._text = text
-        self._named = named
+        self._tokens = _Tokens(text, named)
         self._kinds = set(kinds)
-        self._tokens = list(self._tokenized())
-        self._at = 0
         self._depth = 0
-
-    def _tokenized(self) -> Iterator[_Token]:
-        place = 0
-        while place < len(self._text):
-            match = _TOKENS.match(self._text, place)
-            if match is None:
-                raise self._error('a name', place)
-            if match.lastgroup:
-                yield _Token(match.lastgroup, match[0], place)
-            place = match.end()
-        yield _Token('end', '', len(self._text))
-
-    # --- tokens ---
-
-    @property
-    def _next(self) -> _Token:
-        return self._tokens[self._at]
-
-    def _take(self, *texts: str) -> _Token:
-        token = self._next
-        if texts and token.text not in texts:
-            raise self._error(' or '.join(map(repr, texts)))
-        self._at += 1
-        return token
-
-    def _error(self, expected: str, place: int | None = None) -> OntologyFileError:
-        if place is None:
-            place = self._next.place
-        shown = self._text[place : place + 20].split('\n')[0] or 'the end'
-        line = self._text.count('\n', 0, place) + 1
-        column = place - (self._text.rfind('\n', 0, place) + 1) + 1
-        return OntologyFileError(f'expected {expected}, got {shown!r}', line, column)
-
-    def _is(self, *texts: str) -> bool:
-        token = self._next
-        return token.text in texts and token.kind in ('name', 'mark', 'keyword')
-
-    def _accept(self, *texts: str) -> bool:
-        if self._is(*texts):
-            self._at += 1
-            return True
-        return False
-
-    def _iri(self, what: str = 'a name') -> str:
-        token = self._next
-        if token.kind == 'iri':
-            iri = token.text[1:-1]
-            if not is_absolute(iri):
-                raise self._error('a full IRI')
-        elif token.kind in ('name', 'number'):
-            try:
-                iri = self._named(token.text)
-            except ValueError as error:
-                raise self._error(f'{what} ({error})') from None
-        else:
-            raise self._error(what)
-        self._at += 1
-        return iri
-
-    def _number(self) -> int:
-        token = self._take()
-        if not token.text.isdigit() or len(token.text) > MOST_DIGITS:
-            raise self._error('a whole number', token.place)
-        return int(token.text)
 
     def _several(self, read: Callable[[], Any]) -> list[Any]:
         """Read a list with commas; annotations in front of a member are read over."""
@@ -178,29 +226,34 @@ class ManchesterParser:
         while True:
             self._skip_annotations()
             found.append(read())
-            if not self._accept(','):
+            if not self._tokens.accept(','):
                 return found
 
     def _skip_annotations(self) -> None:
-        while self._accept('Annotations:'):
+        while self._tokens.accept('Annotations:'):
             self._annotations()
 
     def _annotations(self) -> list[tuple[str, str | Literal]]:
         found = []
         while True:
-            prop = self._iri('an annotation property')
-            value = self._literal() if self._at_literal() else self._iri()
+            prop = self._tokens.iri('an annotation property')
+            value = self._tokens.literal() if self._tokens.at_literal() else self._tokens.iri()
             found.append((prop, value))
-            if not self._accept(','):
+            if not self._tokens.accept(','):
                 return found
+
+    def header_annotations(self) -> Iterator[tuple[str, str | Literal]]:
+        """Read the annotations of an ontology's header, as pairs (property, value)."""
+        while self._tokens.accept('Annotations:'):
+            yield from self._annotations()
 
     # --- expressions ---
 
     def whole(self, read: Callable[[], Any]) -> Any:
         """Read what the text as a whole holds."""
         found = read()
-        if self._next.kind != 'end':
-            raise self._error('the end')
+        if self._tokens.next.kind != 'end':
+            raise self._tokens.error('the end')
         return found
 
     def class_expression(self) -> ex.ClassExpression:
@@ -212,62 +265,62 @@ class ManchesterParser:
 
     def _joined(self, word: str, record: Any) -> Any:
         parts = [self._primary()]
-        while self._accept(word, 'that'):
+        while self._tokens.accept(word, 'that'):
             parts.append(self._primary())
         return parts[0] if len(parts) == 1 else record(tuple(parts))
 
     def _nested(self, word: str, record: Any, read: Callable[[], Any]) -> Any:
         self._depth += 1
         if self._depth > DEEPEST:
-            raise self._error(f'expressions that nest no deeper than {DEEPEST}')
+            raise self._tokens.error(f'expressions that nest no deeper than {DEEPEST}')
         parts = [read()]
-        while self._accept(word):
+        while self._tokens.accept(word):
             parts.append(read())
         self._depth -= 1
         return parts[0] if len(parts) == 1 else record(tuple(parts))
 
     def _primary(self) -> ex.ClassExpression:
-        if self._accept('not'):
+        if self._tokens.accept('not'):
             return ex.ObjectComplementOf(self._primary())
-        if self._is('('):
-            before = self._at
-            self._take('(')
-            if self._is('inverse'):
-                self._at = before
+        if self._tokens.is_next('('):
+            before = self._tokens.at
+            self._tokens.take('(')
+            if self._tokens.is_next('inverse'):
+                self._tokens.at = before
                 return self._restriction()
             found = self.class_expression()
-            self._take(')')
+            self._tokens.take(')')
             return found
-        if self._accept('{'):
-            individuals = self._several(self._iri)
-            self._take('}')
+        if self._tokens.accept('{'):
+            individuals = self._several(self._tokens.iri)
+            self._tokens.take('}')
             return ex.ObjectOneOf(tuple(individuals))
-        follows = self._tokens[self._at + 1] if self._next.kind != 'end' else self._next
-        if self._is('inverse') or follows.text in _RESTRICTIONS:
+        follows = self._tokens.after
+        if self._tokens.is_next('inverse') or follows.text in _RESTRICTIONS:
             return self._restriction()
-        return self._iri('a class')
+        return self._tokens.iri('a class')
 
     def _property(self) -> ex.PropertyExpression:
-        brackets = self._accept('(')
-        if not self._accept('inverse'):
-            return self._iri('a property')
-        inner = self._accept('(')
-        prop = ex.ObjectInverseOf(self._iri('a property'))
+        brackets = self._tokens.accept('(')
+        if not self._tokens.accept('inverse'):
+            return self._tokens.iri('a property')
+        inner = self._tokens.accept('(')
+        prop = ex.ObjectInverseOf(self._tokens.iri('a property'))
         for open_one in (inner, brackets):
             if open_one:
-                self._take(')')
+                self._tokens.take(')')
         return prop
 
     def _restriction(self) -> ex.ClassExpression:
         prop = self._property()
-        word = self._take(*_RESTRICTIONS).text
+        word = self._tokens.take(*_RESTRICTIONS).text
         if word == 'Self':
             return ex.ObjectHasSelf(prop)
         if word == 'value':
-            if self._at_literal():
-                return ex.DataHasValue(str(prop), self._literal())
-            return ex.ObjectHasValue(prop, self._iri('an individual'))
-        count = self._number() if word in _COUNTS else 0
+            if self._tokens.at_literal():
+                return ex.DataHasValue(str(prop), self._tokens.literal())
+            return ex.ObjectHasValue(prop, self._tokens.iri('an individual'))
+        count = self._tokens.number() if word in _COUNTS else 0
         if self._is_data(prop):
             return self._of_values(str(prop), word, count)
         if word in _COUNTS:
@@ -286,8 +339,8 @@ class ManchesterParser:
         return data(prop, self._data_primary())
 
     def _filler(self, default: Any, read: Callable[[], Any]) -> Any:
-        begins = self._next.kind in ('iri', 'name') or self._is('(', '{', 'not')
-        return read() if begins and not self._is('and', 'or', 'that') else default
+        begins = self._tokens.next.kind in ('iri', 'name') or self._tokens.is_next('(', '{', 'not')
+        return read() if begins and not self._tokens.is_next('and', 'or', 'that') else default
 
     def _is_data(self, prop: ex.PropertyExpression) -> bool:
         """Tell whether a property has values: by its declaration, else by what stands behind it."""
@@ -295,21 +348,21 @@ class ManchesterParser:
             return False
         if ('data_property', prop) in self._kinds:
             return True
-        token = self._next
+        token = self._tokens.next
         if token.text == '{':
-            token = self._tokens[self._at + 1]
+            token = self._tokens.after
             return token.kind in ('string', 'number') or token.text in ('true', 'false')
         if token.kind not in ('iri', 'name') or token.text in ('and', 'or', 'not'):
             return False
         if token.text in _DATATYPES:
             return True
-        before = self._at
+        before = self._tokens.at
         try:
-            iri = self._iri()
+            iri = self._tokens.iri()
         except OntologyFileError:
             return False
         finally:
-            self._at = before
+            self._tokens.at = before
         is_range = ('datatype', iri) in self._kinds
         return is_range or iri.startswith(XSD) or iri in (RDFS + 'Literal', RDF + 'PlainLiteral')
 
@@ -322,85 +375,60 @@ class ManchesterParser:
 
     def _data_joined(self) -> ex.DataRange:
         parts = [self._data_primary()]
-        while self._accept('and'):
+        while self._tokens.accept('and'):
             parts.append(self._data_primary())
         return parts[0] if len(parts) == 1 else ex.DataIntersectionOf(tuple(parts))
 
     def _data_primary(self) -> ex.DataRange:
-        if self._accept('not'):
+        if self._tokens.accept('not'):
             return ex.DataComplementOf(self._data_primary())
-        if self._accept('('):
+        if self._tokens.accept('('):
             found = self.data_range()
-            self._take(')')
+            self._tokens.take(')')
             return found
-        if self._accept('{'):
-            literals = self._several(self._literal)
-            self._take('}')
+        if self._tokens.accept('{'):
+            literals = self._several(self._tokens.literal)
+            self._tokens.take('}')
             return ex.DataOneOf(tuple(literals))
-        if self._next.text in _DATATYPES:
-            datatype = _DATATYPES[self._take().text]
+        if self._tokens.next.text in _DATATYPES:
+            datatype = _DATATYPES[self._tokens.take().text]
         else:
-            datatype = self._iri('a datatype')
-        if not self._accept('['):
+            datatype = self._tokens.iri('a datatype')
+        if not self._tokens.accept('['):
             return datatype
         facets = self._several(self._facet)
-        self._take(']')
+        self._tokens.take(']')
         return ex.DatatypeRestriction(datatype, tuple(facets))
 
     def _facet(self) -> tuple[str, Literal]:
-        word = self._take(*_FACETS).text
+        word = self._tokens.take(*_FACETS).text
         space = RDF if word == 'langRange' else XSD
-        return space + _FACETS[word], self._literal()
-
-    def _at_literal(self) -> bool:
-        return self._next.kind in ('string', 'number') or self._is('true', 'false')
-
-    def _literal(self) -> Literal:
-        token = self._take()
-        if token.text in ('true', 'false'):
-            return Literal(token.text, XSD + 'boolean')
-        if token.kind == 'number':
-            text = token.text
-            if text[-1] in 'fF':
-                return Literal(text[:-1], XSD + 'float')
-            kind = 'double' if 'e' in text.lower() else 'decimal' if '.' in text else 'integer'
-            return Literal(text, XSD + kind)
-        if token.kind != 'string':
-            raise self._error('a value', token.place)
-        text = re.sub(r'\\(.)', r'\1', token.text[1:-1], flags=re.DOTALL)
-        if self._next.kind == 'language':
-            return Literal(text, RDF + 'langString', language_tag(self._take().text[1:]))
-        if self._accept('^^'):
-            if self._next.text in _DATATYPES:
-                return Literal(text, _DATATYPES[self._take().text])
-            return Literal(text, self._iri('a datatype'))
-        return Literal(text)
+        return space + _FACETS[word], self._tokens.literal()
 
     # --- rules ---
 
     def rule(self) -> ax.Rule:
         """Read ``ROOM(?r), hasDoor(?r, ?d) -> Open(?r)``."""
-        body = [] if self._is('->') else self._several(self._atom)
-        self._take('->')
-        head = [] if self._next.kind in ('end', 'keyword') else self._several(self._atom)
+        body = [] if self._tokens.is_next('->') else self._several(self._atom)
+        self._tokens.take('->')
+        head = [] if self._tokens.next.kind in ('end', 'keyword') else self._several(self._atom)
         return ax.Rule(tuple(body), tuple(head))
 
     def _atom(self) -> Any:
-        if self._is('sameAs', 'SameAs', 'differentFrom', 'DifferentFrom'):
-            same = self._take().text.lower() == 'sameas'
+        if self._tokens.is_next('sameAs', 'SameAs', 'differentFrom', 'DifferentFrom'):
+            same = self._tokens.take().text.lower() == 'sameas'
             first, second = self._arguments(2)
             record = ex.SameIndividualAtom if same else ex.DifferentIndividualsAtom
             return record(first, second)
-        token = self._next
-        before = self._at
-        if token.kind == 'name' and self._tokens[before + 1].text == '(':
+        token = self._tokens.next
+        if token.kind == 'name' and self._tokens.after.text == '(':
             name = token.text.removeprefix('swrlb:')
             if name != token.text or self._is_builtin(name):
-                self._take()
+                self._tokens.take()
                 return ex.BuiltinAtom(SWRLB + name, tuple(self._arguments(0)))
-            predicate: Any = self._iri('a class, property or built-in')
-        elif token.kind == 'iri' and self._tokens[before + 1].text == '(':
-            predicate = self._iri()
+            predicate: Any = self._tokens.iri('a class, property or built-in')
+        elif token.kind == 'iri' and self._tokens.after.text == '(':
+            predicate = self._tokens.iri()
             if predicate.startswith(SWRLB):
                 return ex.BuiltinAtom(predicate, tuple(self._arguments(0)))
         else:
@@ -412,7 +440,7 @@ class ManchesterParser:
             )
             return (ex.DataRangeAtom if is_range else ex.ClassAtom)(predicate, arguments[0])
         if len(arguments) != 2 or not isinstance(predicate, str):
-            raise self._error('one or two arguments', token.place)
+            raise self._tokens.error('one or two arguments', token.place)
         data = ('data_property', predicate) in self._kinds or isinstance(arguments[1], Literal)
         record2: Any = ex.DataPropertyAtom if data else ex.ObjectPropertyAtom
         return record2(predicate, *arguments)
@@ -422,51 +450,55 @@ class ManchesterParser:
 
         if any(builtin(name, count) for count in range(1, 5)):
             try:
-                iri = self._named(name)
+                iri = self._tokens.named(name)
             except ValueError:
                 return True
             return not any(known == iri for _, known in self._kinds)
         return False
 
     def _arguments(self, count: int) -> list[Any]:
-        self._take('(')
+        self._tokens.take('(')
         found = self._several(self._argument)
         if count and len(found) != count:
-            raise self._error(f'{count} arguments')
-        self._take(')')
+            raise self._tokens.error(f'{count} arguments')
+        self._tokens.take(')')
         return found
 
     def _argument(self) -> Any:
-        if self._next.kind == 'variable':
-            name = self._take().text[1:]
+        if self._tokens.next.kind == 'variable':
+            name = self._tokens.take().text[1:]
             return ex.Variable(name[1:-1] if name[0] == '<' else f'urn:swrl:var#{name}')
-        return self._literal() if self._at_literal() else self._iri('an individual')
+        return (
+            self._tokens.literal()
+            if self._tokens.at_literal()
+            else self._tokens.iri('an individual')
+        )
 
     # --- frames ---
 
     def axioms(self) -> list[Axiom]:
         """Read frames and rules, ``Class: A SubClassOf: B``."""
         found: list[Axiom] = []
-        while self._next.kind != 'end':
+        while self._tokens.next.kind != 'end':
             found += self.frame()
         return found
 
     def frame(self) -> list[Axiom]:
         """Read one frame, list or rule."""
-        word = self._take().text
+        word = self._tokens.take().text
         head = word.removesuffix(':')
         if word == head or head not in _HEADS:
-            self._at -= 1
-            raise self._error('a frame such as Class: or Individual:')
+            self._tokens.at -= 1
+            raise self._tokens.error('a frame such as Class: or Individual:')
         if head in _RULES:
             self._skip_annotations()
             return [self.rule()]
         if head in _SETS:
-            return [_SETS[head](frozenset(self._several(self._iri)))]
+            return [_SETS[head](frozenset(self._several(self._tokens.iri)))]
         if head in _LISTS:
             return [self._listed(head)]
         if head not in _FRAMES:
-            raise self._error(f'no {word} here')
+            raise self._tokens.error(f'no {word} here')
         return list(self._entity(_FRAMES[head]))
 
     def _listed(self, head: str) -> Axiom:
@@ -486,13 +518,13 @@ class ManchesterParser:
         elif kind == 'object_property':
             subject = self._property()
         else:
-            subject = self._iri()
+            subject = self._tokens.iri()
         if isinstance(subject, str):
             self._kinds.add((kind, subject))
             if not subject.startswith('_:') and not subject.startswith((OWL, XSD, RDFS)):
                 yield ax.Declaration(kind, subject)
-        while self._next.kind == 'keyword' and self._next.text[:-1] not in _HEADS:
-            word = self._take().text[:-1]
+        while self._tokens.next.kind == 'keyword' and self._tokens.next.text[:-1] not in _HEADS:
+            word = self._tokens.take().text[:-1]
             if word == 'Annotations':
                 for prop, value in self._annotations():
                     if isinstance(subject, str):
@@ -502,18 +534,18 @@ class ManchesterParser:
             yield from sections(word, subject)
 
     def _no_section(self, word: str) -> OntologyFileError:
-        self._at -= 1
-        return self._error(f'a section of this frame, not {word}:')
+        self._tokens.at -= 1
+        return self._tokens.error(f'a section of this frame, not {word}:')
 
     def _class_section(self, word: str, cls: Any) -> Iterator[Axiom]:
         if word == 'HasKey':
             objects: list[ex.PropertyExpression] = []
             datas: list[ex.PropertyExpression] = []
-            while self._next.kind in ('iri', 'name'):
+            while self._tokens.next.kind in ('iri', 'name'):
                 key = self._property()
                 is_data = ('data_property', key) in self._kinds
                 (datas if is_data else objects).append(key)
-                self._accept(',')
+                self._tokens.accept(',')
             yield ax.HasKey(cls, tuple(objects), tuple(map(str, datas)))
             return
         if word not in ('SubClassOf', 'EquivalentTo', 'DisjointWith', 'DisjointUnionOf'):
@@ -532,11 +564,11 @@ class ManchesterParser:
 
     def _object_property_section(self, word: str, prop: Any) -> Iterator[Axiom]:
         if word == 'Characteristics':
-            for name in self._several(lambda: self._take(*_CHARACTERISTICS).text):
+            for name in self._several(lambda: self._tokens.take(*_CHARACTERISTICS).text):
                 yield _CHARACTERISTICS[name](prop)
         elif word == 'SubPropertyChain':
             chain = [self._property()]
-            while self._accept('o'):
+            while self._tokens.accept('o'):
                 chain.append(self._property())
             yield ax.SubPropertyChainOf(tuple(chain), prop)
         elif word in ('Domain', 'Range'):
@@ -549,7 +581,7 @@ class ManchesterParser:
 
     def _data_property_section(self, word: str, prop: str) -> Iterator[Axiom]:
         if word == 'Characteristics':
-            self._take('Functional')
+            self._tokens.take('Functional')
             yield ax.FunctionalDataProperty(prop)
         elif word == 'Domain':
             yield from (
@@ -558,7 +590,7 @@ class ManchesterParser:
         elif word == 'Range':
             yield from (ax.DataPropertyRange(prop, one) for one in self._several(self.data_range))
         elif word in ('SubPropertyOf', 'EquivalentTo', 'DisjointWith'):
-            for other in self._several(self._iri):
+            for other in self._several(self._tokens.iri):
                 if word == 'SubPropertyOf':
                     yield ax.SubDataPropertyOf(prop, other)
                 elif word == 'EquivalentTo':
@@ -572,7 +604,7 @@ class ManchesterParser:
         names = {'SubPropertyOf': 'subPropertyOf', 'Domain': 'domain', 'Range': 'range'}
         if word not in names:
             raise self._no_section(word)
-        for other in self._several(self._iri):
+        for other in self._several(self._tokens.iri):
             yield ax.AnnotationAssertion(RDFS + names[word], prop, other)
 
     def _datatype_section(self, word: str, datatype: str) -> Iterator[Axiom]:
@@ -588,18 +620,18 @@ class ManchesterParser:
             yield from self._several(lambda: self._fact(ind))
         elif word in ('SameAs', 'DifferentFrom'):
             record = _SETS['SameIndividual' if word == 'SameAs' else 'DifferentIndividuals']
-            for other in self._several(self._iri):
+            for other in self._several(self._tokens.iri):
                 yield record(frozenset((ind, other)))
         else:
             raise self._no_section(word)
 
     def _fact(self, ind: str) -> Axiom:
-        negative = self._accept('not')
+        negative = self._tokens.accept('not')
         prop = self._property()
-        if self._at_literal():
+        if self._tokens.at_literal():
             data = ax.NegativeDataPropertyAssertion if negative else ax.DataPropertyAssertion
-            return data(str(prop), ind, self._literal())
-        other = self._iri('an individual')
+            return data(str(prop), ind, self._tokens.literal())
+        other = self._tokens.iri('an individual')
         if isinstance(prop, ex.ObjectInverseOf):
             prop, ind, other = prop.prop, other, ind
         record = ax.NegativeObjectPropertyAssertion if negative else ax.ObjectPropertyAssertion
@@ -657,9 +689,8 @@ class ManchesterDocument(Axioms):
         """Read the frames."""
         known = [*declared, *self.declared]
         parser = ManchesterParser(self._body, self._full, known)
-        while parser._accept('Annotations:'):
-            for prop, value in parser._annotations():
-                self.axioms[ax.AnnotationAssertion(prop, self.iri, value)] = None
+        for prop, value in parser.header_annotations():
+            self.axioms[ax.AnnotationAssertion(prop, self.iri, value)] = None
         self.axioms.update(dict.fromkeys(parser.axioms()))
 
     def _full(self, name: str) -> str:

@@ -34,7 +34,7 @@ from owl_reasoner.reasoner.clauses import (
     closure,
     turned,
 )
-from owl_reasoner.reasoner.consequence_based.contexts import Role
+from owl_reasoner.reasoner.consequence_based.rule_index import Role
 
 AnyRole: TypeAlias = tuple[Any, bool]
 Step: TypeAlias = tuple[int, 'AnyRole | None', int]

@@ -36,13 +36,8 @@ from owl_reasoner.reasoner.clauses import (
     closure,
     turned,
 )
-from owl_reasoner.reasoner.consequence_based.contexts import (
-    Context,
-    Contexts,
-    Role,
-    Token,
-    Tokens,
-)
+from owl_reasoner.reasoner.consequence_based.contexts import Context, Contexts
+from owl_reasoner.reasoner.consequence_based.rule_index import Role, Token, Tokens
 from owl_reasoner.reasoner.property_chains import report_counted_chains, spell_out_chains
 from owl_reasoner.reasoner.simplify import drop_implied_atoms, simplify
 from owl_reasoner.reasoner.translation import Translation, directed
@@ -275,13 +270,13 @@ class Classification:
         """Return the classes that can make a difference to what an individual must be related
         to.
         """
-        program, rules = self.program, self._contexts.edge_rules
+        program, rules = self.program, self._contexts.rules.of_role
         roles: dict[Role, None] = {}
         for existential in program.existentials:
             if existential.prop.kind == 'object':
                 role = (existential.prop, existential.inverse)
                 for start in (role, turned(role)):
-                    roles.update(closure(start, self._contexts.possible_roles))
+                    roles.update(closure(start, self._contexts.rules.possible_roles))
         found: set[Token] = set(labels)
         for role in roles:
             for rule in rules.get(role, ()):
@@ -375,9 +370,9 @@ class Classification:
             if prop not in known and self._excludes(('self', prop)):
                 program.irreflexive.append(prop)
         pairs = set(program.disjoint_properties)
-        contradictions = self._contexts.contradictions()
+        contradictions = self._contexts.rules.contradictions()
         above = {
-            (prop, backwards): self._contexts.roles_above((prop, backwards))
+            (prop, backwards): self._contexts.rules.roles_above((prop, backwards))
             for prop in props
             for backwards in (False, True)
         }

@@ -15,7 +15,6 @@ A token is a class predicate, ('is', individual), ('has', property, turned, indi
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
 from itertools import combinations
 from typing import Any, TypeAlias, TypeGuard
 
@@ -26,53 +25,28 @@ from owl_reasoner.reasoner.budget import Budget
 from owl_reasoner.reasoner.clauses import (
     AtLeast,
     AtMost,
-    BodyAtom,
-    Clause,
     Constant,
     HeadAtom,
     Predicate,
     PredicateAtom,
     Program,
-    RangeAtom,
     SameAtom,
-    Term,
     closure,
     turned,
 )
+from owl_reasoner.reasoner.consequence_based.rule_index import (
+    EdgeRule,
+    Role,
+    RuleIndex,
+    Token,
+    Tokens,
+)
 from owl_reasoner.reasoner.value_sets import EVERY, NONE, ValueSet, point
 
-Token: TypeAlias = 'Predicate | tuple[Any, ...]'
-Tokens: TypeAlias = frozenset[Token]
-Role: TypeAlias = tuple[Predicate, bool]
 _Gap: TypeAlias = tuple[Axiom | None, str]
 _CASES = 'which of the related individuals are the same would need reasoning by cases'
 _DATES = 'whether its values suit another range is not decided'
 _NOMINALS = 'facts about the individual are not used for classes and unnamed individuals'
-
-
-@dataclass(frozen=True, slots=True)
-class _EdgeRule:
-    """For x related to y by all roles, with tokens of both: a token of x or y, a role, or a clash.
-
-    `head` is ('x', token), ('y', token), ('role', role) or ('clash',).
-    """
-
-    roles: frozenset[Role]
-    xs: Tokens
-    ys: Tokens
-    head: tuple[Any, ...]
-    origin: Axiom | None
-
-
-@dataclass(frozen=True, slots=True)
-class _ValueRule:
-    """For x with a value in `values` by all properties: a token, a property, or a clash."""
-
-    props: frozenset[Predicate]
-    xs: Tokens
-    values: ValueSet
-    head: tuple[Any, ...]
-    origin: Axiom | None
 
 
 class _Edge:
@@ -138,61 +112,12 @@ class Context:
         return 'what is implied by ' + (', '.join(sorted(named)) or 'owl:Thing')
 
 
-class _Body:
-    """What a clause's body says of each term, and of each pair of terms.
+class Contexts:
+    """Completes contexts of one program; rules of SWRL take no part.
 
     Attributes:
-        tokens: What an individual is.
-        roles: How one is related to another, each pair in one direction.
-        datas: Whose value a value is, and by which properties.
-        values: The set that a value is in, where there is one.
+        rules: What follows from what.
     """
-
-    def __init__(self) -> None:
-        self.tokens: dict[Any, set[Token]] = {}
-        self.roles: dict[tuple[Any, Any], set[Role]] = {}
-        self.datas: dict[Any, tuple[Any, set[Predicate]]] = {}
-        self.values: dict[Any, ValueSet] = {}
-
-    def takes(self, atom: BodyAtom) -> bool:
-        """Add an atom; return False for one that no context can use."""
-        if isinstance(atom, PredicateAtom):
-            return self._takes_fact(atom.predicate, atom.terms)
-        if isinstance(atom, SameAtom):
-            one, other = map(_key, atom.terms)
-            if isinstance(one, tuple):
-                one, other = other, one
-            self.tokens.setdefault(one, set()).add(other)
-            return isinstance(other, tuple)
-        if isinstance(atom, RangeAtom):
-            (v,) = atom.terms
-            self.values[v] = self.values.get(v, EVERY) & atom.values
-            return True
-        return False
-
-    def _takes_fact(self, predicate: Predicate, terms: tuple[Term, ...]) -> bool:
-        if predicate.kind == 'class':
-            self.tokens.setdefault(_key(terms[0]), set()).add(predicate)
-        elif predicate.kind == 'data':
-            x, v = terms
-            self.datas.setdefault(v, (x, set()))[1].add(predicate)
-            if isinstance(v, Constant):
-                self.values[v] = point(v.value)
-        elif predicate.kind == 'object':
-            one, other = map(_key, terms)
-            if one == other:
-                self.tokens.setdefault(one, set()).add(('self', predicate))
-            elif (other, one) in self.roles:
-                self.roles[other, one].add((predicate, True))
-            else:
-                self.roles.setdefault((one, other), set()).add((predicate, False))
-        else:
-            return False
-        return True
-
-
-class Contexts:
-    """Completes contexts of one program; rules of SWRL take no part."""
 
     def __init__(self, program: Program, budget: Budget) -> None:
         self._program, self._budget = program, budget
@@ -200,19 +125,8 @@ class Contexts:
         self._known: dict[tuple[Tokens, bool], Context] = {}
         self._opened: list[Context] = []
         self._waiting: dict[Context, None] = {}
-        self._always: list[tuple[Token | None, Axiom | None]] = []
-        self._class_rules: dict[Token, list[tuple[Tokens, Token | None]]] = {}
-        self.edge_rules: dict[Role, list[_EdgeRule]] = {}
-        # The same by one token of y, made when the first edge asks.
-        self._edge_index: dict[Role, dict[Token | None, list[_EdgeRule]]] = {}
+        self.rules = RuleIndex(program)
         self._has_names = False
-        self._value_rules: dict[Predicate, list[_ValueRule]] = {}
-        for clause in program.clauses:
-            if not clause.named_only:
-                self._take(clause)
-        for predicate in program.predicates():
-            for other in predicate.disjoint:
-                self._class_rule(frozenset((predicate, other)), None, None)
         self._existentials: dict[Token, list[Any]] = {}
         for existential in program.existentials:
             self._existentials.setdefault(existential.label, []).append(existential)
@@ -220,133 +134,6 @@ class Contexts:
         self._at_most_values = [c for c in program.at_most if c.prop.kind == 'data']
         self._at_least = [c for c in program.at_least if c.prop.kind == 'object']
         self._at_least_values = [c for c in program.at_least if c.prop.kind == 'data']
-
-    # --- rules ---
-
-    def _take(self, clause: Clause) -> None:
-        """Index a clause about one individual, or one and what it is directly related to.
-
-        Chains of properties are spelt out as steps by `classification`.
-        """
-        body = _Body()
-        if not all(map(body.takes, clause.body)):
-            return
-        for tokens in body.tokens.values():
-            tokens.discard(self._program.thing)
-        if body.datas:
-            self._take_values(clause, body.tokens, body.datas, body.values)
-        elif not body.roles:
-            self._take_class(clause, body.tokens)
-        elif len(body.roles) == 1:
-            (((one, other), roles),) = body.roles.items()
-            self._take_edge(clause, one, other, frozenset(roles), body.tokens)
-            self._take_edge(clause, other, one, frozenset(map(turned, roles)), body.tokens)
-
-    def _take_edge(
-        self,
-        clause: Clause,
-        x: Any,
-        y: Any,
-        roles: frozenset[Role],
-        tokens: dict[Any, set[Token]],
-    ) -> None:
-        """Index a clause as a rule about x and the y that it is related to."""
-        if isinstance(x, tuple):
-            return
-        xs, ys = frozenset(tokens.get(x, ())), set(tokens.get(y, ()))
-        if isinstance(y, tuple):
-            ys.add(y)
-        head = self._edge_head(clause, x, y)
-        if head is not None:
-            rule = _EdgeRule(roles, xs, frozenset(ys), head, clause.origin)
-            for role in roles:
-                self.edge_rules.setdefault(role, []).append(rule)
-
-    def _edge_head(self, clause: Clause, x: Any, y: Any) -> tuple[Any, ...] | None:
-        head = clause.head
-        if isinstance(head, PredicateAtom) and head.predicate.kind == 'object':
-            one, other = map(_key, head.terms)
-            if (one, other) == (x, y):
-                return 'role', (head.predicate, False)
-            if (one, other) == (y, x):
-                return 'role', (head.predicate, True)
-        place, token = self._token(head)
-        if token is None:
-            return ('clash',) if place is not None else None
-        if place == x:
-            return 'x', token
-        return ('y', token) if place == y else None
-
-    def _token(self, head: HeadAtom) -> tuple[Any, Token | None]:
-        """Return what a head says of one individual, as (place, token).
-
-        Without a token it is a clash, without a place nothing that a context can use.
-        """
-        if isinstance(head, SameAtom):
-            one, other = map(_key, head.terms)
-            if isinstance(one, tuple):
-                one, other = other, one
-            return (one, other) if isinstance(other, tuple) else (None, None)
-        predicate, terms = head.predicate, head.terms
-        if predicate is self._program.nothing:
-            return _key(terms[0]), None
-        if predicate.kind == 'class':
-            return _key(terms[0]), predicate
-        if predicate.kind == 'data':
-            value = terms[1]
-            if isinstance(value, Constant):
-                return terms[0], ('value', predicate, value.value)
-            return None, None
-        if predicate.kind != 'object':
-            return None, None
-        one, other = map(_key, terms)
-        if one == other:
-            return one, ('self', predicate)
-        if isinstance(other, tuple):
-            return one, ('has', predicate, False, other[1])
-        if isinstance(one, tuple):
-            return other, ('has', predicate, True, one[1])
-        return None, None
-
-    def _take_class(self, clause: Clause, tokens: dict[Any, set[Token]]) -> None:
-        place, token = self._token(clause.head)
-        if len(tokens) > 1 or place is None or isinstance(place, tuple):
-            return
-        body = frozenset(tokens.get(place, ()))
-        if set(tokens) <= {place}:
-            self._class_rule(body, token, clause.origin)
-
-    def _class_rule(self, body: Tokens, token: Token | None, origin: Axiom | None) -> None:
-        if not body:
-            self._always.append((token, origin))
-        for one in body:
-            self._class_rules.setdefault(one, []).append((body, token))
-
-    def _take_values(
-        self,
-        clause: Clause,
-        tokens: dict[Any, set[Token]],
-        datas: dict[Any, tuple[Any, set[Predicate]]],
-        values: dict[Any, ValueSet],
-    ) -> None:
-        if len(datas) != 1:
-            return
-        ((v, (x, props)),) = datas.items()
-        if isinstance(x, Constant) or not set(tokens) <= {x}:
-            return
-        head: tuple[Any, ...] | None = None
-        atom = clause.head
-        if isinstance(atom, PredicateAtom) and atom.predicate.kind == 'data' and atom.terms[1] == v:
-            head = ('prop', atom.predicate)
-        else:
-            place, token = self._token(atom)
-            if place == x:
-                head = ('clash',) if token is None else ('x', token)
-        if head is not None:
-            xs = frozenset(tokens.get(x, ()))
-            rule = _ValueRule(frozenset(props), xs, values.get(v, EVERY), head, clause.origin)
-            for prop in props:
-                self._value_rules.setdefault(prop, []).append(rule)
 
     # --- questions ---
 
@@ -378,32 +165,6 @@ class Contexts:
                         subject = 'an assertion' if origin is None else axiom_text(origin)
                         found[f'{subject}: {what}'] = None
         return found
-
-    def roles_above(self, role: Role) -> frozenset[Role]:
-        """Return the role and every role that it implies by itself."""
-        return frozenset(closure(role, self._implied_roles))
-
-    def _implied_roles(self, role: Role) -> list[Role]:
-        return [
-            rule.head[1]
-            for rule in self.edge_rules.get(role, ())
-            if rule.head[0] == 'role' and not (rule.xs or rule.ys) and len(rule.roles) == 1
-        ]
-
-    def possible_roles(self, role: Role) -> list[Role]:
-        """Roles, turned ones too, that an edge with this one may come to have."""
-        heads = [r.head[1] for r in self.edge_rules.get(role, ()) if r.head[0] == 'role']
-        return [*heads, *map(turned, heads)]
-
-    def contradictions(self) -> list[frozenset[Role]]:
-        """Return sets of roles by all of which one individual cannot be related to another."""
-        found = {
-            rule.roles: None
-            for rules in self.edge_rules.values()
-            for rule in rules
-            if rule.head[0] == 'clash' and not (rule.xs or rule.ys)
-        }
-        return list(found)
 
     def heads_of(self, context: Context) -> Iterator[HeadAtom]:
         """Yield the tokens and edges of a context as heads of clauses about individual 0."""
@@ -502,14 +263,14 @@ class Contexts:
         if context.bare:
             return
         tokens = context.tokens
-        for token, _ in self._always:
+        for token, _ in self.rules.always:
             if token is None:
                 self._clash(context)
             elif token not in tokens:
                 self._add(context, token, beyond=False)
         while context.unclosed:
             one = context.unclosed.pop()
-            for body, token in self._class_rules.get(one, ()):
+            for body, token in self.rules.of_class.get(one, ()):
                 if (token is None or token not in tokens) and body <= tokens:
                     if token is None:
                         self._clash(context)
@@ -566,7 +327,7 @@ class Contexts:
                 edge.seen = seen
                 size = len(edge.core)
                 for role in tuple(edge.roles):
-                    for rule in self._rules_along(role, target):
+                    for rule in self.rules.along(role, target.tokens, bool(target.names)):
                         if rule.xs <= tokens and rule.ys <= target.tokens:
                             if rule.roles <= edge.roles:
                                 self._fire(context, edge, rule)
@@ -576,26 +337,7 @@ class Contexts:
                     self._retarget(context, edge)
             self._join_parent(context, edge)
 
-    def _rules_along(self, role: Role, target: Context) -> Iterator[_EdgeRule]:
-        """Return the rules that may say something of who is related by a role to the target.
-
-        Ontologies have thousands of rules for one property, each for another class of what is
-        related: they are found by one of its classes (as in ELK; Kazakov, Kroetzsch and Simancik,
-        "The incredible ELK", Journal of Automated Reasoning 53, 2014).
-        """
-        if target.names:
-            yield from self.edge_rules.get(role, ())  # To tell what is left out.
-            return
-        index = self._edge_index.get(role)
-        if index is None:
-            index = self._edge_index[role] = {}
-            for rule in self.edge_rules.get(role, ()):
-                index.setdefault(next(iter(rule.ys), None), []).append(rule)
-        yield from index.get(None, ())
-        for token in tuple(target.tokens):
-            yield from index.get(token, ())
-
-    def _fire(self, context: Context, edge: _Edge, rule: _EdgeRule) -> None:
+    def _fire(self, context: Context, edge: _Edge, rule: EdgeRule) -> None:
         head = rule.head
         if head[0] == 'clash':
             self._clash(context)
@@ -648,7 +390,7 @@ class Contexts:
             return
         context.looped = looped
         for role in tuple(context.loops):
-            for rule in self.edge_rules.get(role, ()):
+            for rule in self.rules.of_role.get(role, ()):
                 if rule.roles <= context.loops and rule.xs | rule.ys <= context.tokens:
                     head = rule.head
                     if head[0] == 'clash':
@@ -765,7 +507,7 @@ class Contexts:
             and rule.xs <= context.tokens
             and rule.ys <= tokens
             for role in roles
-            for rule in self.edge_rules.get(role, ())
+            for rule in self.rules.of_role.get(role, ())
         )
 
     def _case_gap(self, context: Context, condition: AtLeast | AtMost) -> None:
@@ -806,7 +548,7 @@ class Contexts:
 
     def _along_value(self, context: Context, held: _Values) -> None:
         for prop in tuple(held.props):
-            for rule in self._value_rules.get(prop, ()):
+            for rule in self.rules.of_prop.get(prop, ()):
                 if not rule.xs <= context.tokens:
                     continue
                 head = rule.head
@@ -874,11 +616,6 @@ class Contexts:
                 if all((a.values & b.values).is_empty for a, b in combinations(chosen, 2)):
                     best = max(best, sum(held.count for held in chosen))
         return best
-
-
-def _key(term: Any) -> Any:
-    """Return a term of a clause: a variable's number, or ('is', individual)."""
-    return ('is', term.value) if isinstance(term, Constant) else term
 
 
 def _holds(token: Any, tokens: set[Token]) -> bool:
