@@ -83,7 +83,7 @@ class AssertionWriter:
         elif isinstance(axiom, ax.ObjectPropertyAssertion):
             x, choices = model.individual(axiom.subject)
             y, more = model.individual(axiom.object)
-            model.relate(x, self._rules.role(axiom.prop), y, choices | more)
+            model.relate(x, self._rules.roles.number(axiom.prop), y, choices | more)
         elif isinstance(axiom, ax.DataPropertyAssertion):
             x, choices = model.individual(axiom.subject)
             model.value(x, axiom.prop, point(value_of(axiom.literal)), choices)

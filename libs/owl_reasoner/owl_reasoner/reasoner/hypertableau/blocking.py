@@ -83,7 +83,7 @@ class Blocking:
 
     def needs_no_choice(self, x: int) -> bool:
         """Tell whether an individual seems to be blocked, or its parent is."""
-        if self._rules.has_inverse:
+        if self._rules.roles.has_inverse:
             return False
         is_known = x in self.put_off or self._model.parent[x] in self.blocked
         return is_known or self._core_blocker(x, self.blocked, self.chosen) is not None

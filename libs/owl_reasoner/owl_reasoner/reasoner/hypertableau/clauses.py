@@ -41,13 +41,12 @@ from owl_reasoner.reasoner.clauses import (
     closure,
     turned,
 )
+from owl_reasoner.reasoner.hypertableau.roles import Roles
 from owl_reasoner.reasoner.normal_form import normal_form
-from owl_reasoner.reasoner.property_chains import AnyRole, Chains
 from owl_reasoner.reasoner.translation import (
     RuleTerms,
     computed_atom,
     directed,
-    inclusions,
 )
 from owl_reasoner.reasoner.value_sets import EVERY, ValueSet, unfolded, value_set
 
@@ -179,13 +178,12 @@ class CaseRules:
         loops: Concepts that relate their members to themselves, and the role.
         marks: Concepts of whoever is related to itself by a role.
         nominals: Concepts of one individual; `nominal_of` the other way.
-        above: Every role that a role implies, itself included; `props_above` the same for data.
+        roles: Its properties, and what each implies.
         disjoint, disjoint_props: Roles (data properties) that exclude each other.
         named: Rules about named individuals: those of SWRL, and keys.
         asked: The concepts, data properties and roles that stand in their bodies.
         gaps: One sentence for each axiom that is not fully covered.
         tested: One for each with a range that single values alone can be tested for.
-        has_inverse: Whether any role is used backwards.
         budget: What the search may use.
     """
 
@@ -196,8 +194,7 @@ class CaseRules:
         tbox = [axiom for axiom in axioms if not isinstance(axiom, (ax.Assertion, ax.Annotation))]
         self.names: list[str] = ['']
         self._numbers: dict[str, int] = {}
-        self._roles: dict[str, int] = {}
-        self.role_names: list[str] = ['']
+        self.roles = Roles()
         self.always: list[Heads] = []
         self.of_node: dict[int, list[NodeRule]] = {}
         self.excluded: dict[int, list[frozenset[int]]] = {}
@@ -218,33 +215,27 @@ class CaseRules:
         self.marks: dict[int, list[int]] = {}
         self.nominals: dict[int, str] = {}
         self.nominal_of: dict[str, int] = {}
-        self.above: dict[int, tuple[int, ...]] = {}
-        self.props_above: dict[str, tuple[str, ...]] = {}
         self.disjoint: dict[int, set[int]] = {}
         self.disjoint_props: dict[str, dict[str, None]] = {}
         self.named: list[NamedRule] = []
-        self._individuals = [
-            iri for axiom in axioms for kind, iri in entities_of(axiom) if kind == 'individual'
-        ]
         self.gaps: dict[str, None] = {}
         self.tested: dict[str, None] = {}
         self._origin: Axiom | None = None
-        self.has_inverse = False
         self._positive: dict[ClassExpression, int] = {}
         self._recognised: dict[ClassExpression, int] = {}
         self._counts: dict[object, int] = {}
-        self._chains = Chains()
-        # No sets of names: their order, and with it the search, would differ from run to run.
-        self._inclusions: dict[AnyRole, dict[AnyRole, None]] = {}
-        self._data_inclusions: dict[str, dict[str, None]] = {}
         self._datatypes = {
             a.datatype: a.range for a in tbox if isinstance(a, ax.DatatypeDefinition)
         }
+        self._named_rules = _NamedRules(
+            self,
+            (iri for axiom in axioms for kind, iri in entities_of(axiom) if kind == 'individual'),
+        )
         for axiom in tbox:
-            self._attempt(axiom, self._property_inclusion)
-        self._top_and_bottom({iri for axiom in axioms for _, iri in entities_of(axiom)})
+            self._attempt(axiom, self.roles.take)
+        self._top_and_bottom({iri for _, iri in entities})
         for axiom in tbox:
-            self._attempt(axiom, self._check_chains)
+            self._attempt(axiom, self.roles.check)
             self._attempt(axiom, self._axiom)
         self._origin = None
         self._common_consequences()
@@ -322,40 +313,12 @@ class CaseRules:
             self.nominals[number] = individual
         return number
 
-    def role(self, prop: PropertyExpression | AnyRole) -> int:
-        """Return the number of a role."""
-        iri, inverted = prop if isinstance(prop, tuple) else directed(prop)
-        number = self._roles.get(iri)
-        if number is None:
-            number = self._roles[iri] = len(self.role_names)
-            self.role_names.append(iri)
-        if inverted:
-            self.has_inverse = True
-        return -number if inverted else number
-
-    def roles_above(self, role: int) -> tuple[int, ...]:
-        """Return the role and every role that it implies by itself."""
-        found = self.above.get(role)
-        if found is None:
-            key = (self.role_names[abs(role)], role < 0)
-            above = closure(key, lambda one: self._inclusions.get(one, ()))
-            found = self.above[role] = tuple(self.role(one) for one in above)
-        return found
-
-    def data_above(self, prop: str) -> tuple[str, ...]:
-        """Return the data property and every one that it implies."""
-        found = self.props_above.get(prop)
-        if found is None:
-            above = closure(prop, lambda one: self._data_inclusions.get(one, ()))
-            found = self.props_above[prop] = tuple(above)
-        return found
-
     def range_of(self, prop: str) -> ValueSet:
         """Return the values of a data property that its ranges leave to everybody."""
         found = self._ranges.get(prop)
         if found is None:
             found = EVERY
-            for one in self.data_above(prop):
+            for one in self.roles.data_above(prop):
                 for rule in self.by_prop.get(one, ()):
                     if rule.xs == _ALL and not rule.heads:
                         found &= rule.rest
@@ -365,23 +328,7 @@ class CaseRules:
     @property
     def is_pairwise(self) -> bool:
         """Whether an individual is blocked only together with the one that it was made for."""
-        return self.has_inverse and bool(self.at_most or self.functional)
-
-    def is_complex(self, prop: str) -> bool:
-        """Tell whether a chain implies the property."""
-        return self._chains.is_complex((prop, False))
-
-    def complex_props(self) -> list[str]:
-        """Return the properties that chains imply."""
-        return [prop for prop, inverse in self._chains.complex_roles() if not inverse]
-
-    def steps(self, prop: str) -> list[tuple[int, int | None, int]]:
-        """Return the automaton of a property, from state 0 to state 1."""
-        try:
-            found = self._chains.steps((prop, False))
-        except UnsupportedError:
-            return [(0, self.role(prop), 1)]
-        return [(a, None if step is None else self.role(step), b) for a, step, b in found]
+        return self.roles.has_inverse and bool(self.at_most or self.functional)
 
     # --- concepts of expressions ---
 
@@ -503,11 +450,11 @@ class CaseRules:
 
     def universal(self, concept: int, prop: PropertyExpression, target: int) -> None:
         """Add the rules by which whoever a member is related to has another concept."""
-        role, body = directed(prop), frozenset((concept,))
-        if not self._chains.is_complex(role):
-            self.edge_rule(EdgeRule(body, self.role(role), _ALL, ((_Y, target),)))
+        body = frozenset((concept,))
+        if not self.roles.is_complex(prop):
+            self.edge_rule(EdgeRule(body, self.roles.number(prop), _ALL, ((_Y, target),)))
             return
-        steps = self._chains.steps(role)
+        steps = self.roles.automaton(prop)
         states: dict[int, int] = {}
         if concept == ANYBODY:
             # Everybody is in the states that are reached without a step.
@@ -526,19 +473,15 @@ class CaseRules:
             if step is None:
                 self.node_rule(here, ((_X, there),))
             else:
-                self.edge_rule(EdgeRule(here, self.role(step), _ALL, ((_Y, there),)))
-
-    def complex_role(self, prop: PropertyExpression) -> bool:
-        """Tell whether a chain implies the role."""
-        return self._chains.is_complex(directed(prop))
+                self.edge_rule(EdgeRule(here, step, _ALL, ((_Y, there),)))
 
     def mark(self, prop: PropertyExpression) -> int:
         """Return a concept of whoever is related to itself by the role."""
         if directed(prop)[0] == TOP:
             return ANYBODY
-        if self.complex_role(prop):
+        if self.roles.is_complex(prop):
             raise UnsupportedError('a property with chains is asked for itself')
-        found = self.marks.setdefault(abs(self.role(prop)), [])
+        found = self.marks.setdefault(abs(self.roles.number(prop)), [])
         if not found:
             found.append(self.concept(self.fresh()))
         return found[0]
@@ -549,25 +492,10 @@ class CaseRules:
         known = self._counts.get(key)
         if known is None:
             known = self._counts[key] = self.concept(self.fresh())
-            self.loops[known] = abs(self.role(prop))
+            self.loops[known] = abs(self.roles.number(prop))
         return known
 
     # --- axioms ---
-
-    def _property_inclusion(self, axiom: Axiom) -> None:
-        data = isinstance(axiom, (ax.SubDataPropertyOf, ax.EquivalentDataProperties))
-        for sub, sup in inclusions(axiom):
-            if data:
-                if sub[0] == TOP_DATA:
-                    raise UnsupportedError('owl:topDataProperty is below another property')
-                self._data_inclusions.setdefault(sub[0], {})[sup[0]] = None
-            else:
-                self._below(sub, sup)
-        if isinstance(axiom, ax.TransitiveObjectProperty):
-            role = directed(axiom.prop)
-            self._chains.imply((role, role), role)
-        elif isinstance(axiom, ax.SubPropertyChainOf):
-            self._chains.imply(tuple(map(directed, axiom.chain)), directed(axiom.sup))
 
     def _top_and_bottom(self, used: set[str]) -> None:
         """Add what the properties mean that OWL itself defines, where they are used.
@@ -577,25 +505,14 @@ class CaseRules:
         """
         if TOP in used:
             role = directed(TOP)
-            self._below(role, turned(role))
-            self._chains.imply((role, role), role)
-            somebody = Count(1, self.role(TOP), self.nominal(self.fresh()))
+            self.roles.include(role, turned(role))
+            self.roles.imply((role, role), role)
+            somebody = Count(1, self.roles.number(TOP), self.nominal(self.fresh()))
             self.node_rule(_ALL, ((_X, self.counted(self.at_least, somebody)),))
         if BOTTOM in used:
-            self.edge_rule(EdgeRule(_ALL, self.role(BOTTOM), _ALL, ()))
+            self.edge_rule(EdgeRule(_ALL, self.roles.number(BOTTOM), _ALL, ()))
         if BOTTOM_DATA in used:
             self.value_rule(BOTTOM_DATA, _ALL, EVERY, ())
-
-    def _below(self, sub: AnyRole, sup: AnyRole) -> None:
-        for role in (sub, sup):
-            self.role(role)
-        self._inclusions.setdefault(sub, {})[sup] = None
-        self._inclusions.setdefault(turned(sub), {})[turned(sup)] = None
-        self._chains.imply((sub,), sup)
-
-    def _check_chains(self, axiom: Axiom) -> None:
-        if isinstance(axiom, ax.SubPropertyChainOf):
-            self._chains.steps(directed(axiom.sup))
 
     def _axiom(self, axiom: Axiom) -> None:
         if isinstance(axiom, ax.SubClassOf):
@@ -613,102 +530,13 @@ class CaseRules:
                 self.include(part, axiom.cls)
             self.include(axiom.cls, ex.ObjectUnionOf(axiom.classes))
         elif isinstance(axiom, ax.HasKey):
-            self._key(axiom)
+            self._named_rules.key(axiom)
         elif isinstance(axiom, ax.Rule):
-            self._rule(axiom)
+            self._named_rules.rule(axiom)
         else:
             self._property_axiom(axiom)
 
     # --- rules about named individuals ---
-
-    def _key(self, key: ax.HasKey) -> None:
-        """Add the rule by which those are the same who share a value of every property."""
-        x, y = 0, 1
-        body: list[NamedAtom] = [OfConcept(self.recognised(key.cls), (one,)) for one in (x, y)]
-        for place, prop in enumerate((*key.object_props, *key.data_props), 2):
-            is_data = place >= 2 + len(key.object_props)
-            for one in (x, y):
-                pair = (one, place)
-                body.append(OfProp(str(prop), pair) if is_data else self._link(prop, *pair))
-        if len(body) > 2:
-            self.named.append(NamedRule(tuple(body), SameAtom((x, y)), key, is_key=True))
-
-    def _link(self, prop: PropertyExpression, x: Term, y: Term) -> FactAtom:
-        """Return the atom that relates two individuals."""
-        if not self.complex_role(prop):
-            return OfRole(self.role(prop), (x, y))
-        reached = {
-            name: self.recognised(ex.ObjectHasValue(prop, name))
-            for name in dict.fromkeys(self._individuals)
-        }
-        return OfChain(reached, (x, y))
-
-    def _rule(self, rule: ax.Rule) -> None:
-        """Add a rule of SWRL, one for each atom of its head."""
-        numbers = count()
-        terms = RuleTerms(lambda: next(numbers))
-        individual, value = terms.individual, terms.value
-        body: list[NamedAtom] = []
-        for atom in rule.body:
-            if isinstance(atom, ex.ClassAtom):
-                body.append(OfConcept(self.recognised(atom.cls), (individual(atom.argument),)))
-            elif isinstance(atom, ex.DataRangeAtom):
-                body.append(OfRange(self.values(atom.range), (value(atom.argument),)))
-            elif isinstance(atom, ex.ObjectPropertyAtom):
-                body.append(self._link(atom.prop, individual(atom.first), individual(atom.second)))
-            elif isinstance(atom, ex.DataPropertyAtom):
-                if atom.prop == TOP_DATA:
-                    raise UnsupportedError('owl:topDataProperty stands in a rule')
-                body.append(OfProp(atom.prop, (individual(atom.first), value(atom.second))))
-            elif isinstance(atom, ex.BuiltinAtom):
-                body.append(computed_atom(atom, terms))
-            else:
-                pair = individual(atom.first), individual(atom.second)
-                is_same = isinstance(atom, ex.SameIndividualAtom)
-                body.append(SameAtom(pair) if is_same else DifferentAtom(pair))
-        heads = [self._head(atom, terms) for atom in rule.head]
-        facts = [atom for atom in body if isinstance(atom, FactAtom)]
-        bound = {term for atom in facts for term in atom.terms}
-        in_body = dict.fromkeys(term for atom in body for term in atom.terms)
-        in_heads = [term for atom in heads for term in atom.terms]
-        if any(isinstance(term, int) and term not in in_body for term in in_heads):
-            raise UnsupportedError('a variable of the head does not stand in the body')
-        for term in dict.fromkeys((*in_body, *in_heads)):
-            if isinstance(term, Constant) and not term.is_value:
-                self.nominal(str(term.value))
-            elif term not in terms.individuals:
-                continue
-            if term not in bound:
-                body.append(OfConcept(ANYBODY, (term,)))
-        if not any(isinstance(atom, FactAtom) for atom in body):
-            raise UnsupportedError('it is about no individual')
-        self._check_values(body, terms.values)
-        self.named += [NamedRule(tuple(body), head, rule) for head in heads or (None,)]
-
-    def _check_values(self, body: list[NamedAtom], terms: Iterable[Term]) -> None:
-        """Raise UnsupportedError where a variable has no value by facts or computation."""
-        bound = {term for atom in body if isinstance(atom, FactAtom) for term in atom.terms}
-        computing = [atom for atom in body if isinstance(atom, ComputedAtom) and atom.solve]
-        for _ in computing:
-            for first, *rest in (atom.terms for atom in computing):
-                if all(isinstance(term, Constant) or term in bound for term in rest):
-                    bound.add(first)
-        if any(isinstance(term, int) and term not in bound for term in terms):
-            raise UnsupportedError('a variable is bound by no other atom')
-
-    def _head(self, atom: ex.Atom, terms: RuleTerms) -> OfConcept | OfRole | OfProp | Any:
-        """Return what a rule says of those of whom its body holds."""
-        individual = terms.individual
-        if isinstance(atom, ex.ClassAtom):
-            return OfConcept(self.positive(atom.cls), (individual(atom.argument),))
-        if isinstance(atom, ex.DataPropertyAtom):
-            return OfProp(atom.prop, (individual(atom.first), terms.value(atom.second)))
-        if isinstance(atom, ex.DataRangeAtom | ex.BuiltinAtom):
-            raise UnsupportedError('a built-in or data range in the head has no meaning here')
-        pair = individual(atom.first), individual(atom.second)
-        if isinstance(atom, ex.ObjectPropertyAtom):
-            return OfRole(self.role(atom.prop), pair)
-        return SameAtom(pair) if isinstance(atom, ex.SameIndividualAtom) else DifferentAtom(pair)
 
     def _all_disjoint(self, classes: tuple[ClassExpression, ...]) -> None:
         for pair in ax.pairs_of(classes):
@@ -720,19 +548,19 @@ class CaseRules:
         elif isinstance(axiom, ax.IrreflexiveObjectProperty):
             self.node_rule(frozenset((self.mark(axiom.prop),)), ())
         elif isinstance(axiom, ax.AsymmetricObjectProperty):
-            role = self.role(axiom.prop)
+            role = self.roles.number(axiom.prop)
             self._exclude(role, -role)
         elif isinstance(axiom, ax.DisjointObjectProperties):
-            if any(map(self.complex_role, axiom.props)):
+            if any(map(self.roles.is_complex, axiom.props)):
                 raise UnsupportedError('a property with chains is disjoint from another')
             for first, second in ax.pairs_of(axiom.props):
-                self._exclude(self.role(first), self.role(second))
+                self._exclude(self.roles.number(first), self.roles.number(second))
         elif isinstance(axiom, (ax.FunctionalObjectProperty, ax.InverseFunctionalObjectProperty)):
-            if self.complex_role(axiom.prop):
+            if self.roles.is_complex(axiom.prop):
                 raise UnsupportedError('a property with chains is functional')
-            role = self.role(axiom.prop)
+            role = self.roles.number(axiom.prop)
             if isinstance(axiom, ax.InverseFunctionalObjectProperty):
-                role, self.has_inverse = -role, True
+                role, self.roles.has_inverse = -role, True
             self.functional.append(Count(1, role, ANYBODY))
         elif isinstance(axiom, ax.ObjectPropertyDomain):
             self.include(ex.ObjectSomeValuesFrom(axiom.prop, THING), axiom.domain)
@@ -755,6 +583,112 @@ class CaseRules:
         for one, other in ((first, second), (-first, -second)):
             self.disjoint.setdefault(one, set()).add(other)
             self.disjoint.setdefault(other, set()).add(one)
+
+
+class _NamedRules:
+    """Reads the rules about named individuals: those of SWRL, and keys.
+
+    They take no part in the model of those who must exist without a name (DL-safe rules; Motik,
+    Sattler, Studer, "Query answering for OWL-DL with rules", 2005): else reasoning would have no
+    end.
+    """
+
+    def __init__(self, rules: CaseRules, individuals: Iterable[str]) -> None:
+        self._rules = rules
+        self._individuals = tuple(dict.fromkeys(individuals))
+
+    def key(self, key: ax.HasKey) -> None:
+        """Add the rule by which those are the same who share a value of every property."""
+        x, y = 0, 1
+        body: list[NamedAtom] = [
+            OfConcept(self._rules.recognised(key.cls), (one,)) for one in (x, y)
+        ]
+        for place, prop in enumerate((*key.object_props, *key.data_props), 2):
+            is_data = place >= 2 + len(key.object_props)
+            for one in (x, y):
+                pair = (one, place)
+                body.append(OfProp(str(prop), pair) if is_data else self._link(prop, *pair))
+        if len(body) > 2:
+            self._rules.named.append(NamedRule(tuple(body), SameAtom((x, y)), key, is_key=True))
+
+    def _link(self, prop: PropertyExpression, x: Term, y: Term) -> FactAtom:
+        """Return the atom that relates two individuals."""
+        if not self._rules.roles.is_complex(prop):
+            return OfRole(self._rules.roles.number(prop), (x, y))
+        reached = {
+            name: self._rules.recognised(ex.ObjectHasValue(prop, name))
+            for name in self._individuals
+        }
+        return OfChain(reached, (x, y))
+
+    def rule(self, rule: ax.Rule) -> None:
+        """Add a rule of SWRL, one for each atom of its head."""
+        numbers = count()
+        terms = RuleTerms(lambda: next(numbers))
+        individual, value = terms.individual, terms.value
+        body: list[NamedAtom] = []
+        for atom in rule.body:
+            if isinstance(atom, ex.ClassAtom):
+                body.append(
+                    OfConcept(self._rules.recognised(atom.cls), (individual(atom.argument),))
+                )
+            elif isinstance(atom, ex.DataRangeAtom):
+                body.append(OfRange(self._rules.values(atom.range), (value(atom.argument),)))
+            elif isinstance(atom, ex.ObjectPropertyAtom):
+                body.append(self._link(atom.prop, individual(atom.first), individual(atom.second)))
+            elif isinstance(atom, ex.DataPropertyAtom):
+                if atom.prop == TOP_DATA:
+                    raise UnsupportedError('owl:topDataProperty stands in a rule')
+                body.append(OfProp(atom.prop, (individual(atom.first), value(atom.second))))
+            elif isinstance(atom, ex.BuiltinAtom):
+                body.append(computed_atom(atom, terms))
+            else:
+                pair = individual(atom.first), individual(atom.second)
+                is_same = isinstance(atom, ex.SameIndividualAtom)
+                body.append(SameAtom(pair) if is_same else DifferentAtom(pair))
+        heads = [self._head(atom, terms) for atom in rule.head]
+        facts = [atom for atom in body if isinstance(atom, FactAtom)]
+        bound = {term for atom in facts for term in atom.terms}
+        in_body = dict.fromkeys(term for atom in body for term in atom.terms)
+        in_heads = [term for atom in heads for term in atom.terms]
+        if any(isinstance(term, int) and term not in in_body for term in in_heads):
+            raise UnsupportedError('a variable of the head does not stand in the body')
+        for term in dict.fromkeys((*in_body, *in_heads)):
+            if isinstance(term, Constant) and not term.is_value:
+                self._rules.nominal(str(term.value))
+            elif term not in terms.individuals:
+                continue
+            if term not in bound:
+                body.append(OfConcept(ANYBODY, (term,)))
+        if not any(isinstance(atom, FactAtom) for atom in body):
+            raise UnsupportedError('it is about no individual')
+        self._check_values(body, terms.values)
+        self._rules.named += [NamedRule(tuple(body), head, rule) for head in heads or (None,)]
+
+    def _check_values(self, body: list[NamedAtom], terms: Iterable[Term]) -> None:
+        """Raise UnsupportedError where a variable has no value by facts or computation."""
+        bound = {term for atom in body if isinstance(atom, FactAtom) for term in atom.terms}
+        computing = [atom for atom in body if isinstance(atom, ComputedAtom) and atom.solve]
+        for _ in computing:
+            for first, *rest in (atom.terms for atom in computing):
+                if all(isinstance(term, Constant) or term in bound for term in rest):
+                    bound.add(first)
+        if any(isinstance(term, int) and term not in bound for term in terms):
+            raise UnsupportedError('a variable is bound by no other atom')
+
+    def _head(self, atom: ex.Atom, terms: RuleTerms) -> OfConcept | OfRole | OfProp | Any:
+        """Return what a rule says of those of whom its body holds."""
+        individual = terms.individual
+        if isinstance(atom, ex.ClassAtom):
+            return OfConcept(self._rules.positive(atom.cls), (individual(atom.argument),))
+        if isinstance(atom, ex.DataPropertyAtom):
+            return OfProp(atom.prop, (individual(atom.first), terms.value(atom.second)))
+        if isinstance(atom, ex.DataRangeAtom | ex.BuiltinAtom):
+            raise UnsupportedError('a built-in or data range in the head has no meaning here')
+        pair = individual(atom.first), individual(atom.second)
+        if isinstance(atom, ex.ObjectPropertyAtom):
+            return OfRole(self._rules.roles.number(atom.prop), pair)
+        return SameAtom(pair) if isinstance(atom, ex.SameIndividualAtom) else DifferentAtom(pair)
 
 
 class _Clause:
@@ -831,9 +765,9 @@ class _Clause:
         self, table: dict[int, Count], n: int, prop: PropertyExpression, concept: int
     ) -> None:
         rules = self._rules
-        if (table is rules.at_most or n > 1) and rules.complex_role(prop):
+        if (table is rules.at_most or n > 1) and rules.roles.is_complex(prop):
             raise UnsupportedError('a property with chains is counted')
-        self._heads.append(rules.counted(table, Count(n, rules.role(prop), concept)))
+        self._heads.append(rules.counted(table, Count(n, rules.roles.number(prop), concept)))
 
     def _count_values(
         self, table: dict[int, ValueCount], n: int, prop: str, data_range: ex.DataRange
@@ -851,7 +785,7 @@ class _Clause:
             return
         inline: ex.ObjectAllValuesFrom | None = None
         for every in sorted(self._every, key=lambda one: _is_negative(one.filler)):
-            simple, excludes = not rules.complex_role(every.prop), _is_negative(every.filler)
+            simple, excludes = not rules.roles.is_complex(every.prop), _is_negative(every.filler)
             if inline is None and simple and not (self._never and excludes):
                 inline = every
             elif excludes:
@@ -879,25 +813,25 @@ class _Clause:
     def _is_chained(self) -> bool:
         """Tell whether one concept alone, or none, says what a property with chains leads to."""
         few = len(self._every) == 1 and len(self._body) <= 1 and not (self._heads or self._never)
-        return few and self._rules.complex_role(self._every[0].prop)
+        return few and self._rules.roles.is_complex(self._every[0].prop)
 
     def _recognise(self, prop: PropertyExpression, filler: ClassExpression, name: str) -> None:
         """Everybody related to a member of the filler gets the named concept."""
         rules = self._rules
         source, target = rules.recognised(filler), rules.concept(name)
-        if not rules.complex_role(prop):
+        if not rules.roles.is_complex(prop):
             ys = frozenset((source,))
-            rules.edge_rule(EdgeRule(_ALL, rules.role(prop), ys, ((_X, target),)))
+            rules.edge_rule(EdgeRule(_ALL, rules.roles.number(prop), ys, ((_X, target),)))
             return
         iri, inverted = directed(prop)
-        rules.has_inverse = True
+        rules.roles.has_inverse = True
         rules.universal(source, iri if inverted else ex.ObjectInverseOf(iri), target)
 
     def _finish_edge(
         self, body: frozenset[int], heads: Heads, every: ex.ObjectAllValuesFrom
     ) -> None:
         rules = self._rules
-        role, filler = rules.role(every.prop), every.filler
+        role, filler = rules.roles.number(every.prop), every.filler
         parts = filler.operands if isinstance(filler, ex.ObjectIntersectionOf) else (filler,)
         for part in parts:
             ys: set[int] = set()

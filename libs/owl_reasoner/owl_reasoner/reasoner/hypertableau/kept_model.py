@@ -145,7 +145,7 @@ class KeptModel:
                 x = model.owner.get(key)
             if x is not None:
                 touched[x] = None
-        if touched and self._rules.complex_props():
+        if touched and self._rules.roles.complex_props():
             # Chains reach further than what they lead along.
             return {name for names in model.names.values() for name in names}
         found: set[str] = set()

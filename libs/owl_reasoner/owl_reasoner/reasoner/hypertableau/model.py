@@ -53,7 +53,7 @@ class CaseModel:
 
     def __init__(self, rules: CaseRules, most_steps: int) -> None:
         self.rules, self._most_steps, self.steps = rules, most_steps, 0
-        self.budget = rules.budget
+        self.budget, self._roles = rules.budget, rules.roles
         self.labels: dict[int, dict[int, Choices]] = {}
         self.out: dict[int, dict[int, dict[int, Choices]]] = {}
         self.names: dict[int, tuple[str, ...]] = {}
@@ -164,7 +164,7 @@ class CaseModel:
         """State that an individual has some value of a set by a data property."""
         v = next(self._numbers)
         self.put(self.values[x], v, None)
-        self.put(self.props, v, dict.fromkeys(self.rules.data_above(prop), choices))
+        self.put(self.props, v, dict.fromkeys(self._roles.data_above(prop), choices))
         self._note_holder(x, v)
         self.put(self.sets, v, (values, choices))
         self.put(self._groups, v, {})
@@ -191,7 +191,7 @@ class CaseModel:
 
     def extend(self, v: int, prop: str, choices: Choices) -> None:
         """State that a value is one by a further data property."""
-        for above in self.rules.data_above(prop):
+        for above in self._roles.data_above(prop):
             if above not in self.props[v]:
                 self.put(self.props[v], above, choices)
         self._note_holder(self.owner[v], v)
@@ -239,7 +239,7 @@ class CaseModel:
             if x != y:
                 self.put(self.out[y], x, {})
         back, having = self.out[y][x], self.having
-        for one in self.rules.roles_above(role):
+        for one in self._roles.above(role):
             if one not in there:
                 self.put(there, one, choices)
                 self.put(back, -one, choices)

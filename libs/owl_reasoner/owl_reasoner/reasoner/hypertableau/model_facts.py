@@ -88,10 +88,10 @@ class ModelFacts:
         for y, roles in model.out[x].items():
             if model.names[y]:
                 for role, choices in roles.items():
-                    if role > 0 and not rules.is_complex(rules.role_names[role]):
-                        yield rules.role_names[role], y, choices
+                    if role > 0 and not rules.roles.is_complex(rules.roles.names[role]):
+                        yield rules.roles.names[role], y, choices
         if model.out[x] or x in self._search.blocked:
-            for prop in rules.complex_props():
+            for prop in rules.roles.complex_props():
                 if prop != TOP:
                     yield from self._along(x, prop)
 
@@ -105,7 +105,7 @@ class ModelFacts:
         steps = self._automata.get(prop)
         if steps is None:
             steps = self._automata[prop] = {}
-            for before, step, after in self._rules.steps(prop):
+            for before, step, after in self._rules.roles.steps(prop):
                 steps.setdefault(before, []).append((step, after))
         reached: dict[tuple[int, int], int] = {(x, 0): 0}
         pending = [(x, 0)]
