@@ -109,6 +109,312 @@ _STRUCTURE = {RDF + 'first', RDF + 'rest'} | {
 }
 
 
+class _Statements:
+    """A graph's statements by subject, and what kind of entity each name is.
+
+    Attributes:
+        nodes: The values of each predicate of each subject.
+        kinds: What each name is declared or guessed to be.
+        header: The node of the ontology itself; '' without one.
+        variables: Nodes that are variables of rules.
+        subject_read: Whose statements are being read; its line is told where a node has none.
+    """
+
+    def __init__(self, graph: Graph) -> None:
+        self.nodes: dict[str, dict[str, list[Node]]] = {}
+        self.kinds: dict[str, set[str]] = {}
+        self.header = ''
+        self.variables: set[str] = set()
+        self.subject_read = ''
+        self._places = graph.places
+        for subject, predicate, value in graph.triples:
+            self.nodes.setdefault(subject, {}).setdefault(predicate, []).append(value)
+            if predicate == _TYPE and isinstance(value, str):
+                kind = DECLARATIONS.get(value)
+                if kind is not None:
+                    self.kinds.setdefault(subject, set()).add(kind)
+                elif value == OWL + 'Ontology' and not self.header:
+                    self.header = subject
+                elif value in CHARACTERISTICS:
+                    self.kinds.setdefault(subject, set()).add('object_property')
+                elif value == SWRL + 'Variable':
+                    self.variables.add(subject)
+
+    def where(self, node: str) -> str:
+        """Return a node's line for the beginning of a message."""
+        place = self._places.get(node)
+        return f'line {place[0]}: ' if place else ''
+
+    def ill_formed(self, node: str, message: str) -> IllFormedError:
+        """Return the error that a node is not as it should be, at its line."""
+        place = self._places.get(node) or self._places.get(self.subject_read, (0, 0))
+        return IllFormedError(message, *place)
+
+    def one(self, node: str, predicate: str) -> Node | None:
+        """Return the first value of a predicate, if there is one."""
+        values = self.nodes.get(node, {}).get(predicate)
+        return values[0] if values else None
+
+    def resource(self, node: str, predicate: str) -> str:
+        value = self.one(node, predicate)
+        if not isinstance(value, str):
+            raise self.ill_formed(
+                node, f'expected a resource as {local_name(predicate)}, got {value!r}'
+            )
+        return value
+
+    def list_of(self, head: Node) -> list[Node]:
+        """Return the items of an RDF list."""
+        items: list[Node] = []
+        seen: set[str] = set()
+        node = head
+        while node != RDF + 'nil':
+            if not isinstance(node, str) or node in seen:
+                raise self.ill_formed(str(head), 'expected a list that ends in rdf:nil')
+            seen.add(node)
+            properties = self.nodes.get(node, {})
+            firsts = set(properties.get(RDF + 'first', ()))
+            rests = set(properties.get(RDF + 'rest', ()))
+            if len(firsts) != 1 or len(rests) != 1:
+                raise self.ill_formed(node, 'expected one rdf:first and one rdf:rest in a list')
+            items.append(firsts.pop())
+            node = rests.pop()
+        return items
+
+    def resources(self, head: Node) -> list[str]:
+        items = self.list_of(head)
+        for item in items:
+            if not isinstance(item, str):
+                raise self.ill_formed(
+                    str(head), f'expected resources in a list, got the literal {item.lexical!r}'
+                )
+        return items  # type: ignore[return-value]
+
+    def number(self, node: str, predicate: str) -> int | None:
+        value = self.one(node, predicate)
+        if value is None:
+            return None
+        try:
+            number = int(value.lexical) if isinstance(value, Literal) else -1
+        except ValueError:
+            number = -1
+        if number < 0:
+            shown = value.lexical if isinstance(value, Literal) else value
+            raise self.ill_formed(
+                node, f'expected a whole number as {local_name(predicate)}, got {shown[:40]!r}'
+            )
+        return number
+
+    def check_one(self, node: str, names: Iterable[str], what: str) -> None:
+        """Check that a node has one of some properties at most, and one value of it."""
+        properties = self.nodes.get(node, {})
+        said = [name for name in names if OWL + name in properties]
+        if len(said) > 1 or any(len(set(properties[OWL + name])) > 1 for name in said):
+            several = ', '.join(said)
+            raise self.ill_formed(node, f'{what} says several things at once: {several}')
+
+    def literals(self, node: str, values: Iterable[Node]) -> tuple[Literal, ...]:
+        """Return values of a data range, which must be literals."""
+        found = []
+        for value in values:
+            if not isinstance(value, Literal):
+                raise self.ill_formed(node, f'expected a literal in a data range, got {value}')
+            found.append(value)
+        return tuple(found)
+
+    def value_kinds(self, prop: Node) -> set[str]:
+        """Return which of object and data property a name is, as far as is known."""
+        return self.kinds.get(str(prop), set()) & {'object_property', 'data_property'}
+
+    def is_data(self, prop: str, range_node: Node | None = None) -> bool:
+        kinds = self.value_kinds(prop)
+        if len(kinds) == 1:
+            return 'data_property' in kinds
+        return isinstance(range_node, str) and self.is_data_range(range_node)
+
+    def is_data_range(self, node: str) -> bool:
+        if 'datatype' in self.kinds.get(node, ()) or node == RDFS + 'Literal':
+            return True
+        return node.startswith(XSD)
+
+    def guess_kinds(self) -> None:
+        """Give undeclared properties the kinds of their values, ranges and superproperties.
+
+        rdf:Property tells no kind: without any of these it is an object property. Nor does the
+        header: what is used there alone annotates the ontology.
+        """
+        guessed: dict[str, set[str]] = {}
+        below: dict[str, list[str]] = {}
+
+        def guess(name: str, are_data: Iterable[bool]) -> None:
+            if name not in self.kinds and not name.startswith(BUILT_IN):
+                kinds = ('data_property' if is_data else 'object_property' for is_data in are_data)
+                guessed.setdefault(name, set()).update(kinds)
+
+        for subject, properties in self.nodes.items():
+            if RDF + 'Property' in properties.get(_TYPE, ()):
+                guess(subject, ())
+            for predicate, values in properties.items():
+                if predicate == RDFS + 'range':
+                    guess(subject, (isinstance(v, str) and self.is_data_range(v) for v in values))
+                elif predicate == RDFS + 'subPropertyOf':
+                    if subject not in self.kinds and not subject.startswith(BUILT_IN):
+                        for value in values:
+                            below.setdefault(str(value), []).append(subject)
+                elif predicate not in self.kinds and subject != self.header:
+                    guess(predicate, (isinstance(value, Literal) for value in values))
+        self.kinds.update((name, kinds) for name, kinds in guessed.items() if kinds)
+        # A superproperty may have its kind from its own superproperty.
+        above = list(below)
+        while above:
+            name = above.pop()
+            kinds = self.value_kinds(name)
+            for sub in below.get(name, ()):
+                if not kinds <= self.kinds.get(sub, set()):
+                    self.kinds.setdefault(sub, set()).update(kinds)
+                    above.append(sub)
+        for name in guessed:
+            self.kinds.setdefault(name, {'object_property'})
+
+
+class _Terms:
+    """Reads what nodes stand for: properties, data ranges and class expressions."""
+
+    def __init__(self, graph: _Statements) -> None:
+        self._graph = graph
+        self._known: dict[str, ex.ClassExpression] = {}
+        self._open: set[str] = set()
+
+    def property(self, node: str) -> ex.PropertyExpression:
+        inverse = self._graph.one(node, OWL + 'inverseOf') if node.startswith('_:') else None
+        if not isinstance(inverse, str):
+            return node
+        inner = self._inside(node, lambda _: self.property(inverse))
+        return inner.prop if isinstance(inner, ex.ObjectInverseOf) else ex.ObjectInverseOf(inner)
+
+    def data_range(self, node: Node) -> ex.DataRange:
+        """Return the data range a node stands for."""
+        if not isinstance(node, str):
+            raise self._graph.ill_formed(
+                self._graph.subject_read, f'expected a data range, got the literal {node.lexical!r}'
+            )
+        return self._inside(node, self._data_range) if node.startswith('_:') else node
+
+    def _data_range(self, node: str) -> ex.DataRange:
+        properties = self._graph.nodes.get(node, {})
+        if OWL + 'oneOf' in properties:
+            items = self._graph.list_of(properties[OWL + 'oneOf'][0])
+            return ex.DataOneOf(self._graph.literals(node, items))
+        for predicate, record in (
+            (OWL + 'intersectionOf', ex.DataIntersectionOf),
+            (OWL + 'unionOf', ex.DataUnionOf),
+        ):
+            if predicate in properties:
+                return record(
+                    tuple(map(self.data_range, self._graph.list_of(properties[predicate][0])))
+                )
+        if OWL + 'datatypeComplementOf' in properties:
+            return ex.DataComplementOf(self.data_range(properties[OWL + 'datatypeComplementOf'][0]))
+        if OWL + 'onDatatype' in properties:
+            facets = []
+            for facet in self._graph.resources(
+                self._graph.one(node, OWL + 'withRestrictions') or RDF + 'nil'
+            ):
+                for name, values in self._graph.nodes.get(facet, {}).items():
+                    if name != _TYPE:
+                        facets += [(name, value) for value in self._graph.literals(node, values)]
+            return ex.DatatypeRestriction(
+                self._graph.resource(node, OWL + 'onDatatype'), tuple(facets)
+            )
+        raise self._graph.ill_formed(node, 'expected a data range')
+
+    def expression(self, node: Node) -> ex.ClassExpression:
+        """Return the class expression a node stands for."""
+        if not isinstance(node, str):
+            raise self._graph.ill_formed(
+                self._graph.subject_read, f'expected a class, got the literal {node.lexical!r}'
+            )
+        if not node.startswith('_:'):
+            return node
+        known = self._known.get(node)
+        if known is not None:
+            return known
+        expression = self._known[node] = self._inside(node, self._expression)
+        return expression
+
+    def _inside(self, node: str, read: Callable[[str], T]) -> T:
+        """Read an anonymous node that may hold others of its kind."""
+        if node in self._open:
+            raise self._graph.ill_formed(node, 'an expression contains itself')
+        if len(self._open) >= DEEPEST:
+            raise self._graph.ill_formed(node, f'expressions nest deeper than {DEEPEST}')
+        self._open.add(node)
+        try:
+            return read(node)
+        finally:
+            self._open.discard(node)
+
+    def _expression(self, node: str) -> ex.ClassExpression:
+        properties = self._graph.nodes.get(node, {})
+        self._graph.check_one(node, _CONSTRUCTORS, 'a class expression')
+        for predicate in _CONSTRUCTED:
+            if predicate in properties:
+                return self.constructed(predicate, properties[predicate][0])
+        if OWL + 'onProperty' in properties:
+            return self.restriction(node, properties)
+        raise self._graph.ill_formed(node, 'expected a class expression')
+
+    def constructed(self, predicate: str, value: Node) -> ex.ClassExpression:
+        if predicate == OWL + 'complementOf':
+            return ex.ObjectComplementOf(self.expression(value))
+        if predicate == OWL + 'oneOf':
+            return ex.ObjectOneOf(tuple(self._graph.resources(value)))
+        record = ex.ObjectUnionOf if predicate == OWL + 'unionOf' else ex.ObjectIntersectionOf
+        return record(tuple(map(self.expression, self._graph.list_of(value))))
+
+    def restriction(self, node: str, properties: dict[str, list[Node]]) -> ex.ClassExpression:
+        on = self._graph.resource(node, OWL + 'onProperty')
+        prop = self.property(on)
+        self._graph.check_one(node, _RESTRICTIONS, f'restriction on {local_name(on)}')
+        filler = self._graph.one(node, OWL + 'someValuesFrom') or self._graph.one(
+            node, OWL + 'allValuesFrom'
+        )
+        if OWL + 'hasValue' in properties:
+            value = properties[OWL + 'hasValue'][0]
+            if isinstance(value, Literal):
+                return ex.DataHasValue(on, value)
+            return ex.ObjectHasValue(prop, value)
+        if OWL + 'hasSelf' in properties:
+            self_value = properties[OWL + 'hasSelf'][0]
+            if isinstance(self_value, Literal) and self_value.lexical in ('true', '1'):
+                return ex.ObjectHasSelf(prop)
+            raise self._graph.ill_formed(
+                node, f'restriction on {local_name(on)}: hasSelf is not true'
+            )
+        if filler is not None:
+            some = OWL + 'someValuesFrom' in properties
+            if self._graph.is_data(on, filler):
+                data = ex.DataSomeValuesFrom if some else ex.DataAllValuesFrom
+                return data(on, self.data_range(filler))
+            quantified = ex.ObjectSomeValuesFrom if some else ex.ObjectAllValuesFrom
+            return quantified(prop, self.expression(filler))
+        on_class = self._graph.one(node, OWL + 'onClass')
+        on_range = self._graph.one(node, OWL + 'onDataRange')
+        counts_values = on_range is not None or (on_class is None and self._graph.is_data(on))
+        for plain, qualified, of_objects, of_data in CARDINALITIES:
+            number = self._graph.number(node, OWL + plain)
+            if number is None:
+                number = self._graph.number(node, OWL + qualified)
+            if number is None:
+                continue
+            if counts_values:
+                return of_data(number, on, self.data_range(on_range or RDFS + 'Literal'))
+            return of_objects(number, prop, self.expression(on_class or OWL + 'Thing'))
+        raise self._graph.ill_formed(
+            node, f'restriction on {local_name(on)} states nothing that is understood'
+        )
+
+
 class Mapping:
     """Turns one graph into axioms.
 
@@ -122,44 +428,26 @@ class Mapping:
         self.axioms: dict[Axiom, None] = {}
         self.unsupported = graph.unsupported.copy()
         self.prefixes = graph.prefixes
-        self._header = ''
-        self._places = graph.places
-        self._subject_read = ''
-        self._nodes: dict[str, dict[str, list[Node]]] = {}
-        self._kinds: dict[str, set[str]] = {}
-        self._expressions: dict[str, ex.ClassExpression] = {}
-        self._open: set[str] = set()
-        self._variables: set[str] = set()
+        self._graph = _Statements(graph)
+        self._terms = _Terms(self._graph)
         self._plain: dict[str, tuple[type, Callable[..., Axiom]]] = {}
-        for subject, predicate, value in graph.triples:
-            self._nodes.setdefault(subject, {}).setdefault(predicate, []).append(value)
-            if predicate == _TYPE and isinstance(value, str):
-                kind = DECLARATIONS.get(value)
-                if kind is not None:
-                    self._kinds.setdefault(subject, set()).add(kind)
-                elif value == OWL + 'Ontology' and not self._header:
-                    self._header = subject
-                elif value in CHARACTERISTICS:
-                    self._kinds.setdefault(subject, set()).add('object_property')
-                elif value == SWRL + 'Variable':
-                    self._variables.add(subject)
         self._added: list[Axiom] = []
         self._used: set[str] = set()
 
     @property
     def iri(self) -> str:
         """The IRI in the header; '' without one."""
-        return '' if self._header.startswith('_:') else self._header
+        return '' if self._graph.header.startswith('_:') else self._graph.header
 
     @property
     def declared(self) -> Iterator[tuple[str, str]]:
         """Pairs (kind, IRI) of what the graph declares."""
-        return ((kind, name) for name, kinds in self._kinds.items() for kind in kinds)
+        return ((kind, name) for name, kinds in self._graph.kinds.items() for kind in kinds)
 
     @property
     def imports(self) -> Iterator[str]:
         """The IRIs of the ontologies that the graph imports."""
-        found = (nodes.get(OWL + 'imports', ()) for nodes in self._nodes.values())
+        found = (nodes.get(OWL + 'imports', ()) for nodes in self._graph.nodes.values())
         return (value for values in found for value in values if isinstance(value, str))
 
     def read(self, declared: Iterable[tuple[str, str]] = ()) -> None:
@@ -169,272 +457,19 @@ class Mapping:
             declared: Pairs (kind, IRI) of what is declared in documents that are read with this.
         """
         for kind, name in declared:
-            self._kinds.setdefault(name, set()).add(kind)
-        self._guess_kinds()
+            self._graph.kinds.setdefault(name, set()).add(kind)
+        self._graph.guess_kinds()
         for kind, value, record in _VALUES:
-            for name, kinds in self._kinds.items():
+            for name, kinds in self._graph.kinds.items():
                 if kinds == {kind} and not name.startswith(BUILT_IN):
                     self._plain[name] = value, record
-        for subject, properties in self._nodes.items():
+        for subject, properties in self._graph.nodes.items():
             self._subject(subject, properties)
-
-    def _guess_kinds(self) -> None:
-        """Give undeclared properties the kinds of their values, ranges and superproperties.
-
-        rdf:Property tells no kind: without any of these it is an object property. Nor does the
-        header: what is used there alone annotates the ontology.
-        """
-        guessed: dict[str, set[str]] = {}
-        below: dict[str, list[str]] = {}
-
-        def guess(name: str, are_data: Iterable[bool]) -> None:
-            if name not in self._kinds and not name.startswith(BUILT_IN):
-                kinds = ('data_property' if is_data else 'object_property' for is_data in are_data)
-                guessed.setdefault(name, set()).update(kinds)
-
-        for subject, properties in self._nodes.items():
-            if RDF + 'Property' in properties.get(_TYPE, ()):
-                guess(subject, ())
-            for predicate, values in properties.items():
-                if predicate == RDFS + 'range':
-                    guess(subject, (isinstance(v, str) and self._is_data_range(v) for v in values))
-                elif predicate == RDFS + 'subPropertyOf':
-                    if subject not in self._kinds and not subject.startswith(BUILT_IN):
-                        for value in values:
-                            below.setdefault(str(value), []).append(subject)
-                elif predicate not in self._kinds and subject != self._header:
-                    guess(predicate, (isinstance(value, Literal) for value in values))
-        self._kinds.update((name, kinds) for name, kinds in guessed.items() if kinds)
-        # A superproperty may have its kind from its own superproperty.
-        above = list(below)
-        while above:
-            name = above.pop()
-            kinds = self._value_kinds(name)
-            for sub in below.get(name, ()):
-                if not kinds <= self._kinds.get(sub, set()):
-                    self._kinds.setdefault(sub, set()).update(kinds)
-                    above.append(sub)
-        for name in guessed:
-            self._kinds.setdefault(name, {'object_property'})
 
     # --- reporting ---
 
-    def _where(self, node: str) -> str:
-        place = self._places.get(node)
-        return f'line {place[0]}: ' if place else ''
-
     def _report(self, node: str, what: str) -> None:
-        self.unsupported.append(self._where(node) + what)
-
-    def _ill_formed(self, node: str, message: str) -> IllFormedError:
-        self._open.clear()
-        place = self._places.get(node) or self._places.get(self._subject_read, (0, 0))
-        return IllFormedError(message, *place)
-
-    # --- reading parts ---
-
-    def _one(self, node: str, predicate: str) -> Node | None:
-        values = self._nodes.get(node, {}).get(predicate)
-        return values[0] if values else None
-
-    def _resource(self, node: str, predicate: str) -> str:
-        value = self._one(node, predicate)
-        if not isinstance(value, str):
-            raise self._ill_formed(
-                node, f'expected a resource as {local_name(predicate)}, got {value!r}'
-            )
-        return value
-
-    def _list(self, head: Node) -> list[Node]:
-        items: list[Node] = []
-        seen: set[str] = set()
-        node = head
-        while node != RDF + 'nil':
-            if not isinstance(node, str) or node in seen:
-                raise self._ill_formed(str(head), 'expected a list that ends in rdf:nil')
-            seen.add(node)
-            properties = self._nodes.get(node, {})
-            firsts = set(properties.get(RDF + 'first', ()))
-            rests = set(properties.get(RDF + 'rest', ()))
-            if len(firsts) != 1 or len(rests) != 1:
-                raise self._ill_formed(node, 'expected one rdf:first and one rdf:rest in a list')
-            items.append(firsts.pop())
-            node = rests.pop()
-        return items
-
-    def _resources(self, head: Node) -> list[str]:
-        items = self._list(head)
-        for item in items:
-            if not isinstance(item, str):
-                raise self._ill_formed(
-                    str(head), f'expected resources in a list, got the literal {item.lexical!r}'
-                )
-        return items  # type: ignore[return-value]
-
-    def _property(self, node: str) -> ex.PropertyExpression:
-        inverse = self._one(node, OWL + 'inverseOf') if node.startswith('_:') else None
-        if not isinstance(inverse, str):
-            return node
-        inner = self._inside(node, lambda _: self._property(inverse))
-        return inner.prop if isinstance(inner, ex.ObjectInverseOf) else ex.ObjectInverseOf(inner)
-
-    def _value_kinds(self, prop: Node) -> set[str]:
-        """Return which of object and data property a name is, as far as is known."""
-        return self._kinds.get(str(prop), set()) & {'object_property', 'data_property'}
-
-    def _is_data(self, prop: str, range_node: Node | None = None) -> bool:
-        kinds = self._value_kinds(prop)
-        if len(kinds) == 1:
-            return 'data_property' in kinds
-        return isinstance(range_node, str) and self._is_data_range(range_node)
-
-    def _is_data_range(self, node: str) -> bool:
-        if 'datatype' in self._kinds.get(node, ()) or node == RDFS + 'Literal':
-            return True
-        return node.startswith(XSD)
-
-    def _number(self, node: str, predicate: str) -> int | None:
-        value = self._one(node, predicate)
-        if value is None:
-            return None
-        try:
-            number = int(value.lexical) if isinstance(value, Literal) else -1
-        except ValueError:
-            number = -1
-        if number < 0:
-            shown = value.lexical if isinstance(value, Literal) else value
-            raise self._ill_formed(
-                node, f'expected a whole number as {local_name(predicate)}, got {shown[:40]!r}'
-            )
-        return number
-
-    def data_range(self, node: Node) -> ex.DataRange:
-        """Return the data range a node stands for."""
-        if not isinstance(node, str):
-            raise self._ill_formed(
-                self._subject_read, f'expected a data range, got the literal {node.lexical!r}'
-            )
-        return self._inside(node, self._data_range) if node.startswith('_:') else node
-
-    def _data_range(self, node: str) -> ex.DataRange:
-        properties = self._nodes.get(node, {})
-        if OWL + 'oneOf' in properties:
-            items = self._list(properties[OWL + 'oneOf'][0])
-            return ex.DataOneOf(self._literals(node, items))
-        for predicate, record in (
-            (OWL + 'intersectionOf', ex.DataIntersectionOf),
-            (OWL + 'unionOf', ex.DataUnionOf),
-        ):
-            if predicate in properties:
-                return record(tuple(map(self.data_range, self._list(properties[predicate][0]))))
-        if OWL + 'datatypeComplementOf' in properties:
-            return ex.DataComplementOf(self.data_range(properties[OWL + 'datatypeComplementOf'][0]))
-        if OWL + 'onDatatype' in properties:
-            facets = []
-            for facet in self._resources(self._one(node, OWL + 'withRestrictions') or RDF + 'nil'):
-                for name, values in self._nodes.get(facet, {}).items():
-                    if name != _TYPE:
-                        facets += [(name, value) for value in self._literals(node, values)]
-            return ex.DatatypeRestriction(self._resource(node, OWL + 'onDatatype'), tuple(facets))
-        raise self._ill_formed(node, 'expected a data range')
-
-    def _literals(self, node: str, values: Iterable[Node]) -> tuple[Literal, ...]:
-        """Return values of a data range, which must be literals."""
-        found = []
-        for value in values:
-            if not isinstance(value, Literal):
-                raise self._ill_formed(node, f'expected a literal in a data range, got {value}')
-            found.append(value)
-        return tuple(found)
-
-    def _check_one(self, node: str, names: Iterable[str], what: str) -> None:
-        """Check that a node has one of some properties at most, and one value of it."""
-        properties = self._nodes.get(node, {})
-        said = [name for name in names if OWL + name in properties]
-        if len(said) > 1 or any(len(set(properties[OWL + name])) > 1 for name in said):
-            several = ', '.join(said)
-            raise self._ill_formed(node, f'{what} says several things at once: {several}')
-
-    def expression(self, node: Node) -> ex.ClassExpression:
-        """Return the class expression a node stands for."""
-        if not isinstance(node, str):
-            raise self._ill_formed(
-                self._subject_read, f'expected a class, got the literal {node.lexical!r}'
-            )
-        if not node.startswith('_:'):
-            return node
-        known = self._expressions.get(node)
-        if known is not None:
-            return known
-        expression = self._expressions[node] = self._inside(node, self._expression)
-        return expression
-
-    def _inside(self, node: str, read: Callable[[str], T]) -> T:
-        """Read an anonymous node that may hold others of its kind."""
-        if node in self._open:
-            raise self._ill_formed(node, 'an expression contains itself')
-        if len(self._open) >= DEEPEST:
-            raise self._ill_formed(node, f'expressions nest deeper than {DEEPEST}')
-        self._open.add(node)
-        found = read(node)
-        self._open.discard(node)
-        return found
-
-    def _expression(self, node: str) -> ex.ClassExpression:
-        properties = self._nodes.get(node, {})
-        self._check_one(node, _CONSTRUCTORS, 'a class expression')
-        for predicate in _CONSTRUCTED:
-            if predicate in properties:
-                return self._constructed(predicate, properties[predicate][0])
-        if OWL + 'onProperty' in properties:
-            return self._restriction(node, properties)
-        raise self._ill_formed(node, 'expected a class expression')
-
-    def _constructed(self, predicate: str, value: Node) -> ex.ClassExpression:
-        if predicate == OWL + 'complementOf':
-            return ex.ObjectComplementOf(self.expression(value))
-        if predicate == OWL + 'oneOf':
-            return ex.ObjectOneOf(tuple(self._resources(value)))
-        record = ex.ObjectUnionOf if predicate == OWL + 'unionOf' else ex.ObjectIntersectionOf
-        return record(tuple(map(self.expression, self._list(value))))
-
-    def _restriction(self, node: str, properties: dict[str, list[Node]]) -> ex.ClassExpression:
-        on = self._resource(node, OWL + 'onProperty')
-        prop = self._property(on)
-        self._check_one(node, _RESTRICTIONS, f'restriction on {local_name(on)}')
-        filler = self._one(node, OWL + 'someValuesFrom') or self._one(node, OWL + 'allValuesFrom')
-        if OWL + 'hasValue' in properties:
-            value = properties[OWL + 'hasValue'][0]
-            if isinstance(value, Literal):
-                return ex.DataHasValue(on, value)
-            return ex.ObjectHasValue(prop, value)
-        if OWL + 'hasSelf' in properties:
-            self_value = properties[OWL + 'hasSelf'][0]
-            if isinstance(self_value, Literal) and self_value.lexical in ('true', '1'):
-                return ex.ObjectHasSelf(prop)
-            raise self._ill_formed(node, f'restriction on {local_name(on)}: hasSelf is not true')
-        if filler is not None:
-            some = OWL + 'someValuesFrom' in properties
-            if self._is_data(on, filler):
-                data = ex.DataSomeValuesFrom if some else ex.DataAllValuesFrom
-                return data(on, self.data_range(filler))
-            quantified = ex.ObjectSomeValuesFrom if some else ex.ObjectAllValuesFrom
-            return quantified(prop, self.expression(filler))
-        on_class = self._one(node, OWL + 'onClass')
-        on_range = self._one(node, OWL + 'onDataRange')
-        counts_values = on_range is not None or (on_class is None and self._is_data(on))
-        for plain, qualified, of_objects, of_data in CARDINALITIES:
-            number = self._number(node, OWL + plain)
-            if number is None:
-                number = self._number(node, OWL + qualified)
-            if number is None:
-                continue
-            if counts_values:
-                return of_data(number, on, self.data_range(on_range or RDFS + 'Literal'))
-            return of_objects(number, prop, self.expression(on_class or OWL + 'Thing'))
-        raise self._ill_formed(
-            node, f'restriction on {local_name(on)} states nothing that is understood'
-        )
+        self.unsupported.append(self._graph.where(node) + what)
 
     # --- axioms ---
 
@@ -443,7 +478,7 @@ class Mapping:
         self._added.append(axiom)
 
     def _subject(self, subject: str, properties: dict[str, list[Node]]) -> None:
-        self._subject_read = subject
+        self._graph.subject_read = subject
         self._added = []
         types = [value for value in properties.get(_TYPE, ()) if isinstance(value, str)]
         special = next((_SPECIAL[name] for name in types if name in _SPECIAL), None)
@@ -469,7 +504,7 @@ class Mapping:
                     self._attempt(subject, self._triple, subject, predicate, value)
 
     def _named_restriction(self, subject: str, properties: dict[str, list[Node]]) -> None:
-        self._add(ax.EquivalentClasses((subject, self._restriction(subject, properties))))
+        self._add(ax.EquivalentClasses((subject, self._terms.restriction(subject, properties))))
 
     def _attempt(self, subject: str, read: Callable[..., None], *arguments: object) -> None:
         """Read one statement; what is ill-formed in it costs the statement alone."""
@@ -484,13 +519,13 @@ class Mapping:
         if handler is None:
             self._statement(subject, predicate, value)
         elif isinstance(value, str):
-            is_annotation = self._kinds.get(subject) == {'annotation_property'}
+            is_annotation = self._graph.kinds.get(subject) == {'annotation_property'}
             if is_annotation and predicate in _OF_PROPERTIES:
                 self._add(ax.AnnotationAssertion(predicate, subject, value))
             elif axiom := handler(self, subject, value):
                 self._add(axiom)
         else:
-            raise self._ill_formed(
+            raise self._graph.ill_formed(
                 subject,
                 f'{local_name(predicate)} of {local_name(subject)} has the literal'
                 f' {value.lexical!r}, expected a resource',
@@ -498,7 +533,7 @@ class Mapping:
 
     def _type(self, subject: str, name: Node) -> None:
         if isinstance(name, Literal):
-            raise self._ill_formed(subject, f'its type is the literal {name.lexical!r}')
+            raise self._graph.ill_formed(subject, f'its type is the literal {name.lexical!r}')
         kind = DECLARATIONS.get(name)
         if kind is not None:
             if not subject.startswith('_:'):
@@ -506,14 +541,14 @@ class Mapping:
         elif name in CHARACTERISTICS:
             if not subject.startswith('_:'):
                 self._add(ax.Declaration('object_property', subject))
-            self._add(CHARACTERISTICS[name](self._property(subject)))
+            self._add(CHARACTERISTICS[name](self._terms.property(subject)))
         elif name == OWL + 'FunctionalProperty':
-            if self._is_data(subject):
+            if self._graph.is_data(subject):
                 self._add(ax.FunctionalDataProperty(subject))
             else:
-                self._add(ax.FunctionalObjectProperty(self._property(subject)))
+                self._add(ax.FunctionalObjectProperty(self._terms.property(subject)))
         elif name == RDF + 'Property':
-            for kind in sorted(self._kinds.get(subject, ())):
+            for kind in sorted(self._graph.kinds.get(subject, ())):
                 self._add(ax.Declaration(kind, subject))
         elif name in (OWL + 'DeprecatedClass', OWL + 'DeprecatedProperty'):
             self._add(ax.AnnotationAssertion(OWL + 'deprecated', subject, _TRUE))
@@ -522,13 +557,13 @@ class Mapping:
         elif name.startswith(BUILT_IN[:3]) and name not in (THING, NOTHING):
             self._report(subject, f'type {name} of {subject} is not understood')
         else:
-            self._add(ax.ClassAssertion(self.expression(name), subject))
+            self._add(ax.ClassAssertion(self._terms.expression(name), subject))
 
     def _statement(self, subject: str, predicate: str, value: Node) -> None:
-        kinds = self._kinds.get(predicate, set())
+        kinds = self._graph.kinds.get(predicate, set())
         fitting = 'data_property' if isinstance(value, Literal) else 'object_property'
         annotates = 'annotation_property' in kinds or predicate in ANNOTATIONS
-        if annotates or (subject == self._header and fitting not in kinds):
+        if annotates or (subject == self._graph.header and fitting not in kinds):
             if subject.startswith('_:') and self._is_construct(subject):
                 self._report(subject, f'{local_name(predicate)} of what has no name is not kept')
             else:
@@ -541,14 +576,14 @@ class Mapping:
             self._report(subject, f'{predicate} on {subject} is not understood')
         elif isinstance(value, Literal):
             if 'object_property' in kinds and 'data_property' not in kinds:
-                raise self._ill_formed(
+                raise self._graph.ill_formed(
                     subject,
                     f'object property {local_name(predicate)} of {local_name(subject)}'
                     f' has the literal {value.lexical!r}, expected an individual',
                 )
             self._add(ax.DataPropertyAssertion(predicate, subject, value))
         elif 'data_property' in kinds and 'object_property' not in kinds:
-            raise self._ill_formed(
+            raise self._graph.ill_formed(
                 subject,
                 f'data property {local_name(predicate)} of {local_name(subject)}'
                 f' has the resource {value}, expected a literal',
@@ -558,72 +593,76 @@ class Mapping:
 
     def _is_construct(self, node: str) -> bool:
         """Tell whether a blank node is part of OWL's own syntax, and no individual."""
-        properties = self._nodes[node]
+        properties = self._graph.nodes[node]
         types = {value for value in properties.get(_TYPE, ()) if isinstance(value, str)}
         if any(name.startswith((OWL, SWRL)) for name in types - {THING, OWL + 'NamedIndividual'}):
             return True
         return not {*_STRUCTURE, *_CONSTRUCTED, OWL + 'inverseOf'}.isdisjoint(properties)
 
     def _equivalent_class(self, subject: str, value: str) -> Axiom:
-        if self._is_data_range(subject):
-            return ax.DatatypeDefinition(subject, self.data_range(value))
-        return ax.EquivalentClasses((self.expression(subject), self.expression(value)))
+        if self._graph.is_data_range(subject):
+            return ax.DatatypeDefinition(subject, self._terms.data_range(value))
+        return ax.EquivalentClasses(
+            (self._terms.expression(subject), self._terms.expression(value))
+        )
 
     def _defined(self, subject: str, value: str, predicate: str) -> Axiom | None:
         """Read a named class that carries the expression itself (OWL 1 style): an equivalence."""
         if subject.startswith('_:'):
             return None
-        if predicate == OWL + 'oneOf' and self._is_data_range(subject):
-            values = ex.DataOneOf(self._literals(subject, self._list(value)))
+        if predicate == OWL + 'oneOf' and self._graph.is_data_range(subject):
+            values = ex.DataOneOf(self._graph.literals(subject, self._graph.list_of(value)))
             return ax.DatatypeDefinition(subject, values)
-        return ax.EquivalentClasses((subject, self._constructed(predicate, value)))
+        return ax.EquivalentClasses((subject, self._terms.constructed(predicate, value)))
 
     def _between(self, subject: str, value: str, predicate: str) -> Axiom:
         """Read a relation of two properties."""
         of_objects, of_data = _BETWEEN[predicate]
-        kinds, others = self._value_kinds(subject), self._value_kinds(value)
+        kinds, others = self._graph.value_kinds(subject), self._graph.value_kinds(value)
         if kinds and others and kinds.isdisjoint(others):
-            raise self._ill_formed(
+            raise self._graph.ill_formed(
                 subject,
                 f'{local_name(predicate)} of an object property and a data property,'
                 f' {local_name(subject)} and {local_name(value)}',
             )
-        if self._is_data(subject) or self._is_data(value):
+        if self._graph.is_data(subject) or self._graph.is_data(value):
             return of_data(subject, value)
-        return of_objects(self._property(subject), self._property(value))
+        return of_objects(self._terms.property(subject), self._terms.property(value))
 
     def _chain(self, subject: str, value: str) -> Axiom:
-        chain = tuple(self._property(item) for item in self._resources(value))
-        return ax.SubPropertyChainOf(chain, self._property(subject))
+        chain = tuple(self._terms.property(item) for item in self._graph.resources(value))
+        return ax.SubPropertyChainOf(chain, self._terms.property(subject))
 
     def _inverse(self, subject: str, value: str) -> Axiom | None:
         if subject.startswith('_:'):
             return None
-        return ax.InverseObjectProperties(subject, self._property(value))
+        return ax.InverseObjectProperties(subject, self._terms.property(value))
 
     def _domain(self, subject: str, value: str) -> Axiom:
-        if self._is_data(subject):
-            return ax.DataPropertyDomain(subject, self.expression(value))
-        return ax.ObjectPropertyDomain(self._property(subject), self.expression(value))
+        if self._graph.is_data(subject):
+            return ax.DataPropertyDomain(subject, self._terms.expression(value))
+        return ax.ObjectPropertyDomain(self._terms.property(subject), self._terms.expression(value))
 
     def _range(self, subject: str, value: str) -> Axiom:
-        if self._is_data(subject, value):
-            return ax.DataPropertyRange(subject, self.data_range(value))
-        return ax.ObjectPropertyRange(self._property(subject), self.expression(value))
+        if self._graph.is_data(subject, value):
+            return ax.DataPropertyRange(subject, self._terms.data_range(value))
+        return ax.ObjectPropertyRange(self._terms.property(subject), self._terms.expression(value))
 
     def _same(self, subject: str, value: str) -> Axiom:
         if not self._used:
-            self._used = {name for properties in self._nodes.values() for name in properties}
+            self._used = {name for properties in self._graph.nodes.values() for name in properties}
         for name in (subject, value):
             if name in self._used:
                 self._report(subject, f'owl:sameAs says nothing of {local_name(name)} as property')
         return ax.SameIndividual(frozenset((subject, value)))
 
     def _key(self, subject: str, value: str) -> Axiom:
-        props = self._resources(value)
-        data = tuple(prop for prop in props if self._is_data(prop))
-        objects = tuple(self._property(prop) for prop in props if not self._is_data(prop))
-        return ax.HasKey(self.expression(subject), objects, data)
+        props = self._graph.resources(value)
+        data = tuple(prop for prop in props if self._graph.is_data(prop))
+        objects = tuple(
+            self._terms.property(prop) for prop in props if not self._graph.is_data(prop)
+        )
+        return ax.HasKey(self._terms.expression(subject), objects, data)
 
     # --- nodes with a shape of their own ---
 
@@ -635,38 +674,40 @@ class Mapping:
     def _all_different(self, node: str, properties: dict[str, list[Node]]) -> None:
         for predicate in (OWL + 'members', OWL + 'distinctMembers'):
             for head in properties.get(predicate, ()):
-                members = frozenset(self._resources(head))
+                members = frozenset(self._graph.resources(head))
                 if len(members) > 1:
                     self._add(ax.DifferentIndividuals(members))
 
     def _all_disjoint_classes(self, node: str, properties: dict[str, list[Node]]) -> None:
         for head in properties.get(OWL + 'members', ()):
-            self._add(ax.DisjointClasses(tuple(map(self.expression, self._list(head)))))
+            self._add(
+                ax.DisjointClasses(tuple(map(self._terms.expression, self._graph.list_of(head))))
+            )
 
     def _all_disjoint_properties(self, node: str, properties: dict[str, list[Node]]) -> None:
         for head in properties.get(OWL + 'members', ()):
-            props = self._resources(head)
-            if any(self._is_data(prop) for prop in props):
+            props = self._graph.resources(head)
+            if any(self._graph.is_data(prop) for prop in props):
                 self._add(ax.DisjointDataProperties(tuple(props)))
             else:
-                self._add(ax.DisjointObjectProperties(tuple(map(self._property, props))))
+                self._add(ax.DisjointObjectProperties(tuple(map(self._terms.property, props))))
 
     def _negative(self, node: str, properties: dict[str, list[Node]]) -> None:
-        source = self._resource(node, OWL + 'sourceIndividual')
-        prop = self._resource(node, OWL + 'assertionProperty')
-        value = self._one(node, OWL + 'targetValue')
+        source = self._graph.resource(node, OWL + 'sourceIndividual')
+        prop = self._graph.resource(node, OWL + 'assertionProperty')
+        value = self._graph.one(node, OWL + 'targetValue')
         if isinstance(value, Literal):
             self._add(ax.NegativeDataPropertyAssertion(prop, source, value))
         else:
-            target = self._resource(node, OWL + 'targetIndividual')
-            expression = self._property(prop)
+            target = self._graph.resource(node, OWL + 'targetIndividual')
+            expression = self._terms.property(prop)
             if isinstance(expression, ex.ObjectInverseOf):
                 source, target, prop = target, source, expression.prop
             self._add(ax.NegativeObjectPropertyAssertion(prop, source, target))
 
     def _annotated(self, node: str, properties: dict[str, list[Node]]) -> None:
         source, predicate, target = (
-            self._one(node, OWL + name)
+            self._graph.one(node, OWL + name)
             for name in ('annotatedSource', 'annotatedProperty', 'annotatedTarget')
         )
         if not isinstance(source, str) or not isinstance(predicate, str) or target is None:
@@ -701,7 +742,12 @@ class Mapping:
 
     def _rule(self, node: str, properties: dict[str, list[Node]]) -> None:
         body, head = (
-            tuple(map(self._atom, self._resources(self._one(node, SWRL + side) or RDF + 'nil')))
+            tuple(
+                map(
+                    self._atom,
+                    self._graph.resources(self._graph.one(node, SWRL + side) or RDF + 'nil'),
+                )
+            )
             for side in ('body', 'head')
         )
         annotations = tuple(
@@ -716,31 +762,31 @@ class Mapping:
         self._add(ax.Rule(body, head, kept))
 
     def _atom(self, node: str) -> ex.Atom:
-        kind = self._one(node, _TYPE)
+        kind = self._graph.one(node, _TYPE)
         if not isinstance(kind, str) or kind not in ATOMS:
-            raise self._ill_formed(node, f'rule atom of type {kind} is not understood')
+            raise self._graph.ill_formed(node, f'rule atom of type {kind} is not understood')
         record, *statements = ATOMS[kind]
         atom: ex.Atom = record(*(self._atom_part(node, predicate) for predicate, _ in statements))
         return atom
 
     def _atom_part(self, node: str, predicate: str) -> Any:
         if predicate == SWRL + 'arguments':
-            items = self._list(self._one(node, predicate) or RDF + 'nil')
+            items = self._graph.list_of(self._graph.one(node, predicate) or RDF + 'nil')
             return tuple(self._argument(item) for item in items)
         if predicate in (SWRL + 'argument1', SWRL + 'argument2'):
-            value = self._one(node, predicate)
+            value = self._graph.one(node, predicate)
             if value is None:
-                raise self._ill_formed(node, 'a rule atom lacks an argument')
+                raise self._graph.ill_formed(node, 'a rule atom lacks an argument')
             return self._argument(value)
-        part = self._resource(node, predicate)
+        part = self._graph.resource(node, predicate)
         if predicate == SWRL + 'classPredicate':
-            return self.expression(part)
+            return self._terms.expression(part)
         if predicate == SWRL + 'dataRange':
-            return self.data_range(part)
-        return self._property(part) if predicate == SWRL + 'propertyPredicate' else part
+            return self._terms.data_range(part)
+        return self._terms.property(part) if predicate == SWRL + 'propertyPredicate' else part
 
     def _argument(self, value: Node) -> Node | ex.Variable:
-        is_variable = isinstance(value, str) and value in self._variables
+        is_variable = isinstance(value, str) and value in self._graph.variables
         return ex.Variable(value) if is_variable else value  # type: ignore[arg-type]
 
 
@@ -760,11 +806,15 @@ _OF_PROPERTIES = {*_BETWEEN, RDFS + 'domain', RDFS + 'range'}
 """What is a mere annotation where it is said of an annotation property."""
 _PREDICATES: dict[str, Callable[[Mapping, str, str], Axiom | None]] = {
     OWL + 'imports': lambda m, s, v: ax.Import(v),
-    RDFS + 'subClassOf': lambda m, s, v: ax.SubClassOf(m.expression(s), m.expression(v)),
+    RDFS + 'subClassOf': lambda m, s, v: ax.SubClassOf(
+        m._terms.expression(s), m._terms.expression(v)
+    ),
     OWL + 'equivalentClass': Mapping._equivalent_class,
-    OWL + 'disjointWith': lambda m, s, v: ax.DisjointClasses((m.expression(s), m.expression(v))),
+    OWL + 'disjointWith': lambda m, s, v: ax.DisjointClasses(
+        (m._terms.expression(s), m._terms.expression(v))
+    ),
     OWL + 'disjointUnionOf': lambda m, s, v: ax.DisjointUnion(
-        s, tuple(map(m.expression, m._list(v)))
+        s, tuple(map(m._terms.expression, m._graph.list_of(v)))
     ),
     OWL + 'propertyChainAxiom': Mapping._chain,
     OWL + 'inverseOf': Mapping._inverse,

@@ -227,10 +227,9 @@ class CaseRules:
         self._datatypes = {
             a.datatype: a.range for a in tbox if isinstance(a, ax.DatatypeDefinition)
         }
-        self._named_rules = _NamedRules(
-            self,
-            (iri for axiom in axioms for kind, iri in entities_of(axiom) if kind == 'individual'),
-        )
+        entities = [entity for axiom in axioms for entity in entities_of(axiom)]
+        individuals = (iri for kind, iri in entities if kind == 'individual')
+        self._named_rules = _NamedRules(self, individuals)
         for axiom in tbox:
             self._attempt(axiom, self.roles.take)
         self._top_and_bottom({iri for _, iri in entities})
