@@ -20,6 +20,7 @@ from patrol_policy.fleet import (
     Layout,
     RightOfWay,
     Share,
+    may_be_contested,
     right_of_way,
 )
 from patrol_policy.graph import PatrolGraph
@@ -188,14 +189,21 @@ class FleetKnowledge:
 
     def right_of_way(self, neighbours: Mapping[str, Collection[str]], now: float) -> RightOfWay:
         """Return whether this robot may go where its intention says, or must give way."""
+        return right_of_way(self._intentions(now), self.name, neighbours, self.layout)
+
+    def may_be_contested(self, neighbours: Mapping[str, Collection[str]], now: float) -> bool:
+        """Return whether another robot may want what this one's intention needs."""
+        return may_be_contested(self._intentions(now), self.name, neighbours, self.layout)
+
+    def _intentions(self, now: float) -> list[Intention]:
+        """Return those of all robots that are heard, this one's last."""
         with self._lock:
             known = [
                 heard.facts.intention
                 for heard in self._heard.values()
                 if not self._is_silent(heard, now)
             ]
-            own = self._own.intention
-        return right_of_way([*known, own], self.name, neighbours, self.layout)
+            return [*known, self._own.intention]
 
     def standing(self, now: float) -> dict[str, str]:
         """Return the robots that are on one way for too long or silent, with a sentence on each."""

@@ -536,6 +536,7 @@ class WorldModel:
             decision.place if goes and decision.place != here else '',
             self._wanted[1],
         )
+        is_new = wish != fleet.own.intention
         share = share_of(decision, fleet.own.robot.share)
         if dock is not None:
             share = None
@@ -554,9 +555,11 @@ class WorldModel:
         if not fleet.others():
             right = RightOfWay(True, wish.heading_to or here)
         else:
-            self._settle(interrupt)
-            if interrupt.is_set():
-                raise CallInterruptedError
+            # What was said before is known to all by now.
+            if is_new and fleet.may_be_contested(world.graph.leg_seconds, now):
+                self._settle(interrupt)
+                if interrupt.is_set():
+                    raise CallInterruptedError
             right = fleet.right_of_way(world.graph.leg_seconds, now)
         if not right.go:
             return self._waiting(decision, world, f'waiting in {here}: {right.because}')

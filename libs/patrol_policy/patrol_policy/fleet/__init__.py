@@ -22,7 +22,13 @@ from patrol_policy.fleet.assignment import (
 )
 from patrol_policy.fleet.docks import ChargeNeed, DockSlot, dock_slots
 from patrol_policy.fleet.partition import FleetPlan, Group, exact_wait, fleet_plan
-from patrol_policy.fleet.traffic import Intention, Layout, RightOfWay, right_of_way
+from patrol_policy.fleet.traffic import (
+    Intention,
+    Layout,
+    RightOfWay,
+    may_be_contested,
+    right_of_way,
+)
 
 __all__ = [
     'Assignment',
@@ -44,5 +50,6 @@ __all__ = [
     'dock_slots',
     'exact_wait',
     'fleet_plan',
+    'may_be_contested',
     'right_of_way',
 ]

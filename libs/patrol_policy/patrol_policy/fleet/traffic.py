@@ -180,6 +180,42 @@ def right_of_way(
     return RightOfWay(True, me.heading_to)
 
 
+def may_be_contested(
+    intentions: Sequence[Intention],
+    robot: str,
+    neighbours: Mapping[str, Collection[str]],
+    layout: Layout,
+) -> bool:
+    """Return whether another robot, whatever it wants next, may want what this one is to use.
+
+    Where none can, nobody needs to hear of an intention before it is carried out.
+
+    Args:
+        intentions: Of all robots that were heard, this one's too.
+        robot: The robot's name.
+        neighbours: The places beside each place.
+        layout: What is wide.
+    """
+    me = next((each for each in intentions if each.robot == robot), None)
+    if me is None or not me.heading_to:
+        return False
+    blocks = _Traffic(neighbours, layout).blocks
+    ends = (me.place, me.heading_to)
+    is_narrow = frozenset(ends) not in layout.ways
+    entered = blocks.get(me.heading_to)
+    for other in intentions:
+        if other.robot == robot:
+            continue
+        for at in {other.place, other.heading_to or other.place}:
+            if is_narrow and at in ends:
+                return True
+            if entered is not None and any(
+                blocks.get(place) == entered for place in (at, *neighbours.get(at, ()))
+            ):
+                return True
+    return False
+
+
 def _is_first(
     other: Intention, me: Intention, others: Sequence[Intention], traffic: _Traffic
 ) -> bool:
