@@ -23,6 +23,7 @@ SEBS      gain against others' intentions (Portugal and Rocha 2013); its gain li
     python benchmarks/fleet.py                    random maps; a minute or two
     python benchmarks/fleet.py --quick            fewer
     python benchmarks/fleet.py --graph FOLDER     maps of patrolling_sim
+    python benchmarks/fleet.py --live --hours 1   the real programs in a simulated place with people
 """
 
 from __future__ import annotations
@@ -245,7 +246,18 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
     parser.add_argument('--quick', action='store_true', help='fewer maps')
     parser.add_argument('--graph', type=Path, help='a folder of patrolling_sim maps')
+    parser.add_argument('--live', action='store_true', help='the real programs in a simulation')
+    parser.add_argument('--hours', type=float, default=1.0, help='simulated, of --live')
+    parser.add_argument('--robots', type=int, default=4, help='of --live')
+    parser.add_argument('--people', type=int, default=2, help='who walk about, of --live')
+    parser.add_argument('--map', type=Path, action='append', help='a place, of --live')
     words = parser.parse_args()
+    if words.live:
+        from fleet_live import CONFIG, compare_places
+
+        places = words.map or [CONFIG / 'seven_rooms.yaml', CONFIG / 'office.yaml']
+        compare_places(places, words.robots, 3600.0 * words.hours, words.people)
+        return
     if words.graph is not None:
         files = sorted(words.graph.glob('**/*.graph'))
         if not files:

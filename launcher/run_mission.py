@@ -85,6 +85,8 @@ def run_mission(run: Run, config: Path, runs: Path, resume: Path | None = None) 
         f'place {place.name}, '
         f'ROS domain {ros_domain(run)}, files in {_short(folder)}'
     )
+    if moved := team[0].moved_points:
+        log.say(f'the points of {", ".join(moved)} are moved inside: a robot there blocks no door')
     if how:
         log.say(how)
     for old in deleted:

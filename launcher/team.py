@@ -18,14 +18,18 @@ from surveillance_runtime.node_table import Node
 from surveillance_runtime.place import read_place_file
 from surveillance_runtime.place.fleet import (
     FleetMember,
+    points_to_pass,
     robots_in_a_row,
     wide_places,
     wide_ways,
+    with_points,
 )
 from surveillance_runtime.profile import ProfileFile
 from surveillance_runtime.run_parameters import full_name, place_file
 from surveillance_runtime.suggestions import nearest
 
+POINTS = 'room_positions'
+"""The table of a place's file with the points of its places."""
 SHARED = 'shared'
 """How `--only` and `--without` name the part that all robots share."""
 
@@ -54,6 +58,12 @@ class Part:
     def everyone(self) -> tuple[Node, ...]:
         """All its nodes."""
         return (*self.nodes, *self.observers)
+
+    @property
+    def moved_points(self) -> list[str]:
+        """The places whose points are other ones than in the place's file."""
+        names = [entry.name.partition('.') for entry in self.entries]
+        return [place for table, _, place in names if table == POINTS]
 
     def folder(self, folder: Path) -> Path:
         """Return where the part writes, in the folder of the run."""
@@ -99,9 +109,14 @@ def parts(run: Run, config: Path, robot: ProfileFile) -> tuple[Part, ...]:
         place_file(config, run.behaviour, run.place), radius=robot.profile.body.reach
     )
     reach = robot.profile.body.reach
+    moved = points_to_pass(place.plan, reach)
+    plan = with_points(place.plan, moved)
     wide = (
-        ('traffic.wide_ways', list(wide_ways(place.plan, reach))),
-        ('traffic.wide_places', list(wide_places(place.plan, reach))),
+        ('traffic.wide_ways', list(wide_ways(plan, reach))),
+        ('traffic.wide_places', list(wide_places(plan, reach))),
+    )
+    table += tuple(
+        Entry('/**', f'{POINTS}.{name}', list(point), '--robots') for name, point in moved.items()
     )
     found = []
     shared = _chosen(run, SHARED, monitored)

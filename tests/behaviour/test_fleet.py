@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 import pytest
 
-from patrol_policy.decision import SHARE, WAIT, DecisionSettings, Rules
+from patrol_policy.decision import SHARE, URGENT, WAIT, DecisionSettings, Rules
 from patrol_policy.fleet import FleetRobot, FleetSettings, Intention, Layout, Share
 from patrol_policy.world import Decision
 from state_machines import Interrupt
@@ -176,6 +176,21 @@ def test_the_rules_hold_for_each_robot() -> None:
         for each in robot.decisions:
             assert each.rule in ('URGENT', 'CORRIDOR', 'ROOM', SHARE, WAIT)
     assert longest_wait(robots, 0.0, 900.0) < 400.0
+
+
+def test_with_rules_four_keep_the_threshold_and_wait_in_no_room() -> None:
+    _, robots = patrol(4, ('URGENT', 'CORRIDOR', 'ROOM'))
+    robots[0].air.run(1500.0)
+    # The threshold of 240 s, and one round of the corridors.
+    assert longest_wait(robots, 0.0, 1500.0) < 310.0
+    decisions = [each for robot in robots for each in robot.decisions]
+    urgent = [(each.time, each.place) for each in decisions if each.rule == URGENT]
+    assert len(urgent) > 15
+    for each in decisions:
+        assert not (each.rule == SHARE and each.stay and each.place.startswith('R'))
+    # Each URGENT place is one robot's.
+    for (at, place), (then, other) in itertools.pairwise(sorted(urgent)):
+        assert place != other or then - at > 200.0 or then - at < 2.0
 
 
 def test_without_the_ontology_each_patrols_on_and_nothing_is_lost() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 from pathlib import Path
 
 import pytest
@@ -51,6 +52,8 @@ def test_a_fleet_shares_ontology_map_and_simulator():
 def test_each_robot_is_told_its_name_and_where_it_starts():
     run = Run(robots=3)
     shared, *robots = team(run)
+    moved = shared.moved_points
+    assert sorted(moved) == ['C2', 'R3', 'R4']
     starts = {}
     for part in robots:
         merged = configuration(CONFIG, part.run, fleet=part.entries)
@@ -60,12 +63,15 @@ def test_each_robot_is_told_its_name_and_where_it_starts():
         starts[part.robot] = settings['start_pose'].value
         behaviour = merged.resolve('robot_behavior', f'/{part.robot}/robot_behavior')
         assert behaviour['fleet'].value is True
-        # The points of the others are in front of a door.
-        assert set(behaviour['traffic.wide_places'].value) == {'C1', 'E', 'R1', 'R2'}
+        # In the place's file three points are in front of a door.
+        assert set(behaviour['traffic.wide_places'].value) == set(moved) | {'C1', 'E', 'R1', 'R2'}
     assert starts['robot1'] == [5.0, 10.0, 0.0]
     for one, other in itertools.combinations(starts.values(), 2):
         assert abs(one[0] - other[0]) + abs(one[1] - other[1]) > 0.9
     told = configuration(CONFIG, shared.run, fleet=shared.entries).resolve('simulator')
+    x, y = told['room_positions.R3'].value
+    assert y > 15.4, 'inside'
+    assert math.dist((x, y), (10.0, 15.0)) < 1.0, 'no farther than needed'
     assert told['robots.robot2.start'].value == starts['robot2']
 
 

@@ -26,7 +26,7 @@ from patrol_policy.battery import (
     Energy,
     Station,
 )
-from patrol_policy.fleet.assignment import FleetOutlook
+from patrol_policy.fleet.assignment import FleetOutlook, Share
 from patrol_policy.policies import DEFAULT_POLICY, POLICIES, Charge, Scores, make_policy
 from patrol_policy.settings import converted, names_expected, parameter, parameters
 from patrol_policy.suggestions import closest_name
@@ -274,7 +274,8 @@ def _shared(
 ) -> Decision:
     """Choose what the robot's share of the places asks for, as far as the rules allow it.
 
-    An URGENT place counts for the robot whose share it is in.
+    An URGENT place counts for the robot that comes to it first on its way along the tour. Stops
+    that the rules do not allow are passed over, and are the next robot's.
     """
     choice = fleet.choose(world.now, world.visited_at)
     here = world.place
@@ -298,7 +299,7 @@ def _shared(
         return Decision(
             **common, place=here, target=here, rule=WAIT, reason=choice.reason, stay=stay
         )
-    mine = frozenset(choice.share.tour)
+    mine = choice.mine
     classes = {
         place: found if place in mine else found - {URGENT}
         for place, found in ((p, classes_of(world, p)) for p in world.graph.places)
@@ -306,7 +307,10 @@ def _shared(
     own = {p: limit if p in mine else math.inf for p, limit in world.own_thresholds.items()}
     rule, allowed = settings.rules.candidates(replace(within, classes=classes, own_thresholds=own))
     goal, graph = choice.place, world.graph
-    if goal == here and rule != URGENT:
+    # It stays where the rules would have it go; but as others pass stops over and overtake it again
+    # and again, not for ever.
+    fits = rule == ANY or (rule in classes[here] and rule != URGENT and not choice.overstays)
+    if goal == here and fits:
         stay = max(1.0, (choice.until or world.now + 1.0) - world.now)
         reason = choice.reason
         return Decision(**common, place=here, target=here, rule=SHARE, reason=reason, stay=stay)
@@ -314,6 +318,15 @@ def _shared(
     if step in allowed or goal not in graph.index:
         named = rule if step in allowed else SHARE
         return Decision(**common, place=step, target=goal, rule=named, reason=choice.reason)
+    for stop in _onward(choice.share):
+        wanted = rule == ANY or not classes.get(stop, frozenset()).isdisjoint((rule, URGENT))
+        if wanted and stop != here and stop in graph.index:
+            step = graph.route(here, stop)[0]
+            if step in allowed:
+                common['share'] = Share(choice.share.tour, stop)
+                reason = f'{stop} is the next on the tour that the rules allow ({rule}); '
+                reason += choice.reason
+                return Decision(**common, place=step, target=stop, rule=rule, reason=reason)
     scores = {
         place: -graph.move(here, place) - graph.seconds(place, goal) + world.unvisited(place) * 1e-3
         for place in allowed
@@ -325,6 +338,12 @@ def _shared(
         f'{goal}; {choice.reason}'
     )
     return Decision(**common, place=best, target=best, rule=rule, reason=reason, scores=scores)
+
+
+def _onward(share: Share) -> tuple[str, ...]:
+    """Return the stops of a share's tour from its own stop on."""
+    first = share.tour.index(share.stop)
+    return share.tour[first:] + share.tour[:first]
 
 
 def world_with_charge(world: World, battery: Battery) -> World:

@@ -6,7 +6,7 @@ import random
 
 import pytest
 
-from patrol_policy.fleet import Intention, Layout, right_of_way
+from patrol_policy.fleet import Intention, Layout, may_be_contested, right_of_way
 
 STAR = {
     'R1': ['C1'],
@@ -117,3 +117,26 @@ def test_on_random_trees_everybody_reaches_every_goal(seed: int) -> None:
         narrow = [at[name] for name in names if at[name] not in wide]
         assert len(narrow) == len(set(narrow)), 'two in one narrow place'
     assert min(reached.values()) > 20
+
+
+def test_where_nobody_may_object_nobody_does_whatever_the_others_want() -> None:
+    rng = random.Random(5)
+    free = 0
+    for _ in range(300):
+        neighbours = tree(rng, 9)
+        places = sorted(neighbours)
+        layout = Layout.of(rng.sample(places, 5), ())
+        starts = rng.sample(places, 3)
+        me = Intention('a', starts[0], rng.choice(neighbours[starts[0]]), 5.0)
+        known = [Intention(name, at) for name, at in zip('bc', starts[1:], strict=True)]
+        told = right_of_way([me, *known], 'a', neighbours, layout)
+        if may_be_contested([me, *known], 'a', neighbours, layout) or not told.go:
+            continue
+        free += 1
+        for wanted in [(x, y) for x in neighbours[starts[1]] for y in neighbours[starts[2]]]:
+            others = [
+                Intention(each.robot, each.place, to, 1.0)
+                for each, to in zip(known, wanted, strict=True)
+            ]
+            assert right_of_way([me, *others], 'a', neighbours, layout).go
+    assert free > 30

@@ -9,11 +9,14 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from surveillance_runtime.place.floor_plan import FloorPlan
-from surveillance_runtime.place.occupancy_grid import distance_to
+from surveillance_runtime.place.occupancy_grid import Grid, distance_to
 from surveillance_runtime.place.plan_grid import draw
 from surveillance_runtime.place.regions import Regions
 from surveillance_runtime.place.rooms import PlaceError, Pose, nested
@@ -94,8 +97,7 @@ def robots_in_a_row(plan: FloorPlan, count: int, radius: float) -> tuple[FleetMe
         PlaceError: There is no room for so many.
     """
     regions = Regions(plan)
-    grid = draw(plan)
-    clearance = distance_to(~grid.free if plan.map is not None else grid.occupied, grid.resolution)
+    grid, clearance = _clearance(plan)
     x0, y0, yaw = plan.start
     room, pitch = regions.room_at(x0, y0), 2.0 * radius + _APART
     steps = range(-MOST_ROBOTS, MOST_ROBOTS + 1)
@@ -124,17 +126,70 @@ def robots_in_a_row(plan: FloorPlan, count: int, radius: float) -> tuple[FleetMe
     )
 
 
+def _clearance(plan: FloorPlan) -> tuple[Grid, NDArray[np.float32]]:
+    """Return the place as a grid, and the distance of each cell to the next wall, metres."""
+    grid = draw(plan)
+    solid = ~grid.free if plan.map is not None else grid.occupied
+    return grid, distance_to(solid, grid.resolution)
+
+
+def _room_to_pass(radius: float) -> float:
+    """Return the distance to walls at which two robots can pass: one at the point, the other beside
+    it: a body, and gaps on both sides.
+    """
+    return 3.0 * radius + 2.0 * _PASSING
+
+
 def wide_places(plan: FloorPlan, radius: float) -> tuple[str, ...]:
     """Return the places in which two robots of a radius can pass at the point of the place."""
-    grid = draw(plan)
-    clearance = distance_to(~grid.free if plan.map is not None else grid.occupied, grid.resolution)
-    # One at the point, the other beside it: a body, and gaps on both sides.
-    needed = 3.0 * radius + 2.0 * _PASSING - grid.resolution
+    grid, clearance = _clearance(plan)
+    needed = _room_to_pass(radius) - grid.resolution
     return tuple(
         name
         for name, (x, y, _) in plan.place.positions.items()
         if float(clearance[grid.cell_of(x, y)]) >= needed
     )
+
+
+def points_to_pass(plan: FloorPlan, radius: float) -> dict[str, tuple[float, float]]:
+    """Return other points for places at whose own point two robots cannot pass, as before a door.
+
+    Each is the nearest point of the same place at which they can, and from which all its doors stay
+    free; a place that has none, as a narrow corridor, is not named. Where no walls say what belongs
+    to a place, none is.
+    """
+    wide = wide_places(plan, radius)
+    if not plan.is_enclosed or len(wide) == len(plan.place.positions):
+        return {}
+    grid, clearance = _clearance(plan)
+    regions = Regions(plan)
+    found = {}
+    for name, (x, y, _) in plan.place.positions.items():
+        if name in wide:
+            continue
+        points = regions.grid.centres_of(np.argwhere(regions.mask(name)))
+        cells = grid.cells_of(points)
+        inside = grid.contains(cells)
+        points, cells = points[inside], cells[inside]
+        fits = clearance[cells[:, 0], cells[:, 1]] >= _room_to_pass(radius)
+        for door in plan.place.rooms[name]:
+            if (opening := plan.doors.get(door)) is not None:
+                away = np.hypot(points[:, 0] - opening.x, points[:, 1] - opening.y)
+                fits &= away >= opening.width / 2.0 + 2.0 * radius
+        if fits.any():
+            points = points[fits]
+            nearest_one = points[np.argmin(np.hypot(points[:, 0] - x, points[:, 1] - y))]
+            found[name] = (round(float(nearest_one[0]), 2), round(float(nearest_one[1]), 2))
+    return found
+
+
+def with_points(plan: FloorPlan, points: Mapping[str, tuple[float, float]]) -> FloorPlan:
+    """Return a plan in which some places have other points, x, y in metres."""
+    positions = {
+        name: (*points[name], at[2]) if name in points else at
+        for name, at in plan.place.positions.items()
+    }
+    return replace(plan, place=replace(plan.place, positions=positions))
 
 
 def wide_ways(plan: FloorPlan, radius: float) -> tuple[str, ...]:

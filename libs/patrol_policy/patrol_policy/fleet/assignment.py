@@ -160,6 +160,9 @@ class FleetChoice:
         share: The share to publish; None: it has none.
         reason: Why, in words.
         slot: The time at the dock that it drives to.
+        mine: The stops of its group that are its own: from the one it drives to up to the one that
+            the next robot on the tour drives to.
+        overstays: Whether it has been in its place for longer than the equal distance.
     """
 
     place: str
@@ -167,6 +170,8 @@ class FleetChoice:
     share: Share | None
     reason: str
     slot: DockSlot | None = field(default=None)
+    mine: frozenset[str] = frozenset()
+    overstays: bool = False
 
 
 def assign(
@@ -240,6 +245,7 @@ def choose(
     group = _group(assignment, share)
     reached = share.stop == me.place
     onward = _next(group, share.stop) if reached else share
+    mine = _mine(group, assignment, robots, me, onward)
     slot, leave = _slot(graph, robots, me, onward.stop, now, settings, assignment)
     if slot is not None and now >= leave:
         late = f', {slot.late:.0f} s late: the docks are too few' if slot.late > 1.0 else ''
@@ -254,12 +260,18 @@ def choose(
             f'staying in {me.place} for {seconds:.0f} s: {ahead} is less than {group.wait:.0f} s '
             f'ahead on the tour of {group.length:.0f} s'
         )
-        return FleetChoice(me.place, now + seconds, share, reason)
+        return FleetChoice(
+            me.place,
+            now + seconds,
+            share,
+            reason,
+            mine=mine,
+            overstays=now - me.since > group.wait,
+        )
     # Where the only stop is its own it looks anew soon: the fleet may have changed.
     look = min(leave, now + settings.back_after) if onward.stop == me.place else None
-    return FleetChoice(
-        onward.stop, look, onward, _why(onward.stop, name, group, assignment, robots)
-    )
+    reason = _why(onward.stop, name, group, assignment, robots)
+    return FleetChoice(onward.stop, look, onward, reason, mine=mine)
 
 
 def _absence(robot: FleetRobot, now: float, settings: FleetSettings) -> str | None:
@@ -407,6 +419,30 @@ def _group(assignment: Assignment, share: Share) -> Group:
 
 def _next(group: Group, stop: str) -> Share:
     return Share(group.stops, group.stops[(group.position[stop] + 1) % len(group.stops)])
+
+
+def _mine(
+    group: Group,
+    assignment: Assignment,
+    robots: Sequence[FleetRobot],
+    me: FleetRobot,
+    onward: Share,
+) -> frozenset[str]:
+    """Return the stops that no other robot of the group comes to before this one.
+
+    Of robots with the same stop it is that of the one that is in its place the longest.
+    """
+    since = {robot.name: (robot.since, robot.name) for robot in robots}
+    here, length = group.position[onward.stop], len(group.stops)
+    gap = length
+    for name, share in assignment.shares.items():
+        if name == me.name or share.tour != group.stops:
+            continue
+        ahead = (group.position[share.stop] - here) % length
+        if ahead == 0 and since[me.name] < since[name]:
+            continue
+        gap = min(gap, ahead)
+    return frozenset(group.stops[(here + step) % length] for step in range(gap))
 
 
 def _hold(
