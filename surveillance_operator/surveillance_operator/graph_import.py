@@ -8,15 +8,13 @@ from __future__ import annotations
 
 import json
 import math
-import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from patrol_policy.graph import GraphError
 from patrol_policy.patrolling_sim import read_patrolling_sim
+from surveillance_operator.rmf_building import level_of
 from surveillance_runtime.files import FileError, read_file
 from surveillance_runtime.place.rooms import problem_in_name
 
@@ -26,41 +24,35 @@ Vertices = dict[str, tuple[str, float, float]]
 """By their id: a name, which may be empty, and x and y in metres."""
 
 
-def read_graph(path: Path) -> dict[str, Any]:
+def read_graph(path: Path, rmf: Any = None, level: str = '') -> dict[str, Any]:
     """Return the parameters of the place that a graph file describes.
 
     Args:
         path: A `.graph` of patrolling_sim, a GeoJSON of Nav2's route server, or a navigation graph
-            of Open-RMF (YAML with `levels`, of which there is one).
+            of Open-RMF.
+        rmf: What the graph of Open-RMF says; None: it is one of the others.
+        level: The level that is meant, where there are several.
 
     Raises:
         FileError: It cannot be read or is of none of these; one line.
     """
     try:
-        if path.suffix == '.graph':
+        if rmf is not None:
+            vertices, edges = _rmf(path, rmf, level)
+        elif level:
+            raise FileError(f'{path}: has no levels: expected no --level')
+        elif path.suffix == '.graph':
             vertices, edges = _patrolling_sim(path)
-        elif path.suffix in SUFFIXES:
-            vertices, edges = _route_graph(json.loads(read_file(path, MOST_BYTES)))
         else:
-            vertices, edges = _rmf(yaml.safe_load(read_file(path, MOST_BYTES)))
+            vertices, edges = _route_graph(json.loads(read_file(path, MOST_BYTES)))
     except FileError:
         raise
     except GraphError as error:
         raise FileError(str(error)) from None
-    except (ValueError, TypeError, KeyError, IndexError, AttributeError, yaml.YAMLError) as error:
+    except (ValueError, TypeError, KeyError, IndexError, AttributeError) as error:
         said = f'{error!r}' if isinstance(error, KeyError) else str(error).splitlines()[0]
         raise FileError(f'{path}: not the graph that was expected: {said}') from None
     return _place(path, vertices, edges)
-
-
-def is_rmf_graph(path: Path) -> bool:
-    """Tell whether a YAML file is a navigation graph of Open-RMF."""
-    if path.suffix not in ('.yaml', '.yml'):
-        return False
-    try:
-        return re.search(rb'^levels:', read_file(path, MOST_BYTES), re.MULTILINE) is not None
-    except FileError:
-        return False
 
 
 def _patrolling_sim(path: Path) -> tuple[Vertices, list[tuple[str, str]]]:
@@ -92,15 +84,11 @@ def _route_graph(document: Any) -> tuple[Vertices, list[tuple[str, str]]]:
     return vertices, edges
 
 
-def _rmf(document: Any) -> tuple[Vertices, list[tuple[str, str]]]:
-    levels = document['levels']
-    if len(levels) != 1:
-        raise ValueError(f'{len(levels)} levels ({", ".join(map(str, levels))}), expected one')
-    level = next(iter(levels.values()))
+def _rmf(path: Path, document: Any, name: str) -> tuple[Vertices, list[tuple[str, str]]]:
+    levels = {str(each): level for each, level in document['levels'].items()}
+    level = levels[level_of(path, levels, name)]
     vertices: Vertices = {}
     for index, (x, y, *more) in enumerate(level['vertices']):
-        if more and not isinstance(more[0], Mapping):
-            raise ValueError('a building in pixels, expected the navigation graph made of it')
         name = str(more[0].get('name', '')) if more else ''
         vertices[str(index)] = name, float(x), float(y)
     return vertices, [(str(lane[0]), str(lane[1])) for lane in level['lanes']]

@@ -10,13 +10,14 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import count
 from typing import Any
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from surveillance_runtime.map_rooms.segmentation import Segmentation, segment
+from surveillance_runtime.map_rooms.segmentation import Line, Segmentation, segment
 from surveillance_runtime.place.occupancy_grid import Grid, distance_to
 from surveillance_runtime.place.occupancy_map import OccupancyMap
 
@@ -27,6 +28,10 @@ Point = tuple[float, float]
 _NEAR_POINT = 3.0
 """A room's point need not be farther from walls than this many radii of the robot."""
 _WIDEST = 20.0
+_SPARE = 0.1
+"""More than the robot needs at the point of a door, where there is more, metres."""
+_BESIDE_DOOR = 0.3
+"""An opening whose middle is as near to that of a known door is that door, metres."""
 
 
 @dataclass(frozen=True)
@@ -48,7 +53,7 @@ class Proposal:
 
 @dataclass(frozen=True)
 class _Opening:
-    """A piece of a border: the rooms, its ends and the cell that is freest, column and row."""
+    """A piece of a border: the rooms, its ends and a cell with room, column and row."""
 
     rooms: tuple[int, int]
     start: tuple[float, float]
@@ -57,17 +62,21 @@ class _Opening:
     clearance: float
 
 
-def propose(building: OccupancyMap, radius: float) -> Proposal:
+def propose(
+    building: OccupancyMap, radius: float, doors: Mapping[str, Line] | None = None
+) -> Proposal:
     """Return a place with the rooms and doors of a map.
 
     Args:
         building: The map.
         radius: Of the robot, metres.
+        doors: Doors that are known, by name: each parts two rooms. World frame, metres.
 
     Raises:
         ValueError: The robot fits nowhere.
     """
-    found = segment(building.own_grid)
+    known = doors or {}
+    found = segment(building.own_grid, [_as_line(building.to_own(each)) for each in known.values()])
     grid = found.working
     # A working cell is not exactly 0.05 m where the map's are of another size.
     scale = building.cells.shape[1] * building.resolution / grid.cells.shape[1]
@@ -76,13 +85,13 @@ def propose(building: OccupancyMap, radius: float) -> Proposal:
     clearance = distance_to(~free, grid.resolution)
     reach = _reachable(labels, clearance, radius)
     needed = radius + 1.5 * grid.resolution
-    openings = _openings(labels, free, clearance)
-    doors = [each for each in openings if each.clearance > needed and _fits(reach, each)]
-    rooms = _joined_rooms({number for number in np.unique(labels[reach]).tolist() if number}, doors)
+    openings = _openings(labels, free, clearance, needed + _SPARE)
+    ways = [each for each in openings if each.clearance > needed and _fits(reach, each)]
+    rooms = _joined_rooms({number for number in np.unique(labels[reach]).tolist() if number}, ways)
     if not rooms:
         raise ValueError(f'a robot with a radius of {radius:g} m fits nowhere: expected free floor')
-    doors = [each for each in doors if set(each.rooms) <= rooms]
-    listed = {id(each) for each in doors}
+    ways = [each for each in ways if set(each.rooms) <= rooms]
+    listed = {id(each) for each in ways}
     names = _names(rooms, found)
 
     def world(points: list[tuple[float, float]]) -> NDArray[np.float64]:
@@ -94,10 +103,15 @@ def propose(building: OccupancyMap, radius: float) -> Proposal:
         positions[names[number]] = _rounded(world([cell])[0])
     table: dict[str, list[str]] = {names[number]: [] for number in sorted(rooms)}
     placed: dict[str, list[float]] = {}
-    for index, door in enumerate(doors, start=1):
-        placed[f'D{index}'] = _line(world([door.start, door.end, door.middle]), scale)
+    called = _called([world([each.start, each.end]).mean(axis=0) for each in ways], known)
+    for name, door in zip(called, ways, strict=True):
+        if name in known:
+            start, end = (np.array(each) for each in known[name])
+            placed[name] = _line(np.array([start, end, (start + end) / 2]), 0.0)
+        else:
+            placed[name] = _line(world([door.start, door.end, door.middle]), scale)
         for number in door.rooms:
-            table[names[number]].append(f'D{index}')
+            table[names[number]].append(name)
     if len(rooms) == 1:
         table[next(iter(table))].append('D1')  # the door that leads out of the place
     walls: dict[str, list[float]] = {}
@@ -129,6 +143,25 @@ def propose(building: OccupancyMap, radius: float) -> Proposal:
     return Proposal(parameters, found, names, tuple(sorted(everything - rooms)))
 
 
+def _called(middles: list[NDArray[np.float64]], known: Mapping[str, Line]) -> list[str]:
+    """Return the names of doors: that of the known one which is there, else the next of D1, D2."""
+    names = [''] * len(middles)
+    for name, line in known.items():
+        start, end = (np.array(each) for each in line)
+        gaps = [math.dist((start + end) / 2, middle) for middle in middles]
+        left = [index for index, taken in enumerate(names) if not taken]
+        best = min(left, key=gaps.__getitem__, default=None)
+        if best is not None and gaps[best] < max(math.dist(start, end) / 2, _BESIDE_DOOR):
+            names[best] = name
+    new = (name for index in count(1) if (name := f'D{index}') not in known)
+    return [name or next(new) for name in names]
+
+
+def _as_line(points: NDArray[np.float64]) -> Line:
+    (x1, y1), (x2, y2) = points.tolist()
+    return (x1, y1), (x2, y2)
+
+
 def _reachable(labels: Labels, clearance: NDArray[np.float32], radius: float) -> Mask:
     """Return the cells of the largest part of the floor that the robot can be in."""
     fits = (clearance > radius) & (labels > 0)
@@ -141,8 +174,17 @@ def _reachable(labels: Labels, clearance: NDArray[np.float32], radius: float) ->
     return np.asarray(pieces == largest)
 
 
-def _openings(labels: Labels, free: Mask, clearance: NDArray[np.float32]) -> list[_Opening]:
-    """Return the pieces of free borders between rooms, in the order of the rooms."""
+def _openings(
+    labels: Labels, free: Mask, clearance: NDArray[np.float32], enough: float
+) -> list[_Opening]:
+    """Return the pieces of free borders between rooms, in the order of the rooms.
+
+    Args:
+        labels: The rooms.
+        free: The cells that are free.
+        clearance: How far each is from what is not, metres.
+        enough: The clearance that a door's point needs, where there is as much, metres.
+    """
     walkable = np.where(free, labels, 0)
     padded = np.pad(walkable, 1)
     found: list[_Opening] = []
@@ -168,20 +210,23 @@ def _openings(labels: Labels, free: Mask, clearance: NDArray[np.float32]) -> lis
         which = pieces[tuple((cells - low).T)]
         for piece in np.unique(which):
             mine = cells[which == piece]
-            found.append(_opening_of(rooms, mine, clearance))
+            found.append(_opening_of(rooms, mine, clearance, enough))
     return found
 
 
 def _opening_of(
-    rooms: tuple[int, int], cells: NDArray[np.intp], clearance: NDArray[np.float32]
+    rooms: tuple[int, int],
+    cells: NDArray[np.intp],
+    clearance: NDArray[np.float32],
+    enough: float,
 ) -> _Opening:
     points = cells[:, ::-1].astype(float)
     centre = points.mean(axis=0)
     start = points[np.argmax(np.hypot(*(points - centre).T))]
     end = points[np.argmax(np.hypot(*(points - start).T))]
     clear = clearance[cells[:, 0], cells[:, 1]]
-    # Of the freest cells the one in the middle.
-    best = clear >= clear.max() - 0.05
+    # Of the cells that are free enough the one in the middle: a door reaches equally far from it.
+    best = clear >= min(float(clear.max()) - 0.05, enough)
     middle = points[best][np.argmin(np.hypot(*(points[best] - (start + end) / 2).T))]
     as_pair = [(float(x), float(y)) for x, y in (start, end, middle)]
     return _Opening(rooms, as_pair[0], as_pair[1], as_pair[2], float(clear.max()))
@@ -252,11 +297,11 @@ def point_in(
 
 
 def _line(points: NDArray[np.float64], side: float) -> list[float]:
-    """Return x, y, yaw and width of a door with these ends and this freest point, metres."""
+    """Return x, y, yaw and width of a door with these ends and this point with room, metres."""
     start, end, middle = points
     length = math.dist(start, end)
     along = (end - start) / length if length > 0 else np.array([1.0, 0.0])
-    # On the line between its ends, at the freest point; so long that it reaches both.
+    # On the line between its ends, beside that point; so long that it reaches both.
     at = start + along * float((middle - start) @ along)
     width = 2 * max(math.dist(at, start), math.dist(at, end)) + side
     yaw = math.atan2(along[1], along[0])

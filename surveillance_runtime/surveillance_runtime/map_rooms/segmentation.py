@@ -12,6 +12,7 @@ distances, so that neither the resolution nor the direction of a map matters.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -25,6 +26,8 @@ from surveillance_runtime.place.occupancy_grid import Grid, distance_to
 
 Labels = NDArray[np.int32]
 Mask = NDArray[np.bool_]
+Line = tuple[tuple[float, float], tuple[float, float]]
+"""Two ends, metres."""
 
 CELL = 0.05
 """Side of the cells that rooms are found on, metres."""
@@ -63,15 +66,18 @@ class Segmentation:
     working_labels: Labels
 
 
-def segment(grid: Grid) -> Segmentation:
+def segment(grid: Grid, shut: Sequence[Line] = ()) -> Segmentation:
     """Return the rooms of a map.
 
     Args:
         grid: The map; row 0 in the south, as ever.
+        shut: Lines that are known to part two rooms, as doors on a plan: metres from the corner of
+            the map.
     """
     working = _at_working_resolution(grid)
     free = working.free
-    cleared = _without_small_things(free)
+    known = _drawn(shut, free.shape, grid.cells.shape[1] * grid.resolution / free.shape[1])
+    cleared = _without_small_things(free) & ~known
     clearance = distance_to(~cleared, CELL)
     found = openings.wall_cuts(cleared, _walls(working)) + openings.saddle_cuts(
         cleared, _saddles(cleared, clearance)
@@ -85,6 +91,7 @@ def segment(grid: Grid) -> Segmentation:
     labels = joining.joined(parts, cuts, clearance, CELL)[parts]
     labels = np.where(cleared, _spread(labels), 0)
     labels = _with_floor_below_furniture(labels, cleared)
+    labels = np.where(known & free & (labels == 0), _spread(labels), labels)
     labels = _numbered(labels)
     count = int(labels.max())
     area = np.bincount(labels.ravel(), minlength=count + 1) * CELL**2
@@ -95,6 +102,15 @@ def segment(grid: Grid) -> Segmentation:
         if depth[number] > 0 and joining.elongation(area[number], depth[number]) > joining.LONG
     )
     return Segmentation(_at_resolution_of(labels, grid, working), count, corridors, working, labels)
+
+
+def _drawn(lines: Sequence[Line], shape: tuple[int, ...], side: float) -> Mask:
+    """Return the cells below lines, two wide: no way leads through at their corners."""
+    drawn = np.zeros(shape, np.uint8)
+    for line in lines:
+        (left, low), (right, high) = np.rint(np.array(line) / side - 0.5).astype(int).tolist()
+        cv2.line(drawn, (left, low), (right, high), 1, 2)
+    return drawn > 0
 
 
 def _at_working_resolution(grid: Grid) -> Grid:
