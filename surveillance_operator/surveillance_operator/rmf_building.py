@@ -148,7 +148,7 @@ class _Level:
 
     def edges(self, kind: str) -> list[tuple[int, int, Mapping[str, Any]]]:
         """Return the walls, doors or measurements: two vertices, and properties by name."""
-        found = []
+        found: list[tuple[int, int, Mapping[str, Any]]] = []
         for first, second, *more in self.described.get(kind) or []:
             for end in (first, second):
                 if not 0 <= int(end) < len(self.points):
@@ -230,7 +230,7 @@ def _drawn(path: Path, name: str, level: _Level, points: Points) -> RmfLevel:
     def cells(ends: Sequence[int] | Points) -> NDArray[np.int32]:
         # Sixteenths of a cell, which OpenCV draws exactly.
         at = points[ends] if not isinstance(ends, np.ndarray) else ends
-        return np.rint(((at - low) / RESOLUTION - 0.5) * 16).astype(np.int32)
+        return np.asarray(np.rint(((at - low) / RESOLUTION - 0.5) * 16), np.int32)
 
     free = np.zeros((rows, columns), np.uint8)
     for outline in floors:
