@@ -22,7 +22,7 @@ from armor_service.sparql import SparqlEngine
 from armor_service.store import Store
 from armor_service.worlds import Worlds
 from owl_reasoner import memory
-from owl_reasoner.knowledge_base import Changes
+from owl_reasoner.feed import Changes
 
 Watcher: TypeAlias = Callable[[str, Changes | None], None]
 """Told of a reference's name and what changed in it; None: it was loaded or dropped."""

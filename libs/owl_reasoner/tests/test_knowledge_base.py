@@ -4,7 +4,8 @@ changes.
 
 from __future__ import annotations
 
-from owl_reasoner.knowledge_base import Changes, KnowledgeBase
+from owl_reasoner.feed import Changes
+from owl_reasoner.knowledge_base import KnowledgeBase
 from owl_reasoner.owl.axioms import (
     AnnotationAssertion,
     ClassAssertion,

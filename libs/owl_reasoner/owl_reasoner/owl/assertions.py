@@ -93,6 +93,10 @@ class Assertions:
         mentions = self.about.get(entity)
         return () if mentions is None else mentions.values()
 
+    def is_known(self, kind: str, iri: str) -> bool:
+        """Tell whether an axiom declares or uses the entity as this kind."""
+        return any((kind, iri) in entities_of(axiom) for axiom in self.mentioning(iri))
+
     def insert(self, axiom: Axiom) -> bool:
         """Assert an axiom; return False when it was asserted already."""
         number = next(self._numbers)

@@ -24,7 +24,8 @@ from owlready2 import reasoning as owlready2_reasoning
 from owlready2.base import LOADING
 from owlready2.namespace import CURRENT_NAMESPACES
 
-from owl_reasoner.knowledge_base import Changes, KnowledgeBase
+from owl_reasoner.feed import Changes
+from owl_reasoner.knowledge_base import KnowledgeBase
 from owl_reasoner.owl import axioms as ax
 from owl_reasoner.owl.axioms import Axiom
 from owl_reasoner.owl.vocabulary import NOTHING, OWL, RDF, RDFS, THING
