@@ -38,7 +38,7 @@ sys.path.insert(0, str(ROOT))
 from benchmarks.tables import table
 from surveillance_operator.page.hub import Hub
 from surveillance_operator.recording.bag import METADATA, BagWriter, TopicType
-from surveillance_operator.recording.runs import find_recording
+from surveillance_operator.recording.runs import find_recordings
 from surveillance_operator.recording.schemas import definition
 from surveillance_operator.replay import open_player
 from surveillance_runtime.testing import claim_domain
@@ -200,7 +200,7 @@ def replayed(recording: Path, name: str) -> list[Row]:
     """Measure from the command to the first picture, and jumps with lidar and camera."""
     with contextlib.ExitStack() as stack:
         began = time.perf_counter()
-        player = open_player(find_recording(str(recording), recording.parent), Hub(), stack)
+        player = open_player(find_recordings(str(recording), recording.parent), Hub(), stack)
         ready = time.perf_counter() - began
         thread = threading.Thread(target=player.run, daemon=True)
         thread.start()
@@ -212,7 +212,7 @@ def replayed(recording: Path, name: str) -> list[Row]:
         def jump() -> None:
             player.seek(random.uniform(5.0, player.length - 5.0))
             player.see()
-            player.jpeg()
+            player.jpeg('')
 
         seconds = slowest(50, jump)
         hours = player.length / 3600

@@ -28,7 +28,7 @@ from launcher.supervisor import Supervisor
 from launcher.team import Part, parts
 from surveillance_behaviour.mission import mission_log
 from surveillance_runtime import node_table
-from surveillance_runtime.files import PLACE, RECORD, TIMELINE, FileError
+from surveillance_runtime.files import LAUNCH_LOG, PLACE, RECORD, TIMELINE, FileError
 from surveillance_runtime.launch_protocol import EXIT_THERE, NotNowError
 from surveillance_runtime.place.writing import copy_place
 from surveillance_runtime.profile import remappings
@@ -79,7 +79,7 @@ def run_mission(run: Run, config: Path, runs: Path, resume: Path | None = None) 
         copy_place(place, own / PLACE)
     names = [part.name(node.name) for part in team for node in part.everyone]
     names += [part.name(COMPOSED) for part in team if run.composed]
-    log = MergedLog(None, names, path=folder / 'launch.log')
+    log = MergedLog(None, names, path=folder / LAUNCH_LOG)
     log.say(
         f'{run.behaviour} in mode {mode}, {_robots(team, profile.name)}, '
         f'place {place.name}, '

@@ -19,7 +19,16 @@ from PIL import Image
 
 from patrol_policy.policies import POLICIES
 from surveillance_operator.room_outlines import room_outlines
-from surveillance_operator.snapshot import NO_POINTS, TRAIL_STEP, Health, Snapshot
+from surveillance_operator.snapshot import (
+    NO_POINTS,
+    TRAIL_STEP,
+    Health,
+    Snapshot,
+    doing,
+    is_out,
+    shares,
+    troubles,
+)
 from surveillance_runtime.place.occupancy_grid import Grid
 
 Parts = dict[str, Any]
@@ -176,6 +185,11 @@ def _history(snapshot: Snapshot) -> Any:
     }
 
 
+def _events(snapshot: Snapshot) -> Any:
+    # A third value says that the event is of the place.
+    return [[round(at, 1), text, *([1] if shared else [])] for at, text, shared in snapshot.events]
+
+
 PARTS: Mapping[str, tuple[tuple[str, ...], Callable[[Snapshot], Any]]] = {
     'mission': (
         ('where', 'mode', 'threshold', 'policy', 'nodes'),
@@ -232,10 +246,56 @@ PARTS: Mapping[str, tuple[tuple[str, ...], Callable[[Snapshot], Any]]] = {
     'requests': (('requests',), lambda s: dict(s.requests)),
     'health': (('namespace', 'nodes', 'ended', 'restarts', 'health', 'silent'), health),
     'figures': (('namespace', 'health'), _figures),
-    'events': (('events',), lambda s: [[round(at, 1), text] for at, text in s.events]),
+    'doing': (('status', 'share', 'paused', 'stopped', 'nodes'), doing),
+    'shares': (('share',), shares),
+    'out': (('share',), is_out),
+    'troubles': (('status', 'stopped', 'nodes', 'ended', 'health', 'namespace'), troubles),
+    'events': (('events',), _events),
     'history': (('history',), _history),
 }
 """Each part with the snapshot's fields that it comes from."""
+
+GLANCE = frozenset(
+    (
+        *('mission', 'status', 'decision', 'battery', 'pose', 'plan', 'stopped', 'active'),
+        *('doing', 'shares', 'out', 'troubles', 'events'),
+    )
+)
+"""The parts that are shown of each robot of a fleet, whichever is chosen."""
+KEPT_EVENTS = 100
+"""Events of all robots that are shown."""
+TOLD_WITHIN = 5.0
+"""Seconds within which what several robots' events say of the place is one event."""
+
+
+def merged_events(events: Mapping[str, Any]) -> list[list[Any]]:
+    """Return the events of all robots in one order: when, the robot's name, what.
+
+    What is of the place has no name, and stands once.
+
+    Args:
+        events: The part `events` by the name of the robot.
+    """
+    told = sorted(
+        ((each[0], robot, each[1], len(each) > 2) for robot in events for each in events[robot]),
+        # In old recordings times are texts.
+        key=lambda each: (not isinstance(each[0], str), each[0]),
+    )
+    found: list[list[Any]] = []
+    by_text: dict[str, list[tuple[float, set[str]]]] = {}
+    for at, robot, text, shared in told:
+        if shared:
+            known = by_text.setdefault(text, [])
+            same = next(
+                (who for then, who in known if at - then <= TOLD_WITHIN and robot not in who), None
+            )
+            if same is not None:
+                same.add(robot)
+                continue
+            known.append((at, {robot}))
+        found.append([at, '' if shared else robot, text])
+    return found[-KEPT_EVENTS:]
+
 
 assert {name for sources, _ in PARTS.values() for name in sources} <= {
     field.name for field in fields(Snapshot)
@@ -252,19 +312,28 @@ class Framer:
     def __init__(self, without: frozenset[str] = frozenset()) -> None:
         self._parts = {name: part for name, part in PARTS.items() if name not in without}
         self._last: Snapshot | None = None
+        self._seen: dict[str, tuple[Any, ...]] = {}
         self.parts: Parts = {}
 
-    def patch(self, snapshot: Snapshot) -> Parts:
-        """Return the parts that differ from the last snapshot's, and a trail that begins anew."""
+    def patch(self, snapshot: Snapshot, only: frozenset[str] | None = None) -> Parts:
+        """Return the parts that differ from the last snapshot's, and a trail that begins anew.
+
+        Args:
+            snapshot: What is known.
+            only: The parts that are asked for; None: all.
+        """
         last, changed = self._last, {}
         self._last = snapshot
         if last is not None and len(snapshot.trail) < len(last.trail):
             changed['trail'] = _points(snapshot.trail)
         for name, (sources, compute) in self._parts.items():
-            if last is not None and all(
-                getattr(last, source) is getattr(snapshot, source) for source in sources
-            ):
+            if only is not None and name not in only:
                 continue
+            values = tuple(getattr(snapshot, source) for source in sources)
+            seen = self._seen.get(name)
+            if seen is not None and all(a is b for a, b in zip(seen, values, strict=True)):
+                continue
+            self._seen[name] = values
             value = compute(snapshot)
             if name not in self.parts or self.parts[name] != value:
                 self.parts[name] = changed[name] = value

@@ -14,7 +14,7 @@ from typing import Any
 from geometry_msgs.msg import Point
 from rcl_interfaces.srv import GetParameters, ListParameters, SetParameters
 from rclpy.parameter import Parameter, parameter_value_to_python
-from std_srvs.srv import Trigger
+from std_srvs.srv import SetBool, Trigger
 
 from armor_service.facts import parse_fact
 from state_machines.exceptions import CallError, CallInterruptedError
@@ -44,6 +44,7 @@ from surveillance_operator.stop_button import StopButton
 from surveillance_operator.topics import BEHAVIOUR, CONTROLLERS
 from surveillance_runtime.configuration import argument_value, declared
 from surveillance_runtime.node import PatrolNode
+from surveillance_runtime.node_table import SHARED, name_for
 from surveillance_runtime.parameters import shown
 from surveillance_runtime.place import problem_in_name
 from surveillance_runtime.place_changes import description_text
@@ -101,13 +102,28 @@ class MissionActions:
     Args:
         node: The node that calls; an executor must spin it.
         timeout: Deadline of each call, seconds.
+        robot: The robot of a fleet whose mission it is; empty: that of the node's namespace.
+        shared: The actions of the node's own namespace, whose services the robots share.
     """
 
-    def __init__(self, node: PatrolNode, timeout: float = 5.0) -> None:
+    def __init__(
+        self,
+        node: PatrolNode,
+        timeout: float = 5.0,
+        *,
+        robot: str = '',
+        shared: MissionActions | None = None,
+    ) -> None:
         self._node = node
         self._timeout = timeout
-        self._callers = {name: ServiceCaller(node, _KINDS[name], name) for name in _KINDS}
-        self._stop = StopButton(node)
+        self._robot = robot
+        self._callers: dict[str, ServiceCaller] = {} if shared is None else shared._callers
+        for service, kind in _KINDS.items():
+            name = name_for(robot, service)
+            if name not in self._callers:
+                self._callers[name] = ServiceCaller(node, kind, name)
+        self._stop = StopButton(node, robot)
+        self._out = ServiceCaller(node, SetBool, name_for(robot, 'take_out'))
         self._armor: ArmorClient | None = None
         self._found_by = time.monotonic() + min(_DISCOVERY, timeout)
 
@@ -198,6 +214,20 @@ class MissionActions:
     def stop(self, on: bool) -> str:
         """Have the robot stand, whoever commands it, or release it."""
         return self._stop.press(bool(on))
+
+    def take_out(self, out: bool) -> str:
+        """Take the robot out of its fleet's patrol, or put it back; the others share its places."""
+        request = SetBool.Request(data=bool(out))
+        try:
+            answer = self._out.call(
+                request, self._timeout, self._node.stopping, discovery=min(1.0, self._timeout)
+            )
+        except UnavailableError:
+            away = self._away(BEHAVIOUR) or 'this robot shares its patrol with no other'
+            raise UnavailableError(away) from None
+        if not answer.success:
+            raise ValueError(answer.message or 'refused')
+        return str(answer.message)
 
     def set_threshold(self, seconds: str) -> str:
         """Set after how long a place is URGENT, seconds."""
@@ -298,14 +328,15 @@ class MissionActions:
 
     def _call(self, service: str, timeout: float | None = None, **fields: Any) -> Any:
         kind = _KINDS.get(service) or _PARAMETER_KINDS[service.rpartition('/')[2]]
-        if service not in self._callers:
-            self._callers[service] = ServiceCaller(self._node, kind, service)
+        name = name_for(self._robot, service)
+        if name not in self._callers:
+            self._callers[name] = ServiceCaller(self._node, kind, name)
         discovery = self._timeout
         if service.startswith(_OPTIONAL):
             # Nobody waits for a service that this kind of mission does not have.
             discovery = max(min(0.5, self._timeout), self._found_by - time.monotonic())
         try:
-            return self._callers[service].call(
+            return self._callers[name].call(
                 kind.Request(**fields),
                 timeout or self._timeout,
                 self._node.stopping,
@@ -321,9 +352,11 @@ class MissionActions:
         """Say which node a service lacks; empty when all that it needs are there."""
         first = service.partition('/')[0]
         there = self._node.get_node_names_and_namespaces()
+        own = self._node.get_namespace()
         for name in _OFFERED_BY.get(first, (first,)):
-            if (name, self._node.get_namespace()) not in there:
-                return f'{name} is not running'
+            robot = '' if name in SHARED else self._robot
+            if (name, f'{own.rstrip("/")}/{robot}' if robot else own) not in there:
+                return f'{name_for(robot, name)} is not running'
         return ''
 
 

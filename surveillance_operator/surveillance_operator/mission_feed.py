@@ -21,6 +21,7 @@ from rosgraph_msgs.msg import Clock as ClockMessage
 
 from armor_service.facts import ShortFact
 from state_machines.ros import CallError, ServiceCaller
+from surveillance_behaviour.ros_adapters.fleet_topic import FLEET_TOPIC
 from surveillance_interfaces.srv import ReferenceName, RoomPosition
 from surveillance_ontology.armor_client import ArmorClient, FactSubscription
 from surveillance_ontology.patrol_ontology import CONNECTIONS, PLACES, URGENT_PLACES, VISITS
@@ -40,6 +41,7 @@ from surveillance_operator.topics import (
 from surveillance_runtime.conversions import clean_texts, pose_from, seconds_of
 from surveillance_runtime.diagnostics import STALE_AFTER
 from surveillance_runtime.node import PatrolNode
+from surveillance_runtime.node_table import name_for
 from surveillance_runtime.place.floor_plan import Door
 from surveillance_runtime.place_changes import follow_place
 from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
@@ -57,9 +59,13 @@ BUILDER = 'ontology_map_builder'
 PLANNER = 'planner_controller'
 """The node that knows the doors' lines and the execution mode, as its parameters."""
 POSE_TYPE = 'geometry_msgs/msg/PoseWithCovarianceStamped'
-OBSERVERS = ('mission_', 'console')
+OF_THE_PLACE = ('map', 'door_states')
+"""The topics that the robots of a fleet share."""
+SHARED = ('grid', 'positions', 'links', 'doors', 'visited_at', 'urgent', 'others')
+"""The fields of a snapshot that are the same for all robots of a fleet."""
+OBSERVERS = ('mission_', 'console', 'fleet_')
 """How the names of nodes begin that only look on: after a mission they may go."""
-TERMINALS = ('mission_view', 'console')
+TERMINALS = ('mission_view', 'console', 'fleet_')
 """And of those that are a person's terminal: they may go at any time."""
 
 
@@ -72,6 +78,11 @@ class MissionFeed:
         on_change: Called on the feed's thread with each new snapshot and what changed.
         streams: Follow the lidar, too, and look as soon as something comes, where the period is
             short.
+        robot: The robot of a fleet whose mission it is; empty: that of the node's own namespace.
+        place: With a robot: follows what the robots share, in the node's own namespace.
+
+    Attributes:
+        fleet: Namespaces of robots that have a feed of their own: they are not among the others.
     """
 
     def __init__(
@@ -81,11 +92,15 @@ class MissionFeed:
         on_change: Callable[[Snapshot, Sequence[Change]], None] = lambda _new, _told: None,
         *,
         streams: bool = False,
+        robot: str = '',
+        place: MissionFeed | None = None,
     ) -> None:
         self._node = node
+        self._place = place
         self._period = period if callable(period) else lambda: period
         self._on_change = on_change
-        namespace = node.get_namespace().strip('/')
+        self._prefix = '/'.join((node.get_namespace().rstrip('/'), *filter(None, (robot,)))) or '/'
+        namespace = self._prefix.strip('/')
         where = f'ROS domain {node.context.get_domain_id()}'
         where += f', namespace {namespace}' if namespace else ''
         self._empty = Snapshot(where=where, namespace=namespace)
@@ -95,9 +110,9 @@ class MissionFeed:
         self._clock_time: float | None = None
         self._clock = PolledSubscription(node, ClockMessage, '/clock', SENSOR_QOS)
         self._topics = [
-            (topic, PolledSubscription(node, topic.kind, topic.name, topic.qos))
+            (topic, PolledSubscription(node, topic.kind, name_for(robot, topic.name), topic.qos))
             for topic in TOPICS
-            if streams or not topic.stream
+            if (streams or not topic.stream) and not (robot and topic.name in OF_THE_PLACE)
         ]
         # The lidar comes with the pose, and health now and then.
         self._prompt = [
@@ -105,8 +120,10 @@ class MissionFeed:
             for topic, subscription in self._topics
             if streams and not topic.beside and not topic.period
         ]
-        self._facts = _Facts(node, self.update)
-        self._others = _OtherRobots(node) if streams else None
+        self._facts = _Facts(node, self.update, robot)
+        self._others = _OtherRobots(node) if streams and not robot else None
+        self._left = threading.Event()
+        self.fleet: frozenset[str] = frozenset()
         self._next_look = self._next_whole_look = self._changed_at = 0.0
         self._processes: Mapping[str, set[str]] = {}
         self._next_reading: dict[str, float] = {}
@@ -131,18 +148,34 @@ class MissionFeed:
         """
         with self._lock:
             old = self._snapshot
-            new = change(old)
+            new = self._with_place(change(old))
             if new is old:
                 return
             if self._over and begins:
                 old = self._begin_anew()
-                new = change(old)
+                new = self._with_place(change(old))
             # Nothing passes after a mission's end.
             now = old.now if self._over else self._now()
             new, told = follow(old, replace(new, now=now), time.time())
             self._over = self._over or bool(old.nodes and not new.nodes)
             self._snapshot = new
         self._on_change(new, told)
+
+    def leave(self) -> None:
+        """Follow the mission no longer."""
+        self._left.set()
+
+    def _with_place(self, snapshot: Snapshot) -> Snapshot:
+        """Return the snapshot of a robot with what the robots of its fleet share."""
+        if self._place is None:
+            return snapshot
+        shared = self._place.snapshot
+        fields = {
+            name: value
+            for name in SHARED
+            if (value := getattr(shared, name)) is not getattr(snapshot, name)
+        }
+        return replace(snapshot, **fields) if fields else snapshot
 
     def _begin_anew(self) -> Snapshot:
         """Return what is still known when another mission begins."""
@@ -156,7 +189,7 @@ class MissionFeed:
 
     def _run(self) -> None:
         stopping = self._node.stopping
-        while not stopping.is_set():
+        while not stopping.is_set() and not self._left.is_set():
             self._take()
             if time.monotonic() >= self._next_look:
                 self._next_look = time.monotonic() + LOOK_PERIOD
@@ -165,6 +198,10 @@ class MissionFeed:
             stopping.wait(period)
             if self._prompt and period < WAKE_PERIOD:
                 await_message(self._node.context, self._prompt, WAKE_PERIOD)
+        if self._left.is_set():
+            for _, subscription in self._topics:
+                subscription.destroy()
+            self._clock.destroy()
 
     def _take(self) -> None:
         """Take all messages that came into one new snapshot."""
@@ -205,7 +242,7 @@ class MissionFeed:
         node, now = self._node, time.monotonic()
         processes: dict[str, set[str]] = {}
         for log in node.get_publishers_info_by_topic('/rosout'):  # which every node has
-            if log.node_namespace == node.get_namespace():
+            if log.node_namespace == self._prefix:
                 processes.setdefault(log.node_name, set()).add(str(log.endpoint_gid))
         if processes != self._processes:
             self._processes, self._changed_at = processes, now
@@ -215,7 +252,7 @@ class MissionFeed:
             self._look_at_topics(processes)
         self._note_silent()
         self._facts.ask()
-        if self._others is not None and (gone := self._others.find()):
+        if self._others is not None and (gone := self._others.find(self.fleet)):
             self.update(
                 lambda old: replace(
                     old, others={name: at for name, at in old.others.items() if name not in gone}
@@ -229,7 +266,8 @@ class MissionFeed:
         names, silent = set(self._facts.servers()), dict(old.silent)
         for topic, subscription in self._topics:
             for info in self._node.get_publishers_info_by_topic(subscription.topic):
-                if not topic.name.startswith('/') and not info.node_name.startswith('_'):
+                is_of_all = topic.name.startswith('/') or topic.name == FLEET_TOPIC
+                if not is_of_all and not info.node_name.startswith('_'):
                     names.add(info.node_name)
                 fits, reason = qos_check_compatible(info.qos_profile, subscription.qos)
                 if fits == QoSCompatibility.ERROR:
@@ -271,23 +309,30 @@ class _Facts:
     Args:
         node: The node that watches.
         update: Takes a function from the old snapshot to the new one.
+        robot: The robot of a fleet; then what the robots share is not asked for.
     """
 
     def __init__(
-        self, node: PatrolNode, update: Callable[[Callable[[Snapshot], Snapshot]], None]
+        self,
+        node: PatrolNode,
+        update: Callable[[Callable[[Snapshot], Snapshot]], None],
+        robot: str = '',
     ) -> None:
         self._node = node
         self._update = update
         self._reference = ServiceCaller(node, ReferenceName, 'ontology_map/reference_name')
         self._position = ServiceCaller(node, RoomPosition, 'ontology_map/room_position')
-        self._list = ServiceCaller(node, ListParameters, f'{PLANNER}/list_parameters')
-        self._get = ServiceCaller(node, GetParameters, f'{PLANNER}/get_parameters')
-        self._get_behaviour = ServiceCaller(node, GetParameters, f'{BEHAVIOUR}/get_parameters')
+        planner, behaviour = name_for(robot, PLANNER), name_for(robot, BEHAVIOUR)
+        self._list = ServiceCaller(node, ListParameters, f'{planner}/list_parameters')
+        self._get = ServiceCaller(node, GetParameters, f'{planner}/get_parameters')
+        self._get_behaviour = ServiceCaller(node, GetParameters, f'{behaviour}/get_parameters')
         follow_place(node, self._take_place)
         self._armor: ArmorClient | None = None
         self._places: set[str] = set()
         self._without_position: set[str] = set()
-        self._questions = (self._ask_doors, self._ask_behaviour, self._ask_reference)
+        of_robot = (self._ask_doors, self._ask_behaviour)
+        self._questions = of_robot if robot else (*of_robot, self._ask_reference)
+        self._asks_places = not robot
         self._unanswered = set(self._questions)
         self._asking = False
 
@@ -306,7 +351,9 @@ class _Facts:
 
     def servers(self) -> frozenset[str]:
         """Return the nodes that there are now to answer."""
-        known = ((BUILDER, self._position), (PLANNER, self._get))
+        known = [(PLANNER, self._get)]
+        if self._asks_places:
+            known.append((BUILDER, self._position))
         return frozenset(name for name, service in known if service.is_ready())
 
     def ask(self) -> None:
@@ -394,12 +441,13 @@ class _OtherRobots:
         self._own = node.get_namespace().strip('/')
         self._poses: dict[str, PolledSubscription] = {}
 
-    def find(self) -> frozenset[str]:
-        """Hear the robots that came; return the names of those that went."""
+    def find(self, left_out: frozenset[str]) -> frozenset[str]:
+        """Hear the robots that came; return the names of those that went, or are left out."""
         for topic, kinds in self._node.get_topic_names_and_types():
             namespace, _, name = topic.strip('/').rpartition('/')
             robot = namespace or 'robot'
-            is_other = name == POSE_TOPIC and POSE_TYPE in kinds and namespace != self._own
+            is_pose = name == POSE_TOPIC and POSE_TYPE in kinds
+            is_other = is_pose and namespace != self._own and namespace not in left_out
             if is_other and robot not in self._poses and self._node.count_publishers(topic):
                 self._poses[robot] = PolledSubscription(
                     self._node, PoseWithCovarianceStamped, topic, STATE_QOS
@@ -407,7 +455,7 @@ class _OtherRobots:
         gone = frozenset(
             robot
             for robot, subscription in self._poses.items()
-            if not self._node.count_publishers(subscription.topic)
+            if robot in left_out or not self._node.count_publishers(subscription.topic)
         )
         for robot in gone:
             self._poses.pop(robot).destroy()

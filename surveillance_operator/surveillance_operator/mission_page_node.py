@@ -5,11 +5,12 @@ It only listens and asks; with `control` it also does what a person at the page 
 
 from __future__ import annotations
 
+import inspect
 import os
 import secrets
 import threading
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,23 +22,27 @@ from sensor_msgs.msg import Image as ImageMessage
 from state_machines.exceptions import CallError
 from state_machines.files import read_file
 from surveillance_ontology.patrol_ontology import checked_names
+from surveillance_operator.fleet_actions import WORDS, FleetActions
+from surveillance_operator.fleet_feed import FleetFeed
 from surveillance_operator.images import ANNOTATED, PLAIN, jpeg_from
 from surveillance_operator.mission_actions import MissionActions
-from surveillance_operator.mission_feed import MissionFeed
 from surveillance_operator.page.hub import Hub
 from surveillance_operator.page.server import Action, Page
 from surveillance_operator.place_page.desk import PlaceDesk
 from surveillance_operator.polled_subscription import PolledSubscription
 from surveillance_operator.sightings import Sightings
+from surveillance_operator.snapshot import Change, Snapshot
 from surveillance_runtime import parameter_checks
 from surveillance_runtime.files import FileError
 from surveillance_runtime.launch_protocol import NotNowError
 from surveillance_runtime.node import PatrolNode
+from surveillance_runtime.node_table import name_for
 from surveillance_runtime.parameters import parameter
 from surveillance_runtime.place.writing import copy_place
 from surveillance_runtime.place_editor import PlaceEditor
 from surveillance_runtime.process import run_node
 from surveillance_runtime.robot_base import robot_radius
+from surveillance_runtime.suggestions import nearest
 
 POLL_PERIOD = 0.015
 """Least seconds between two looks at the topics while somebody looks at the page."""
@@ -104,8 +109,9 @@ class MissionPage(PatrolNode):
         self._sightings = Sightings(self, evidence_folder)
         self._hub = Hub()
         files = self.declare_fields(PlaceSettings())
-        self._camera = Camera(self)
-        self._actions = MissionActions(self)
+        self._cameras: dict[str, Camera] = {'': Camera(self)}
+        self._feed = FleetFeed(self, self._period, self._on_news, self._hub.forget, streams=True)
+        self._actions = FleetActions(self, lambda: self._feed.robots)
         desk = self._desk(files) if control and files.place_file else None
         try:
             self.page = Page(
@@ -113,8 +119,10 @@ class MissionPage(PatrolNode):
                 questions=self._questions() | (desk.questions if desk else {}),
                 actions=(self._offered_actions() if control else {})
                 | (desk.actions if desk else {}),
-                picture=self._camera.jpeg,
-                evidence=lambda name, leaves: self._sightings.picture(name, blur=leaves),
+                picture=self._picture,
+                evidence=lambda name, robot, leaves: self._sightings.picture(
+                    name, robot, blur=leaves
+                ),
                 host=host,
                 port=port,
                 origin=origin,
@@ -123,10 +131,7 @@ class MissionPage(PatrolNode):
             )
         except OSError as error:
             raise NotNowError(str(error)) from error
-        self._feed = MissionFeed(
-            self, self._period, lambda new, _told: self._hub.show(new), streams=True
-        )
-        self._hub.show(self._feed.snapshot)
+        self._hub.show(self._feed.snapshot(''))
         self.page.start()
         self.get_logger().info(f'the mission is shown at {self.page.address}')
         self.spawn(self._tick, 'page')
@@ -139,10 +144,28 @@ class MissionPage(PatrolNode):
     def _period(self) -> float:
         return POLL_PERIOD if self._hub.viewers else IDLE_PERIOD
 
+    def _on_news(self, robot: str, new: Snapshot, _told: Sequence[Change]) -> None:
+        self._hub.show(new, robot)
+
+    def _picture(self, robot: str) -> bytes | None:
+        """Return the newest image of a robot's camera."""
+        camera = self._cameras.get(robot)
+        return None if camera is None else camera.jpeg()
+
     def _tick(self) -> None:
         while not self.stopping.wait(1.0):
-            self._hub.show(self._feed.see())
-            self._camera.rest()
+            for robot, snapshot in self._feed.see().items():
+                self._hub.show(snapshot, robot)
+                self._meet(robot)
+            for camera in self._cameras.values():
+                camera.rest()
+
+    def _meet(self, robot: str) -> None:
+        """Be ready for a robot: its services are found before a person wants them."""
+        if robot not in self._cameras:
+            self._actions.of(robot)
+            self._sightings.follow(robot)
+            self._cameras[robot] = Camera(self, robot)
 
     def _desk(self, files: PlaceSettings) -> PlaceDesk | None:
         """Let the place be edited; None, with a warning, where its file cannot be."""
@@ -152,7 +175,7 @@ class MissionPage(PatrolNode):
             try:
                 if copy:
                     copy_place(path, Path(copy))
-                return self._actions.set_place(editor.whole())
+                return self._actions.shared.set_place(editor.whole())
             except (ValueError, CallError) as error:
                 return f'but the running mission keeps the place that it has: {error}'
 
@@ -166,34 +189,50 @@ class MissionPage(PatrolNode):
     def _questions(self) -> dict[str, Action]:
         actions = self._actions
 
-        def why_not(place: str) -> Any:
-            text, premises = actions.why_not(place)
+        def why_not(place: str, robot: str = '') -> Any:
+            text, premises = actions.of(robot).why_not(place)
             return {'ok': True, 'text': text, 'premises': premises}
 
         return {
-            'facts': lambda place: {'ok': True, 'facts': actions.facts(place)},
-            'explain': lambda fact: {'ok': True, 'lines': actions.explain(fact)},
+            'facts': lambda place: {'ok': True, 'facts': actions.shared.facts(place)},
+            'explain': lambda fact: {'ok': True, 'lines': actions.shared.explain(fact)},
             'why_not': why_not,
             'sightings': self._sightings.listed,
         }
 
     def _offered_actions(self) -> dict[str, Action]:
-        actions = self._actions
+        shared = self._actions.shared
         return {
-            'door': actions.set_door,
-            'obstacle': actions.place_obstacle,
-            'remove_obstacle': actions.remove_obstacle,
-            'add_room': actions.add_room,
-            'remove_room': actions.remove_room,
-            'go': actions.go_to,
-            'arm': actions.move_arm,
-            'machine': actions.machine,
-            'stop': actions.stop,
-            'threshold': actions.set_threshold,
-            'policy': actions.set_policy,
-            'command': actions.command,
-            'event': actions.event,
+            'door': shared.set_door,
+            'obstacle': shared.place_obstacle,
+            'remove_obstacle': shared.remove_obstacle,
+            'add_room': shared.add_room,
+            'remove_room': shared.remove_room,
+            'go': self._of_robots(MissionActions.go_to),
+            'arm': self._of_robots(MissionActions.move_arm),
+            'machine': self._of_robots(MissionActions.machine),
+            'stop': self._of_robots(MissionActions.stop),
+            'threshold': self._of_robots(MissionActions.set_threshold),
+            'policy': self._of_robots(MissionActions.set_policy),
+            'command': self._of_robots(MissionActions.command),
+            'event': self._of_robots(MissionActions.event),
+            'fleet': self._tell_fleet,
         }
+
+    def _of_robots(self, do: Callable[..., str]) -> Action:
+        """Return an action that takes the name of a robot, or `ALL`, beside its own fields."""
+
+        def act(robot: str = '', **fields: Any) -> str:
+            inspect.signature(do).bind(None, **fields)
+            return self._actions.told(robot, lambda actions: do(actions, **fields))
+
+        return act
+
+    def _tell_fleet(self, word: str, robot: str) -> str:
+        """Have one robot or all do what a word says."""
+        if word not in WORDS:
+            raise ValueError(f'{word!r}: expected {nearest(word, WORDS)}')
+        return self._actions.told(robot, WORDS[word][1])
 
 
 def _kept_token(path: str) -> str:
@@ -216,10 +255,12 @@ class Camera:
 
     Args:
         node: The node that listens.
+        robot: The robot of a fleet; empty: that of the node's namespace.
     """
 
-    def __init__(self, node: PatrolNode) -> None:
+    def __init__(self, node: PatrolNode, robot: str = '') -> None:
         self._node = node
+        self._annotated, self._plain = name_for(robot, ANNOTATED), name_for(robot, PLAIN)
         self._lock = threading.Lock()
         self._subscriptions: dict[str, PolledSubscription] = {}
         self._asked = self._annotated_at = self._came_at = 0.0
@@ -230,14 +271,14 @@ class Camera:
         with self._lock:
             now = time.monotonic()
             if not self._subscriptions:
-                self._annotated_at = now if self._node.count_publishers(ANNOTATED) else 0.0
+                self._annotated_at = now if self._node.count_publishers(self._annotated) else 0.0
             self._asked = now
-            newest = self._newest(ANNOTATED)
+            newest = self._newest(self._annotated)
             if newest is not None:
                 self._annotated_at = now
-                self._leave(PLAIN)
+                self._leave(self._plain)
             elif now - self._annotated_at > PATIENCE:
-                newest = self._newest(PLAIN)
+                newest = self._newest(self._plain)
             if newest is not None:
                 self._jpeg, self._came_at = jpeg_from(newest), now
             return self._jpeg if now - self._came_at <= PATIENCE else None
@@ -246,8 +287,8 @@ class Camera:
         """Leave the topics when nobody has asked for a while; call it now and then."""
         with self._lock:
             if time.monotonic() - self._asked > IDLE_SECONDS:
-                self._leave(ANNOTATED)
-                self._leave(PLAIN)
+                self._leave(self._annotated)
+                self._leave(self._plain)
                 self._jpeg = None
 
     def _newest(self, topic: str) -> ImageMessage | None:

@@ -12,13 +12,14 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from surveillance_operator.page.hub import Hub
 from surveillance_operator.page.server import Action, Page
-from surveillance_operator.recording.runs import Recording, find_recording, run_parser
+from surveillance_operator.recording.runs import Recording, find_recordings, run_parser
 from surveillance_operator.recording.timeline import MARKS, Timeline
 from surveillance_runtime.command_line import EXIT_BAD_INPUT, page_address
 from surveillance_runtime.files import TIMELINE, FileError
@@ -37,30 +38,37 @@ MOST_LINES = 400
 """Lines that one step applies; where more have passed, it jumps."""
 
 
+@dataclass
+class Track:
+    """What is played of one robot.
+
+    Attributes:
+        line: What the page showed.
+        sights: What lidar and camera saw; None for nothing.
+        read: Returns which share of the recording is in the time line, 0 to 1.
+        number: Of the line that is shown.
+    """
+
+    line: Timeline
+    sights: RecordedSights | None = None
+    read: Callable[[], float] = lambda: 1.0
+    number: int = -1
+
+
 class Player:
     """Where a replay is, and how fast it goes.
 
     Args:
-        line: What is played.
+        tracks: What is played, by the robots' names; a robot that was alone has none.
         hub: Where it is shown.
-        sights: What lidar and camera saw; None for nothing.
-        read: Returns which share of the recording is in the time line, 0 to 1.
     """
 
-    def __init__(
-        self,
-        line: Timeline,
-        hub: Hub,
-        sights: RecordedSights | None = None,
-        read: Callable[[], float] = lambda: 1.0,
-    ) -> None:
-        self._line = line
+    def __init__(self, tracks: Mapping[str, Track], hub: Hub) -> None:
+        self._tracks = dict(tracks)
         self._hub = hub
-        self._sights = sights
-        self._read = read
         self._lock = threading.Lock()
-        self._time = line.times[0]
-        self._number = -1
+        self._begin = min(each.line.times[0] for each in self._tracks.values())
+        self._time = self._begin
         self._speed = 1.0
         self._playing = True
         self._ended = threading.Event()
@@ -77,8 +85,9 @@ class Player:
                     self._forward((now - before) * self._speed)
                 if grows and now >= next_look:
                     grows = self._read() < 1.0
-                    self._line.extend()
-                    self._tell({}, None)
+                    for each in self._tracks.values():
+                        each.line.extend()
+                    self._tell()
                 at = self._time
             if now >= next_look and at != seen_at:
                 seen_at = at
@@ -90,16 +99,26 @@ class Player:
     @property
     def length(self) -> float:
         """Seconds of the recording that can be shown."""
-        return self._line.times[-1] - self._line.times[0]
+        return self._end - self._begin
+
+    @property
+    def _end(self) -> float:
+        return max(each.line.times[-1] for each in self._tracks.values())
+
+    def _read(self) -> float:
+        return min(each.read() for each in self._tracks.values())
 
     def see(self) -> None:
-        """Show what the lidar saw at this moment of the recording."""
-        if self._sights is not None:
-            self._hub.show_parts({'scan': self._sights.scan(self._time)}, None, whole=False)
+        """Show what the lidars saw at this moment of the recording."""
+        for robot, track in self._tracks.items():
+            if track.sights is not None:
+                seen = {'scan': track.sights.scan(self._time)}
+                self._hub.show_parts(seen, None, whole=False, robot=robot)
 
-    def jpeg(self) -> bytes | None:
-        """Return what the camera saw at this moment of the recording."""
-        return None if self._sights is None else self._sights.jpeg(self._time)
+    def jpeg(self, robot: str) -> bytes | None:
+        """Return what a robot's camera saw at this moment of the recording."""
+        track = self._tracks.get(robot)
+        return None if track is None or track.sights is None else track.sights.jpeg(self._time)
 
     def stop(self) -> None:
         """End `run`."""
@@ -108,7 +127,7 @@ class Player:
     def seek(self, to: float) -> str:
         """Go to a moment, seconds from the recording's start."""
         with self._lock:
-            self._jump(self._line.times[0] + max(0.0, float(to)))
+            self._jump(self._begin + max(0.0, float(to)))
         return 'moved'
 
     def actions(self) -> dict[str, Action]:
@@ -127,57 +146,62 @@ class Player:
             raise ValueError(f'speed {speed:g}: expected {SPEEDS[0]} to {SPEEDS[1]:g}')
         with self._lock:
             self._speed = speed
-            self._tell({}, None)
+            self._tell()
         return f'speed {speed:g}'
 
     def _set_playing(self, playing: bool) -> str:
         with self._lock:
             self._playing = playing
-            self._tell({}, None)
+            self._tell()
         return 'playing' if playing else 'paused'
 
     def _jump_to_mark(self, kind: str) -> str:
         if kind not in MARKS:
             raise ValueError(f'{kind!r}: expected {nearest(kind, MARKS)}')
         with self._lock:
-            at = self._line.next_mark(kind, self._time)
+            marks = [each.line.next_mark(kind, self._time) for each in self._tracks.values()]
+            at = min((mark for mark in marks if mark is not None), default=None)
             if at is None:
                 raise ValueError(f'no {kind} after this moment')
             self._jump(at)
         return f'at the {kind}'
 
     def _jump(self, at: float) -> None:
-        last = self._line.times[-1]
-        self._time = min(at, last)
-        self._number, now, parts = self._line.at(self._time)
-        self._tell(parts, now, whole=True)
+        self._time = min(at, self._end)
+        for robot, track in self._tracks.items():
+            track.number, now, parts = track.line.at(self._time)
+            self._hub.show_parts(parts, now, whole=True, robot=robot)
+        self._tell()
 
     def _forward(self, seconds: float) -> None:
-        self._time = min(self._time + seconds, self._line.times[-1])
-        times, number = self._line.times, self._number
-        changed: dict[str, Any] = {}
-        now = None
-        while number + 1 < len(times) and times[number + 1] <= self._time:
-            number += 1
-            if number - self._number > MOST_LINES:
-                self._jump(self._time)
-                return
-            then, parts = self._line.line(number)
-            now = now if then is None else then
-            changed.update(parts)
-        self._number = number
-        self._tell(changed, now)
+        self._time = min(self._time + seconds, self._end)
+        for robot, track in self._tracks.items():
+            times, number = track.line.times, track.number
+            changed: dict[str, Any] = {}
+            now = None
+            while number + 1 < len(times) and times[number + 1] <= self._time:
+                number += 1
+                if number - track.number > MOST_LINES:
+                    self._jump(self._time)
+                    return
+                then, parts = track.line.line(number)
+                now = now if then is None else then
+                changed.update(parts)
+            track.number = number
+            self._hub.show_parts(changed, now, whole=False, robot=robot)
+        self._tell()
 
-    def _tell(self, parts: dict[str, Any], now: float | None, *, whole: bool = False) -> None:
+    def _tell(self) -> None:
         replay = {
-            'at': round(self._time - self._line.times[0], 1),
+            'at': round(self._time - self._begin, 1),
             'length': round(self.length, 1),
             'playing': self._playing,
             'speed': self._speed,
             'read': round(self._read(), 2),
             'time': round(self._time, 1),
         }
-        self._hub.show_parts({**parts, 'replay': replay}, now, whole=whole)
+        (robot, *_) = self._tracks
+        self._hub.show_parts({'replay': replay}, None, whole=False, robot=robot)
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -197,9 +221,9 @@ def main(argv: Sequence[str] | None = None) -> int:
         parser.error(str(error))
     with contextlib.ExitStack() as stack:
         try:
-            recording = find_recording(options.run, options.runs)
+            recordings = find_recordings(options.run, options.runs)
             hub = Hub()
-            player = open_player(recording, hub, stack)
+            player = open_player(recordings, hub, stack)
             page = Page(
                 hub,
                 questions={},
@@ -214,7 +238,8 @@ def main(argv: Sequence[str] | None = None) -> int:
             return EXIT_BAD_INPUT
         thread = threading.Thread(target=player.run, name='replay', daemon=True)
         thread.start()
-        print(f'{recording.name} is shown at {page.address} until Ctrl-C', flush=True)
+        shown = ', '.join(str(each.name) for each in recordings.values())
+        print(f'{shown} is shown at {page.address} until Ctrl-C', flush=True)
         try:
             page.run()
         except KeyboardInterrupt:
@@ -226,12 +251,18 @@ def main(argv: Sequence[str] | None = None) -> int:
     return 0
 
 
-def open_player(recording: Recording, hub: Hub, stack: contextlib.ExitStack) -> Player:
-    """Return a player of a recording; what it needs ends with the stack.
+def open_player(
+    recordings: Mapping[str, Recording], hub: Hub, stack: contextlib.ExitStack
+) -> Player:
+    """Return a player of the recordings of a run's robots; what it needs ends with the stack.
 
     Raises:
-        FileError: It cannot be read, or holds nothing of a mission.
+        FileError: One cannot be read, or holds nothing of a mission.
     """
+    return Player({robot: _track(each, stack) for robot, each in recordings.items()}, hub)
+
+
+def _track(recording: Recording, stack: contextlib.ExitStack) -> Track:
     path, read = recording.timeline, lambda: 1.0
     if not recording.is_whole:
         assert recording.messages is not None  # one of the two was found
@@ -246,7 +277,7 @@ def open_player(recording: Recording, hub: Hub, stack: contextlib.ExitStack) -> 
         read = conversion.share
     line = Timeline(path, lambda problem: print(f'replay: {problem}', file=sys.stderr))
     stack.callback(line.close)
-    return Player(line, hub, _sights(recording, stack), read)
+    return Track(line, _sights(recording, stack), read)
 
 
 def _sights(recording: Recording, stack: contextlib.ExitStack) -> RecordedSights | None:

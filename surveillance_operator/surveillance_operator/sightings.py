@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import threading
-from functools import lru_cache
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +12,7 @@ from std_msgs.msg import String
 
 from state_machines.files import parse_json
 from surveillance_runtime.node import PatrolNode
+from surveillance_runtime.node_table import name_for
 from surveillance_runtime.state_topics import StateSubscription
 
 MOST_BYTES = 4_000_000
@@ -32,14 +33,18 @@ class Sightings:
         self._node = node
         self._folder = Path(folder) if folder else None
         self._lock = threading.Lock()
-        self._events: list[dict[str, Any]] = []
-        self._heard = False
-        StateSubscription(node, String, 'events', self._on_events)
+        self._events: dict[str, list[dict[str, Any]]] = {}
+        self.follow('')
 
-    def listed(self) -> dict[str, Any]:
-        """Return all events, the newest first, and how many were false alarms."""
+    def follow(self, robot: str) -> None:
+        """Hear a robot of a fleet, too; a robot that is alone has no name."""
+        topic = name_for(robot, 'events')
+        StateSubscription(self._node, String, topic, partial(self._on_events, robot))
+
+    def listed(self, robot: str = '') -> dict[str, Any]:
+        """Return all events of a robot, the newest first, and how many were false alarms."""
         with self._lock:
-            events, heard = self._events, self._heard
+            events, heard = self._events.get(robot, []), robot in self._events
         told = [each for each in events if each.get('severity', 0) >= 3]
         false = sum(each.get('state') == 'false alarm' for each in told)
         answered = sum(each.get('state') in _ANSWERED for each in told)
@@ -52,21 +57,25 @@ class Sightings:
             'false': false,
         }
 
-    def picture(self, name: str, *, blur: bool) -> bytes | None:
+    def picture(self, name: str, robot: str, *, blur: bool) -> bytes | None:
         """Return one of the observer's pictures as JPEG; None where there is none of that name.
 
         Args:
             name: As an event has it.
+            robot: Whose event it is.
             blur: Whether it leaves this machine: then people in it are blurred.
         """
-        if self._folder is None or not _PICTURE.match(name):
+        is_known = not robot or robot in self._events
+        if self._folder is None or not is_known or not _PICTURE.match(name):
             return None
+        # Each robot of a fleet has a folder of its own in that of the run.
+        folder = self._folder.parent / robot / self._folder.name
         try:
-            return _shown(self._folder / name, blur=blur)
+            return _shown(folder / name, blur=blur)
         except OSError:
             return None
 
-    def _on_events(self, message: String) -> None:
+    def _on_events(self, robot: str, message: String) -> None:
         try:
             if len(message.data) > MOST_BYTES:
                 raise ValueError(f'more than {MOST_BYTES} bytes')
@@ -77,7 +86,7 @@ class Sightings:
             self._node.get_logger().warn(f'events: {error}', throttle_duration_sec=60.0)
             return
         with self._lock:
-            self._events, self._heard = events, True
+            self._events[robot] = events
 
 
 def _is_event(value: Any) -> bool:

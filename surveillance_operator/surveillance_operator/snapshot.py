@@ -10,7 +10,7 @@ import math
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,8 +28,8 @@ BATTERY_STEP = 10
 KEPT_EVENTS = 50
 WAITS_FOR_HELP = 'the robot waits for help'
 STOPPED = 'the robot is stopped'
-STALE = 3
-"""The level of health of what no longer reports."""
+ERROR, STALE = 2, 3
+"""Levels of health: of what does not work, and of what no longer reports."""
 HISTORY_SECONDS = 3600.0
 MOST_HISTORY = 5000
 """How far back histories go, seconds of the mission's time, and their most entries."""
@@ -135,11 +135,50 @@ class Change:
         text: In short.
         detail: What a log says, too.
         routine: Whether the views show it anyway.
+        shared: Whether it is of the place, so that whoever watches another robot sees it, too.
     """
 
     text: str
     detail: str = ''
     routine: bool = False
+    shared: bool = False
+
+
+class Event(NamedTuple):
+    """One of the latest changes.
+
+    Attributes:
+        at: When, seconds since 1970.
+        text: What.
+        shared: As of a `Change`.
+    """
+
+    at: float
+    text: str
+    shared: bool = False
+
+
+@dataclass(frozen=True)
+class Share:
+    """What a robot of a fleet tells the others; see FleetRobot.msg.
+
+    Attributes:
+        tour: The places that are its own, in the order of their tour; it may share them.
+        stop: The one that it is to visit next.
+        dock: Where it charges, or drives to in order to charge.
+        heading_to: Where it wants to go next.
+        is_moving: Whether it is on its way there; else it waits for its turn.
+        runs_until: When its battery reaches its reserve, mission time in seconds; None: unknown.
+        taken_out: Whether a person took it out of the patrol.
+    """
+
+    tour: tuple[str, ...] = ()
+    stop: str = ''
+    dock: str = ''
+    heading_to: str = ''
+    is_moving: bool = False
+    runs_until: float | None = None
+    taken_out: bool = False
 
 
 @dataclass(frozen=True)
@@ -192,7 +231,8 @@ class Snapshot:
         requests: What each controller in MANUAL mode announced last.
         health: What the nodes report, by name.
         silent: Why nothing comes on a topic, where that is known.
-        events: The latest changes with their times, seconds since 1970; routine ones left out.
+        share: What it tells the other robots of a fleet; None: there are none.
+        events: The latest changes; routine ones left out.
         history: What happened in the last hour.
     """
 
@@ -242,7 +282,8 @@ class Snapshot:
     requests: Mapping[str, str] = field(default_factory=dict)
     health: Mapping[str, Health] = field(default_factory=dict)
     silent: Mapping[str, str] = field(default_factory=dict)
-    events: tuple[tuple[float, str], ...] = ()
+    share: Share | None = None
+    events: tuple[Event, ...] = ()
     history: History = History()
 
 
@@ -254,7 +295,7 @@ def follow(old: Snapshot, new: Snapshot, at: float) -> tuple[Snapshot, list[Chan
         at: The later one, seconds since 1970.
     """
     told = list(changes(old, new))
-    events = [(at, each.text) for each in told if not each.routine]
+    events = [Event(at, each.text, each.shared) for each in told if not each.routine]
     more: dict[str, object] = {}
     if events:
         more['events'] = (*new.events, *events)[-KEPT_EVENTS:]
@@ -282,7 +323,8 @@ def changes(old: Snapshot, new: Snapshot) -> Iterator[Change]:
     if new.status is not None and new.status != old.status:
         yield from _status_changes(old.status, new.status)
     if new.decision is not None and (new.decision, new.number) != (old.decision, old.number):
-        yield Change(_decision_line(new), detail=new.decision.reason)
+        again = old.decision is not None and _waits(new.decision) and _waits(old.decision)
+        yield Change(_decision_line(new), detail=new.decision.reason, routine=again)
     if new.battery is not None:
         before = None if old.battery is None else math.ceil(old.battery / BATTERY_STEP)
         if before != math.ceil(new.battery / BATTERY_STEP):
@@ -296,9 +338,10 @@ def changes(old: Snapshot, new: Snapshot) -> Iterator[Change]:
     doors, before_doors = new.doors or {}, old.doors or {}
     for door, is_open in doors.items():
         if is_open != before_doors.get(door, True):
-            yield Change(f'door {door} {"opened" if is_open else "closed"}')
+            yield Change(f'door {door} {"opened" if is_open else "closed"}', shared=True)
     if old.urgent != new.urgent:
-        yield from (Change(f'{place} is URGENT') for place in sorted(new.urgent - old.urgent))
+        for place in sorted(new.urgent - old.urgent):
+            yield Change(f'{place} is URGENT', shared=True)
     if new.obstacles is not None and new.obstacles is not old.obstacles:
         had, has = old.obstacles is not None and len(old.obstacles), len(new.obstacles)
         if has and not had:
@@ -310,10 +353,86 @@ def changes(old: Snapshot, new: Snapshot) -> Iterator[Change]:
         yield Change(STOPPED if new.stopped else 'the robot is released')
     if old.paused != new.paused:
         yield Change('the state machine is paused' if new.paused else 'the state machine continues')
+    if is_out(new) != is_out(old):
+        yield Change('taken out of the patrol' if is_out(new) else 'put back into the patrol')
     for each in new.waiting:
         if each not in old.waiting:
             yield Change(f'approval is waited for: {each}')
     yield from _node_changes(old, new)
+
+
+def _waits(decision: Decision) -> bool:
+    """Tell whether the robot stays where it is until another one has made way."""
+    return decision.place == decision.from_place
+
+
+def is_out(snapshot: Snapshot) -> bool:
+    """Tell whether a person took the robot out of its fleet's patrol."""
+    return snapshot.share is not None and snapshot.share.taken_out
+
+
+def doing(snapshot: Snapshot) -> str:
+    """Return in a few words what the robot is about."""
+    status, share = snapshot.status, snapshot.share
+    if status is None:
+        return 'begins' if snapshot.nodes else 'not heard yet'
+    if not snapshot.nodes:
+        return 'not heard any more'
+    if snapshot.stopped:
+        return 'stopped'
+    if status.waiting_for_help:
+        return 'waits for help'
+    if snapshot.paused:
+        return 'paused'
+    if is_out(snapshot):
+        return 'taken out of the patrol'
+    if share is not None and share.dock and share.dock == status.place:
+        return f'charging at {share.dock}'
+    if share is not None and share.heading_to:
+        kind = 'on its way to' if share.is_moving else 'waits to go to'
+        to_charge = f' to charge at {share.dock}' if share.dock else ''
+        return f'{kind} {share.heading_to}{to_charge}'
+    if status.heading_to not in ('', status.place):
+        return f'on its way to {status.heading_to}'
+    return (status.state or 'begins').lower().replace('_', ' ')
+
+
+def shares(snapshot: Snapshot) -> str:
+    """Return which places of a fleet's patrol are the robot's; empty: it is in no fleet."""
+    share = snapshot.share
+    if share is None:
+        return ''
+    if not share.tour:
+        return 'no share'
+    return f'shares {", ".join(share.tour)}, next {share.stop}'
+
+
+def troubles(snapshot: Snapshot) -> list[str]:
+    """Return what a person should look at, in words, the most important first."""
+    found = []
+    status = snapshot.status
+    if snapshot.stopped:
+        found.append('stopped until a person releases it')
+    if status is not None and status.waiting_for_help:
+        found.append(f'waits for help: {status.text}')
+    if status is not None and not snapshot.nodes:
+        return [*found, 'none of its programs is heard']
+    if snapshot.ended:
+        found.append(f'ended: {", ".join(sorted(snapshot.ended))}')
+    start = f'{snapshot.namespace}/' if snapshot.namespace else ''
+    silent = []
+    for name, each in sorted(snapshot.health.items()):
+        own = name.removeprefix(start)
+        is_own = name.startswith(start) and '/' not in own
+        if not is_own or each.level < ERROR or own.partition(':')[0] in snapshot.ended:
+            continue
+        if each.level == STALE:
+            silent.append(own)
+        else:
+            found.append(f'{own}: {each.message}')
+    if silent:
+        found.append(f'silent: {", ".join(silent)}')
+    return found
 
 
 def _decision_line(snapshot: Snapshot) -> str:

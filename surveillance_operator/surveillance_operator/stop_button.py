@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from std_srvs.srv import SetBool, Trigger
 
-from state_machines.exceptions import UnavailableError
+from state_machines.exceptions import CallError, UnavailableError
 from state_machines.ros import ServiceCaller
 from surveillance_runtime.node import PatrolNode
+from surveillance_runtime.node_table import name_for
 from surveillance_runtime.run_parameters import BEHAVIOUR_NODE
 
 TIMEOUT = 2.0
@@ -20,13 +21,15 @@ class StopButton:
 
     Args:
         node: The node that calls; an executor must spin it.
+        robot: The robot of a fleet; empty: that of the node's namespace.
     """
 
-    def __init__(self, node: PatrolNode) -> None:
-        self._stop = ServiceCaller(node, SetBool, 'stop')
+    def __init__(self, node: PatrolNode, robot: str = '') -> None:
+        machine = name_for(robot, f'{BEHAVIOUR_NODE}/fsm')
+        self._stop = ServiceCaller(node, SetBool, name_for(robot, 'stop'))
         self._machine = {
-            True: ServiceCaller(node, Trigger, f'{BEHAVIOUR_NODE}/fsm/pause'),
-            False: ServiceCaller(node, Trigger, f'{BEHAVIOUR_NODE}/fsm/resume'),
+            True: ServiceCaller(node, Trigger, f'{machine}/pause'),
+            False: ServiceCaller(node, Trigger, f'{machine}/resume'),
         }
 
     def press(self, stop: bool) -> str:
@@ -40,6 +43,8 @@ class StopButton:
         """
         try:
             answer = self._stop.call(SetBool.Request(data=stop), TIMEOUT, discovery=DISCOVERY)
+            if not answer.success:
+                raise CallError(answer.message or 'refused')
             return str(answer.message)
         except UnavailableError:
             self._machine[stop].call(Trigger.Request(), TIMEOUT, discovery=DISCOVERY)

@@ -26,10 +26,12 @@ from std_msgs.msg import Bool, String, UInt8
 
 from armor_service.facts import ShortFact, parse_fact
 from surveillance_behaviour.conversions import decision_from, promises_from
+from surveillance_behaviour.ros_adapters.fleet_topic import FLEET_TOPIC
 from surveillance_interfaces.action import Control, FollowPath, ScanSurroundings
 from surveillance_interfaces.msg import (
     Decision,
     DoorStates,
+    FleetRobot,
     FsmStatus,
     FsmStructure,
     FsmTransition,
@@ -44,11 +46,13 @@ from surveillance_operator.snapshot import (
     Container,
     Health,
     Pose,
+    Share,
     Snapshot,
     Status,
     Transition,
 )
 from surveillance_runtime.conversions import map_from, points_from_cloud, pose_from, seconds_of
+from surveillance_runtime.node_table import BY_NAME
 from surveillance_runtime.qos import STATE_QOS
 from surveillance_runtime.robot_arm import ARM
 
@@ -222,14 +226,39 @@ def _on_detections(message: MarkerDetectionArray, old: Snapshot) -> Fields:
 
 
 def _on_diagnostics(message: DiagnosticArray, old: Snapshot) -> Fields:
-    health = {**old.health, **health_from(message)}
+    came = health_from(message)
+    health = {
+        **old.health,
+        **{name: came[name] for name in came if not _is_of_another(name, old.namespace)},
+    }
     if len(health) > MOST_NAMES:
         raise ValueError(f'{len(health)} parts report: expected at most {MOST_NAMES}')
     return {'health': health}
 
 
-def _on_parameters(message: ParameterEvent, _old: Snapshot) -> Fields:
-    if message.node.rsplit('/', 1)[-1] != BEHAVIOUR:
+def _is_of_another(status: str, namespace: str) -> bool:
+    """Tell whether a node of another robot says it: one that is neither ours nor shared."""
+    where, _, node = status.partition(':')[0].rpartition('/')
+    return node in BY_NAME and not f'{namespace}/'.startswith(f'{where}/' if where else '')
+
+
+def _on_fleet_robot(message: FleetRobot, old: Snapshot) -> Fields:
+    if message.robot != old.namespace.rpartition('/')[2]:
+        return {}
+    share = Share(
+        _names(message.tour, 'places'),
+        message.stop,
+        message.dock,
+        message.heading_to,
+        message.is_moving,
+        message.runs_until if math.isfinite(message.runs_until) else None,
+        message.taken_out,
+    )
+    return {} if share == old.share else {'share': share}
+
+
+def _on_parameters(message: ParameterEvent, old: Snapshot) -> Fields:
+    if message.node.strip('/') != '/'.join(filter(None, (old.namespace, BEHAVIOUR))):
         return {}
     changed = (*message.new_parameters, *message.changed_parameters)
     return behaviour_fields({each.name: each.value for each in changed})
@@ -472,6 +501,7 @@ TOPICS: tuple[Topic, ...] = (
     Topic(f'{FSM}/status', FsmStatus, _on_machine),
     Topic(f'{FSM}/transition', FsmTransition, _on_transition, _QUEUE),
     *(Topic(f'{name}/announcement', String, _on_request(name)) for name in CONTROLLERS),
+    Topic(FLEET_TOPIC, FleetRobot, _on_fleet_robot, _MANY),
     Topic('/diagnostics', DiagnosticArray, _on_diagnostics, _MANY, period=1.0),
     Topic('/parameter_events', ParameterEvent, _on_parameters, _MANY),
 )

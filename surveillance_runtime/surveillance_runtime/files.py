@@ -16,8 +16,9 @@ from surveillance_runtime.suggestions import like
 
 RECORD, PLACE = 'mission.jsonl', 'place.yaml'
 INCIDENTS, TRUTH = 'incidents.jsonl', 'truth.jsonl'
-RECORDING, TIMELINE = 'recording', 'timeline.jsonl'
-"""In the folder of a run: the mission's record, the place, the recording and its time line."""
+RECORDING, TIMELINE, LAUNCH_LOG = 'recording', 'timeline.jsonl', 'launch.log'
+"""In the folder of a run: the mission's record, the place, the recording, its time line, the log of
+all programs."""
 
 
 class FileError(ValueError):

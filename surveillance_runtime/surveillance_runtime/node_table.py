@@ -130,13 +130,13 @@ _SHARED_NAMES = (
         f'ontology_map/{name}'
         for name in (
             *('reference_name', 'built', 'room_position'),
-            *('add_room', 'remove_room', 'set_door'),
+            *('add_room', 'remove_room', 'set_door', 'set_place'),
         )
     ),
-    *('map', 'door_states', 'fleet_robots'),
+    *('map', 'door_states', 'place', 'fleet_robots'),
     *(
         f'simulation/{name}'
-        for name in ('set_door', 'place_obstacle', 'remove_obstacle', 'set_marker')
+        for name in ('set_door', 'place_obstacle', 'remove_obstacle', 'set_marker', 'stage')
     ),
 )
 
@@ -149,6 +149,16 @@ def shared_names(namespace: str | None) -> list[tuple[str, str]]:
     """
     prefix = '/' + (namespace or '').strip('/')
     return [(name, f'{prefix.rstrip("/")}/{name}') for name in _SHARED_NAMES]
+
+
+def name_for(robot: str, name: str) -> str:
+    """Return how a topic or service of a robot is called, seen from the shared namespace.
+
+    Args:
+        robot: Its name in the fleet; empty: the one robot of that namespace.
+        name: As the robot's own nodes call it.
+    """
+    return name if not robot or name[0] == '/' or name in _SHARED_NAMES else f'{robot}/{name}'
 
 
 def find(name: str) -> Node:

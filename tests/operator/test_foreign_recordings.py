@@ -28,7 +28,7 @@ from surveillance_interfaces.msg import Decision, FactChange, FactChanges, Missi
 from surveillance_interfaces.msg import Fact as FactMessage
 from surveillance_operator.mission_markers_node import markers_of
 from surveillance_operator.recording.reading import Messages
-from surveillance_operator.recording.runs import find_recording
+from surveillance_operator.recording.runs import find_recordings
 from surveillance_operator.recording.schemas import definition
 from surveillance_operator.recording.stored import Conversion, RecordedSights, prefix_of
 from surveillance_operator.recording.timeline import Timeline
@@ -150,10 +150,10 @@ def test_what_lidar_and_camera_saw_is_found(bag: Path) -> None:
 def test_a_bag_and_its_file_are_found_by_name(bag: Path, tmp_path: Path) -> None:
     (file,) = bag.glob('*.mcap')
     for name in (bag, file):
-        found = find_recording(str(name), tmp_path)
+        found = find_recordings(str(name), tmp_path)['']
         assert (found.is_whole, found.messages) == (False, name)
     with pytest.raises(FileError, match='expected'):
-        find_recording(str(tmp_path / 'nothing.mcap'), tmp_path)
+        find_recordings(str(tmp_path / 'nothing.mcap'), tmp_path)['']
 
 
 def test_messages_before_a_moment_come_newest_first(bag: Path) -> None:
@@ -250,17 +250,17 @@ def test_no_damaged_byte_ends_the_reader(tmp_path: Path) -> None:
 def test_the_time_line_is_kept_for_the_next_time(bag: Path, tmp_path: Path) -> None:
     recording = tmp_path / 'rosbag2'
     shutil.copytree(bag, recording)
-    first = find_recording(str(recording), tmp_path)
+    first = find_recordings(str(recording), tmp_path)['']
     assert not first.is_whole
     conversion = Conversion(recording, tmp_path / 'made.jsonl', keep=first.timeline)
     conversion.start()
     conversion._thread.join(60)
-    again = find_recording(str(recording), tmp_path)
+    again = find_recordings(str(recording), tmp_path)['']
     assert again.is_whole
     assert Timeline(again.timeline).at(START + 12.9)[2]['status']['state'] == 'S12'
     (file,) = recording.glob('*.mcap')
     os.utime(file, (time.time() + 10, time.time() + 10))  # it was written on
-    assert not find_recording(str(recording), tmp_path).is_whole
+    assert not find_recordings(str(recording), tmp_path)[''].is_whole
 
 
 def test_a_recording_of_something_else_is_refused(tmp_path: Path) -> None:

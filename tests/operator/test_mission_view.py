@@ -15,7 +15,7 @@ from rich.console import Console
 
 from patrol_policy.world import Decision
 from state_machines import Interrupt
-from surveillance_operator.snapshot import Health, Snapshot, Status, changes
+from surveillance_operator.snapshot import Event, Health, Snapshot, Status, changes
 from surveillance_operator.watch import raster
 from surveillance_operator.watch.raster import Frame, rasterise
 from surveillance_operator.watch.view import MissionView, node_page, show_once
@@ -54,7 +54,7 @@ def whole() -> Snapshot:
         pose=(1.0, 3.0, math.pi / 2),
         trail=np.array([(0.0, 3.0), (1.0, 3.0)]),
         obstacles=np.array([(2.0, 3.5)]),
-        events=((time.mktime((2026, 1, 1, 12, 0, 0, 0, 0, -1)), 'arrived in A'),),
+        events=(Event(time.mktime((2026, 1, 1, 12, 0, 0, 0, 0, -1)), 'arrived in A'),),
     )
 
 

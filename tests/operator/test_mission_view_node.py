@@ -117,7 +117,7 @@ def test_it_gathers_what_topics_ontology_and_parameters_tell(graph: Any) -> None
     assert seen.pose == (1.5, 0.0, 0.0)
     assert seen.trail.tolist() == [[1.5, 0.0]]
     assert seen.visited_at == {'A': 0.0, 'B': 0.0}  # never yet
-    assert 'door D closed' in [text for _, text in seen.events]
+    assert 'door D closed' in [each.text for each in seen.events]
 
     graph.remove(planner)
     graph.until(lambda: view.snapshot.ended == {'planner_controller'})
@@ -175,7 +175,7 @@ def test_the_next_mission_begins_with_an_empty_picture(graph: Any) -> None:
     assert view.snapshot.battery is None
     assert view.snapshot.history.battery == ()
     assert view.see().now > 1e9
-    assert any('waiting for the next mission' in text for _, text in view.snapshot.events)
+    assert any('waiting for the next mission' in each.text for each in view.snapshot.events)
 
 
 def test_that_the_observers_of_an_ended_mission_are_gone_is_no_fault(

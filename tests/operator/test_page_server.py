@@ -201,7 +201,8 @@ def test_a_viewer_gets_everything_and_then_what_changed(page: Page) -> None:
     assert first['p']['battery'] == {'level': 50.0, 'low': False}  # type: ignore[index]
     page._hub.show(Snapshot(battery=49.0, now=2.0))
     second = event()
-    assert second == {'now': 2.0, 'whole': 0, 'p': {'battery': {'level': 49.0, 'low': False}}}
+    battery = {'battery': {'level': 49.0, 'low': False}}
+    assert second == {'now': 2.0, 'whole': 0, 'robot': '', 'p': battery, 'r': {}}
     connection.close()
 
 
@@ -211,10 +212,10 @@ def test_an_address_that_is_taken_is_one_line(page: Page) -> None:
 
 
 def test_pictures_are_for_whoever_may_look_and_beyond_this_machine_blurred() -> None:
-    asked: list[tuple[str, bool]] = []
+    asked: list[tuple[str, str, bool]] = []
 
-    def picture(name: str, leaves: bool) -> bytes | None:
-        asked.append((name, leaves))
+    def picture(name: str, robot: str, leaves: bool) -> bytes | None:
+        asked.append((name, robot, leaves))
         return b'jpeg' if name == 'a.jpg' else None
 
     here = Page(Hub(), questions={}, actions={}, evidence=picture, port=0)
@@ -223,10 +224,10 @@ def test_pictures_are_for_whoever_may_look_and_beyond_this_machine_blurred() -> 
         each.start()
     try:
         assert ask(here, 'GET', '/evidence/a.jpg') == (200, 'jpeg')
-        assert ask(here, 'GET', '/evidence/b.jpg')[0] == 404
+        assert ask(here, 'GET', '/evidence/b.jpg?robot=anna')[0] == 404
         assert ask(away, 'GET', '/evidence/a.jpg')[0] == 403
         assert ask(away, 'GET', f'/evidence/a.jpg?token={away.token}') == (200, 'jpeg')
     finally:
         for each in (here, away):
             each.stop()
-    assert asked == [('a.jpg', False), ('b.jpg', False), ('a.jpg', True)]
+    assert asked == [('a.jpg', '', False), ('b.jpg', 'anna', False), ('a.jpg', '', True)]

@@ -14,6 +14,7 @@ from surveillance_operator.page.hub import Hub
 from surveillance_operator.page.server import Page
 from surveillance_operator.snapshot import (
     Container,
+    Event,
     Health,
     History,
     Snapshot,
@@ -71,7 +72,7 @@ def mission(names: tuple[str, ...]) -> Snapshot:
         markers={11: (0.5, 0.5)},
         health={name: Health(2, first, (('memory_mb', '5'),)) for name in names},
         silent={first: last},
-        events=((1e9, first),),
+        events=(Event(1e9, first),),
         history=History(((4900.0, last),), ((4000.0, 60.0),), ((4950.0, 'failure', first),)),
     )  # fmt: skip
 

@@ -24,7 +24,7 @@ from surveillance_operator.page.server import Page
 from surveillance_operator.recording import timeline
 from surveillance_operator.recording.runs import find_run
 from surveillance_operator.recording.timeline import Timeline
-from surveillance_operator.replay import Player
+from surveillance_operator.replay import Player, Track
 from surveillance_operator.report import draw_picture, write_report
 from surveillance_runtime.files import FileError
 from surveillance_runtime.place import read_place_file
@@ -60,7 +60,7 @@ def run(tmp_path: Path) -> Path:
 @pytest.fixture
 def page(run: Path) -> Iterator[Page]:
     hub = Hub()
-    player = Player(Timeline(run / 'timeline.jsonl'), hub)
+    player = Player({'': Track(Timeline(run / 'timeline.jsonl'))}, hub)
     page = Page(hub, questions={}, actions=player.actions(), port=0, replay=True)
     page.player = player  # type: ignore[attr-defined]
     page.start()

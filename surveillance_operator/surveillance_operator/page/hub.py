@@ -2,6 +2,9 @@
 
 Of each part only the newest value is kept, as text that is made once for all viewers. A viewer that
 comes gets everything; later what changed since it was served last. Nothing is queued.
+
+A viewer looks at one robot: it gets all parts of that one, and of each other robot of the fleet
+those of `GLANCE`. A robot that is alone has no name; in a fleet, that is what all robots share.
 """
 
 from __future__ import annotations
@@ -10,29 +13,44 @@ import asyncio
 import json
 import threading
 from collections.abc import AsyncIterator
+from typing import Any
 
-from surveillance_operator.frames import PARTS, Framer, Parts, lengthen
+from surveillance_operator.frames import GLANCE, PARTS, Framer, Parts, lengthen, merged_events
 from surveillance_operator.snapshot import Snapshot
 
 LEAST_PERIOD = 0.015
 """Seconds between two messages to one viewer."""
 HEARTBEAT = 2.0
 """Seconds after which a viewer is told the time at least."""
+OF_ALL = frozenset({'events', 'replay'})
+"""Parts that are not of one robot."""
+
+Texts = dict[str, tuple[int, str]]
+"""By the name of a part: the version that it came with, and the part as JSON."""
+
+
+class _Robot:
+    """What viewers are shown of one robot."""
+
+    def __init__(self) -> None:
+        self.framer = Framer()
+        self.snapshot: Snapshot | None = None
+        self.now = 0.0
+        self.texts: Texts = {}
+        self.trail: list[list[float]] = []
+        self.events: list[Any] = []
 
 
 class Hub:
     """The newest parts, for all viewers."""
 
     def __init__(self) -> None:
-        self._framer = Framer()
         self._lock = threading.Lock()
         self._loop: asyncio.AbstractEventLoop | None = None
-        self._waiting: set[asyncio.Event] = set()
-        self._texts: dict[str, tuple[int, str]] = {}
+        self._waiting: dict[asyncio.Event, str] = {}
+        self._robots: dict[str, _Robot] = {}
+        self._of_all: Texts = {}
         self._version = 0
-        self._trail: list[list[float]] = []
-        self._snapshot: Snapshot | None = None
-        self._now = 0.0
         self.closed = False
 
     @property
@@ -40,26 +58,38 @@ class Hub:
         """How many there are."""
         return len(self._waiting)
 
-    def show(self, snapshot: Snapshot) -> None:
-        """Take a new snapshot; from any thread."""
+    def show(self, snapshot: Snapshot, robot: str = '') -> None:
+        """Take a new snapshot of a robot; from any thread."""
         with self._lock:
-            self._snapshot, self._now = snapshot, snapshot.now
+            shown = self._robots.setdefault(robot, _Robot())
+            shown.snapshot, shown.now = snapshot, snapshot.now
             if not self._waiting:
                 return  # Nobody looks: what is new is computed when somebody does.
-            self._accept(self._framer.patch(snapshot))
+            self._bring(robot)
         self._rouse()
 
-    def show_parts(self, parts: Parts, now: float | None, *, whole: bool) -> None:
+    def show_parts(self, parts: Parts, now: float | None, *, whole: bool, robot: str = '') -> None:
         """Take parts that are known already, as a replay does; from any thread.
 
         Args:
             parts: What changed, or everything.
             now: The mission's time; None for no other than before.
             whole: Whether it is everything: what is not in it is not known.
+            robot: Whose they are.
         """
         with self._lock:
-            self._now = self._now if now is None else now
-            self._accept({**dict.fromkeys(PARTS), 'trail': [], **parts} if whole else parts)
+            shown = self._robots.setdefault(robot, _Robot())
+            shown.now = shown.now if now is None else now
+            everything = {**dict.fromkeys(PARTS), 'trail': [], **parts}
+            self._accept(robot, everything if whole else parts)
+        self._rouse()
+
+    def forget(self, robot: str) -> None:
+        """Show a robot no longer; from any thread."""
+        with self._lock:
+            if self._robots.pop(robot, None) is not None:
+                self._version += 1
+                self._merge()
         self._rouse()
 
     def close(self) -> None:
@@ -67,28 +97,35 @@ class Hub:
         self.closed = True
         self._rouse()
 
-    async def stream(self) -> AsyncIterator[str]:
-        """Yield what a new viewer is to see, as server-sent events."""
+    async def stream(self, robot: str | None = None) -> AsyncIterator[str]:
+        """Yield what a new viewer is to see, as server-sent events.
+
+        Args:
+            robot: The one that it looks at; None, or where there is none of that name: the first.
+        """
         self._loop = asyncio.get_running_loop()
         changed = asyncio.Event()
         with self._lock:
-            self._waiting.add(changed)
-            if self._snapshot is not None:
-                patch = self._framer.patch(self._snapshot)
-                self._accept({**patch, 'trail': self._framer.whole()['trail']})
+            self._waiting[changed] = self._chosen(robot)
+            for name in self._robots:
+                self._bring(name, anew=True)
         try:
-            seen = -1
+            seen, chosen, names = -1, '', set[str]()
             yield 'retry: 1000\n\n'
             while not self.closed:
                 changed.clear()
                 with self._lock:
-                    first = seen < 0
-                    parts = {name: text for name, (at, text) in self._texts.items() if at > seen}
-                    seen, now = self._version, self._now
-                    if first:
-                        parts['trail'] = json.dumps(self._trail)
-                body = ','.join(f'"{name}":{text}' for name, text in parts.items())
-                yield f'data: {{"now":{now:.2f},"whole":{int(first)},"p":{{{body}}}}}\n\n'
+                    now_chosen, now_names = self._chosen(robot), set(self._robots)
+                    # Another robot, or one fewer: what is not told again is not known.
+                    if now_chosen != chosen or names - now_names:
+                        seen = -1
+                    chosen, names = now_chosen, now_names
+                    if seen < 0:
+                        self._waiting[changed] = chosen
+                        self._bring(chosen, anew=True)
+                    message = self._message(chosen, seen)
+                    seen = self._version
+                yield f'data: {message}\n\n'
                 await asyncio.sleep(LEAST_PERIOD)
                 try:
                     await asyncio.wait_for(changed.wait(), HEARTBEAT)
@@ -96,19 +133,72 @@ class Hub:
                     continue
         finally:
             with self._lock:
-                self._waiting.discard(changed)
+                self._waiting.pop(changed, None)
 
-    def _accept(self, parts: Parts) -> None:
+    def _chosen(self, asked: str | None) -> str:
+        """Return the robot that a viewer sees; what all share only when it is asked for."""
+        if asked is not None and asked in self._robots:
+            return asked
+        return min(self._robots, key=lambda name: (not name, name), default='')
+
+    def _message(self, chosen: str, seen: int) -> str:
+        """Return what a viewer is told that knows the versions up to one."""
+        robot = self._robots.get(chosen, _Robot())
+        parts = {name: text for name, (at, text) in robot.texts.items() if at > seen}
+        if seen < 0:
+            parts['trail'] = json.dumps(robot.trail)
+        parts |= {name: text for name, (at, text) in self._of_all.items() if at > seen}
+        others = {
+            name: glance
+            for name, other in sorted(self._robots.items())
+            if name != chosen
+            and (
+                glance := {
+                    part: text
+                    for part, (at, text) in other.texts.items()
+                    if at > seen and part in GLANCE
+                }
+            )
+        }
+        body = ','.join(f'{json.dumps(name)}:{_object(each)}' for name, each in others.items())
+        return (
+            f'{{"now":{robot.now:.2f},"whole":{int(seen < 0)},"robot":{json.dumps(chosen)},'
+            f'"p":{_object(parts)},"r":{{{body}}}}}'
+        )
+
+    def _bring(self, name: str, *, anew: bool = False) -> None:
+        """Compute what viewers see of a robot's snapshot; its whole trail, too, if anew."""
+        robot = self._robots.get(name)
+        if robot is None or robot.snapshot is None:
+            return
+        watched = name in self._waiting.values()
+        patch = robot.framer.patch(robot.snapshot, None if watched else GLANCE)
+        self._accept(name, patch)
+        if anew:
+            robot.trail = robot.framer.whole()['trail']
+
+    def _accept(self, name: str, parts: Parts) -> None:
+        robot = self._robots[name]
         # Viewers lengthen the trail themselves, unless they are given one.
         if 'trail' in parts:
-            self._trail = list(parts['trail'])
+            robot.trail = list(parts['trail'])
         elif parts.get('pose'):
-            lengthen(self._trail, parts['pose'])
-        if parts:
-            self._version += 1
-            for name, value in parts.items():
-                text = json.dumps(value, separators=(',', ':'), allow_nan=False)
-                self._texts[name] = self._version, text
+            lengthen(robot.trail, parts['pose'])
+        if not parts:
+            return
+        self._version += 1
+        for part, value in parts.items():
+            if part == 'events':
+                robot.events = list(value or ())
+                self._merge()
+                continue
+            texts = self._of_all if part in OF_ALL else robot.texts
+            texts[part] = self._version, _text(value)
+
+    def _merge(self) -> None:
+        """Tell the events of all robots."""
+        told = {name: robot.events for name, robot in self._robots.items()}
+        self._of_all['events'] = self._version, _text(merged_events(told))
 
     def _rouse(self) -> None:
         loop = self._loop
@@ -118,3 +208,11 @@ class Hub:
             waiting = list(self._waiting)
         for each in waiting:
             loop.call_soon_threadsafe(each.set)
+
+
+def _text(value: Any) -> str:
+    return json.dumps(value, separators=(',', ':'), allow_nan=False)
+
+
+def _object(parts: dict[str, str]) -> str:
+    return '{' + ','.join(f'"{name}":{text}' for name, text in parts.items()) + '}'

@@ -65,8 +65,10 @@ class Page:
         hub: What viewers see.
         questions: Answered to whoever may look, by name.
         actions: Done for whoever may act, by name; none without control.
-        picture: The camera's image as JPEG, or None when there is none.
-        evidence: A kept picture by name as JPEG, or None; told whether it leaves this machine.
+        picture: The image of a robot's camera as JPEG, or None when there is none; of a robot that
+            is alone the name is empty.
+        evidence: A kept picture by its name and its robot as JPEG, or None; told whether it leaves
+            this machine.
         host, port: Where to listen; port 0 takes any.
         origin: What browsers know the page by behind a proxy, as ``https://robot.example.org``;
             empty: there is no proxy.
@@ -87,8 +89,8 @@ class Page:
         *,
         questions: Mapping[str, Action],
         actions: Mapping[str, Action],
-        picture: Callable[[], bytes | None] = lambda: None,
-        evidence: Callable[[str, bool], bytes | None] = lambda _name, _leaves: None,
+        picture: Callable[[str], bytes | None] = lambda _robot: None,
+        evidence: Callable[[str, str, bool], bytes | None] = lambda _name, _robot, _leaves: None,
         host: str = '127.0.0.1',
         port: int = 8080,
         origin: str = '',
@@ -215,18 +217,19 @@ class Page:
         text = text.replace('data-kind=""', attributes)
         return Response(text, media_type='text/html')
 
-    async def _events(self, _request: Request) -> Response:
-        return StreamingResponse(self._hub.stream(), media_type='text/event-stream')
+    async def _events(self, request: Request) -> Response:
+        stream = self._hub.stream(request.query_params.get('robot'))
+        return StreamingResponse(stream, media_type='text/event-stream')
 
-    async def _camera(self, _request: Request) -> Response:
-        image = await run_in_threadpool(self._picture)
+    async def _camera(self, request: Request) -> Response:
+        image = await run_in_threadpool(self._picture, request.query_params.get('robot', ''))
         if image is None:
             return Response(status_code=204)
         return Response(image, media_type='image/jpeg')
 
     async def _evidence(self, request: Request) -> Response:
-        name = request.path_params['name']
-        image = await run_in_threadpool(self._evidence_of, name, not self._is_local)
+        name, robot = request.path_params['name'], request.query_params.get('robot', '')
+        image = await run_in_threadpool(self._evidence_of, name, robot, not self._is_local)
         if image is None:
             return PlainTextResponse('no such picture', 404)
         return Response(image, media_type='image/jpeg')

@@ -7,7 +7,15 @@ from pathlib import Path
 
 from surveillance_operator.recording.reading import SUFFIX, files_of
 from surveillance_runtime.command_line import CommandParser
-from surveillance_runtime.files import RECORD, RECORDING, TIMELINE, FileError, like_file
+from surveillance_runtime.files import (
+    LAUNCH_LOG,
+    PLACE,
+    RECORD,
+    RECORDING,
+    TIMELINE,
+    FileError,
+    like_file,
+)
 from surveillance_runtime.suggestions import like
 
 LAST = 'last'
@@ -53,22 +61,33 @@ class Recording:
     is_whole: bool
 
 
-def find_recording(name: str, runs: Path) -> Recording:
-    """Return the recording of a run, or one that another program wrote.
+def find_recordings(name: str, runs: Path) -> dict[str, Recording]:
+    """Return the recordings of a run by its robots, or the one that another program wrote.
+
+    A robot that was alone has no name.
 
     Raises:
         FileError: There is none.
     """
     given = Path(name)
     if given.suffix == SUFFIX and given.is_file():
-        return _foreign(given, given)
+        return {'': _foreign(given, given)}
     if given.is_dir() and not is_run(given) and not is_run(given.parent):
-        return _foreign(given, files_of(given)[0].parent)
+        return {'': _foreign(given, files_of(given)[0].parent)}
     folder = find_run(name, runs)
+    found = {robot: _recorded(own) for robot, own in robots_of(folder).items()}
+    recordings = {robot: each for robot, each in found.items() if each is not None}
+    if not recordings:
+        raise FileError(f'{folder}: nothing was recorded')
+    return recordings
+
+
+def _recorded(folder: Path) -> Recording | None:
+    """Return what there is to replay of one robot's run."""
     line, recorded = folder / TIMELINE, folder / RECORDING
     has_messages = recorded.is_dir() and any(recorded.glob(f'*{SUFFIX}'))
     if not line.is_file() and not has_messages:
-        raise FileError(f'{folder}: nothing was recorded')
+        return None
     return Recording(folder, line, recorded if has_messages else None, line.is_file())
 
 
@@ -82,6 +101,19 @@ def _foreign(name: Path, messages: Path) -> Recording:
 
 def is_run(folder: Path) -> bool:
     """Tell whether a folder holds what a run leaves."""
+    return bool(robots_of(folder))
+
+
+def robots_of(folder: Path) -> dict[str, Path]:
+    """Return the folder of each robot of a run; a robot that was alone has no name."""
+    if _is_of_robot(folder):
+        return {'': folder}
+    if not any((folder / file).is_file() for file in (PLACE, LAUNCH_LOG)):
+        return {}
+    return {own.name: own for own in sorted(folder.iterdir()) if _is_of_robot(own)}
+
+
+def _is_of_robot(folder: Path) -> bool:
     return any((folder / file).is_file() for file in (TIMELINE, RECORD))
 
 

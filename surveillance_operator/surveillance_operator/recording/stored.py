@@ -13,7 +13,7 @@ import shutil
 import sys
 import threading
 from collections import deque
-from collections.abc import Iterable
+from collections.abc import Container, Iterable
 from dataclasses import replace
 from pathlib import Path
 
@@ -42,6 +42,7 @@ from surveillance_operator.topics import (
     with_fact,
 )
 from surveillance_runtime.files import FileError, in_one_line
+from surveillance_runtime.node_table import name_for
 
 CLOCK = '/clock'
 WINDOW = 0.4
@@ -86,6 +87,15 @@ def prefix_of(topics: Iterable[str]) -> str:
     return max(found, key=found.count, default='/')
 
 
+def _recorded_name(name: str, prefix: str, recorded: Container[str]) -> str:
+    """Return a topic's full name; what robots of a fleet share is in the namespace above theirs."""
+    own = name if name.startswith('/') else prefix + name
+    above, _, robot = prefix.strip('/').rpartition('/')
+    shared = f'/{above}/{name}' if above else f'/{name}'
+    is_shared = robot and name_for(robot, name) == name and shared in recorded
+    return shared if is_shared and own not in recorded else own
+
+
 class Conversion:
     """Writes the time line of a recording.
 
@@ -107,8 +117,7 @@ class Conversion:
         prefix = prefix_of(self._messages.types)
         self._snapshot = Snapshot(where='a recording', namespace=prefix.strip('/'))
         self._topics = {
-            each.name if each.name.startswith('/') else prefix + each.name: each
-            for each in STORED_TOPICS
+            _recorded_name(each.name, prefix, self._messages.types): each for each in STORED_TOPICS
         }
         if not self._topics.keys() & self._messages.types.keys():
             raise FileError(f'{recording}: holds no topic of a mission, like mission_status')

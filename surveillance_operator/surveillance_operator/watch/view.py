@@ -28,7 +28,7 @@ from rich.text import Text
 
 from state_machines import Interrupt
 from surveillance_operator.frames import health
-from surveillance_operator.snapshot import Snapshot, why
+from surveillance_operator.snapshot import Event, Snapshot, why
 from surveillance_operator.watch import raster
 from surveillance_operator.watch.raster import Canvas, Frame, rasterise
 from surveillance_runtime.place.occupancy_grid import Box
@@ -148,7 +148,7 @@ class MissionView:
         fixed += [*decision[:most], *doors]
         places = place_lines(snapshot, width)
         told = snapshot.events[-MOST_EVENTS:]
-        texts = [_event(*each) for each in told]
+        texts = [_event(each) for each in told]
         # The places come before all but the latest events.
         room = max(0, height - len(fixed) - 2)
         events = _wrapped(console, texts, width)
@@ -264,11 +264,12 @@ def node_page(snapshot: Snapshot) -> list[Text]:
 
 def event_page(snapshot: Snapshot) -> list[Text]:
     """Return the latest events, newest first."""
-    told = [_event(*each) for each in reversed(snapshot.events)]
+    told = [_event(each) for each in reversed(snapshot.events)]
     return told or [_dim('no events yet')]
 
 
-def _event(at: float, text: str) -> Text:
+def _event(event: Event) -> Text:
+    at, text, _ = event
     return Text.assemble((time.strftime('%H:%M:%S', time.localtime(at)), DIM), ' ', text)
 
 

@@ -25,6 +25,8 @@ from surveillance_runtime.suggestions import nearest
 MOST_ROBOTS = 100
 _NAME = re.compile(r'[A-Za-z][A-Za-z0-9_]*\Z')
 _KEYS = ('start', 'dock', 'profile')
+_WORDS = ('all', 'shared')
+"""What commands and options call several robots, and the programs that they share."""
 _APART = 0.6
 """Metres between the bodies of two robots that start beside one another."""
 _FROM_WALL = 0.3
@@ -66,6 +68,8 @@ def members_of(described: Mapping[str, Any], plan: FloorPlan) -> tuple[FleetMemb
         where = ('robots', name)
         if not _NAME.match(name):
             raise PlaceError(where, 'expected a name of letters, digits and _, like robot1')
+        if name in _WORDS:
+            raise PlaceError(where, f'stands for other things: expected another name than {name}')
         if name in plan.place.rooms or name in plan.doors:
             raise PlaceError(where, 'is the name of a room or a door: expected another one')
         if not isinstance(table, Mapping):

@@ -46,11 +46,21 @@ export function wait({places, history, mission, promises}, name, now) {
   return {seconds, late, share: late ? 1 : threshold ? seconds / threshold : 0, text: (visited === null ? 'never' : age(seconds)) + (late ? ' !' : '')};
 }
 
+// The robot that is looked at; one that is alone has no name.
+export const shown = {robot: ''};
+const OF_ROBOT = new Set(['go', 'arm', 'machine', 'stop', 'threshold', 'policy', 'command', 'event', 'why_not', 'sightings']);
+const whose = (name, fields) => (shown.robot && OF_ROBOT.has(name) ? {robot: shown.robot, ...fields} : fields);
+
+// The colour of a robot of a fleet, by its place in the order of their names.
+const COLOURS = 8;
+export const colour = (name, all) => `robot-${names(all).filter(Boolean).indexOf(name) % COLOURS}`;
+
 export async function ask(name, fields) {
-  return answerOf(fetch(`/ask/${name}?` + new URLSearchParams(fields)));
+  return answerOf(fetch(`/ask/${name}?` + new URLSearchParams(whose(name, fields))));
 }
 
-export async function act(name, fields) {
+export async function act(name, given) {
+  const fields = whose(name, given);
   return answerOf(fetch(`/act/${name}`, {method: 'POST', body: JSON.stringify(fields), headers: {'Content-Type': 'application/json'}}));
 }
 

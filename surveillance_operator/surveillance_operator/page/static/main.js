@@ -1,16 +1,19 @@
 // Follows the mission's events and hands each part to those who show it.
-import {$, h, timeOfDay} from './dom.js';
+import {$, h, colour, shown, timeOfDay} from './dom.js';
 import {MapView} from './map.js';
 import {drawMachine, lightMachine} from './machine.js';
 import {drawStrips, showPromises} from './time.js';
 import {Why} from './why.js';
 import {showHealth} from './health.js';
 import {Control} from './control.js';
+import {Fleet} from './fleet.js';
 import {Replay} from './replay.js';
 import {Watching} from './watching.js';
 
 const root = document.documentElement;
 const state = {};
+// The same of each robot: all parts of the one that is looked at, a glance of the others.
+const robots = {};
 const clock = {now: 0, at: 0, rate: 1, measured: 1};
 const may = root.dataset.control === '1';
 const replaying = root.dataset.kind === 'replay';
@@ -19,7 +22,16 @@ const why = new Why(state);
 const control = new Control(state, may && !replaying);
 const map = new MapView($('map'), (place) => { why.choose(place); control.choose(place); }, (point) => control.pick(point));
 const replay = replaying ? new Replay() : null;
-window.mission = {state, now, received: 0};
+const fleet = new Fleet(robots, may && !replaying, look);
+let asked = new URLSearchParams(location.search).get('robot');
+window.mission = {state, robots, now, received: 0};
+
+// Looks at another robot.
+function look(robot) {
+  asked = robot;
+  history.replaceState(null, '', `?robot=${encodeURIComponent(robot)}${location.hash}`);
+  connect();
+}
 
 export function now() {
   const passed = (performance.now() - clock.at) / 1000;
@@ -34,8 +46,13 @@ function set(id, text) {
 function header() {
   const {status, mission, battery} = state;
   const ended = mission && !mission.running && status;
-  set('title', status ? `${status.machine}${mission?.mode ? ' · ' + mission.mode : ''}` : mission?.running ? 'a mission begins' : 'no mission yet');
-  document.title = status ? `${status.place || '?'} · ${status.machine}` : 'Mission';
+  const name = shown.robot ? `${shown.robot} · ` : '';
+  const begins = fleet.isOne || shown.robot ? `${name}a mission begins` : 'what all robots share';
+  set('title', status ? `${name}${status.machine}${mission?.mode ? ' · ' + mission.mode : ''}` : mission?.running ? begins : 'no mission yet');
+  document.title = status ? `${name}${status.place || '?'} · ${status.machine}` : 'Mission';
+  set('stop', shown.robot ? `STOP ${shown.robot}` : 'STOP');
+  $('stop').hidden = !fleet.isOne && !shown.robot;
+  set('control-h', shown.robot ? `Control of ${shown.robot}` : 'Control');
   const words = status ? [ended && 'the mission has ended', status.state, status.whereabouts, status.waiting_for_help ? 'waiting for help' : status.text] : [`waiting on ${mission?.where ?? ''}`];
   set('state', words.filter(Boolean).join(' · '));
   $('state').classList.toggle('warn', Boolean(status?.waiting_for_help || ended));
@@ -44,13 +61,13 @@ function header() {
 }
 
 function list(id, lines) {
-  $(id).replaceChildren(...lines.map(([at, text]) => h('li', {}, h('time', {}, at), text)));
+  $(id).replaceChildren(...lines.map(([at, ...what]) => h('li', {}, h('time', {}, at), ...what)));
   if (!lines.length) $(id).append(h('li', {}, 'none yet'));
 }
 
 function lists() {
   const {events, markers, transitions} = state;
-  list('events', (events ?? []).toReversed().map(([at, text]) => [timeOfDay(at), text]));
+  list('events', (events ?? []).toReversed().map(([at, robot, text]) => [timeOfDay(at), robot ? h('b', {class: `of ${colour(robot, robots)}`}, robot) : null, text]));
   $('markers').replaceChildren(...(markers?.seen ?? []).map(([id, known, confirmed, confidence]) =>
     h('li', {}, `marker ${id}${confirmed ? ', confirmed' : ''}${known ? '' : ', not on the list'}, confidence ${confidence}`)));
   $('markers').hidden = !markers?.seen?.length;
@@ -69,10 +86,11 @@ function present() {
 }
 
 const MOST_TRAIL = 600;
-const MAP_PARTS = ['status', 'grid', 'places', 'regions', 'links', 'doors', 'plan', 'scan', 'obstacles', 'pose', 'trail', 'mission', 'markers', 'others', 'promises'];
+const MAP_PARTS = ['status', 'grid', 'places', 'regions', 'links', 'doors', 'plan', 'scan', 'obstacles', 'pose', 'trail', 'mission', 'markers', 'others', 'promises', 'robots'];
 const SHOW = {
   present: [['grid', 'places', 'machine', 'mission', 'health'], present],
-  header: [['status', 'mission', 'battery'], header],
+  fleet: [['robots', 'doing', 'shares', 'out', 'troubles', 'battery', 'decision', 'stopped', 'active', 'mission'], () => fleet.show()],
+  header: [['status', 'mission', 'battery', 'robots'], header],
   why: [['decision', 'places', 'status'], () => why.show()],
   lists: [['events', 'markers', 'transitions'], lists],
   health: [['health', 'figures'], () => showHealth(state)],
@@ -85,17 +103,17 @@ const SHOW = {
     $('waiting').textContent = `waits for approval: ${waiting.join(', ')}`;
   }],
   stopped: [['stopped'], () => {
-    $('stopped').hidden = !state.stopped;
+    $('stopped').hidden = !state.stopped || !fleet.isOne;
     $('release').hidden = !state.stopped;
   }],
   control: [['places', 'doors', 'mission', 'requests', 'health'], () => control.show()],
   promises: [['promises'], () => showPromises(state)],
   strips: [['history', 'places', 'mission', 'promises'], () => drawStrips($('strips'), state, now())],
-  map: [MAP_PARTS, (parts) => map.show(state, parts, now())],
+  map: [MAP_PARTS, (parts) => map.show(state, parts, now(), robots)],
 };
 
 function receive(message) {
-  const parts = message.p;
+  const parts = {...message.p};
   const at = performance.now();
   if (clock.at && !message.whole) {
     const passed = (at - clock.at) / 1000;
@@ -107,13 +125,17 @@ function receive(message) {
     }
   }
   if (!clock.at || at - clock.at > 500 || message.whole) { clock.now = message.now; clock.at = at; }
-  if (message.whole) for (const name of Object.keys(state)) delete state[name];
+  if (message.whole) for (const known of [state, robots]) for (const name of Object.keys(known)) delete known[name];
+  shown.robot = message.robot;
+  robots[shown.robot] = state;
+  for (const [name, glance] of Object.entries(message.r)) robots[name] = Object.assign(robots[name] ?? {}, glance);
+  if (message.whole || Object.keys(message.r).length) parts.robots = true;
   if (parts.pose && !parts.trail && state.trail) {
     const last = state.trail.at(-1);
     if (!last || Math.hypot(last[0] - parts.pose[0], last[1] - parts.pose[1]) > 0.099) state.trail.push(parts.pose.slice(0, 2));
     state.trail.splice(0, state.trail.length - MOST_TRAIL);
   }
-  Object.assign(state, parts);
+  Object.assign(state, message.p);
   if (parts.replay) replay?.show(parts.replay);
   for (const [needs, draw] of Object.values(SHOW)) if (needs.some((name) => name in parts)) draw(parts);
   window.mission.received += 1;
@@ -133,7 +155,7 @@ let heard = 0;
 function connect() {
   source?.close();
   heard = performance.now();
-  source = new EventSource('/events');
+  source = new EventSource(asked === null ? '/events' : `/events?robot=${encodeURIComponent(asked)}`);
   source.onmessage = (event) => {
     heard = performance.now();
     connection('on', replaying ? 'replay' : 'live');
@@ -159,7 +181,7 @@ function camera() {
   const shown = (there) => { image.hidden = !there; $('no-camera').hidden = there; };
   next.onload = () => { image.src = next.src; shown(true); };
   next.onerror = () => shown(false);
-  next.src = `/camera.jpg?${Date.now()}`;
+  next.src = `/camera.jpg?robot=${encodeURIComponent(shown.robot)}&at=${Date.now()}`;
 }
 
 $('edit-link').hidden = root.dataset.edit !== '1';

@@ -1,7 +1,7 @@
 // The map: what the robot knows of the place, and what it does there. Metres; y points up.
-import {s, short, wait} from './dom.js';
+import {s, colour, names, short, shown, wait} from './dom.js';
 
-const LAYERS = ['regions', 'grid', 'links', 'driven', 'plan', 'doors', 'lidar', 'obstacles', 'markers', 'places', 'others', 'robot'];
+const LAYERS = ['regions', 'grid', 'links', 'driven', 'plans', 'plan', 'doors', 'lidar', 'obstacles', 'markers', 'places', 'others', 'fleet', 'robot'];
 const ROBOT = 'M.55 0L-.35 .38L-.15 0L-.35 -.38Z';
 
 const line = (points) => points.map(([x, y], i) => `${i ? 'L' : 'M'}${x} ${-y}`).join('');
@@ -22,6 +22,7 @@ export class MapView {
     this.plan = s('path', {class: 'plan'});
     this.lidar = s('path', {class: 'lidar'});
     this.robot = s('g', {class: 'robot', visibility: 'hidden'}, s('title', {}, 'the robot'), s('path', {d: ROBOT}));
+    this.fleet = new Map();
     for (const name of ['driven', 'plan', 'lidar', 'robot']) this.layers[name].append(this[name]);
     svg.addEventListener('click', (event) => {
       const at = new DOMPoint(event.clientX, event.clientY).matrixTransform(svg.getScreenCTM().inverse());
@@ -29,7 +30,7 @@ export class MapView {
     });
   }
 
-  show(state, parts, now) {
+  show(state, parts, now, robots = {}) {
     const came = (...names) => names.some((name) => name in parts);
     if (came('grid')) this.drawGrid(state.grid);
     if (came('grid', 'places')) this.frame(state);
@@ -42,7 +43,42 @@ export class MapView {
     if (came('obstacles')) this.drawObstacles(state.obstacles);
     if (came('markers', 'grid')) this.drawMarkers(state.markers?.at);
     if (came('others')) this.drawOthers(state.others);
-    if (came('pose') || (came('status') && !state.pose)) this.drawRobot(state);
+    if (came('pose', 'robots') || (came('status') && !state.pose)) this.drawRobot(state);
+    if (came('robots', 'pose', 'status')) this.drawFleet(robots, state.places);
+  }
+
+  // Each robot of a fleet in its colour, with its name and its planned way; the one that is looked at is drawn whole.
+  drawFleet(robots, places) {
+    const known = names(robots).filter(Boolean);
+    if (known.join() !== [...this.fleet.keys()].join()) {
+      this.fleet = new Map(known.map((name) => {
+        const hue = colour(name, robots);
+        return [name, {
+          robot: s('g', {class: `robot ${hue}`, 'data-robot': name}, s('title', {}, name), s('path', {d: ROBOT})),
+          label: s('text', {class: `tag name ${hue}`}, short(name, 16)),
+          plan: s('path', {class: `plan other ${hue}`}),
+        }];
+      }));
+      const drawn = [...this.fleet.values()];
+      this.layers.plans.replaceChildren(...drawn.map(({plan}) => plan));
+      this.layers.fleet.replaceChildren(...drawn.flatMap(({robot, label}) => [robot, label]));
+    }
+    for (const [name, {robot, label, plan}] of this.fleet) {
+      const {pose, plan: way, status, mission} = robots[name];
+      const at = pose ?? places?.[status?.place]?.at;
+      robot.setAttribute('visibility', at && name !== shown.robot ? 'visible' : 'hidden');
+      robot.classList.toggle('gone', mission?.running === false);
+      label.setAttribute('visibility', at ? 'visible' : 'hidden');
+      label.classList.toggle('chosen', name === shown.robot);
+      plan.setAttribute('d', name === shown.robot ? '' : line(way ?? []));
+      if (!at) continue;
+      placeAt(robot, at);
+      label.setAttribute('x', at[0]);
+      label.setAttribute('y', at[1] > (this.top ?? Infinity) - 1.2 ? -at[1] + .95 : -at[1] - .55);
+    }
+    const own = known.includes(shown.robot) ? colour(shown.robot, robots) : '';
+    this.robot.setAttribute('class', `robot ${own}`);
+    this.plan.setAttribute('class', `plan ${own}`);
   }
 
   drawGrid(grid) {

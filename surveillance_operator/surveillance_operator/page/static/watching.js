@@ -1,5 +1,5 @@
 // What the observer has noticed: a timeline, and of each event its pictures, its spot on the map, and what a person says of it.
-import {$, h, s, act, ask, timeOfDay} from './dom.js';
+import {$, h, s, act, ask, shown, timeOfDay} from './dom.js';
 
 const PERIOD = 2000;
 const MOST = 60;
@@ -87,7 +87,7 @@ export class Watching {
       h('button', {type: 'button', 'data-answer': verb, onclick: () => this.say(verb, event.number)}, text))) : null;
     return h('div', {class: 'details'}, ...lines.map((text) => h('p', {class: 'note'}, text)),
       h('div', {class: 'pictures'}, ...pictures.map((name, index) => h('figure', {},
-        h('img', {src: `/evidence/${encodeURIComponent(name)}`, alt: `${words(event)}: ${index ? 'last' : 'first'} sighting, before and after`, loading: 'lazy'}),
+        h('img', {src: `/evidence/${encodeURIComponent(name)}?robot=${encodeURIComponent(shown.robot)}`, alt: `${words(event)}: ${index ? 'last' : 'first'} sighting, before and after`, loading: 'lazy'}),
         h('figcaption', {class: 'note'}, pictures.length > 1 ? (index ? 'last sighting' : 'first sighting') : 'sighting')))),
       buttons, h('p', {role: 'status', class: 'note'}, this.answer ?? ''));
   }

@@ -1,0 +1,117 @@
+"""Feeds the snapshots of all robots that a watcher sees: of one, or of those that share a patrol.
+
+A watcher listens in one namespace. Either a robot's mission is there, or what the robots of a fleet
+share; then each robot has a namespace of its own below. Which these are, the publishers of
+`fleet_robots` tell. The snapshot of the watcher's own namespace has no name.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Sequence
+
+from surveillance_behaviour.ros_adapters.fleet_topic import FLEET_TOPIC
+from surveillance_operator.mission_feed import LOOK_PERIOD, MissionFeed
+from surveillance_operator.snapshot import Change, Snapshot
+from surveillance_runtime.node import PatrolNode
+
+OnChange = Callable[[str, Snapshot, Sequence[Change]], None]
+"""Takes a robot's name, its snapshot, and what changed."""
+
+
+class FleetFeed:
+    """Keeps a snapshot of each robot.
+
+    Args:
+        node: The node that watches.
+        period: As of a `MissionFeed`.
+        on_change: Called on a feed's thread.
+        on_leave: Called when a robot of an earlier mission is no longer shown.
+        streams: As of a `MissionFeed`.
+    """
+
+    def __init__(
+        self,
+        node: PatrolNode,
+        period: float | Callable[[], float],
+        on_change: OnChange = lambda _robot, _new, _told: None,
+        on_leave: Callable[[str], None] = lambda _robot: None,
+        *,
+        streams: bool = False,
+    ) -> None:
+        self._node = node
+        self._period, self._streams = period, streams
+        self._on_change, self._on_leave = on_change, on_leave
+        self._lock = threading.Lock()
+        self._feeds: dict[str, MissionFeed] = {}
+        self._place = MissionFeed(node, period, self._on_place, streams=streams)
+        self._feeds[''] = self._place
+        node.spawn(self._run, 'fleet feed')
+
+    @property
+    def robots(self) -> tuple[str, ...]:
+        """The names of the robots, in order; one that is alone has none: ''."""
+        with self._lock:
+            return tuple(sorted(self._feeds.keys() - {''})) or ('',)
+
+    def snapshot(self, robot: str) -> Snapshot:
+        """Return all that is known of a robot, with the time of the last change.
+
+        Raises:
+            KeyError: There is no such robot.
+        """
+        return self._feeds[robot].snapshot
+
+    def see(self) -> dict[str, Snapshot]:
+        """Return the snapshot of each robot at the mission's present time.
+
+        Of a fleet, what the robots share is there, too, last and without a name.
+        """
+        with self._lock:
+            feeds = sorted(self._feeds.items(), key=lambda each: (not each[0], each[0]))
+        return {name: feed.see() for name, feed in feeds}
+
+    def _on_place(self, new: Snapshot, told: Sequence[Change]) -> None:
+        self._on_change('', new, told)
+        for name, feed in list(self._feeds.items()):
+            if name:
+                feed.update(lambda old: old, begins=False)  # which takes in what is shared
+
+    def _run(self) -> None:
+        while not self._node.stopping.wait(LOOK_PERIOD):
+            found = self._find()
+            known = self._feeds.keys() - {''}
+            if found - known and not any(self._feeds[name].snapshot.nodes for name in known):
+                # Another fleet begins: whoever has ended before is not missed.
+                for name in known - found:
+                    self._feeds.pop(name).leave()
+                    self._on_leave(name)
+            for name in sorted(found - known):
+                self._follow(name)
+
+    def _find(self) -> set[str]:
+        """Return the robots that say something to each other."""
+        own = self._node.get_namespace().rstrip('/') + '/'
+        topic = self._node.resolve_topic_name(FLEET_TOPIC)
+        return {
+            each.node_namespace.removeprefix(own)
+            for each in self._node.get_publishers_info_by_topic(topic)
+            if each.node_namespace.startswith(own) and each.node_namespace != own
+        }
+
+    def _follow(self, name: str) -> None:
+        def on_change(new: Snapshot, told: Sequence[Change]) -> None:
+            self._on_change(name, new, told)
+
+        feed = MissionFeed(
+            self._node,
+            self._period,
+            on_change,
+            streams=self._streams,
+            robot=name,
+            place=self._place,
+        )
+        with self._lock:
+            self._feeds = {**self._feeds, name: feed}
+        self._place.fleet = frozenset(each.snapshot.namespace for each in self._feeds.values())
+        self._on_change(name, feed.snapshot, ())

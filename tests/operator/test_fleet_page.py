@@ -1,0 +1,387 @@
+"""A fleet before a person: its robots on one page and in one time line, told one by one or all.
+
+The page of a robot that is alone is that of a fleet of one; `test_page_states.py` has it.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from geometry_msgs.msg import PoseWithCovarianceStamped
+from rclpy.qos import QoSProfile
+from std_msgs.msg import UInt8
+from std_srvs.srv import SetBool, Trigger
+
+from patrol_policy.world import Decision
+from state_machines.exceptions import CallError
+from surveillance_interfaces.msg import DoorStates, FleetRobot, MissionStatus
+from surveillance_operator import fleet_feed, mission_feed
+from surveillance_operator.fleet_actions import WORDS, FleetActions
+from surveillance_operator.fleet_feed import FleetFeed
+from surveillance_operator.fleet_table import fleet_lines
+from surveillance_operator.frames import merged_events
+from surveillance_operator.page.hub import Hub
+from surveillance_operator.page.server import Page
+from surveillance_operator.snapshot import (
+    Event,
+    Health,
+    Share,
+    Snapshot,
+    Status,
+    doing,
+    follow,
+    troubles,
+)
+from surveillance_runtime.node import PatrolNode
+from surveillance_runtime.place.occupancy_grid import Grid
+from surveillance_runtime.qos import STATE_QOS
+from tests.operator.browser import CHROMIUM, DESK, DRIVER, MISSING, PHONE, Viewer
+
+
+def robot(name: str, place: str = 'A', x: float = 1.0) -> Snapshot:
+    """Return a robot of a fleet on its way from a place."""
+    cells = np.zeros((20, 60), np.int8)
+    cells[0] = cells[-1] = cells[:, 0] = cells[:, -1] = 100
+    return Snapshot(
+        where='ROS domain 5',
+        namespace=name,
+        now=100.0,
+        threshold=240.0,
+        nodes={'robot_behavior': frozenset('1')},
+        status=Status(90.0, 'surveillance', 'MOVE', place, 'B', False, '', ()),
+        decision=Decision(95.0, place, 'B', 'B', 'URGENT', 'tour', f'B is for {name}', {}),
+        number=1,
+        battery=80.0,
+        grid=Grid(cells, 0.1),
+        positions={'A': (1.0, 1.0), 'B': (5.0, 1.0)},
+        pose=(x, 1.0, 0.0),
+        plan=np.array([(x, 1.0), (5.0, 1.0)]),
+        share=Share(('A', 'B'), 'B', heading_to='B', is_moving=True),
+        events=(Event(1e9, f'{name} begins'), Event(1e9 + 1.0, 'door D closed', shared=True)),
+    )  # fmt: skip
+
+
+FLEET = {
+    '': replace(Snapshot(where='ROS domain 5'), nodes={'armor_server': frozenset('1')}),
+    'anna': robot('anna'),
+    'bert': robot('bert', x=2.0),
+    'carl': robot('carl', x=3.0),
+}
+
+
+# --- without ROS and without a browser ---
+
+
+def test_one_time_line_names_each_robot_and_tells_of_the_place_once() -> None:
+    told = {
+        '': [[12.0, 'armor_server was started again']],
+        'anna': [[10.0, 'arrived in A'], [11.0, 'door D closed', 1], [30.0, 'door D closed', 1]],
+        'bert': [[9.0, 'arrived in A'], [11.4, 'door D closed', 1]],
+    }
+    assert merged_events(told) == [
+        [9.0, 'bert', 'arrived in A'],
+        [10.0, 'anna', 'arrived in A'],
+        [11.0, '', 'door D closed'],
+        [12.0, '', 'armor_server was started again'],
+        [30.0, '', 'door D closed'],
+    ]
+
+
+def test_what_a_robot_does_and_what_is_wrong_with_it_is_said_in_words() -> None:
+    anna = FLEET['anna']
+    assert doing(anna) == 'on its way to B'
+    share = anna.share
+    assert share is not None
+    assert doing(replace(anna, share=replace(share, is_moving=False))) == 'waits to go to B'
+    out = replace(anna, share=Share(taken_out=True))
+    assert doing(out) == 'taken out of the patrol'
+    assert [each.text for each in follow(anna, out, 1.0)[1]] == ['taken out of the patrol']
+    health = {
+        'anna/battery_controller': Health(3, 'silent', ()),
+        'anna/motion_controller': Health(2, 'no odometry', ()),
+        'bert/motion_controller': Health(2, 'not mine', ()),
+        'armor_server': Health(2, 'of all', ()),
+    }
+    bad = replace(anna, stopped=True, health=health, ended=frozenset({'robot_behavior'}))
+    assert troubles(bad) == [
+        'stopped until a person releases it',
+        'ended: robot_behavior',
+        'motion_controller: no odometry',
+        'silent: battery_controller',
+    ]
+    assert troubles(replace(anna, nodes={})) == ['none of its programs is heard']
+    lines = fleet_lines({'anna': bad, '': replace(FLEET[''], ended=frozenset({'simulator'}))})
+    assert lines[0].split() == [
+        'anna',
+        'A',
+        '80',
+        '%',
+        'stopped;',
+        'shares',
+        'A,',
+        'B,',
+        'next',
+        'B',
+    ]
+    assert lines[-1] == 'shared  ! ended: simulator'
+
+
+def test_a_viewer_gets_all_of_one_robot_and_a_glance_of_the_others() -> None:
+    hub = Hub()
+    for name, snapshot in FLEET.items():
+        hub.show(snapshot, name)
+
+    async def look() -> tuple[Any, Any, Any]:
+        first = hub.stream('bert')
+        usual = hub.stream()
+        read: list[Any] = []
+        for stream in (first, usual):
+            await anext(stream)
+            read.append(json.loads((await anext(stream)).removeprefix('data: ')))
+        hub.show(replace(FLEET['anna'], battery=79.0), 'anna')
+        read.append(json.loads((await anext(first)).removeprefix('data: ')))
+        return read[0], read[1], read[2]
+
+    bert, usual, later = asyncio.run(look())
+    assert (bert['robot'], usual['robot']) == ('bert', 'anna'), 'the first one, unless asked for'
+    assert 'grid' in bert['p']
+    assert bert['r'].keys() == {'', 'anna', 'carl'}
+    assert bert['r']['anna']['pose'] == [1.0, 1.0, 0.0]
+    assert 'grid' not in bert['r']['anna']
+    assert ['anna begins' in each for each in bert['p']['events']].count(True) == 1
+    assert [each[1:] for each in bert['p']['events']].count(['', 'door D closed']) == 1
+    assert (later['p'], later['r']) == ({}, {'anna': {'battery': {'level': 79.0, 'low': False}}})
+
+
+# --- among nodes ---
+
+
+class Robot:
+    """What others see of one robot.
+
+    Args:
+        graph: Where it lives.
+        name: Its namespace.
+        answers: What it says when it is stopped; None: it does not answer.
+    """
+
+    def __init__(self, graph: Any, name: str, answers: bool = True) -> None:
+        self.node = graph.add(PatrolNode, name='robot_behavior', namespace=name)
+        self.told: list[Any] = []
+        status = MissionStatus(machine='surveillance', state='MOVE', place=f'place_of_{name}')
+        pose = PoseWithCovarianceStamped()
+        pose.pose.pose.position.x, pose.pose.pose.orientation.w = float(len(name)), 1.0
+        self._publishers = [
+            self.say('mission_status', status),
+            self.say('amcl_pose', pose),
+            self.say('battery_level', UInt8(data=10 * len(name))),
+        ]
+        fleet = self.node.create_publisher(FleetRobot, '/fleet_robots', QoSProfile(depth=10))
+        word = FleetRobot(robot=name, place='A', tour=['A', name], stop=name, runs_until=9.0)
+        self.node.create_timer(0.05, lambda: fleet.publish(word))
+        self.node.create_service(SetBool, 'stop', self._obey if answers else self._refuse)
+        self.node.create_service(SetBool, 'take_out', self._obey)
+        self.node.create_service(Trigger, 'robot_behavior/fsm/pause', self._obey)
+
+    def say(self, topic: str, message: Any) -> Any:
+        publisher = self.node.create_publisher(type(message), topic, STATE_QOS)
+        publisher.publish(message)
+        return publisher
+
+    def _obey(self, request: Any, response: Any) -> Any:
+        self.told.append(getattr(request, 'data', 'pause'))
+        response.success, response.message = True, 'done'
+        return response
+
+    def _refuse(self, _request: Any, response: Any) -> Any:
+        response.success, response.message = False, 'no'
+        return response
+
+
+@pytest.fixture(autouse=True)
+def _look_often(monkeypatch: pytest.MonkeyPatch) -> None:
+    for module in (mission_feed, fleet_feed):
+        monkeypatch.setattr(module, 'LOOK_PERIOD', 0.05)
+
+
+def test_robots_are_found_and_told_apart_and_share_the_place(graph: Any) -> None:
+    watcher = graph.add(PatrolNode, name='mission_page')
+    heard: list[tuple[str, str]] = []
+    feed = FleetFeed(
+        watcher, 0.02, lambda name, _new, told: heard.extend((name, each.text) for each in told)
+    )
+    assert feed.robots == ('',), 'one that is alone has no name'
+    robots = {name: Robot(graph, name) for name in ('anna', 'bertha')}
+    doors = graph.node.create_publisher(DoorStates, 'door_states', STATE_QOS)
+    doors.publish(DoorStates(closed=['D']))
+    health = graph.node.create_publisher(DiagnosticArray, '/diagnostics', 10)
+    graph.until(lambda: feed.robots == ('anna', 'bertha'))
+
+    def known() -> bool:
+        names = ('anna/motion_controller', 'bertha/motion_controller', 'armor_server')
+        health.publish(DiagnosticArray(status=[DiagnosticStatus(name=name) for name in names]))
+        seen = [feed.snapshot(name) for name in robots]
+        return all(
+            each.status and each.pose and each.battery and each.share and each.doors and each.health
+            for each in seen
+        )
+
+    graph.until(known)
+    anna, bertha = (feed.snapshot(name) for name in robots)
+    assert anna.status is not None
+    assert bertha.status is not None
+    assert (anna.status.place, bertha.status.place) == ('place_of_anna', 'place_of_bertha')
+    assert (anna.battery, bertha.battery) == (40.0, 60.0)
+    assert anna.share == Share(('A', 'anna'), 'anna', runs_until=9.0)
+    assert anna.doors == bertha.doors == {'D': False}
+    assert anna.health.keys() == {'anna/motion_controller', 'armor_server'}
+    assert list(feed.see()) == ['anna', 'bertha', ''], 'what they share is last'
+    graph.until(lambda: 'robot_behavior' in feed.snapshot('anna').nodes)
+    # A program of one that ends is not one of the other.
+    graph.remove(robots['anna'].node)
+    graph.until(lambda: 'robot_behavior' in feed.snapshot('anna').ended)
+    assert 'robot_behavior' in feed.snapshot('bertha').nodes
+    assert ('anna', 'every node has ended: waiting for the next mission') in heard
+    assert 'anna' in feed.robots, 'a robot that is gone is missed'
+
+
+def test_a_word_is_for_one_robot_or_for_all_whatever_becomes_of_one(graph: Any) -> None:
+    robots = {name: Robot(graph, name, answers=name != 'bert') for name in ('anna', 'bert')}
+    names = tuple(robots)
+    actions = FleetActions(graph.add(PatrolNode, name='hands'), lambda: names, timeout=60.0)
+    assert actions.told('anna', WORDS['stop'][1]) == 'done'
+    assert (robots['anna'].told, robots['bert'].told) == ([True], [])
+    with pytest.raises(CallError, match=r'anna: done; bert: no'):
+        actions.told('all', WORDS['release'][1])
+    assert robots['anna'].told == [True, False]
+    assert actions.told('all', WORDS['out'][1]) == 'anna: done; bert: done'
+    assert actions.told('bert', WORDS['pause'][1]) == 'done'
+    assert robots['bert'].told == [True, 'pause']
+    with pytest.raises(ValueError, match="no robot 'ana': expected 'anna'"):
+        actions.told('ana', WORDS['stop'][1])
+
+
+def test_taking_out_a_robot_that_is_alone_is_one_line(graph: Any) -> None:
+    alone = FleetActions(graph.add(PatrolNode, name='hands'), lambda: ('',), timeout=0.1)
+    with pytest.raises(CallError, match='robot_behavior is not running'):
+        alone.told('all', WORDS['out'][1])
+
+
+# --- in a real browser ---
+
+
+@pytest.fixture(scope='module')
+def told() -> list[tuple[str, str]]:
+    return []
+
+
+@pytest.fixture(scope='module')
+def hub() -> Hub:
+    return Hub()
+
+
+@pytest.fixture(scope='module')
+def viewer(hub: Hub, told: list[tuple[str, str]]) -> Iterator[Viewer]:
+    if not (CHROMIUM and DRIVER):
+        pytest.skip(MISSING)
+
+    def fleet(word: str, robot: str) -> str:
+        told.append((word, robot))
+        return f'{word} {robot}'
+
+    def stop(on: bool, robot: str = '') -> str:
+        return fleet('stop' if on else 'release', robot)
+
+    page = Page(hub, questions={}, actions={'fleet': fleet, 'stop': stop}, port=0)
+    page.start()
+    for name, snapshot in FLEET.items():
+        hub.show(snapshot, name)
+    viewer = Viewer(page.address)
+    yield viewer
+    viewer.close()
+    page.stop()
+
+
+def test_the_page_shows_all_robots_and_one_of_them_whole(hub: Hub, viewer: Viewer) -> None:
+    viewer.until(lambda: viewer.count('[data-row]') == 4)
+    assert viewer.text('#title').startswith('anna')
+    assert viewer.text('[data-row=bert] .doing') == (
+        'A · on its way to B · battery 80 % · shares A, B, next B'
+    )
+    assert 'B is for carl' in viewer.text('[data-row=carl] .note')
+    assert viewer.count('#map [data-robot]') == 3
+    looks = 'return [...document.querySelectorAll("#map [data-robot] path")].map('
+    looks += '(each) => getComputedStyle(each).fill)'
+    assert len(set(viewer.js(looks))) == 3, 'each has a colour of its own'
+    assert viewer.count('#map .plan.other[d^=M]') == 2
+    assert viewer.js('return document.getElementById("stop").textContent') == 'STOP anna'
+    viewer.click('[data-choose=bert]')
+    viewer.until(lambda: viewer.text('#title').startswith('bert'))
+    assert viewer.text('#reason') == 'B is for bert'
+    assert viewer.attribute('[data-choose=bert]', 'aria-pressed') == 'true'
+    assert 'robot=bert' in viewer.driver.current_url
+    hub.show(replace(FLEET['carl'], pose=(4.0, 1.0, 0.0)), 'carl')
+    viewer.until(lambda: '4px' in viewer.attribute('#map [data-robot=carl]', 'style'))
+
+
+def test_alarms_name_the_robot_and_one_time_line_has_the_events_of_all(
+    hub: Hub, viewer: Viewer
+) -> None:
+    status = FLEET['carl'].status
+    assert status is not None
+    help_needed = replace(status, waiting_for_help=True, text='shut in')
+    events = (*FLEET['carl'].events, Event(1e9 + 9.0, 'battery low'))
+    hub.show(replace(FLEET['carl'], status=help_needed, events=events), 'carl')
+    viewer.until(lambda: viewer.text('#alarms') == 'carl: waits for help: shut in')
+    viewer.until(lambda: 'battery low' in viewer.text('#events li'))
+    assert viewer.text('#events li b') == 'carl'
+    assert viewer.text('#events').count('door D closed') == 1
+    hub.show(FLEET['carl'], 'carl')
+    viewer.until(lambda: viewer.js('return document.getElementById("alarms").hidden'))
+
+
+def test_one_robot_or_all_are_told(hub: Hub, viewer: Viewer, told: list[tuple[str, str]]) -> None:
+    viewer.until(lambda: viewer.count('[data-row]') == 4)
+    for selector in (
+        '[data-row=carl] [data-word=out]',
+        '[data-row=bert] [data-word=pause]',
+        '[data-all=go]',
+        '#stop-all',
+        '[data-row=anna] [data-word=stop]',
+    ):
+        count = len(told)
+        viewer.click(selector)
+        viewer.until(lambda count=count: len(told) > count)
+    assert told[-5:] == [
+        ('out', 'carl'),
+        ('pause', 'bert'),
+        ('go', 'all'),
+        ('stop', 'all'),
+        ('stop', 'anna'),
+    ]
+    viewer.until(lambda: viewer.text('#fleet-answer') == '✓ stop anna')
+    hub.show(replace(FLEET['anna'], stopped=True, share=Share(taken_out=True)), 'anna')
+    words = 'return [...document.querySelectorAll("[data-row=anna] [data-word]")]'
+    words += '.filter((each) => !each.hidden).map((each) => each.dataset.word)'
+    viewer.until(lambda: viewer.js(words) == ['pause', 'release', 'in'])
+    hub.show(FLEET['anna'], 'anna')
+    viewer.click('[data-choose=anna]')
+    viewer.until(lambda: viewer.text('#title').startswith('anna'))
+    viewer.click('#stop')
+    viewer.until(lambda: told[-1] == ('stop', 'anna'))
+
+
+def test_a_fleet_is_readable_everywhere(viewer: Viewer) -> None:
+    for size, dark in ((PHONE, True), (DESK, False)):
+        viewer.size(*size, dark=dark)
+        assert viewer.js('return document.documentElement.scrollWidth') <= size[0]
+        assert viewer.axe() == []
+    severe = [each for each in viewer.driver.get_log('browser') if each['level'] == 'SEVERE']
+    assert severe == []
