@@ -2,11 +2,10 @@
 
 A plan follows a `Course`: targets on the way in, and a round that is walked again and again.
 Charges are targets like places, put where they cost least. There is one search: `rounds` looks for
-a round with short waits that the rules and the charge allow (simulated annealing). Where the robot
-would have to wait on it for places to be URGENT, also for one that is filled with further visits.
-Ways into the rounds that were found are then compared by simulating each from where the robot is
-until the patrol repeats itself (`rollout`), which gives the longest wait for ever. So are the walks
-of the simple policies `oldest` and `lookahead`: the plan is never worse than those.
+a round with short waits that the rules and the charge allow (simulated annealing). Ways into it are
+then compared by simulating each from where the robot is until the patrol repeats itself
+(`rollout`), which gives the longest wait for ever. So are the walks of the simple policies `oldest`
+and `lookahead`: the plan is never worse than those.
 
 All that is done at the first choice. Work is counted in steps and not in time, so that the same
 world gives the same mission on a slow machine, too; only `MOST_SECONDS` of the processor's time end
@@ -38,7 +37,7 @@ from patrol_policy.rollout import (
     roll_out,
     rule_map,
 )
-from patrol_policy.rounds import RoundSearch, with_charges
+from patrol_policy.rounds import GOOD_ENOUGH, Round, RoundSearch
 from patrol_policy.world import World
 
 FIRST_WORK = 360_000.0
@@ -57,10 +56,8 @@ MOVE_WORK = 3.0
 """Work of a move that is simulated."""
 HORIZON = 12.0
 """How many periods a course is simulated at most."""
-FILLED_UP_TO = 6.0
-"""Rounds are filled with visits while places wait at most so many shortest rounds."""
-GOOD_ENOUGH = 1.004
-"""A longest wait of so many bounds is not improved any further."""
+PHASE_STEPS = 60_000
+"""Steps of rounds that are looked at to compare with which target one is begun."""
 ACCEPTED = 1.03
 """A wait from visit to visit of so many bounds is accepted for shorter first waits. The round may
 be a little longer than it need be itself, and both together are to stay below 1.05."""
@@ -188,10 +185,12 @@ class Plan:
         self._observe(world, 100.0 if energy is None else world.level)
         work = FIRST_WORK * min(1.0, FULL_UP_TO / rules.count)
         if before and before.places == self.places and before.stations == self.stations:
+            self._lap = before._lap
             self._begin([before.targets], min(work, WARM_WORK), before.course)
         else:
-            tour = world.graph.tour.order
-            self._begin([tour, tour[::-1]], work)
+            tour = world.graph.tour
+            self._lap = tour.length
+            self._begin([tour.order, tour.order[::-1]], work)
 
     def fits(self, world: World, energy: Energy | None) -> bool:
         """Return whether the plan is for this map, these thresholds, rules and stations.
@@ -330,26 +329,23 @@ class Plan:
             course: One that is followed already; None: the best round is begun.
         """
         rules = self.rules
-        rounds = list(filter(None, (self._feasible(targets) for targets in rounds)))
-        if not rounds:
-            # Nothing can be visited but the place where the robot is.
-            rounds = [(rules.charge_from(self._state.place),) if rules.energy else (0,)]
-        length = rules.length(rounds[0])
-        self._horizon = HORIZON * max(length, rules.least_period)
+        self._horizon = HORIZON * max(rules.length(rounds[0]), rules.least_period)
         if rules.energy:
             # A course that has not come to its charge yet looks better than it is.
             self._horizon += 2.0 * rules.energy.cycle_seconds
         simple = SIMPLE if rules.count <= SIMPLE_UP_TO else ()
         walks = [self._simulated(choose) for choose in simple]
         self._simple = min((walk.settled for walk in walks if not walk.cut), default=math.inf)
-        filled = self._find_rounds(rounds, walks, 0.7 * work)
+        starts = [rounds, *(list(rules.laps(walk.walk)) for walk in walks)]
+        self._search = RoundSearch(rules, starts, self._lap)
+        self._search_on(self._search, 0.7 * work)
         # A charge on its round takes time that the length of the ways does not tell.
         self._horizon = max(self._horizon, HORIZON * self._search.best.length)
-        self._course = course or self._entered(self._phases()[0])
+        self._course = course or self._entered(self._search.best, 0)
         self._outcome = self._followed(self._course, math.inf)
         self._began = self._state
         end = self._work + work
-        for candidate in self._candidates(filled):
+        for candidate in self._candidates():
             if self._work > end or self._is_finished() or self._late():
                 break
             self._try(candidate)
@@ -377,75 +373,27 @@ class Plan:
         self._work += MOVE_WORK * len(outcome.walk)
         return outcome
 
-    def _feasible(self, targets: tuple[int, ...]) -> tuple[int, ...]:
-        """Return a round without what the charge does not allow, and with the charges it needs."""
-        rules = self.rules
-        if rules.energy is None:
-            return targets
-        wanted = set(rules.wanted)
-        kept = tuple(t for t in targets if t >= rules.count or t in wanted)
-        if any(target >= rules.count for target in kept):
-            return kept
-        return with_charges(rules, kept) if kept else ()
+    def _candidates(self) -> Iterator[Course]:
+        """Yield ways into the rounds, the likeliest first.
 
-    def _find_rounds(
-        self, rounds: list[tuple[int, ...]], walks: list[Outcome], work: float
-    ) -> tuple[int, ...]:
-        """Search a short round; return one that is filled with visits where the robot would wait on
-        the short one, else nothing."""
-        rules = self.rules
-        length = rules.length(rounds[0])
-        waits = length < rules.least_period
-        starts = [rounds]
-        if not waits:  # Else the simple policies wait by walking more.
-            laps = ([*rules.laps(walk.walk)] for walk in walks)
-            starts += [group for group in laps if group]
-            if rules.energy:
-                starts = [[*filter(None, map(self._feasible, group))] for group in starts]
-        self._search = RoundSearch(rules, starts)
-        filled: tuple[int, ...] = ()
-        if waits and rules.least_period < FILLED_UP_TO * length:
-            search = RoundSearch(rules, starts, fills=True)
-            self._search_on(search, work / 2.0)
-            if not search.best.breaches and not search.best.short:
-                filled = search.best.targets
-        self._search_on(self._search, work / 2.0 if filled else work)
-        return filled
-
-    def _candidates(self, filled: tuple[int, ...]) -> Iterator[Course]:
-        """Yield ways into the round that was found and the filled one, the likeliest first."""
-        phases = [*self._phases(), *range(len(self._search.best.targets))]
-        likeliest = [self._entered(phase) for phase in phases[:2]]
-        yield from likeliest
-        for phase in range(len(filled)):
-            yield self._entered(phase, filled)
-        for course in likeliest:
-            yield replace(course, targets=course.targets[::-1])
-        for skip, patience in itertools.product(SKIPS, (0.0, likeliest[0].patience, math.inf)):
-            yield replace(likeliest[0], skip=skip * self._bound, patience=patience)
-        for phase in phases[2:]:
-            yield self._entered(phase)
-        if self.rules.least_period > self._search.best.length - 1e-6:
-            yield from self._with_one_more_visit()
-
-    def _with_one_more_visit(self) -> Iterator[Course]:
-        """Yield the best course so far with one visit more or less: waiting in another way.
-
-        That is gone on with as long as one of them is better.
+        A round that the search has made a little shorter may be harder to come into than the one
+        that it began with.
         """
-        course = None
-        while course is not self._course:
-            course = self._course
-            targets, patience = course.targets, {0.0, course.patience, math.inf}
-            for position in range(course.back, len(targets)):
-                changed = [
-                    (*targets[:position], place, *targets[position:])
-                    for place in self.rules.near(targets[position])
-                ]
-                if targets.count(targets[position]) > 1:
-                    changed.append((*targets[:position], *targets[position + 1 :]))
-                for other, wait in itertools.product(changed, sorted(patience)):
-                    yield replace(course, targets=other, patience=wait)
+        search = self._search
+        ways = [
+            [self._entered(found, phase) for phase in self._phases(found)]
+            for found in dict.fromkeys((search.begun, search.best))
+        ]
+        for courses in ways:
+            yield from courses[:2]
+        for courses in ways:
+            for course in courses[:2]:
+                yield replace(course, targets=course.targets[::-1])
+        first = ways[-1][0]
+        for skip, patience in itertools.product(SKIPS, (0.0, first.patience, math.inf)):
+            yield replace(first, skip=skip * self._bound, patience=patience)
+        for courses in itertools.zip_longest(*(each[2:] for each in ways)):
+            yield from filter(None, courses)
 
     def _is_finished(self) -> bool:
         """Return whether no better course is looked for."""
@@ -485,20 +433,45 @@ class Plan:
         lasting = max(0, math.ceil(100.0 * (outcome.settled - self._accepted) / bound - 1e-6))
         return outcome.cut, lasting, round(100.0 * outcome.first / bound), outcome.settled
 
-    def _entered(self, phase: int, targets: tuple[int, ...] = ()) -> Course:
-        """Return the course that begins a round, the best one if none is given, with one of its
-        targets."""
-        targets = targets or self._search.best.targets
-        rules = self.rules
+    def _entered(self, found: Round, phase: int) -> Course:
+        """Return the course that begins a round with one of its targets."""
+        targets, rules = found.targets, self.rules
         wait = max(0.0, rules.least_period - rules.length(targets))
         patience = wait + 2.0 * rules.mean_leg
         return Course(targets[phase:] + targets[:phase], patience=patience)
 
-    def _phases(self) -> list[int]:
-        """Return where the best round is well begun: where it leads on, with the oldest place."""
-        targets, seen, places = self._search.best.targets, self._state.seen, self.rules.places
-        phases = [k for k in range(len(targets)) if places[targets[k - 1]] == self._state.place]
-        return [*phases, min(range(len(targets)), key=lambda k: seen[places[targets[k]]])]
+    def _phases(self, found: Round) -> list[int]:
+        """Return with which targets a round may be begun, the least first waits first.
+
+        How long each place would wait follows from the times of the round; what the rules demand
+        in between is left to the simulation.
+        """
+        rules, state, targets = self.rules, self._state, found.targets
+        count, away, here = len(targets), rules.away, state.place
+        times = [0.0]
+        for before, after in zip(targets, (*targets[1:], targets[0]), strict=True):
+            times.append(times[-1] + away[before][after])
+        length = times.pop()
+        idle = [state.now - seen for seen in state.seen]
+        every = max(1, count * count // PHASE_STEPS)
+        phases = {*range(0, count, every)}
+        phases |= {k for k in range(count) if rules.places[targets[k - 1]] == here}
+        phases.add(min(range(count), key=lambda k: state.seen[rules.places[targets[k]]]))
+
+        def longest(phase: int) -> float:
+            waits: dict[int, float] = {}
+            begin = away[here][targets[phase]] - times[phase]
+            for position in range(phase, phase + count):
+                target = targets[position % count]
+                place = rules.places[target]
+                wait = begin + times[position % count] + idle[place]
+                wait += length if position >= count else 0.0
+                if rules.gates[place] >= 0 and wait <= rules.overdue_after[place]:
+                    wait += length
+                waits[place] = min(wait, waits.get(place, math.inf))
+            return max(wait - rules.slack[place] for place, wait in waits.items())
+
+        return sorted(phases, key=lambda phase: (round(longest(phase), 3), phase))
 
 
 def plan_of(world: World, energy: Energy | None = None) -> Plan:

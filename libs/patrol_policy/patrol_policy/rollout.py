@@ -240,24 +240,30 @@ class RuleMap:
         )
 
     @cached_property
-    def least_period(self) -> float:
-        """Seconds that some place waits from visit to visit whatever the robot does.
-
-        A place that may be entered only when it is URGENT waits for the threshold and the leg to
-        it. 0: there is none.
-        """
-        held = [
-            self.thresholds[place] + self.leg_seconds[self.gates[place]][place] + HALF_OPEN
+    def held_periods(self) -> dict[int, float]:
+        """Seconds that each place waits at least that may be entered only when it is URGENT: for
+        its threshold and the leg to it."""
+        return {
+            place: self.thresholds[place] + self.leg_seconds[self.gates[place]][place] + HALF_OPEN
             for place in self.wanted
             if self.gates[place] >= 0 and math.isfinite(self.thresholds[place])
-        ]
-        return max(held, default=0.0)
+        }
+
+    @cached_property
+    def least_period(self) -> float:
+        """Seconds that some place waits from visit to visit whatever the robot does; 0: none."""
+        return max(self.held_periods.values(), default=0.0)
+
+    @cached_property
+    def least_wait(self) -> float:
+        """The same, less what the place has more time than others."""
+        return max((p - self.slack[place] for place, p in self.held_periods.items()), default=0.0)
 
     @cached_property
     def least_round(self) -> float:
         """Seconds that no lawful round is known to fall below."""
         if self.energy is not None or not self.is_even:
-            return 0.0
+            return self.least_wait
         tour = self.graph.tour
         return max(self.least_period, tour.length if tour.find_bound is None else 0.0)
 

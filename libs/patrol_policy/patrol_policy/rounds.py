@@ -10,8 +10,9 @@ changes: a place beside the way that the rules would force the robot into is tak
 is put elsewhere.
 
 Where places may be entered only when they are URGENT, a round can be shorter than they allow. Then
-the robot waits by going to and fro, or the round is filled: another search adds the visits that
-make it just long enough.
+it begins with further laps through the other places, as many as make it just long enough
+(`filled`). Where that would be very many laps the round stays short, and such places are skipped
+until they are due.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ import math
 import random
 from bisect import bisect_right
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 from patrol_policy.battery import WORTH_CHARGING
@@ -30,14 +31,20 @@ from patrol_policy.rollout import RuleMap
 PENALTY = 4.0
 """What a forbidden step costs, in mean legs."""
 HEAT, FILLING_HEAT = 0.04, 0.3
-"""The first temperature of an annealing, in penalties; of one that fills rounds."""
+"""The first temperature of an annealing, in penalties; of one of rounds that are filled."""
 FILLING = 0.1
 """Part of the changes that add a visit where rounds are filled."""
+FILLED_UP_TO = 6.0
+"""Rounds are filled with visits while places wait at most so many shortest rounds."""
 CHARGES = 0.12
 """Part of the changes that add or move a charge where the battery matters."""
 EMPTY = 3.0
 """What it costs to come home with nothing left, in penalties, and once more for each mean leg by
 which the charge is too short."""
+ROTATIONS = 4_000
+"""From so many places of a round further laps are tried, divided by its places."""
+GOOD_ENOUGH = 1.004
+"""A longest wait of so many bounds is not improved any further."""
 FIRST_CYCLE = 200_000.0
 """Work of the first annealing; each later one takes twice as much as the one before."""
 ALL_WORK = 10e6
@@ -65,8 +72,7 @@ class Round:
 
     Attributes:
         targets: Stops; every wanted place at least once.
-        length: Seconds for walking it once, with charging and with the time that it waits for
-            places to be URGENT.
+        length: Seconds for walking it once, with charging.
         wait: The longest wait on it, less what the place has more time than others, seconds.
         breaches: The steps that the rules forbid.
         short: By how much the charge is too short at the worst places, seconds in all.
@@ -84,34 +90,67 @@ class RoundSearch:
 
     Args:
         rules: The map.
-        starts: Groups of rounds; the first annealings begin with the best of each group.
-        fills: Whether a round must be as long as the rules demand by what it visits; else the robot
-            is taken to wait before the first target.
+        starts: Groups of rounds; the first annealings begin with the best of each group. Visits
+            and charges that they lack are added.
+        lap: Length of the shortest round that is known, rules and charges left aside, seconds.
 
     Attributes:
         best: The best round so far.
+        begun: The best of those that it began with.
         work: Work done so far.
     """
 
     def __init__(
-        self, rules: RuleMap, starts: Iterable[Iterable[tuple[int, ...]]], *, fills: bool = False
+        self, rules: RuleMap, starts: Iterable[Iterable[tuple[int, ...]]], lap: float
     ) -> None:
         self._rules = rules
-        self._least = 0.0 if fills else rules.least_period
+        periods = {
+            place: period
+            for place, period in rules.held_periods.items()
+            if period <= FILLED_UP_TO * lap
+        }
+        # What is held for longer is skipped until it is due, which is no breach.
+        self._resting = rules.held_periods.keys() - periods
+        self._period = max(periods.values(), default=0.0)
+        fills = self._period > lap
         self._heat = FILLING_HEAT if fills else HEAT
         # A place with less time than others is visited more than once.
         self._filling = FILLING if fills or not rules.is_even else 0.0
         self._draw = random.Random(0)
         self._penalty = PENALTY * rules.mean_leg
         self.work = 0.0
-        rounds = [min(map(self.judged, group), key=self.cost) for group in starts]
+        prepared = (
+            [round for start in group for round in self._prepared(start)] for group in starts
+        )
+        rounds = [min(map(self.judged, group), key=self.cost) for group in prepared if group]
+        rounds = rounds or [self.judged((max(0, rules.charge_from(0)),))]
         rounds.sort(key=lambda found: (self.cost(found), len(found.targets)))
-        self.best, self._starts = rounds[0], rounds
+        self.best = self.begun = rounds[0]
+        self._starts = rounds
         self._cycle, self._cycle_end = FIRST_CYCLE / 2.0, 0.0
+
+    def _prepared(self, targets: tuple[int, ...]) -> Iterator[tuple[int, ...]]:
+        """Yield a round without what the charge does not allow, with the visits and charges that
+        it needs."""
+        rules = self._rules
+        wanted = {*rules.wanted, *range(rules.count, len(rules.places))}
+        kept = tuple(target for target in targets if target in wanted)
+        if not kept:
+            return
+        turned: Iterable[tuple[int, ...]] = (kept,)
+        if rules.length(kept) < self._period:
+            every = max(1, len(kept) ** 2 // ROTATIONS)
+            turned = (kept[k:] + kept[:k] for k in range(0, len(kept), every))
+            turned = (filled(rules, each, self._period) for each in turned)
+        for each in turned:
+            if rules.energy and all(target < rules.count for target in each):
+                each = with_charges(rules, each)
+            yield each
 
     def cost(self, found: Round) -> float:
         """Return the longest wait of a round with the penalties for what is forbidden, seconds."""
-        cost = found.wait + self._penalty * len(found.breaches)
+        # That a round is shorter than places can be visited on is no merit.
+        cost = max(found.wait, self._rules.least_wait) + self._penalty * len(found.breaches)
         if found.short > 0.0:
             cost += EMPTY * self._penalty * (1.0 + found.short / self._rules.mean_leg)
         return cost
@@ -125,8 +164,7 @@ class RoundSearch:
         """
         walk, ends = self._walked(targets)
         times, short = self._timed(walk)
-        length = max(times[-1] if times else 0.0, self._least)
-        wait = length
+        wait = length = times[-1] if times else 0.0
         if not self._rules.is_even:
             wait = self._longest_wait(walk, times, length)
         most = (limit - wait) / max(self._penalty, 1e-9)
@@ -212,7 +250,7 @@ class RoundSearch:
         rules = self._rules
         legs, ranks, urgent, places = rules.leg_seconds, rules.ranks, rules.urgent, rules.places
         overdue, count = rules.overdue_after, rules.count
-        within = rules.energy.within_range if rules.energy else None
+        within, resting = rules.energy.within_range if rules.energy else None, self._resting
         # When each place was visited last, for the first step: in the round before.
         seen = {places[stop]: then - length for stop, then in zip(walk, times, strict=True)}
         breaches, now, place = list[Breach](), 0.0, places[walk[-1]]
@@ -223,7 +261,7 @@ class RoundSearch:
                 seen[place] = then
                 continue
             rank = ranks[stop]
-            if rank > urgent and now - seen[stop] > overdue[stop]:
+            if rank > urgent and (now - seen[stop] > overdue[stop] or stop in resting):
                 rank = urgent
             if rank:
                 for instead in legs[place]:
@@ -248,7 +286,7 @@ class RoundSearch:
             return True
         if best.breaches or best.short > 0.0:
             return False
-        return best.wait <= self._rules.least_round + 1e-6
+        return self.cost(best) <= GOOD_ENOUGH * self._rules.least_round
 
     def improve(self, work: float) -> None:
         """Search on."""
@@ -439,6 +477,29 @@ class RoundChanges:
         if where > last:
             where -= size
         return rest[:where] + stretch + rest[where:]
+
+
+def filled(rules: RuleMap, targets: tuple[int, ...], period: float) -> tuple[int, ...]:
+    """Return a round that goes on with the places that may always be entered until it is so long.
+
+    Args:
+        rules: The map.
+        targets: The round; the further laps keep to its order.
+        period: Seconds that it is to take.
+    """
+    free = [t for t in dict.fromkeys(targets) if t < rules.count and rules.gates[t] < 0]
+    found, away = list(targets), rules.away
+    walked = sum(away[a][b] for a, b in itertools.pairwise(targets))
+    if len(free) < 2:
+        return targets
+    at = min(range(len(free)), key=lambda k: away[targets[-1]][free[k]])
+    while walked + away[found[-1]][targets[0]] < period:
+        after = free[at % len(free)]
+        if after != found[-1]:
+            walked += away[found[-1]][after]
+            found.append(after)
+        at += 1
+    return tuple(found)
 
 
 def with_charges(rules: RuleMap, targets: Sequence[int]) -> tuple[int, ...]:

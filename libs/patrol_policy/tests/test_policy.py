@@ -133,7 +133,7 @@ def test_no_decision_breaks_the_rules(
         assert decision.place in (urgent or corridors or set(before.reachable))
 
 
-@settings(max_examples=8)
+@settings(max_examples=30)
 @given(graphs(), st.floats(0.01, 0.6), st.sampled_from(['tour', 'seed', 'oldest']))
 def test_the_reserve_never_strands(graph: PatrolGraph, draw: float, policy: str) -> None:
     station = graph.places[0]
@@ -155,6 +155,6 @@ def test_the_reserve_never_strands(graph: PatrolGraph, draw: float, policy: str)
         station,
         SimulatedBattery(draw=draw),
     )
-    for _ in range(60):
+    for _ in range(100):
         patrol.step()
     assert patrol.run.strandings == 0
