@@ -42,8 +42,8 @@ from patrol_policy.world import World
 
 FIRST_WORK = 360_000.0
 """Work before the first choice of a plan: about microseconds."""
-FULL_UP_TO = 100.0
-"""Larger maps, in places, have less work before the first choice: knowing them takes its time."""
+FULL_FROM, FULL_UP_TO = 16.0, 100.0
+"""Smaller maps, in places, need less work; larger ones have less: knowing them takes its time."""
 MOST_SECONDS = 1.5
 """Time of the processor for one choice; what is looked for then is ended, and the plan says so."""
 WARM_WORK = 60_000.0
@@ -169,6 +169,7 @@ class Plan:
 
     _state: State
     _began: State
+    _lap: float  # Length of the shortest round that is known, rules and charges left aside.
 
     def __init__(
         self, world: World, energy: Energy | None = None, before: Plan | None = None
@@ -183,7 +184,7 @@ class Plan:
         met = [before is not None] * rules.count
         self._state = State(world.graph.index[world.place], world.now, [], met)
         self._observe(world, 100.0 if energy is None else world.level)
-        work = FIRST_WORK * min(1.0, FULL_UP_TO / rules.count)
+        work = FIRST_WORK * min(1.0, rules.count / FULL_FROM, FULL_UP_TO / rules.count)
         if before and before.places == self.places and before.stations == self.stations:
             self._lap = before._lap
             self._begin([before.targets], min(work, WARM_WORK), before.course)
@@ -392,8 +393,8 @@ class Plan:
         first = ways[-1][0]
         for skip, patience in itertools.product(SKIPS, (0.0, first.patience, math.inf)):
             yield replace(first, skip=skip * self._bound, patience=patience)
-        for courses in itertools.zip_longest(*(each[2:] for each in ways)):
-            yield from filter(None, courses)
+        for further in itertools.zip_longest(*(each[2:] for each in ways)):
+            yield from filter(None, further)
 
     def _is_finished(self) -> bool:
         """Return whether no better course is looked for."""

@@ -242,11 +242,14 @@ class RuleMap:
     @cached_property
     def held_periods(self) -> dict[int, float]:
         """Seconds that each place waits at least that may be entered only when it is URGENT: for
-        its threshold and the leg to it."""
+        its threshold and the leg to it. A place with a station may be entered for a charge."""
+        stations = self.energy.stations if self.energy else ()
         return {
             place: self.thresholds[place] + self.leg_seconds[self.gates[place]][place] + HALF_OPEN
             for place in self.wanted
-            if self.gates[place] >= 0 and math.isfinite(self.thresholds[place])
+            if self.gates[place] >= 0
+            and place not in stations
+            and math.isfinite(self.thresholds[place])
         }
 
     @cached_property

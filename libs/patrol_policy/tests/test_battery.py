@@ -159,6 +159,16 @@ def test_the_bound_is_that_of_trying_all_walks(reach: float, factor: float) -> N
     assert bound.high == pytest.approx(shortest, rel=0.02)
 
 
+def test_a_station_in_a_dead_end_is_entered_by_a_charge_before_it_is_urgent() -> None:
+    legs = {'A': {'B': 8.0}, 'B': {'A': 8.0, 'C': 7.0}, 'C': {'B': 7.0, 'D': 9.0}, 'D': {'C': 9.0}}
+    graph = PatrolGraph(legs, 6.0)
+    station = Station('A', ChargeCurve.even(4.0))
+    energy = Energy(graph, [station], Draw(0.2), 0.0, BatteryLimits())
+    rules = RuleMap(graph, 5.0 * graph.tour.length, default_ranks(graph), 0, energy=energy)
+    # D waits for its threshold, A does not: the robot charges there.
+    assert list(rules.held_periods) == [graph.index['D']]
+
+
 def test_what_is_promised_is_what_comes() -> None:
     for seed in range(3):
         draw = random.Random(seed)
