@@ -2,8 +2,9 @@
 
 Two parts that share a cut are joined where the opening is wide for the smaller one: a room behind a
 door of 0.9 m has many times the area of a square on that door, a niche less than one. Parts of one
-corridor, long and about equally wide, are joined, too. The least separate pair is joined first, and
-what is left is measured anew.
+corridor are joined, too: a door narrows, and where the opening is as wide as the corridor behind
+it, the corridor goes on. The least separate pair is joined first, and what is left is measured
+anew.
 """
 
 from __future__ import annotations
@@ -16,13 +17,16 @@ from numpy.typing import NDArray
 
 SEPARATE = 0.9
 """Area of the smaller part, in squares of the opening's width, from which on two are rooms."""
-_SMALL = 0.5
+_SMALL = 1.0
 """A part with less area is no room, m^2."""
 _SHALLOW = 0.35
 """A part with less depth than this share of its openings' width is a niche."""
 LONG = 4.0
 """From this area on, in squares of its mean width, a part is a corridor."""
-_EQUALLY_WIDE, _FULL_WIDTH = 1.5, 0.75
+_PIECE = 2.8
+"""The same for a part that may be a piece of a corridor."""
+_FULL_WIDTH = 0.9
+"""An opening that has this share of the width behind it is no door: the corridor goes on."""
 
 
 @dataclass
@@ -151,12 +155,10 @@ class _Rooms:
             return 0.01 * area / width**2
         if area / length**2 < _SHALLOW:
             return 0.3 * area / length**2
-        widths = [half_width(self._area[each], self._depth[each]) for each in (first, second)]
-        if (
-            all(elongation(self._area[each], self._depth[each]) > LONG for each in (first, second))
-            and max(widths) < _EQUALLY_WIDE * min(widths)
-            and width > _FULL_WIDTH * 2 * min(widths)
-        ):
+        shapes = [(self._area[each], self._depth[each]) for each in (first, second)]
+        long = sorted(elongation(*shape) for shape in shapes)
+        narrower = 2 * min(half_width(*shape) for shape in shapes)
+        if long[0] > _PIECE and long[1] > LONG and width > _FULL_WIDTH * narrower:
             return 0.5
         return area / width**2
 

@@ -17,9 +17,13 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from surveillance_runtime.map_rooms.segmentation import Line, Segmentation, segment
+from surveillance_runtime.map_rooms.segmentation import Line, Segmentation, segment, spread
+from surveillance_runtime.place.floor_plan import Door, FloorPlan
 from surveillance_runtime.place.occupancy_grid import Grid, distance_to
 from surveillance_runtime.place.occupancy_map import OccupancyMap
+from surveillance_runtime.place.plan_grid import walled_off
+from surveillance_runtime.place.regions import Regions, check_passable
+from surveillance_runtime.place.rooms import PlaceError
 
 Labels = NDArray[np.int32]
 Mask = NDArray[np.bool_]
@@ -30,6 +34,9 @@ _NEAR_POINT = 3.0
 _WIDEST = 20.0
 _SPARE = 0.1
 """More than the robot needs at the point of a door, where there is more, metres."""
+_SHORTEST_WALL = 0.12
+_LINE_CELLS = 5
+"""A room's point keeps this far from the lines of doors: their thickness, working cells."""
 _BESIDE_DOOR = 0.3
 """An opening whose middle is as near to that of a known door is that door, metres."""
 
@@ -80,12 +87,70 @@ def propose(
     grid = found.working
     # A working cell is not exactly 0.05 m where the map's are of another size.
     scale = building.cells.shape[1] * building.resolution / grid.cells.shape[1]
-    labels = found.working_labels
     free = grid.free
-    clearance = distance_to(~free, grid.resolution)
+    floor = _Floor(building, radius, known, scale, free, distance_to(~free, grid.resolution))
+    for _ in range(found.rooms):
+        layout = _laid_out(floor, found)
+        pair = layout.one_room or _not_parted(floor, layout)
+        if pair is None:
+            return layout.proposal
+        found = found.joined(*pair)
+    return _laid_out(floor, found).proposal
+
+
+@dataclass(frozen=True)
+class _Floor:
+    """What stays while rooms are tried.
+
+    Attributes:
+        building: The map.
+        radius: Of the robot, metres.
+        known: Doors that are known, by name.
+        scale: Side of a working cell, metres.
+        free: The working cells that are free.
+        clearance: How far each is from what is not, metres.
+    """
+
+    building: OccupancyMap
+    radius: float
+    known: Mapping[str, Line]
+    scale: float
+    free: Mask
+    clearance: NDArray[np.float32]
+
+    def world(self, points: list[tuple[float, float]]) -> NDArray[np.float64]:
+        """Return working cells (column, row) in the world, metres."""
+        return self.building.to_world((np.array(points) + 0.5) * self.scale)
+
+
+@dataclass(frozen=True)
+class _Layout:
+    """A proposal, and which rooms each of its doors joins.
+
+    Attributes:
+        proposal: The proposal.
+        joins: The numbers of the rooms on both sides of each door.
+        one_room: Two rooms that are one, as one of them has no point for the robot.
+    """
+
+    proposal: Proposal
+    joins: Mapping[str, tuple[int, int]]
+    one_room: tuple[int, int] | None = None
+
+
+def _laid_out(floor: _Floor, found: Segmentation) -> _Layout:
+    """Return the place of rooms as they were found.
+
+    Raises:
+        ValueError: The robot fits nowhere.
+    """
+    labels, clearance, radius, scale = (
+        *(found.working_labels, floor.clearance),
+        *(floor.radius, floor.scale),
+    )
     reach = _reachable(labels, clearance, radius)
-    needed = radius + 1.5 * grid.resolution
-    openings = _openings(labels, free, clearance, needed + _SPARE)
+    needed = radius + 1.5 * found.working.resolution
+    openings = _openings(labels, floor.free, clearance, needed + _SPARE)
     ways = [each for each in openings if each.clearance > needed and _fits(reach, each)]
     rooms = _joined_rooms({number for number in np.unique(labels[reach]).tolist() if number}, ways)
     if not rooms:
@@ -93,41 +158,42 @@ def propose(
     ways = [each for each in ways if set(each.rooms) <= rooms]
     listed = {id(each) for each in ways}
     names = _names(rooms, found)
-
-    def world(points: list[tuple[float, float]]) -> NDArray[np.float64]:
-        return building.to_world((np.array(points) + 0.5) * scale)
-
-    positions: dict[str, list[float]] = {}
-    for number in sorted(rooms):
-        cell = point_in(labels == number, reach, clearance, radius)
-        positions[names[number]] = _rounded(world([cell])[0])
     table: dict[str, list[str]] = {names[number]: [] for number in sorted(rooms)}
     placed: dict[str, list[float]] = {}
-    called = _called([world([each.start, each.end]).mean(axis=0) for each in ways], known)
+    middles = [floor.world([each.start, each.end]).mean(axis=0) for each in ways]
+    called = _called(middles, floor.known)
     for name, door in zip(called, ways, strict=True):
-        if name in known:
-            start, end = (np.array(each) for each in known[name])
+        if name in floor.known:
+            start, end = (np.array(each) for each in floor.known[name])
             placed[name] = _line(np.array([start, end, (start + end) / 2]), 0.0)
         else:
-            placed[name] = _line(world([door.start, door.end, door.middle]), scale)
+            placed[name] = _line(floor.world([door.start, door.end, door.middle]), scale)
         for number in door.rooms:
             table[names[number]].append(name)
+    joins = {name: door.rooms for name, door in zip(called, ways, strict=True)}
     if len(rooms) == 1:
         table[next(iter(table))].append('D1')  # the door that leads out of the place
-    walls: dict[str, list[float]] = {}
-    for opening in openings:
-        if id(opening) not in listed and set(opening.rooms) <= rooms:
-            start, end = world([opening.start, opening.end])
-            gap = math.dist(start, end)
-            along = (end - start) / max(gap, 1e-9)
-            longer = max(scale, (0.12 - gap) / 2)
-            if gap < 1e-9:
-                along = np.array([1.0, 0.0])
-            walls[f'W{len(walls) + 1}'] = [
-                *_rounded(start - along * longer),
-                *_rounded(end + along * longer),
-            ]
-    station, home = _station(building, labels, reach, rooms, names, positions, scale)
+    walls = [
+        _as_line(_longer(floor.world([each.start, each.end]), scale))
+        for each in openings
+        if id(each) not in listed and set(each.rooms) <= rooms
+    ]
+    lines = [Door(name, *row).ends for name, row in placed.items()]
+    near = _beside(floor, [*lines, *walls])
+    positions: dict[str, list[float]] = {}
+    one_room = None
+    for number in sorted(rooms):
+        mask = labels == number
+        inside = mask & ~near
+        if len(rooms) > 1 and not (inside & reach).any():
+            # So small that the lines of its doors fill it.
+            beside = [each.rooms for each in ways if number in each.rooms]
+            one_room = one_room or beside[0]
+            inside = mask
+        cell = point_in(inside, reach, clearance, radius)
+        positions[names[number]] = _rounded(floor.world([cell])[0])
+    walls += _gaps(floor, found, [*lines, *walls], list(positions.values()))
+    station, home = _station(floor.building, labels, reach & ~near, rooms, names, positions, scale)
     parameters: dict[str, Any] = {
         'map': table,
         'room_positions': positions,
@@ -138,9 +204,91 @@ def propose(
     if placed:
         parameters['doors'] = placed
     if walls:
-        parameters['walls'] = walls
+        parameters['walls'] = {
+            f'W{index}': [*_rounded(np.array(start)), *_rounded(np.array(end))]
+            for index, (start, end) in enumerate(walls, start=1)
+        }
     everything = set(range(1, found.rooms + 1))
-    return Proposal(parameters, found, names, tuple(sorted(everything - rooms)))
+    proposal = Proposal(parameters, found, names, tuple(sorted(everything - rooms)))
+    return _Layout(proposal, joins, one_room)
+
+
+def _not_parted(floor: _Floor, layout: _Layout) -> tuple[int, int] | None:
+    """Return two rooms that their door does not part as the place's file has to; None: all fits.
+
+    It is asked what reads that file, so that no place is proposed which would then be refused.
+    """
+    parameters, names = layout.proposal.parameters, layout.proposal.names
+    try:
+        plan = FloorPlan.from_parameters(parameters, floor.building)
+        Regions(plan)
+        check_passable(plan, floor.radius)
+    except PlaceError as error:
+        table, name, *_ = (*error.where, '', '')
+        if table == 'doors' and name in layout.joins:
+            return layout.joins[name]
+        room = next((number for number, each in names.items() if each == name), None)
+        return next((pair for pair in layout.joins.values() if room in pair), None)
+    return None
+
+
+def _longer(ends: NDArray[np.float64], more: float) -> NDArray[np.float64]:
+    """Return a wall that reaches farther on both sides, and is as long as walls have to be."""
+    start, end = ends
+    gap = math.dist(start, end)
+    along = (end - start) / gap if gap > 1e-9 else np.array([1.0, 0.0])
+    longer = max(more, (_SHORTEST_WALL - gap) / 2)
+    return np.array([start - along * longer, end + along * longer])
+
+
+def _beside(floor: _Floor, lines: list[Line]) -> Mask:
+    """Return the working cells below the lines of doors and walls, and beside them."""
+    drawn = np.zeros(floor.free.shape, np.uint8)
+    for line in lines:
+        start, end = np.rint(floor.building.to_own(line) / floor.scale - 0.5).astype(int).tolist()
+        cv2.line(drawn, start, end, 1, _LINE_CELLS)
+    return drawn > 0
+
+
+def _gaps(
+    floor: _Floor, found: Segmentation, lines: list[Line], points: list[list[float]]
+) -> list[Line]:
+    """Return walls where two rooms are one beside their door, through cells that are too narrow.
+
+    Rooms are found on cells of 0.05 m; a finer map has gaps between them, and a border may run
+    through furniture, where no straight door closes it.
+    """
+    building, grid = floor.building, floor.building.own_grid
+    side = grid.resolution
+    drawn = [_as_line(building.to_own(line)) for line in lines]
+    opened = walled_off(grid, drawn).free.astype(np.uint8)
+    parts = cv2.connectedComponents(opened, connectivity=4)[1]
+    inside: dict[int, int] = {}
+    for x, y in building.to_own(points):
+        part = grid.at(parts, x, y)
+        inside[part] = inside.get(part, 0) + 1
+    crowded = [part for part, count_ in inside.items() if part and count_ > 1]
+    if not crowded:
+        return []
+    rooms = np.where(np.isin(parts, crowded), spread(found.labels), 0)
+    border = np.zeros(rooms.shape, np.bool_)
+    for here, there in ((np.s_[:, :-1], np.s_[:, 1:]), (np.s_[:-1], np.s_[1:])):
+        one, other = rooms[here], rooms[there]
+        border[here] |= (one > 0) & (other > 0) & (one != other)
+    narrow = border & (distance_to(~grid.free, side) < floor.radius)
+    count_, pieces = cv2.connectedComponents(
+        cv2.dilate(narrow.astype(np.uint8), np.ones((3, 3), np.uint8)), connectivity=8
+    )
+    cells = np.argwhere(narrow)
+    which = pieces[cells[:, 0], cells[:, 1]]
+    walls = []
+    for piece in range(1, count_):
+        mine = cells[which == piece][:, ::-1].astype(float)
+        start = mine[np.argmax(np.hypot(*(mine - mine.mean(axis=0)).T))]
+        end = mine[np.argmax(np.hypot(*(mine - start).T))]
+        ends = building.to_world((np.array([start, end]) + 0.5) * side)
+        walls.append(_as_line(_longer(ends, 1.5 * side)))
+    return walls
 
 
 def _called(middles: list[NDArray[np.float64]], known: Mapping[str, Line]) -> list[str]:

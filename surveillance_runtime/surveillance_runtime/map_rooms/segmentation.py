@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import cv2
@@ -65,6 +65,24 @@ class Segmentation:
     working: Grid
     working_labels: Labels
 
+    def joined(self, first: int, second: int) -> Segmentation:
+        """Return the rooms with two of them made one, numbered without a gap."""
+        keeps, goes = sorted((first, second))
+        numbers = np.arange(self.rooms + 1, dtype=np.int32)
+        numbers[goes] = keeps
+        numbers[numbers > goes] -= 1
+        areas = np.bincount(self.working_labels.ravel(), minlength=self.rooms + 1)
+        smaller = goes if areas[keeps] >= areas[goes] else keeps
+        long = {each for each in self.corridors if each != smaller}
+        corridors = frozenset(int(numbers[each]) for each in long)
+        return replace(
+            self,
+            labels=numbers[self.labels],
+            rooms=self.rooms - 1,
+            corridors=corridors,
+            working_labels=numbers[self.working_labels],
+        )
+
 
 def segment(grid: Grid, shut: Sequence[Line] = ()) -> Segmentation:
     """Return the rooms of a map.
@@ -89,9 +107,9 @@ def segment(grid: Grid, shut: Sequence[Line] = ()) -> Segmentation:
         dtype=np.int32,
     )
     labels = joining.joined(parts, cuts, clearance, CELL)[parts]
-    labels = np.where(cleared, _spread(labels), 0)
+    labels = np.where(cleared, spread(labels), 0)
     labels = _with_floor_below_furniture(labels, cleared)
-    labels = np.where(known & free & (labels == 0), _spread(labels), labels)
+    labels = np.where(known & free & (labels == 0), spread(labels), labels)
     labels = _numbered(labels)
     count = int(labels.max())
     area = np.bincount(labels.ravel(), minlength=count + 1) * CELL**2
@@ -258,7 +276,7 @@ def _meeting(
     return found
 
 
-def _spread(labels: Labels) -> Labels:
+def spread(labels: Labels) -> Labels:
     """Return the label of the nearest cell that has one, for each cell."""
     if not labels.any():
         return labels
@@ -295,7 +313,7 @@ def _with_floor_below_furniture(labels: Labels, free: Mask) -> Labels:
     furniture[0] = False
     near = distance_to(labels > 0, CELL) <= _BENEATH
     below = (furniture[blocks] | closed) & (labels == 0) & near
-    return np.where(below, _spread(labels), labels)
+    return np.where(below, spread(labels), labels)
 
 
 def _numbered(labels: Labels) -> Labels:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -53,12 +54,8 @@ def walled(
 
     All else is free, or as the place's map has it.
     """
-    solid = boxes.boxes_around(lines, WALL_THICKNESS)
     if plan.map is not None:
-        grid = plan.map.grid
-        cells = grid.cells.copy()
-        _paint(cells, grid.resolution, grid.origin, solid)
-        return Grid(cells, grid.resolution, grid.origin)
+        return walled_off(plan.map.grid, lines)
     west, south, east, north = plan.bounds
     # The corner of the grid falls on a multiple of the resolution: maps of one place line up.
     origin_x = math.floor((west - margin) / resolution) * resolution
@@ -66,8 +63,15 @@ def walled(
     columns = math.ceil((east + margin - origin_x) / resolution)
     rows = math.ceil((north + margin - origin_y) / resolution)
     cells = np.zeros((rows, columns), np.int8)
-    _paint(cells, resolution, (origin_x, origin_y), solid)
-    return Grid(cells, resolution, (origin_x, origin_y))
+    return walled_off(Grid(cells, resolution, (origin_x, origin_y)), lines)
+
+
+def walled_off(grid: Grid, lines: Sequence[tuple[Point, Point]]) -> Grid:
+    """Return a grid with walls along lines, metres."""
+    cells = grid.cells.copy()
+    solid = boxes.boxes_around(lines, WALL_THICKNESS)
+    _paint(cells, grid.resolution, grid.origin, solid)
+    return Grid(cells, grid.resolution, grid.origin)
 
 
 def _paint(
