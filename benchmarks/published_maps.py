@@ -1,0 +1,145 @@
+"""Published maps, imported and patrolled: what `launch.py import` makes of each, driven.
+
+    .venv/bin/python benchmarks/published_maps.py FOLDER [--minutes 10] [--quick] [MAP ...]
+
+FOLDER holds maps in map_server's format, in folders of their own or not: those of nav2_bringup
+(depot, tb3_sandbox, warehouse), turtlebot3_navigation2, aws-robomaker-small-house-world and the
+like; nothing in it is changed, and no file is touched by hand. Each map is imported as the command
+does it, and the whole stack patrols the place on simulated time, in the walls of the map.
+Collisions are the simulator's own count; rooms are those of the place, all of which the robot can
+reach.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import tempfile
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+
+from localisation import print_table
+from whole_stack import Stack
+
+from surveillance_operator.place_import import ImportRequest, import_place
+from surveillance_runtime.place import read_place_file
+from surveillance_runtime.place.occupancy_map import read_map
+
+PATIENCE = 300.0
+"""So long in real time without a simulated second, and the run has failed, seconds."""
+
+
+@dataclass(frozen=True)
+class Patrol:
+    """What came of a patrol: simulated seconds, metres, collisions, rooms that were visited."""
+
+    seconds: float
+    metres: float
+    collisions: int
+    visited: frozenset[str]
+    first_round: float
+    error: str = ''
+
+
+def patrolled(place: Path, seconds: float) -> Patrol:
+    """Patrol a place for simulated seconds."""
+    rooms = read_place_file(place).plan.place.rooms
+    with tempfile.TemporaryDirectory() as folder:
+        record = Path(folder) / 'mission.jsonl'
+        stack = Stack(place, {'robot_behavior': {'record': str(record)}})
+        stack.start()
+        error = ''
+        try:
+            begun = stack.robot.time
+            last, heard = begun, time.monotonic()
+            while stack.robot.time < begun + seconds:
+                time.sleep(0.1)
+                if stack.robot.time > last + 1.0:
+                    last, heard = stack.robot.time, time.monotonic()
+                if stack.error is not None or time.monotonic() - heard > PATIENCE:
+                    error = repr(stack.error) if stack.error else 'time stands still'
+                    break
+            driven, collisions = stack.robot.base.travelled, stack.robot.base.collisions
+            passed = stack.robot.time - begun
+        finally:
+            stack.close()
+        events = [json.loads(line) for line in record.read_text().splitlines()]
+    visits = [each for each in events if each['event'] in ('start', 'visit')]
+    first = 0.0
+    seen: set[str] = set()
+    for each in visits:
+        if each['place'] not in seen:
+            seen.add(each['place'])
+            first = each['time'] - visits[0]['time']
+    return Patrol(passed, driven, collisions, frozenset(seen & set(rooms)), first, error)
+
+
+def maps_in(folder: Path) -> list[Path]:
+    """Return the descriptions of maps below a folder; masks of costmap filters are none."""
+    found = []
+    for path in sorted(folder.rglob('*.yaml')):
+        try:
+            read_map(path)
+        except ValueError:
+            continue
+        if not path.stem.endswith(('_keepout', '_speed', '_mask')):
+            found.append(path)
+    return found
+
+
+def main() -> int:
+    """Import and patrol each map; print the table."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument('folder', type=Path)
+    parser.add_argument('only', nargs='*', metavar='MAP', help='names of maps; default: all')
+    parser.add_argument('--minutes', type=float, default=10.0, help='simulated, each map')
+    parser.add_argument('--quick', action='store_true', help='two minutes each')
+    options = parser.parse_args()
+    rows = []
+    for path in maps_in(options.folder):
+        name = str(path.relative_to(options.folder).with_suffix(''))
+        if options.only and name not in options.only:
+            continue
+        with tempfile.TemporaryDirectory() as folder:
+            place = Path(folder) / 'place.yaml'
+            begun = time.perf_counter()
+            try:
+                import_place(ImportRequest(path, place))
+            except ValueError as error:
+                rows.append((name, '-', '-', str(error)[:60], '-', '-', '-', '-'))
+                continue
+            seconds = time.perf_counter() - begun
+            rows_, columns = read_map(path).cells.shape
+            rooms = read_place_file(place).plan.place.rooms
+            run = patrolled(place, 60.0 * (2.0 if options.quick else options.minutes))
+        rows.append(
+            (
+                name,
+                f'{columns} x {rows_}',
+                f'{seconds:.1f}',
+                run.error or f'{run.seconds / 60:.1f}',
+                f'{run.metres:.0f}',
+                str(run.collisions),
+                f'{len(run.visited)} of {len(rooms)}',
+                f'{run.first_round:.0f}',
+            )
+        )
+        print(*rows[-1], ' '.join(sorted(set(rooms) - run.visited)), flush=True)
+    print_table(
+        'Published maps: imported and patrolled with no file touched by hand.',
+        (
+            *('map', 'cells', 'import s', 'simulated min', 'm', 'collisions', 'rooms visited'),
+            'all seen s',
+        ),
+        rows,
+    )
+    return 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())
