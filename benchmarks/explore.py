@@ -1,0 +1,211 @@
+"""Exploring measured: how long a robot takes to map a place by itself, and how good the map is.
+
+    python benchmarks/explore.py [--quick] [--place FILE ...] [--keep DIR]
+
+Pure simulation on the cores alone, faster than real time. The shortest tour leads through all
+rooms of a place that one knows; nobody can visit them in less.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import sys
+import time
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+from tables import table
+from whole_stack import ROOT
+
+from surveillance_controllers.exploration.exploration import Exploration, Phase
+from surveillance_controllers.exploration.frontiers import FrontierParameters
+from surveillance_controllers.exploration.map_building import MapBuilder
+from surveillance_controllers.geometry import Scan
+from surveillance_operator.map_command import graph_over_doors
+from surveillance_runtime.place import plan_grid
+from surveillance_runtime.place.occupancy_grid import Grid, distance_to
+from surveillance_simulation.robot.base import BaseModel
+from surveillance_simulation.robot.lidar import LidarModel
+from surveillance_simulation.robot.robot import Robot
+from surveillance_simulation.world.world import World, read_world
+
+PLACES = ('seven_rooms', 'patrol_world', 'office')
+STEP = 0.1
+"""Seconds between two scans."""
+
+
+@dataclass
+class Explored:
+    """What came of one exploration; metres and seconds."""
+
+    seconds: float
+    metres: float
+    share: float
+    wall_error: float
+    pose_error: float
+    odometry_error: float
+    loops: int
+    collisions: int
+    back: bool
+    given_up: list[str]
+    think_ms: list[float]
+    grid: Grid
+
+
+def explore(
+    world: World,
+    seed: int,
+    *,
+    errors: float = 1.0,
+    noise: float = 0.01,
+    frontiers: FrontierParameters | None = None,
+    most: float = 3600.0,
+) -> Explored:
+    """Explore a place with a robot whose odometry has so many times the usual errors."""
+    usual = BaseModel()
+    base = replace(
+        usual,
+        distance_error=errors * usual.distance_error,
+        turn_error=errors * usual.turn_error,
+    )
+    lidar = replace(LidarModel(), noise=noise)
+    robot = Robot(world, base, lidar, rng=np.random.default_rng(seed))
+    exploration = Exploration(
+        MapBuilder(start=robot.base.pose), frontiers=frontiers or FrontierParameters()
+    )
+    angles, worst = robot.lidar.angles, 0.0
+    think_ms = []
+    while exploration.phase is not Phase.DONE and robot.time < most:
+        scan = Scan(angles, robot.scan().astype(float), robot.lidar.range_max)
+        velocity = exploration.see(scan, robot.base.odometry, robot.time)
+        robot.base.command(velocity.speed, velocity.turn)
+        robot.advance(STEP)
+        begun = time.process_time()
+        if exploration.think():
+            think_ms.append(1e3 * (time.process_time() - begun))
+        pose = exploration.pose(robot.base.odometry)
+        worst = max(worst, math.dist(pose[:2], robot.base.pose[:2]))
+    assert exploration.grid is not None
+    share, wall_error = compared(exploration.grid, world)
+    return Explored(
+        robot.time,
+        robot.base.travelled,
+        share,
+        wall_error,
+        worst,
+        math.dist(robot.base.odometry[:2], robot.base.pose[:2]),
+        exploration.builder.loops,
+        robot.base.collisions,
+        math.dist(robot.base.pose[:2], world.plan.start[:2]) < 0.5,
+        [f'{each.reason} {np.round(each.point, 1).tolist()}' for each in exploration.unreached],
+        think_ms,
+        exploration.grid,
+    )
+
+
+def compared(grid: Grid, world: World) -> tuple[float, float]:
+    """Return the share of the true free floor that a map has as free, and its walls' error.
+
+    The floor is what is free and connected with the robot's start; the error is the 95th percentile
+    of the distance from an occupied cell's centre to the surface of what is really there, metres.
+    """
+    fine = 0.02
+    truth = plan_grid.draw(world.plan, fine)
+    import cv2
+
+    regions = cv2.connectedComponents(truth.free.astype(np.uint8), connectivity=4)[1]
+    floor = regions == regions[truth.cell_of(*world.plan.start[:2])]
+    points = truth.centres_of(np.argwhere(floor))
+    cells = grid.cells_of(points)
+    inside = grid.contains(cells)
+    row, column = cells[inside].T
+    share = float(grid.free[row, column].sum()) / len(points)
+    # From outside of what is there, and from inside of it.
+    solid = ~truth.free
+    outside, within = distance_to(solid, fine), distance_to(~solid, fine)
+    walls = grid.centres_of(np.argwhere(grid.occupied))
+    surface = np.maximum(outside, within).astype(np.float32) - np.float32(fine / 2)
+    return share, float(np.percentile(truth.interpolated(surface, walls), 95))
+
+
+def picture(grid: Grid) -> NDArray[np.uint8]:
+    """Return a map as map_server draws it."""
+    shades = np.where(grid.cells < 0, 205, np.where(grid.occupied, 0, 254))
+    return np.asarray(shades[::-1], np.uint8)
+
+
+def main() -> int:
+    """Explore the places and print the table."""
+    parser = argparse.ArgumentParser(description='Exploring, measured.')
+    parser.add_argument('--quick', action='store_true', help='the seven rooms once')
+    parser.add_argument('--place', action='append', type=Path, help='another place')
+    parser.add_argument('--seeds', type=int, default=1)
+    parser.add_argument('--errors', type=float, default=None, help='of the odometry, times')
+    parser.add_argument('--keep', type=Path, help='write the maps into this folder')
+    options = parser.parse_args()
+    names = options.place or [
+        ROOT / 'config' / f'{name}.yaml' for name in (PLACES[:1] if options.quick else PLACES)
+    ]
+    rows = []
+    kinds = (1.0, 5.0) if options.errors is None else (options.errors,)
+    for file in names:
+        tour = graph_over_doors(read_world(file).plan).tour.length
+        for errors in kinds:
+            noise = 0.01 if errors == 1.0 else 0.03
+            for seed in range(options.seeds):
+                begun = time.process_time()
+                did = explore(read_world(file), seed, errors=errors, noise=noise)
+                cpu = time.process_time() - begun
+                least = tour / BaseModel().speed
+                rows.append(
+                    (
+                        f'{file.stem}, errors x{errors:g}',
+                        f'{did.seconds:.0f}',
+                        f'{did.seconds / least:.2f}',
+                        f'{did.metres:.0f}',
+                        f'{did.metres / tour:.2f}',
+                        f'{did.share:.1%}',
+                        f'{did.wall_error:.3f}',
+                        f'{did.pose_error:.3f}',
+                        f'{did.odometry_error:.2f}',
+                        f'{did.loops}',
+                        f'{did.collisions}',
+                        'yes' if did.back else 'no',
+                        f'{np.median(did.think_ms):.0f}',
+                        f'{max(did.think_ms):.0f}',
+                        f'{cpu:.0f}',
+                    )
+                )
+                for each in did.given_up:
+                    print(f'{file.stem}: left: {each}')
+                if options.keep is not None:
+                    options.keep.mkdir(parents=True, exist_ok=True)
+                    name = f'{file.stem}_{errors:g}_{seed}.png'
+                    Image.fromarray(picture(did.grid)).save(options.keep / name)
+    head = (
+        'place',
+        's',
+        'x tour',
+        'm',
+        'x tour',
+        'floor',
+        'wall p95',
+        'pose max',
+        'odom end',
+        'loops',
+        'hits',
+        'back',
+        'think ms',
+        'max',
+        'cpu s',
+    )
+    print(table([head, *rows]))
+    return 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())
