@@ -22,6 +22,7 @@ from owl_reasoner.owl.axioms import (
 from owl_reasoner.owl.entities import entities_of
 from owl_reasoner.owl.expressions import ClassExpression
 from owl_reasoner.owl.vocabulary import NOTHING, THING
+from owl_reasoner.reasoner.assertion_reader import needs_of
 from owl_reasoner.reasoner.budget import Budget, ReasoningBudgetError
 from owl_reasoner.reasoner.clauses import Predicate
 from owl_reasoner.reasoner.consequence_based.classification import Classification
@@ -97,7 +98,7 @@ class Derivation:
             return False
         if isinstance(fact, ClassAssertion) and fact.cls == THING:
             return self._told.is_known('individual', fact.individual)
-        if engine.understands(fact) and engine.holds(fact):
+        if engine.reader.understands(fact) and engine.holds(fact):
             return True
         if isinstance(fact, DifferentIndividuals) and self.completion is not None:
             return self.completion.entails(self._told.axioms, fact)
@@ -217,17 +218,17 @@ class Derivation:
         added, and for none that went.
         """
         told = self._told
-        if not all(map(engine.takes, told.added)):
+        if not all(map(engine.reader.takes, told.added)):
             return False
-        classes, negated = Engine.needs_of(told.removed)
+        classes, negated = needs_of(told.removed)
         if not classes and not negated:
             return True
-        left = Engine.needs_of(told.complex)
+        left = needs_of(told.complex)
         return set(classes) <= set(left[0]) and set(negated) <= set(left[1])
 
     def _classify(self) -> None:
         self.classified += 1
-        needs = Engine.needs_of(self._told.complex)
+        needs = needs_of(self._told.complex)
         self.classification = Classification(self._told.schema, *needs, self.budget)
 
     def _change_of(self, engine: Engine | None) -> ProgramChange | None:
@@ -267,7 +268,7 @@ class Derivation:
         assert self.classification is not None
         engine = self.engine = Engine(self.classification.program, self._told, self.budget)
         if old is not None:
-            engine.take_spelling(old)
+            engine.reader.take_spelling(old.reader)
         self._told.settle()
         assertions = [axiom for axiom in self._told.axioms if is_assertion(axiom)]
         self.completion = self._completion_of(engine)

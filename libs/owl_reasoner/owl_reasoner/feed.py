@@ -8,8 +8,9 @@ from dataclasses import dataclass
 from owl_reasoner.owl.axioms import (
     Axiom,
 )
+from owl_reasoner.reasoner.assertion_reader import is_public
 from owl_reasoner.reasoner.clauses import Fact as StoredFact
-from owl_reasoner.reasoner.engine import Engine, FactView, is_public
+from owl_reasoner.reasoner.engine import Engine, FactView
 
 
 @dataclass(frozen=True)

@@ -300,7 +300,7 @@ class KnowledgeBase:
         representative = engine.equality.find(individual)
         stored = known.succ.get(representative)
         if stored:
-            covered = {engine.value(literal) for literal in found}
+            covered = {engine.reader.value(literal) for literal in found}
             view = FactView(engine)
             for value in stored:
                 if value not in covered and (known, representative, value) not in engine.asserted:
@@ -585,8 +585,9 @@ class KnowledgeBase:
         The memory of a large ontology, given back at once, would stop all threads for long.
         """
         owners: list[Any] = [self._told]
-        if self._derived.engine is not None:
-            owners += [self._derived.engine, *self._derived.engine.program.predicates()]
+        engine = self._derived.engine
+        if engine is not None:
+            owners += [engine, engine.reader, *engine.program.predicates()]
         for owner in owners:
             names = getattr(owner, '__slots__', None) or vars(owner)
             for held in [getattr(owner, name) for name in names]:

@@ -47,7 +47,7 @@ from owl_reasoner.owl.expressions import (
     SameIndividualAtom,
     Variable,
 )
-from owl_reasoner.reasoner import engine
+from owl_reasoner.reasoner import assertion_reader, engine, equality
 from owl_reasoner.reasoner.datatypes import value_of
 
 from .patrol_map import (
@@ -80,7 +80,7 @@ def by_value(axiom: Axiom) -> object:
 
 
 def test_a_value_that_changes_for_ever_is_forgotten(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(engine, 'LEAST_VALUES', 50)
+    monkeypatch.setattr(assertion_reader, 'LEAST_VALUES', 50)
     xsd = 'http://www.w3.org/2001/XMLSchema#'
     written = Literal('007', xsd + 'int')
     kb = KnowledgeBase(IRI)
@@ -315,13 +315,13 @@ def test_a_difference_that_a_rule_made_ends_with_the_rule_and_the_assertion() ->
 
 def test_many_individuals_become_the_same_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
     renamed: list[object] = []
-    current = engine.Engine.current
+    current = equality.Equality.current
 
-    def counted(self: engine.Engine, fact: engine.Fact) -> engine.Fact:
+    def counted(self: equality.Equality, fact: equality.Fact) -> equality.Fact:
         renamed.append(fact)
         return current(self, fact)
 
-    monkeypatch.setattr(engine.Engine, 'current', counted)
+    monkeypatch.setattr(equality.Equality, 'current', counted)
     links = [link('p', f's{one}', f'{end}{one}') for one in range(300) for end in 'xy']
     kb = KnowledgeBase(IRI, [FunctionalObjectProperty(n('p')), *links])
     assert kb.reason()

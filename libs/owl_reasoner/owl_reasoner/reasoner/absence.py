@@ -84,7 +84,7 @@ class Absences:
 
     def of_fact(self, axiom: Axiom) -> Absence | None:
         """Return what an assertion lacks; None where it is not about one class or property."""
-        fact = self._engine.fact_of(axiom)
+        fact = self._engine.reader.fact_of(axiom)
         if fact is None:
             return None
         gap = self._nearest(fact, ())

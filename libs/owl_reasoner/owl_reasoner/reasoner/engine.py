@@ -22,17 +22,16 @@ from owl_reasoner.owl.axioms import (
     ClassAssertion,
     DataPropertyAssertion,
     DifferentIndividuals,
-    NegativeDataPropertyAssertion,
-    NegativeObjectPropertyAssertion,
     ObjectPropertyAssertion,
     SameIndividual,
 )
 from owl_reasoner.owl.entities import entities_of
-from owl_reasoner.owl.expressions import ClassExpression, Literal
-from owl_reasoner.owl.vocabulary import NOTHING, THING, local_name
+from owl_reasoner.owl.expressions import Literal
+from owl_reasoner.owl.vocabulary import NOTHING, local_name
+from owl_reasoner.reasoner.assertion_reader import AssertionReader
 from owl_reasoner.reasoner.budget import Budget
 from owl_reasoner.reasoner.clauses import AtMost, Fact, Predicate, Premises, Program
-from owl_reasoner.reasoner.datatypes import Value, literal_of, value_of
+from owl_reasoner.reasoner.datatypes import Value, literal_of
 from owl_reasoner.reasoner.difference import Difference
 from owl_reasoner.reasoner.equality import Conflicts, Equality, Merge, individuals_in
 from owl_reasoner.reasoner.network import Network
@@ -46,10 +45,49 @@ _FACTS_A_LOOK = 64
 LONGEST = 100_000
 """The characters or digits of the longest value that rules make."""
 _LONGEST_BITS = LONGEST * 10 // 3
-LEAST_VALUES = 2_000
-"""So many values of literals are remembered before those that nobody asserts are forgotten."""
 BY_CASES = 'every case leads to it'
 """The origin of facts that reasoning by cases found."""
+
+
+class _CaseFacts:
+    """Facts that reasoning by cases found: they rest on no premise, but hold for a time alone."""
+
+    def __init__(self) -> None:
+        # Until the next update, and until `release`.
+        self.passing: set[Fact] = set()
+        self.lasting: set[Fact] = set()
+        self._released: list[Fact] = []
+        self._supported: set[Predicate] = set()
+        self.mark = Predicate('class', 'found by cases'), NOTHING
+        """The premise of every merge that cases found: when it goes, the merges go."""
+
+    def take(self, facts: Iterable[Fact], lasting: bool = False) -> None:
+        """Have facts hold without a premise."""
+        for fact in facts:
+            if fact[0] not in self._supported:
+                self._supported.add(fact[0])
+                fact[0].supports.append((self._supports(fact[0]), BY_CASES))
+            (self.lasting if lasting else self.passing).add(fact)
+
+    def release(self) -> None:
+        """Have the next update take back what lasts."""
+        self._released += self.lasting
+        self.lasting.clear()
+
+    def over(self) -> list[Fact]:
+        """Take the facts whose time is over."""
+        found = [*self.passing, *self._released]
+        self.passing.clear()
+        self._released.clear()
+        return found
+
+    def _supports(self, predicate: Predicate) -> Callable[..., Iterator[Premises]]:
+        def supports(*arguments: object) -> Iterator[Premises]:
+            fact = (predicate, *arguments)
+            if fact in self.passing or fact in self.lasting:
+                yield ()
+
+        return supports
 
 
 class Engine:
@@ -69,10 +107,11 @@ class Engine:
     Attributes:
         equality: Who stands for whom.
         difference: Who is known to be different.
-        spelling: A literal for each value, as some assertion wrote it.
+        reader: Reads assertions as facts.
         asserted: How many assertions state each fact.
         conflicts: Merges of individuals that are different.
         proofs: Searches why a fact holds.
+        cases: What reasoning by cases found.
         changed: Where a log of one update is wanted: facts that came, went or changed their
             standing, with whether they were derived (and not asserted) before.
         renamed: Whether an individual came to stand for another, or ceased to, since this was
@@ -84,9 +123,7 @@ class Engine:
         self.budget = budget or Budget()
         self.told = told
         self.equality = Equality()
-        self.spelling: dict[Value, Literal] = {}
-        self._values: dict[Literal, Value] = {}
-        self._most_values = LEAST_VALUES
+        self.reader = AssertionReader(program, self.equality)
         self.difference = Difference(program)
         self.asserted: dict[Fact, int] = {}
         self._queue: list[Fact] = []
@@ -99,12 +136,7 @@ class Engine:
         self._removed: dict[Fact, None] = {}
         self._split_happened = False
         self.proofs = ProofSearch(self.asserted)
-        # Facts found by cases, until the next update, and until `release_cases`.
-        self._by_cases: set[Fact] = set()
-        self._by_lasting_cases: set[Fact] = set()
-        self._released: list[Fact] = []
-        self._with_cases: set[Predicate] = set()
-        self._cases = Predicate('class', 'found by cases')
+        self.cases = _CaseFacts()
         self.changed: dict[Fact, bool] | None = None
         self.renamed = False
         self._network = Network(
@@ -116,7 +148,7 @@ class Engine:
             self._insert_now,
             self._request,
             self.budget.due,
-            self._looker,
+            partial(_looker, self.budget),
         )
         self._nothing = program.nothing
         self._nothing.supports.append((self._conflict_supports, 'one individual, yet different'))
@@ -128,139 +160,6 @@ class Engine:
             self._attach_touching(predicate)
         for fire in self._network.initial:
             fire()
-
-    # --- limits ---
-
-    def _looker(self, origin: Axiom | None) -> Callable[[], None]:
-        """Return what the joins of an axiom's clauses call to look at the limits."""
-        budget = self.budget
-        if origin is None:
-            return budget.count_due
-        text = partial(axiom_text, origin)
-
-        def look() -> None:
-            budget.at_work = text
-            budget.count_due()
-
-        return look
-
-    def _name_work(self, fact: Fact) -> None:
-        """Have an error name the axiom by which a fact was derived."""
-        self.budget.at_work = lambda: self._reason_of(fact)
-
-    def _reason_of(self, fact: Fact) -> str:
-        for support, origin in fact[0].supports:
-            if isinstance(origin, Axiom) and next(iter(support(*fact[1:])), None) is not None:
-                return axiom_text(origin)
-        return f'the facts of {local_name(fact[0].name)}'
-
-    # --- assertions as facts ---
-
-    def value(self, literal: Literal) -> Value:
-        """Return the literal's value, remembered."""
-        values = self._values
-        value = values.get(literal)
-        if value is None:
-            value = values[literal] = value_of(literal)
-            self.spelling.setdefault(value, literal)
-        return value
-
-    def _forget_values(self) -> None:
-        """Keep the values that are asserted: each moment of a clock is another one."""
-        used = {fact[-1] for fact in self.asserted}
-        self._values = {text: value for text, value in self._values.items() if value in used}
-        self.spelling = {value: text for value, text in self.spelling.items() if value in used}
-        self._most_values = max(LEAST_VALUES, 2 * len(self._values))
-
-    def fact_of(self, axiom: Axiom) -> Fact | None:
-        """Return the fact an assertion states, in representatives; None for assertions of another
-        kind.
-        """
-        names = self.equality.representative
-        kind = type(axiom)
-        if kind is DataPropertyAssertion:
-            subject = axiom.subject  # type: ignore[attr-defined]
-            value = self.value(axiom.literal)  # type: ignore[attr-defined]
-            return self.program.data(axiom.prop), names.get(subject, subject), value  # type: ignore[attr-defined]
-        if kind is ObjectPropertyAssertion:
-            subject, target = axiom.subject, axiom.object  # type: ignore[attr-defined]
-            prop = self.program.object(axiom.prop)  # type: ignore[attr-defined]
-            return prop, names.get(subject, subject), names.get(target, target)
-        if isinstance(axiom, ClassAssertion):
-            individual = names.get(axiom.individual, axiom.individual)
-            if axiom.cls == THING:
-                return None
-            if axiom.cls == NOTHING:
-                return self.program.nothing, individual
-            if isinstance(axiom.cls, str):
-                return self.program.cls(axiom.cls), individual
-            label = self.program.labels.get(axiom.cls)
-            return None if label is None else (label, individual)
-        if isinstance(axiom, NegativeObjectPropertyAssertion):
-            negative = self.program.negatives[self.program.object(axiom.prop)]
-            pair = names.get(axiom.subject, axiom.subject), names.get(axiom.object, axiom.object)
-            return (negative, *pair)
-        if isinstance(axiom, NegativeDataPropertyAssertion):
-            negative = self.program.negatives[self.program.data(axiom.prop)]
-            return negative, names.get(axiom.subject, axiom.subject), self.value(axiom.literal)
-        if isinstance(axiom, DifferentIndividuals) and len(axiom.individuals) == 1:
-            (individual,) = axiom.individuals
-            return self.program.nothing, names.get(individual, individual)
-        return None
-
-    def current(self, fact: Fact) -> Fact:
-        """Return the fact with every individual under its representative's name."""
-        names = self.equality.representative
-        if not names:
-            return fact
-        if len(fact) == 2:
-            return fact[0], names.get(fact[1], fact[1])
-        predicate, x, y = fact
-        return predicate, names.get(x, x), y if predicate.kind == 'data' else names.get(y, y)
-
-    @staticmethod
-    def needs_of(
-        axioms: Iterable[Axiom],
-    ) -> tuple[list[ClassExpression], list[tuple[str, str]]]:
-        """Return the complex classes and the negated properties (kind, IRI) that assertions use."""
-        expressions: dict[ClassExpression, None] = {}
-        negated: dict[tuple[str, str], None] = {}
-        for axiom in axioms:
-            if isinstance(axiom, ClassAssertion) and not isinstance(axiom.cls, str):
-                expressions[axiom.cls] = None
-            elif isinstance(axiom, NegativeObjectPropertyAssertion):
-                negated['object', axiom.prop] = None
-            elif isinstance(axiom, NegativeDataPropertyAssertion):
-                negated['data', axiom.prop] = None
-        return list(expressions), list(negated)
-
-    def understands(self, axiom: Axiom) -> bool:
-        """Tell whether the program was made for a complex class or negated property that an
-        assertion uses.
-        """
-        if isinstance(axiom, ClassAssertion):
-            return isinstance(axiom.cls, str) or axiom.cls in self.program.labels
-        if isinstance(axiom, NegativeObjectPropertyAssertion):
-            return self.program.object(axiom.prop) in self.program.negatives
-        if isinstance(axiom, NegativeDataPropertyAssertion):
-            return self.program.data(axiom.prop) in self.program.negatives
-        return True
-
-    def takes(self, axiom: Axiom) -> bool:
-        """Tell whether the program keeps an assertion apart from others: it understands it, and a
-        complex class has a label that is no named class equal to it, with what it implies.
-        """
-        if not self.understands(axiom):
-            return False
-        if isinstance(axiom, ClassAssertion) and not isinstance(axiom.cls, str):
-            required = axiom.cls in self.program.required
-            return required and not is_public(self.program.labels[axiom.cls])
-        return True
-
-    def take_spelling(self, other: Engine) -> None:
-        """Write derived values as another engine did."""
-        self._values.update(other._values)
-        self.spelling.update(other.spelling)
 
     @property
     def consistent(self) -> bool:
@@ -274,7 +173,7 @@ class Engine:
         if isinstance(axiom, DifferentIndividuals):
             names = sorted(self.equality.find(name) for name in axiom.individuals)
             return all(self.difference.different(*pair) for pair in combinations(names, 2))
-        fact = self.fact_of(axiom)
+        fact = self.reader.fact_of(axiom)
         return fact is not None and bool(fact[0].holds(fact))
 
     @property
@@ -366,7 +265,7 @@ class Engine:
         if self.changed is not None:
             self.changed.setdefault(fact, True)
         for merge in self._conflicts_about(individuals_in(fact)):
-            if fact in map(self.current, merge.premises):
+            if fact in map(self.equality.current, merge.premises):
                 self._withdraw_conflict(merge)
 
     def _follows(self, fact: Fact) -> bool:
@@ -384,25 +283,6 @@ class Engine:
             return bool(self.conflicts.between(fact[1], fact[2]))
         holds: bool = fact[0].holds(fact)
         return holds
-
-    def _filled(self) -> list[Predicate]:
-        """Return the predicates that hold of somebody."""
-        predicates = dict.fromkeys(self.program.predicates())
-        return [one for one in predicates if one.members or one.succ]
-
-    @staticmethod
-    def _facts_about(individual: str, predicates: Iterable[Predicate]) -> Iterator[Fact]:
-        for predicate in predicates:
-            if predicate.kind == 'class':
-                if individual in predicate.members:
-                    yield predicate, individual
-                continue
-            for y in predicate.succ.get(individual, ()):
-                yield predicate, individual, y
-            if predicate.kind != 'data':
-                for x in predicate.pred.get(individual, ()):
-                    if x != individual:
-                        yield predicate, x, individual
 
     # --- individuals that must be the same ---
 
@@ -433,7 +313,7 @@ class Engine:
 
     def _same_supports(self, first: str, second: str) -> Iterator[Premises]:
         for merge in self.conflicts.between(first, second):
-            yield tuple(map(self.current, merge.premises))
+            yield tuple(map(self.equality.current, merge.premises))
 
     def _state_same(self, axiom: SameIndividual) -> None:
         first, *others = sorted(axiom.individuals)
@@ -444,7 +324,7 @@ class Engine:
         pending = tuple(self._requests)
         self._requests.clear()
         equality, merged = self.equality, False
-        filled = self._filled() if pending else []  # Merging takes facts away and adds none.
+        filled = _filled(self.program) if pending else []  # Merging takes facts away and adds none.
         for merge in pending:
             self.budget.tick()
             origin = merge.origin
@@ -453,7 +333,7 @@ class Engine:
             x, y = equality.find(merge.first), equality.find(merge.second)
             if x == y:
                 continue
-            if not all(self._holds(self.current(fact)) for fact in merge.premises):
+            if not all(self._holds(self.equality.current(fact)) for fact in merge.premises):
                 for ask in self._network.merging:  # By other premises they may still be.
                     ask(x, y)
                 continue
@@ -470,7 +350,7 @@ class Engine:
         self.renamed = True
         kept, gone = self.equality.join(merge)
         self.difference.merge(kept, self.equality.members[kept])
-        moved = list(self._facts_about(gone, filled))
+        moved = list(_facts_about(gone, filled))
         for fact in moved:
             for fire in fact[0].on_delete:
                 fire(*fact[1:])
@@ -486,7 +366,7 @@ class Engine:
         self._overdeleted.clear()
         self._doubtful.clear()
         for place, fact in enumerate(self._queue):
-            current = self.current(fact)
+            current = self.equality.current(fact)
             if current != fact:
                 self._queue[place] = current
                 count = self.asserted.pop(fact, 0)
@@ -508,7 +388,7 @@ class Engine:
             return
         self.renamed = self._split_happened = True
         self._touch_before_removal(representative)
-        facts = list(self._facts_about(representative, self._filled()))
+        facts = list(_facts_about(representative, _filled(self.program)))
         for fact in facts:
             if self.asserted.pop(fact, None) and self.changed is not None:
                 self.changed.setdefault(fact, False)
@@ -531,7 +411,7 @@ class Engine:
         for axiom in axioms:
             if isinstance(axiom, SameIndividual):
                 self._state_same(axiom)
-            stated = self.fact_of(axiom)
+            stated = self.reader.fact_of(axiom)
             if stated is not None and not members.isdisjoint(individuals_in(stated)):
                 self._assert(stated)
             if self.program.uses_thing:
@@ -549,12 +429,7 @@ class Engine:
         splitting: set[str] = set()
         self.proofs.reset()
         added, removed = list(added), list(removed)
-        if self._by_cases:
-            self._overdeleted += map(self.current, self._by_cases)
-            self._by_cases.clear()
-        if self._released:
-            self._overdeleted += map(self.current, self._released)
-            self._released.clear()
+        self._overdeleted += map(equality.current, self.cases.over())
         self._restate_differences(added, removed, splitting)
         for axiom in removed:
             if equality.members:
@@ -563,7 +438,7 @@ class Engine:
                 for merge in self.conflicts.mentioning(axiom.individuals):
                     if merge.origin == axiom:
                         self._withdraw_conflict(merge, again=False)
-            fact = self.fact_of(axiom)
+            fact = self.reader.fact_of(axiom)
             if fact is not None:
                 self._unassert(fact)
             if uses_thing:
@@ -572,7 +447,7 @@ class Engine:
         for axiom in added:
             if type(axiom) is SameIndividual:
                 self._state_same(axiom)
-            fact = self.fact_of(axiom)
+            fact = self.reader.fact_of(axiom)
             if fact is not None:
                 self._assert(fact)
             if uses_thing:
@@ -582,8 +457,7 @@ class Engine:
             self._replace(splitting)
         self._queue.reverse()
         self._propagate()
-        if len(self._values) > self._most_values:
-            self._forget_values()
+        self.reader.forget_values(self.asserted)
 
     def _replace(self, splitting: Iterable[str]) -> None:
         """Take away what went, and split classes of equal individuals, once new assertions hold."""
@@ -655,7 +529,7 @@ class Engine:
 
         Args:
             facts: Class and property assertions and who is the same; None for a contradiction.
-            lasting: They hold until the update after `release_cases`; none says who is the same.
+            lasting: They hold until the update after `cases.release`; none says who is the same.
         """
         found: list[Fact] = []
         if facts is None:
@@ -664,9 +538,8 @@ class Engine:
         axioms = list(facts)
         sames = [axiom for axiom in axioms if isinstance(axiom, SameIndividual)]
         if sames:
-            mark = self._cases, NOTHING
-            self._let_cases_support(self._cases)
-            self._by_cases.add(mark)
+            mark = self.cases.mark
+            self.cases.take((mark,))
             self._queue.append(mark)
             self._propagate()
         for same in sames:
@@ -674,30 +547,11 @@ class Engine:
             for other in others:
                 self._requests[Merge(first, other, None, (mark,))] = None
         self._propagate()
-        found += filter(None, map(self.fact_of, axioms))
-        for predicate in {fact[0] for fact in found}:
-            self._let_cases_support(predicate)
-        (self._by_lasting_cases if lasting else self._by_cases).update(found)
+        # Who is the same is settled now: what else was found stands under the representatives.
+        found += filter(None, map(self.reader.fact_of, axioms))
+        self.cases.take(found, lasting)
         self._queue += found
         self._propagate()
-
-    def release_cases(self) -> None:
-        """Have the next update take back what lasting cases led to."""
-        self._released += self._by_lasting_cases
-        self._by_lasting_cases.clear()
-
-    def _let_cases_support(self, predicate: Predicate) -> None:
-        if predicate not in self._with_cases:
-            self._with_cases.add(predicate)
-            predicate.supports.append((self._case_supports(predicate), BY_CASES))
-
-    def _case_supports(self, predicate: Predicate) -> Callable[..., Iterator[Premises]]:
-        def supports(*arguments: object) -> Iterator[Premises]:
-            fact = (predicate, *arguments)
-            if fact in self._by_cases or fact in self._by_lasting_cases:
-                yield ()
-
-        return supports
 
     def _classes_of(self, axiom: Axiom) -> set[str]:
         found = {self.equality.find(name) for name in individuals_of(axiom)}
@@ -777,7 +631,7 @@ class Engine:
         queue, names = self._queue, self.equality.representative
         for fact in self._removed:
             self.budget.tick()
-            if names and self.current(fact) != fact:
+            if names and self.equality.current(fact) != fact:
                 continue
             if self._follows(fact):
                 queue.append(fact)
@@ -807,7 +661,7 @@ class Engine:
                 left -= 1
                 if left < 0:
                     left = _FACTS_A_LOOK
-                    self._name_work(fact)
+                    budget.at_work = partial(_reason_of, fact)
                     budget.count(_FACTS_A_LOOK)
                 if len(fact) == 2:
                     x = fact[1]
@@ -885,6 +739,47 @@ class Engine:
                 touch(one)
 
 
+def _looker(budget: Budget, origin: Axiom | None) -> Callable[[], None]:
+    """Return what the joins of an axiom's clauses call to look at the limits."""
+    if origin is None:
+        return budget.count_due
+    text = partial(axiom_text, origin)
+
+    def look() -> None:
+        budget.at_work = text
+        budget.count_due()
+
+    return look
+
+
+def _reason_of(fact: Fact) -> str:
+    """Return the axiom by which a fact was derived, for an error that ends its consequences."""
+    for support, origin in fact[0].supports:
+        if isinstance(origin, Axiom) and next(iter(support(*fact[1:])), None) is not None:
+            return axiom_text(origin)
+    return f'the facts of {local_name(fact[0].name)}'
+
+
+def _filled(program: Program) -> list[Predicate]:
+    """Return the predicates that hold of somebody."""
+    predicates = dict.fromkeys(program.predicates())
+    return [one for one in predicates if one.members or one.succ]
+
+
+def _facts_about(individual: str, predicates: Iterable[Predicate]) -> Iterator[Fact]:
+    for predicate in predicates:
+        if predicate.kind == 'class':
+            if individual in predicate.members:
+                yield predicate, individual
+            continue
+        for y in predicate.succ.get(individual, ()):
+            yield predicate, individual, y
+        if predicate.kind != 'data':
+            for x in predicate.pred.get(individual, ()):
+                if x != individual:
+                    yield predicate, x, individual
+
+
 def individuals_of(axiom: Axiom) -> set[str]:
     """Return the individuals that an axiom mentions."""
     return {name for kind, name in entities_of(axiom) if kind == 'individual'}
@@ -901,11 +796,6 @@ def _is_long(value: Value) -> bool:
     return False
 
 
-def is_public(predicate: Predicate) -> bool:
-    """Tell whether a predicate is a named class or property rather than internal."""
-    return isinstance(predicate.expression, str)
-
-
 class FactView:
     """Reads an engine's facts."""
 
@@ -916,7 +806,7 @@ class FactView:
         """Return a literal for a value: as some assertion writes it, else in its most general
         datatype.
         """
-        return self._engine.spelling.get(value) or literal_of(value)
+        return self._engine.reader.spelling.get(value) or literal_of(value)
 
     def public(self, fact: Fact, classes: Classes) -> Iterator[Axiom]:
         """Yield a stored fact as assertions, one for each combination of names."""
@@ -973,7 +863,7 @@ class FactView:
                     isinstance(axiom, DataPropertyAssertion)
                     and axiom.prop == predicate.expression
                     and axiom.subject == subject
-                    and engine.value(axiom.literal) == value
+                    and engine.reader.value(axiom.literal) == value
                 ):
                     break
             else:

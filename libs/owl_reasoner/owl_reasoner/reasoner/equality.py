@@ -86,6 +86,16 @@ class Equality:
         self._merges: dict[str, list[Merge]] = {}
         self._used: dict[Any, set[str]] = {}
 
+    def current(self, fact: Fact) -> Fact:
+        """Return the fact with every individual under its representative's name."""
+        names = self.representative
+        if not names:
+            return fact
+        if len(fact) == 2:
+            return fact[0], names.get(fact[1], fact[1])
+        predicate, x, y = fact
+        return predicate, names.get(x, x), y if predicate.kind == 'data' else names.get(y, y)
+
     def find(self, individual: str) -> str:
         """Return the representative."""
         return self.representative.get(individual, individual)

@@ -128,7 +128,7 @@ class Reasons:
             proofs = [engine.proofs.find((engine.program.different, *pair)) for pair in pairs]
             parts = [self._explained(proof) for proof in proofs if proof is not None]
             return parts[0] if len(parts) == 1 else self._joined(axiom_text(axiom), parts)
-        fact = engine.fact_of(axiom)
+        fact = engine.reader.fact_of(axiom)
         if fact is None or not fact[0].holds(fact):
             return None
         proof = engine.proofs.find(fact)
@@ -226,7 +226,7 @@ class Reasons:
         for name in names:
             for other in sorted(engine.equality.same(name)):
                 for axiom in engine.told.mentioning(other):
-                    if isinstance(axiom, ax.Assertion) and engine.fact_of(axiom) == fact:
+                    if isinstance(axiom, ax.Assertion) and engine.reader.fact_of(axiom) == fact:
                         written = Explanation(axiom_text(axiom), 'asserted', axioms=(axiom,))
                         same = self._renamings(axiom, fact)
                         if not same:
@@ -274,7 +274,7 @@ class Reasons:
         self._merging.add(merge)
         premises: list[Explanation] = []
         for written in merge.premises:
-            proof = self._engine.proofs.find(self._engine.current(written))
+            proof = self._engine.proofs.find(self._engine.equality.current(written))
             if proof is not None:
                 premises.append(self._explained(proof))
         self._merging.discard(merge)
@@ -350,7 +350,7 @@ class Reasons:
         shown: list[str] = []
         for argument in atom.arguments:
             if isinstance(argument, ex.Literal):
-                values[argument] = self._engine.value(argument)
+                values[argument] = self._engine.reader.value(argument)
                 texts[argument] = literal_text(argument)
             shown.append(texts.get(argument, ''))
         sign = _SIGNS.get(name)

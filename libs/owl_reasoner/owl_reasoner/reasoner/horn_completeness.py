@@ -101,7 +101,7 @@ class Completion:
         self._steps = 0
         # The pairs of classes that reasoning by cases last added.
         self._pairs: list[tuple[str, str]] = []
-        engine.release_cases()
+        engine.cases.release()
 
     @cached_property
     def _open(self) -> OpenCases:
@@ -133,7 +133,7 @@ class Completion:
         if self._unserving == _MOST_UNSERVING:
             self._pause, self._unserving = _PAUSE, 0
         self._kept, self._served = None, 0
-        self._engine.release_cases()
+        self._engine.cases.release()
 
     def run(self, axioms: Iterable[Axiom]) -> None:
         """Add what follows from everything that is asserted now."""
