@@ -204,6 +204,7 @@ class Translation:
         budget.stage, budget.at_work = 'reading axioms', self._subject
         tbox = [axiom for axiom in axioms if not isinstance(axiom, (ax.Assertion, ax.Annotation))]
         self.program = Program()
+        self._properties, self._rules = _PropertyAxioms(self), _Rules(self)
         self._variables = _Y
         self._described: set[ClassExpression] = set()
         self._recognised: set[ClassExpression] = set()
@@ -233,7 +234,7 @@ class Translation:
             isinstance(clause.head, PredicateAtom) and clause.head.predicate is self.program.apart
             for clause in self.program.clauses
         ):
-            self.contradict((self._differs(_X, _X),), _X)
+            self.contradict((self.differs(_X, _X),), _X)
         if self.program.uses_thing:
             self._state_named()
 
@@ -268,6 +269,7 @@ class Translation:
     # --- clauses ---
 
     def fresh(self) -> int:
+        """Return the number of a variable that stands in no clause yet."""
         self._variables += 1
         return self._variables
 
@@ -313,7 +315,7 @@ class Translation:
             return self.program.object(prop), False
         return self.program.object(prop.prop), True
 
-    def _values(self, data_range: ex.DataRange) -> ValueSet | None:
+    def values(self, data_range: ex.DataRange) -> ValueSet | None:
         """Return the values of a range, None where these are all that there are.
 
         Raises:
@@ -366,13 +368,14 @@ class Translation:
         return None
 
     def property(self, prop: ex.PropertyExpression, x: Term, y: Term) -> PredicateAtom:
+        """Return the atom that relates two terms; an inverse turns them."""
         return property_atom(self.program, prop, x, y)
 
     def _related(self, prop: ex.PropertyExpression, filler: ClassExpression, x: Term) -> list[Body]:
         y = self.fresh()
-        return [(self.property(prop, x, y), *body) for body in self._simple_bodies(filler, y)]
+        return [(self.property(prop, x, y), *body) for body in self.simple_bodies(filler, y)]
 
-    def _simple_bodies(self, expression: ClassExpression, y: Term) -> list[Body]:
+    def simple_bodies(self, expression: ClassExpression, y: Term) -> list[Body]:
         """Return the bodies that relate `y` to nothing: restrictions in the expression become
         labels.
 
@@ -387,7 +390,7 @@ class Translation:
         ):
             return self.bodies(expression, y)
         if isinstance(expression, ex.ObjectUnionOf):
-            parts = [self._simple_bodies(operand, y) for operand in expression.operands]
+            parts = [self.simple_bodies(operand, y) for operand in expression.operands]
             return [body for part in parts for body in part]
         return [(PredicateAtom(self._recognise(expression), (y,)),)]
 
@@ -407,7 +410,7 @@ class Translation:
     def _valued(self, prop: str, data_range: ex.DataRange, x: Term) -> Body:
         v = self.fresh()
         atom = PredicateAtom(self.program.data(prop), (x, v))
-        values = self._values(data_range)
+        values = self.values(data_range)
         return (atom,) if values is None else (atom, RangeAtom(values, (v,)))
 
     def _labelled_bodies(self, expression: ClassExpression, x: Term) -> list[Body]:
@@ -460,7 +463,7 @@ class Translation:
         """Return what is counted: by which property, whether backwards, and in which filler."""
         if isinstance(expression, (ex.ObjectMinCardinality, ex.ObjectMaxCardinality)):
             return *self._direction(expression.prop), self._filler(expression.filler)
-        return self.program.data(expression.prop), False, self._values(expression.range)
+        return self.program.data(expression.prop), False, self.values(expression.range)
 
     # --- consequents ---
 
@@ -488,6 +491,7 @@ class Translation:
                 self._describe(label, expression)
 
     def contradict(self, body: Body, x: Term) -> None:
+        """Add that the body never holds; `x` is whom the contradiction is told of."""
         self.clause(body, PredicateAtom(self.program.nothing, (x,)))
 
     def _imply_union(self, body: Body, expression: ex.ObjectUnionOf, x: Term) -> None:
@@ -512,7 +516,7 @@ class Translation:
             self._exist(label, n, self._direction(expression.prop), required)
         elif isinstance(expression, (ex.DataSomeValuesFrom, ex.DataMinCardinality)):
             n = expression.n if isinstance(expression, ex.DataMinCardinality) else 1
-            values = self._values(expression.range)
+            values = self.values(expression.range)
             every = EVERY if values is None else values
             self._exist(label, n, (self.program.data(expression.prop), False), every)
         elif isinstance(expression, ex.ObjectAllValuesFrom):
@@ -538,23 +542,24 @@ class Translation:
 
     def _describe_complement(self, label: Predicate, operand: ClassExpression) -> None:
         if isinstance(operand, str):
-            self._disjoint(label, self.program.cls(operand))
+            self.disjoint(label, self.program.cls(operand))
             return
         for other in self.bodies(operand, _X):
             self.contradict((PredicateAtom(label, (_X,)), *other), _X)
         if isinstance(operand, ex.ObjectOneOf):
             for name in operand.individuals:
-                differs = self._differs(_X, Constant(name))
+                differs = self.differs(_X, Constant(name))
                 self.clause((PredicateAtom(label, (_X,)),), differs)
 
     def only(self, body: Body, prop: str, data_range: ex.DataRange) -> None:
-        values = self._values(data_range)
+        """Add that who satisfies the body has values of a range only."""
+        values = self.values(data_range)
         if values is not None:
             v = self.fresh()
             atom = PredicateAtom(self.program.data(prop), (_X, v))
             self.contradict((*body, atom, RangeAtom(~values, (v,))), _X)
 
-    def _disjoint(self, first: Predicate, second: Predicate) -> None:
+    def disjoint(self, first: Predicate, second: Predicate) -> None:
         if first is second:
             self.contradict((PredicateAtom(first, (_X,)),), _X)
         else:
@@ -574,7 +579,7 @@ class Translation:
                 text = f'owl:top{name}: it is used like any other property'
                 program.unsupported.append(text)
 
-    def _differs(self, x: Term, y: Term) -> PredicateAtom:
+    def differs(self, x: Term, y: Term) -> PredicateAtom:
         return PredicateAtom(self.program.apart, (x, y))
 
     def _negate(self, kind: str, iri: str) -> None:
@@ -621,13 +626,13 @@ class Translation:
                 self._attempt(self._sub_class, part, axiom.cls)
             self._attempt(self._sub_class, axiom.cls, ex.ObjectUnionOf(axiom.classes))
         elif isinstance(axiom, ax.Rule):
-            self._rule(axiom)
+            self._rules.add(axiom)
         elif isinstance(axiom, ax.Import):
             raise UnsupportedError('imports are not followed')
         elif isinstance(axiom, ax.HasKey):
             self._key(axiom)
         elif not isinstance(axiom, (ax.Declaration, ax.DatatypeDefinition)):
-            self._property_axiom(axiom)
+            self._properties.add(axiom)
 
     def _sub_class(self, sub: ClassExpression, sup: ClassExpression) -> None:
         sub, sup = normal_form(sub), normal_form(sup)
@@ -637,7 +642,7 @@ class Translation:
             return
         opposite = sup.operand if isinstance(sup, ex.ObjectComplementOf) else None
         if isinstance(sub, str) and isinstance(opposite, str):
-            self._disjoint(self._label(sub), self._label(opposite))
+            self.disjoint(self._label(sub), self._label(opposite))
         for body in self.bodies(sub, _X):
             self.imply(body, sup, _X)
 
@@ -651,7 +656,7 @@ class Translation:
             elif not is_positive(first):
                 self._attempt(self._sub_class, second, normal_form(first, True))
             else:
-                self._disjoint(self._recognise(first), self._recognise(second))
+                self.disjoint(self._recognise(first), self._recognise(second))
 
     def _key(self, axiom: ax.HasKey) -> None:
         props = [self._direction(prop) for prop in axiom.object_props]
@@ -660,45 +665,50 @@ class Translation:
             cls = self._filler(axiom.cls)
             self.program.keys.append(Key(cls, tuple(props), axiom))
 
-    # --- property axioms ---
 
-    def _property_axiom(self, axiom: Axiom) -> None:
+class _PropertyAxioms:
+    """Adds the clauses of axioms about properties to a translation."""
+
+    def __init__(self, to: Translation) -> None:
+        self._to = to
+
+    def add(self, axiom: Axiom) -> None:
         """Add the clauses of an axiom about properties."""
         data = isinstance(axiom, (ax.SubDataPropertyOf, ax.EquivalentDataProperties))
         link = self._data_link if data else self._object_link
         for sub, sup in inclusions(axiom):
-            self.clause((link(*sub),), link(*sup))
+            self._to.clause((link(*sub),), link(*sup))
         if isinstance(axiom, (ax.DisjointObjectProperties, ax.DisjointDataProperties)):
             data = isinstance(axiom, ax.DisjointDataProperties)
             self._disjoint_properties(axiom.props, self._data_link if data else self._object_link)
         elif isinstance(axiom, ax.ObjectPropertyDomain):
-            self.imply((self.property(axiom.prop, _X, _Y),), axiom.domain, _X)
+            self._to.imply((self._to.property(axiom.prop, _X, _Y),), axiom.domain, _X)
         elif isinstance(axiom, ax.ObjectPropertyRange):
-            self.imply((self.property(axiom.prop, _X, _Y),), axiom.range, _Y)
+            self._to.imply((self._to.property(axiom.prop, _X, _Y),), axiom.range, _Y)
         elif isinstance(axiom, ax.DataPropertyDomain):
-            self.imply((self._data_link(axiom.prop),), axiom.domain, _X)
+            self._to.imply((self._data_link(axiom.prop),), axiom.domain, _X)
         elif isinstance(axiom, ax.DataPropertyRange):
-            self.only((), axiom.prop, axiom.range)
+            self._to.only((), axiom.prop, axiom.range)
         else:
             self._characteristic(axiom)
 
     def _characteristic(self, axiom: Axiom) -> None:
         """Add the clauses of an axiom that says of what kind a property, or a chain, is."""
-        program, prop = self.program, self.property
+        program, prop = self._to.program, self._to.property
         if isinstance(axiom, ax.SubPropertyChainOf):
             body = tuple(prop(part, place, place + 1) for place, part in enumerate(axiom.chain))
-            self.clause(body, prop(axiom.sup, 0, len(axiom.chain)))
+            self._to.clause(body, prop(axiom.sup, 0, len(axiom.chain)))
         elif isinstance(axiom, ax.TransitiveObjectProperty):
             both = prop(axiom.prop, _X, _Y), prop(axiom.prop, _Y, _Z)
-            self.clause(both, prop(axiom.prop, _X, _Z))
+            self._to.clause(both, prop(axiom.prop, _X, _Z))
         elif isinstance(axiom, ax.ReflexiveObjectProperty):
-            self.clause((), prop(axiom.prop, _X, _X))
+            self._to.clause((), prop(axiom.prop, _X, _X))
         elif isinstance(axiom, ax.IrreflexiveObjectProperty):
             program.irreflexive.append(prop(axiom.prop, _X, _X).predicate)
-            self.contradict((prop(axiom.prop, _X, _X),), _X)
+            self._to.contradict((prop(axiom.prop, _X, _X),), _X)
         elif isinstance(axiom, ax.AsymmetricObjectProperty):
             program.asymmetric.append(prop(axiom.prop, _X, _Y).predicate)
-            self.contradict((prop(axiom.prop, _X, _Y), prop(axiom.prop, _Y, _X)), _X)
+            self._to.contradict((prop(axiom.prop, _X, _Y), prop(axiom.prop, _Y, _X)), _X)
         elif isinstance(axiom, (ax.FunctionalObjectProperty, ax.InverseFunctionalObjectProperty)):
             atom = prop(axiom.prop, _X, _Y)
             inverse = (atom.terms[0] == _Y) != isinstance(axiom, ax.InverseFunctionalObjectProperty)
@@ -712,29 +722,34 @@ class Translation:
         for first, second in ax.pairs_of(props):
             one, two = link(*directed(first)), link(*directed(second))
             pair = (one.predicate, one.terms[0] == _Y, two.predicate, two.terms[0] == _Y)
-            self.program.disjoint_properties.append(pair)
-            self.contradict((one, two), _X)
+            self._to.program.disjoint_properties.append(pair)
+            self._to.contradict((one, two), _X)
 
     def _object_link(self, iri: str, inverted: bool = False) -> PredicateAtom:
         pair = (_Y, _X) if inverted else (_X, _Y)
-        return PredicateAtom(self.program.object(iri), pair)
+        return PredicateAtom(self._to.program.object(iri), pair)
 
     def _data_link(self, iri: str, _: bool = False) -> PredicateAtom:
-        return PredicateAtom(self.program.data(iri), (_X, _Y))
+        return PredicateAtom(self._to.program.data(iri), (_X, _Y))
 
-    # --- rules ---
 
-    def _rule(self, rule: ax.Rule) -> None:
-        """Add the clauses of one rule to the self's program."""
-        terms = RuleTerms(self.fresh)
+class _Rules:
+    """Adds the clauses of SWRL rules to a translation."""
+
+    def __init__(self, to: Translation) -> None:
+        self._to = to
+
+    def add(self, rule: ax.Rule) -> None:
+        """Add the clauses of one rule."""
+        terms = RuleTerms(self._to.fresh)
         alternatives: list[list[tuple[BodyAtom, ...]]] = []
         for atom in rule.body:
             if isinstance(atom, ex.ClassAtom):
                 # What it relates to need have no name: that is the label's matter.
                 term = terms.individual(atom.argument)
-                alternatives.append(self._simple_bodies(atom.cls, term))
+                alternatives.append(self._to.simple_bodies(atom.cls, term))
             elif isinstance(atom, ex.DataRangeAtom):
-                term, values = terms.value(atom.argument), self._values(atom.range)
+                term, values = terms.value(atom.argument), self._to.values(atom.range)
                 if values is not None:
                     alternatives.append([(RangeAtom(values, (term,)),)])
             else:
@@ -752,10 +767,12 @@ class Translation:
         assert not isinstance(atom, (ex.ClassAtom, ex.DataRangeAtom))
         first = terms.individual(atom.first)
         if isinstance(atom, ex.DataPropertyAtom):
-            return PredicateAtom(self.program.data(atom.prop), (first, terms.value(atom.second)))
+            return PredicateAtom(
+                self._to.program.data(atom.prop), (first, terms.value(atom.second))
+            )
         second = terms.individual(atom.second)
         if isinstance(atom, ex.ObjectPropertyAtom):
-            return self.property(atom.prop, first, second)
+            return self._to.property(atom.prop, first, second)
         kind = SameAtom if isinstance(atom, ex.SameIndividualAtom) else DifferentAtom
         return kind((first, second))
 
@@ -769,7 +786,7 @@ class Translation:
         Raises:
             UnsupportedError: A value is bound by nothing.
         """
-        program = self.program
+        program = self._to.program
         bound: set[Term] = set()
         computing: set[BodyAtom] = set()
         for atom in body:
@@ -814,7 +831,7 @@ class Translation:
         bound = {term for atom in body for term in atom.terms if isinstance(term, int)}
         if not rule.head:
             subject = next((term for term in sorted(bound) if term in terms.individuals), None)
-            self.contradict(body, Constant(NOTHING) if subject is None else subject)
+            self._to.contradict(body, Constant(NOTHING) if subject is None else subject)
 
         def check(*arguments: Term) -> None:
             if any(isinstance(term, int) and term not in bound for term in arguments):
@@ -824,7 +841,7 @@ class Translation:
             if isinstance(atom, ex.ClassAtom):
                 argument = terms.individual(atom.argument)
                 check(argument)
-                self.imply(body, atom.cls, argument)
+                self._to.imply(body, atom.cls, argument)
             elif isinstance(atom, (ex.DataRangeAtom, ex.BuiltinAtom)):
                 raise UnsupportedError('a built-in or data range in the head has no meaning here')
             else:
@@ -832,5 +849,5 @@ class Translation:
                 assert not isinstance(head, ComputedAtom)
                 check(*head.terms)
                 if isinstance(head, DifferentAtom):
-                    head = self._differs(*head.terms)
-                self.clause(body, head)
+                    head = self._to.differs(*head.terms)
+                self._to.clause(body, head)
