@@ -126,15 +126,22 @@ class Engine:
         self.reader = AssertionReader(program, self.equality)
         self.difference = Difference(program)
         self.asserted: dict[Fact, int] = {}
+        # What is still to be added, and candidates for removal. The hooks of predicates append to
+        # both.
         self._queue: list[Fact] = []
         self._overdeleted: list[Fact] = []
         self._requests: dict[Merge, None] = {}
         self.conflicts = Conflicts()
+        # Individuals whose difference from others may have changed: looked at after the facts, as
+        # several facts of one change touch the same ones.
         self._touched: dict[str, None] = {}
         # Who stands for individuals that are the same because others differ, which may be over.
         self._doubtful: dict[str, None] = {}
         self._removed: dict[Fact, None] = {}
         self._split_happened = False
+        # The forward part of backward/forward deletion (Motik, Nenov, Piro and Horrocks,
+        # "Incremental update of datalog materialisation", AAAI 2015): a candidate with a proof is
+        # not taken away, and nothing that rests on it is looked at.
         self.proofs = ProofSearch(self.asserted)
         self.cases = _CaseFacts()
         self.changed: dict[Fact, bool] | None = None
@@ -429,6 +436,8 @@ class Engine:
         splitting: set[str] = set()
         self.proofs.reset()
         added, removed = list(added), list(removed)
+        # What cases found rests on no facts that could be followed: all of it goes, and comes back
+        # where the next search finds it again.
         self._overdeleted += map(equality.current, self.cases.over())
         self._restate_differences(added, removed, splitting)
         for axiom in removed:
@@ -453,8 +462,11 @@ class Engine:
             if uses_thing:
                 for individual in individuals_of(axiom):
                     self._assert((self.program.thing, equality.find(individual)))
+        # Removal comes before addition, but the new assertions hold by then (`_enter`): a clock
+        # that is set retracts one value and asserts another, and what both support never goes.
         if self._overdeleted or splitting or self._doubtful:
             self._replace(splitting)
+        # It is worked off from its end: in the order of the assertions, then.
         self._queue.reverse()
         self._propagate()
         self.reader.forget_values(self.asserted)
@@ -616,6 +628,9 @@ class Engine:
                     self._split(representative, fresh)
                 if not fact[0].holds(fact):
                     continue
+            # DRed (Gupta, Mumick and Subrahmanian, SIGMOD 1993) would take it away with all that it
+            # leads to, and derive most of that again. The proof is searched to a small depth: where
+            # that is too little the fact goes, and `_settle` brings it back.
             if fact in asserted or proves(fact):
                 continue
             self._take(fact)
@@ -633,6 +648,8 @@ class Engine:
             self.budget.tick()
             if names and self.equality.current(fact) != fact:
                 continue
+            # One step from what is left is enough: whatever needs more steps is reached by
+            # propagation from those that need one.
             if self._follows(fact):
                 queue.append(fact)
         self._removed.clear()
@@ -653,6 +670,8 @@ class Engine:
         budget, left = self.budget, _FACTS_A_LOOK
         budget.stage = 'deriving facts'
         changed = self.changed
+        # A built-in can make a new value of each value for ever; classes and individuals are
+        # finitely many, so values are all that needs a bound.
         values_left = _MOST_VALUES + 4 * len(self.asserted)
         while True:
             while queue:
@@ -697,11 +716,15 @@ class Engine:
                     changed.setdefault(fact, False)
                 for fire in predicate.on_insert:
                     fire(x, y)
+            # Facts first, then merges, then differences: a merge walks all facts of an individual,
+            # so it is done once for all that is known of it.
             if self._requests:
                 self._run_requests()
             elif touched:
                 self._run_touched()
             else:
+                # Last the sorted indexes of thresholds (`threshold_rules`): they take a change of
+                # many values as one.
                 for flush in flushes:
                     flush()
                 if not queue:

@@ -34,6 +34,8 @@ _DEEPEST = 16
 
 @lru_cache(maxsize=4096)
 def _code(source: str) -> CodeType:
+    # Compiling takes far longer than making a function of known code, and an ontology has
+    # few shapes of clauses: the objects are parameters of the factory, not part of the text.
     return compile(source, '<join>', 'exec')
 
 
@@ -69,6 +71,7 @@ class _Writer:
         self.bound: set[int] = set()
         self.temporaries = 0
         self.parts = 0
+        # Temporaries that a loop still needs when the function goes on in a further part.
         self.kept: list[str] = []
         self.calling = ''
 
@@ -209,6 +212,8 @@ class _Writer:
                 pending = None
             if not waiting:
                 return
+            # Greedy, one atom at a time: bodies have two to five atoms, and sizes of tables change
+            # while the code stays. What is bound decides more than how many facts there are.
             atom = min(waiting, key=self._cost)
             waiting.remove(atom)
             self.step(atom)
@@ -280,6 +285,8 @@ def compile_trigger(
     signature = _arguments(writer, terms)
     predicate = head.predicate
 
+    # The head is looked up as soon as its variables are bound, not at the end: most instances of a
+    # body lead to what is there already, and the loops inside are saved for all of them.
     def guard() -> bool:
         if not all(map(writer.is_bound, head.terms)):
             return False
@@ -328,6 +335,7 @@ def compile_support(
     With `outputs` it yields pairs (values of the outputs, premises).
     """
     writer = _Writer(context, origin)
+    # A generator: whoever asks for a reason stops at the first one that holds.
     writer.calling = 'yield from '
     signature = _arguments(writer, terms)
     writer.join(body)

@@ -95,6 +95,8 @@ class Network:
                 self.touch_insert.append(counter.touch_insert)
                 self.touch_delete.append(counter.touch_delete)
         self.counters: list[AtMostCounter] = []
+        # Bounds for everybody (functional properties) act first: what they merge the others need not
+        # count.
         for at_most in sorted(program.at_most, key=lambda condition: condition.label is not None):
             self.limit(at_most)
         for key in program.keys:
@@ -123,6 +125,10 @@ class Network:
             hooks.append((place, what))
 
         context, body, head = self.context, clause.body, clause.head
+        # Three functions for each clause: what it leads to from a new fact (semi-naive evaluation;
+        # Abiteboul, Hull and Vianu, "Foundations of Databases", 1995, chapter 13), what it led to
+        # from one that goes, and, from a fact, the premises it rests on. The last one is asked
+        # instead of a record of all derivations, which would be larger than the facts.
         support = compile_support(context, body, head.terms, origin=clause.origin)
         gain: Callable[[BodyAtom | None, Sequence[Term]], Callable[..., None]]
         if isinstance(head, SameAtom):
@@ -138,6 +144,7 @@ class Network:
             gain = partial(trigger, emit=self._enqueue, present=False)
             lose = partial(trigger, emit=self._overdelete, present=True)
         triggered = False
+        # Transitive properties are closed by a hand-written step (`_close`).
         closed = transitive(clause)
         if closed is not None:
             hook(closed.on_insert, partial(self._close, closed, context.looker(clause.origin)))
@@ -153,6 +160,8 @@ class Network:
                     hook(self.touch_insert, gain(None, (term,)))
                     if lose is not None:
                         hook(self.touch_delete, lose(None, (term,)))
+        # What names an individual finds its facts under whoever stands for it: a merge or a split
+        # changes that, and no fact comes that would tell.
         if not triggered or _names_individual(clause):
             run = gain(None, ())
             hook(self.naming, run)
@@ -169,6 +178,7 @@ class Network:
         """
         sources, targets = (x, *predicate.pred.get(x, ())), (y, *predicate.succ.get(y, ()))
         due, insert, succ = self.context.due, self._insert, predicate.succ
+        # The facts that are inserted below fire this step again, for what is being closed.
         if predicate in self._closing:
             return
         self._closing.add(predicate)
@@ -214,6 +224,7 @@ class Network:
 
         def request(x: str, y: str) -> None:
             if x != y:
+                # One derivation is enough: when its premises go, the split asks again.
                 for premises in support(x, y):
                     merge(first or x, second or y, origin, premises)
                     return

@@ -64,6 +64,8 @@ class ProofSearch:
     def _prove(self, fact: Fact, depth: int) -> bool:
         if fact in self._asserted or fact in self._proved:
             return True
+        # Iterative deepening (Korf, "Depth-first iterative-deepening", 1985): cyclic derivations
+        # need no marks of what is being searched, as each step leaves one less to go.
         if depth <= 0 or self._failed.get(fact, -1) >= depth:
             return False
         arguments = fact[1:]
@@ -78,6 +80,7 @@ class ProofSearch:
                     return True
                 if self._budget <= 0:
                     return False
+        # A failure holds for no greater depth. One for want of budget is not kept: it says nothing.
         self._failed[fact] = depth
         return False
 

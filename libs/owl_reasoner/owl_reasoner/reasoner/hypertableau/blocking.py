@@ -37,6 +37,7 @@ class Blocking:
 
     def forget(self) -> None:
         """Take in that something was taken back."""
+        # Concepts went, so equal sizes are no sign of equal sets any more.
         self._signs.clear()
 
     def look(self) -> None:
@@ -50,6 +51,7 @@ class Blocking:
             parent = model.parent[x]
             if parent is None:
                 continue
+            # Blocked indirectly: below a blocked individual the model is that below its blocker.
             if parent in found:
                 found[x] = found[parent]
                 cores.pop(x, None)
@@ -62,9 +64,15 @@ class Blocking:
             if self._is_its_own(x):
                 continue
             sign: Any = self._sign(x)
+            # With inverses and counting, what is required of an individual comes from above as
+            # well: two are alike only if they, their parents and the roles between are (pairwise
+            # blocking; Horrocks and Sattler, "A description logic with transitive and inverse roles
+            # and role hierarchies", 1999).
             if self._rules.is_pairwise:
                 roles = model.out[parent].get(x, {})
                 sign = sign, self._sign(parent), frozenset(roles)
+            # Anywhere blocking: any earlier individual, not an ancestor alone. A tree with many
+            # equal branches needs one of them only.
             first = seen.setdefault(sign, x)
             if first != x:
                 found[x] = first
@@ -100,6 +108,7 @@ class Blocking:
         # Many are alike: what is not found in one of them is not looked for in the others.
         unlike: set[frozenset[int]] = set()
         for y in cores if known is None else (known, *cores):
+            # Earlier ones alone: two that blocked each other would both be without successors.
             if y in blocked or y in put_off or y >= x or model.is_gone(y):
                 continue
             sign = self._sign(y)
@@ -113,6 +122,8 @@ class Blocking:
             model.step()
             if not unwanted & other <= own:
                 continue
+            # What its parent asks of x must be met by y in the place of x (Glimm, Horrocks and
+            # Motik 2010, core blocking with a check of validity).
             for body, heads in conditions:
                 if body <= other and heads.isdisjoint(other):
                     break

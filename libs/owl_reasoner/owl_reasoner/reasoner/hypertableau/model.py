@@ -95,11 +95,15 @@ class CaseModel:
         """Go back to a state."""
         trail = self._trail
         while len(trail) > mark:
+            # A trail as in constraint solvers: going back costs as much as going forward did, and
+            # no table is copied for a choice.
             table, key, value = trail.pop()
             if value is _MISSING:
                 del table[key]
             else:
                 table[key] = value
+        # What is still in them was put there after the mark: a choice is made with all queues
+        # empty.
         self.queue.clear()
         self.recount.clear()
         self.revalue.clear()
@@ -147,6 +151,8 @@ class CaseModel:
 
     def somebody(self, parent: int | None = None) -> int:
         """Return a new individual, unnamed so far; `parent`: for whom it is made."""
+        # Numbers are not taken back: an individual made again is another one, and who came earlier
+        # (`blocking`) stays decided.
         x = next(self._numbers)
         tables: tuple[dict[int, Any], ...] = (
             *(self.labels, self.out, self._groups, self.values, self.children),
@@ -200,6 +206,8 @@ class CaseModel:
     def find(self, node: int) -> tuple[int | None, Choices]:
         """Return who stands for a node now (None: nobody), and by which choices."""
         choices, current, gone = 0, node, self.gone
+        # No path compression: the steps carry the choices of each merge, and go one by one when
+        # these are taken back.
         while current in gone:
             following, more = gone[current]
             choices |= more

@@ -45,6 +45,8 @@ class _Choice:
 
     def __init__(self, mark: int, alternatives: list[Alternative], choices: Choices) -> None:
         self.mark, self.alternatives, self.place = mark, alternatives, 0
+        # What the disjunction itself rests on; and with it what its failed alternatives rested on,
+        # which its last alternative inherits.
         self.stated = self.choices = choices
 
 
@@ -86,6 +88,8 @@ class CaseSearch:
         self.depends = False
         self._stack: list[_Choice] = []
         self._held = 0
+        # By concept, over all of the search: not undone with it, as what failed in one place often
+        # fails in the next.
         self._failures: dict[int, int] = {}
         # Disjunctions by number; `_next` tells which was not looked at yet.
         self._open: dict[int, _Either | _Always] = {}
@@ -172,6 +176,9 @@ class CaseSearch:
         while True:
             try:
                 self._saturate()
+                # A choice before a new individual: a successor that a later choice makes needless
+                # is then never made, and blocking compares individuals of whom all is known. What
+                # was put off comes last: mostly it is never needed.
                 if not (self._branch() or self._expand() or self._resume()):
                     return True
             except ClashError as clash:
@@ -193,6 +200,8 @@ class CaseSearch:
                     self._on_concept(*event)
                 elif not is_gone(event[2]):
                     self._on_relation(*event)
+            # Counting after concepts and relations: it may merge individuals, which walks over all
+            # that is known of both.
             if recount:
                 x, _ = recount.popitem()
                 budget.tick()
@@ -313,6 +322,9 @@ class CaseSearch:
             choice = self._stack[-1]
             bit = 1 << len(self._stack) - 1
             self._back_to(choice.mark)
+            # Backjumping (dependency-directed backtracking; Horrocks, "Optimising tableaux decision
+            # procedures for description logics", 1997, section 6.2): this choice took no part in
+            # the contradiction, its other alternatives would meet it again.
             if not choices & bit:
                 self._stack.pop()
                 continue
@@ -322,6 +334,8 @@ class CaseSearch:
                 self._failures[failed.concept] = self._failures.get(failed.concept, 0) + 1
             choice.place += 1
             stated = choice.stated | bit
+            # The last alternative is no choice any more: it follows from the failures of the
+            # others, and a contradiction with it goes back past this point at once.
             if choice.place == len(choice.alternatives) - 1:
                 self._stack.pop()
                 stated = choice.choices
@@ -354,6 +368,8 @@ class CaseSearch:
             model.same(named, x, labels[concept] | more)
             if is_gone(x):
                 return
+        # Hyperresolution: a rule is looked at whenever one of its concepts comes, and fires with
+        # the last of them. It needs no order of its body, and each instance is found once.
         for rule in rules.of_node.get(concept, ()):
             choices = total(rule.body, labels)
             if choices is not None:
@@ -368,6 +384,8 @@ class CaseSearch:
             for y, roles in tuple(model.out[x].items()):
                 if -edge_rule.role in roles:
                     self._fire(edge_rule, y, x)
+        # One entry for all disjunctions about everybody: one for each of them would be individuals
+        # times axioms.
         if concept == ANYBODY and rules.always:
             self._append(_Always(x, 0))
         if concept in rules.loops:
@@ -433,6 +451,7 @@ class CaseSearch:
             # Whoever is blocked has needs that wait: nobody is.
             self._blocking.blocked = {}
             return False
+        # Once for all needs: comparing individuals costs more than making one.
         self._blocking.look()
         progress = False
         for x, concept in tuple(self._needs):
@@ -454,6 +473,7 @@ class CaseSearch:
             return
         made = [model.somebody(x) for _ in range(needed.n)]
         if len(made) > 1:
+            # Else a bound above would make them the same, and `n` would be met by one.
             model.differ(made, choices)
         for y in made:
             model.relate(x, needed.role, y, choices)
