@@ -74,8 +74,12 @@ def shortest_tour(distances: Matrix) -> Tour:
         length = tour_length(distances, order)
         return Tour(order, length)
     order = _good_order((distances + distances.T) / 2.0)
+    # The search knows the mean of both directions (2-opt turns parts round); only the result is
+    # measured one way.
     order = min(order, order[::-1], key=lambda way: tour_length(distances, way))
     length = tour_length(distances, order)
+    # The bound takes longer than the tour and is for benchmarks and promises: found when it is
+    # asked for.
     return Tour(order, length, lambda: _one_tree_bound(np.minimum(distances, distances.T), length))
 
 
@@ -123,6 +127,7 @@ def _tour_of_block(ways: Sequence[Mapping[int, float]], members: Sequence[int]) 
         legs[row, list(others)] = list(others.values())
     np.fill_diagonal(legs, 0.0)
     if len(members) <= EXACT_UP_TO:
+        # Floyd and Warshall: faster than a start of SciPy for so few.
         for middle in range(len(members)):
             np.minimum(legs, legs[:, middle, None] + legs[middle], out=legs)
         return shortest_tour(legs)
@@ -240,6 +245,7 @@ def _exact_order(distances: Matrix) -> tuple[int, ...]:
     came_from = np.zeros((size, others), dtype=np.intp)
     for last in range(others):
         cost[1 << last, last] = distances[others, last]
+    # In the order of the numbers, each set comes after all of its subsets.
     for visited in range(1, size):
         for last in range(others):
             if not visited >> last & 1 or visited == 1 << last:

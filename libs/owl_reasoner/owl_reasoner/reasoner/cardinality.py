@@ -124,10 +124,14 @@ class AtLeastCounter(_Counter):
 
     def gain(self, z: str) -> None:
         """Count again after something came."""
+        # Most calls end here: a count of all that is related, before who of it counts and who is
+        # different.
         if z in self.head.members or len(self.succ.get(z, ())) < self.n:
             return
         values = self.related(z)
         if len(values) >= self.n and (
+            # Individuals may be the same unless known to be different (no unique name assumption):
+            # so many pairwise different ones are a clique in the graph of known differences.
             self.is_data or clique(values, self.n, self.difference.different) is not None
         ):
             self._enqueue((self.head, z))
@@ -188,6 +192,7 @@ class AtMostCounter(_Counter):
         if len(related) <= self.n:
             return
         if self.n == 1:
+            # Each with the first one, not each pair: equality is transitive.
             for other in related[1:]:
                 self._only_one(z, related[0], other)
             return
@@ -196,6 +201,8 @@ class AtMostCounter(_Counter):
             if z not in self._nothing.members:
                 self._enqueue((self._nothing, z))
             return
+        # One too many, and one pair alone that may be the same: then it is (a unit of the
+        # disjunction over pairs). More than one such pair is left to reasoning by cases.
         facts = self._label_fact(z) + self.facts(z, related)
         for one, other in self._forced(related):
             apart = self.differences(related)
@@ -242,6 +249,7 @@ class AtMostCounter(_Counter):
         """Something that counted is about to go."""
         if z in self._nothing.members:
             self._overdelete((self._nothing, z))
+            # Its contradiction may hide that two are the same: looked at again when it is over.
             self.recheck.add(z)
 
     def _label_fact(self, z: str) -> Premises:
@@ -311,6 +319,7 @@ class KeyWatcher:
     def gain(self, x: str) -> None:
         """Look for individuals that `x` now shares its key with."""
         cls = self._key.cls
+        # A key identifies named individuals only (OWL 2 Structural Specification, 9.5).
         if is_anonymous(x) or (cls is not None and x not in cls.members):
             return
         shared: dict[str, list[Fact]] | None = None

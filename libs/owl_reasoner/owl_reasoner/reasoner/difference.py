@@ -54,6 +54,8 @@ class Difference:
 
     def state(self, axiom: DifferentIndividuals) -> None:
         """Add a set of individuals all different from each other."""
+        # A set of n individuals costs n entries; the pairs would be n times as many, and a map of
+        # 1,000 rooms states one such set.
         number = self._next = self._next + 1
         self._numbers[axiom] = number
         self._axioms[number] = axiom
@@ -121,6 +123,7 @@ class Difference:
                     return True
         elif self.stated(x, y):
             return True
+        # The cheap sources first: sets, then rules, then what facts imply.
         if self._apart.succ and self._stated_by_rule(x, y):
             return True
         return bool(self.evidence or self.through) and self._follows(x, y)
@@ -135,6 +138,8 @@ class Difference:
             for evidence in self.evidence:
                 for _ in evidence.premises(*pair):
                     return True
+            # What each pair comes down to may be very many pairs: beyond these the difference
+            # counts as not known, which is sound.
             if len(seen) > _MAX_PAIRS:
                 continue
             for counter in self.through:

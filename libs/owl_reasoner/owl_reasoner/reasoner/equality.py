@@ -110,12 +110,16 @@ class Equality:
         stays, before anonymous individuals.
         """
         pair = self.find(merge.first), self.find(merge.second)
+        # Not by size, as in union-find: the name that stays is shown to users, and must not depend
+        # on the order in which merges come.
         kept, gone = sorted(pair, key=lambda name: (is_anonymous(name), name))
         members = self.members.setdefault(kept, {kept})
         joining = self.members.pop(gone, {gone})
         members |= joining
         for individual in joining:
             self.representative[individual] = kept
+        # The merges themselves are kept, not only their result: a class is explained, and split, by
+        # them.
         merges = self._merges.setdefault(kept, [])
         merges += self._merges.pop(gone, ())
         merges.append(merge)
@@ -126,6 +130,8 @@ class Equality:
 
     def split(self, representative: str) -> set[str]:
         """Have every member of the class stand for itself again; return the members."""
+        # The whole class, not the part that rested on what went: which members would stay together
+        # is found by merging them again, by what still holds.
         members = self.members.pop(representative)
         for individual in members:
             self.representative.pop(individual, None)
@@ -147,6 +153,8 @@ class Equality:
             if argument in self.members:
                 found.add(argument)
         if self._used:
+            # A merge names its premises as they were written then; by now the fact may stand under
+            # another name.
             for written in self._spellings(fact):
                 for individual in self._used.get(written, ()):
                     found.add(self.find(individual))
@@ -176,6 +184,7 @@ class Equality:
         merges = self._merges.get(self.find(first), [])
         came: dict[str, Merge | None] = {first: None}
         origin: dict[str, str] = {}
+        # Breadth first: the shortest chain of merges is the explanation that is read.
         pending = [first]
         while pending and second not in came:
             here = pending.pop(0)

@@ -143,11 +143,15 @@ class Completion:
             self._forget_classes()
             return
         assertions = [axiom for axiom in axioms if is_assertion(axiom)]
+        # A search by cases looks at everybody in one model: on so many it would take minutes, and
+        # is left out with a sentence that says so.
         if len(assertions) > _MOST_ASSERTIONS:
             self._forget_classes()
             self._left_out = (*self._native, 'the assertions: too many for reasoning by cases')
             return
         began = engine.budget.now()
+        # Models of an earlier change first: most changes leave them models of what is asserted now,
+        # and then nothing that they decide has to be searched.
         if not self._run_kept(assertions):
             reasoner = CaseReasoner([*self._schema, *assertions], budget=engine.budget)
             self._run_cases(reasoner)
@@ -204,6 +208,8 @@ class Completion:
             known = self._classification
             # Where the individuals took all steps, classes are not compared at all.
             self._stands = not reasoner.names_individuals and not reasoner.stopped
+            # Only the pairs that the consequence-based hierarchy does not have: what it has are
+            # told subsumers here.
             pairs = list(reasoner.hierarchy(known.classes(), known.below_by_itself))
             if pairs != self._pairs or not self._compared:
                 known.complete(pairs)

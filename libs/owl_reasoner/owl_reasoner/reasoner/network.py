@@ -95,8 +95,8 @@ class Network:
                 self.touch_insert.append(counter.touch_insert)
                 self.touch_delete.append(counter.touch_delete)
         self.counters: list[AtMostCounter] = []
-        # Bounds for everybody (functional properties) act first: what they merge the others need not
-        # count.
+        # Bounds for everybody (functional properties) act first: what they merge, the others need
+        # not count.
         for at_most in sorted(program.at_most, key=lambda condition: condition.label is not None):
             self.limit(at_most)
         for key in program.keys:

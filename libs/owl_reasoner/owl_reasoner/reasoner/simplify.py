@@ -31,6 +31,7 @@ def simplify(program: Program, asserted: Iterable[Predicate]) -> None:
     """Simplifies in place; `asserted` are labels that individuals are asserted to belong to."""
     kept = set(asserted)
     program.clauses = list(dict.fromkeys(program.clauses))
+    # Aliases first: a label that became a class lets the other steps see what implies what.
     _replace_aliases(program, kept)
     _prune(program, kept)
     drop_implied_atoms(program)
@@ -61,14 +62,18 @@ def _replace_aliases(program: Program, kept: set[Predicate]) -> None:
         counted = {condition.head for condition in program.at_least}
         alias: dict[Predicate, Predicate] = {}
         for label, clauses in producers.items():
+            # With two producers the label is a union; one that assertions use, that is counted or
+            # that excludes something has a meaning beyond its clause.
             if len(clauses) != 1 or label in kept or label in counted or label.disjoint:
                 continue
             (clause,) = clauses
             atom = _source(clause)
             if atom is None or atom.predicate is label or atom.predicate in alias:
                 continue
+            # A rule holds for named individuals alone, so its label is less than the class.
             if clause.named_only or atom.predicate in (program.thing, program.nothing):
                 continue
+            # No chains of aliases in one pass: the next one takes the rest.
             if label not in alias.values():
                 alias[label] = atom.predicate
         if not alias:
@@ -95,6 +100,8 @@ def _substitute(program: Program, alias: dict[Predicate, Predicate]) -> None:
 
 def _prune(program: Program, kept: set[Predicate]) -> None:
     while True:
+        # Pruned from both ends: forwards from what assertions can state, backwards from what
+        # queries can see, until nothing goes.
         reached = set(kept) | {condition.head for condition in program.at_least}
         consumed: set[Predicate] = set()
         for clause in program.clauses:
@@ -152,6 +159,8 @@ class _Implications:
                 continue
             body, head = clause.body[0], clause.head
             if isinstance(body, PredicateAtom) and isinstance(head, PredicateAtom):
+                # A clause about the same individual twice, or about a certain one, says less than
+                # its predicates.
                 terms = body.terms
                 if all(isinstance(term, int) for term in terms) and len(set(terms)) == len(terms):
                     self._clauses.setdefault(body.predicate, []).append((body, head))
@@ -181,6 +190,8 @@ def drop_implied_atoms(program: Program) -> None:
         body = list(clause.body)
         for atom in clause.body:
             if isinstance(atom, PredicateAtom) and atom.predicate.kind == 'class' and len(body) > 1:
+                # From what is left, not from the whole body: two atoms that imply each other would
+                # both go.
                 rest = [other for other in body if other is not atom]
                 if implications.imply(rest, atom):
                     body = rest

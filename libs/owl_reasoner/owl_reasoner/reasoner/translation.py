@@ -278,9 +278,13 @@ class Translation:
         program = self.program
         bound = {term for atom in body for term in atom.terms if isinstance(term, int)}
         loose = [term for term in head.terms if isinstance(term, int) and term not in bound]
+        # A head about somebody of whom the body says nothing: he has to exist, so the body says
+        # that.
         for term in dict.fromkeys(loose):
             program.uses_thing = True
             body = (*body, PredicateAtom(program.thing, (term,)))
+        # DL-safe rules (Motik, Sattler and Studer, 2005); a label is defined for everybody, whoever
+        # asks for it.
         named_only = isinstance(self._origin, ax.Rule) and not defines
         program.clauses.append(Clause(tuple(dict.fromkeys(body)), head, self._origin, named_only))
 
@@ -398,6 +402,8 @@ class Translation:
         """Return the bodies for what is in every operand, at most one of which is spelt out as a
         relation.
         """
+        # The product of the alternatives of all operands grows exponentially: all but one get a
+        # label, which has its alternatives once.
         spelt_out = [one for one in operands if isinstance(one, (*_RELATING, ex.ObjectUnionOf))]
         parts: list[list[Body]] = []
         for operand in operands:
@@ -498,6 +504,9 @@ class Translation:
         positive: list[ClassExpression] = []
         for operand in expression.operands:
             opposite = normal_form(operand, True)
+            # Absorption: a negative alternative of a union is a condition instead. With one
+            # positive one left it is a Horn clause; with several, a case that the hypertableau
+            # tries.
             if is_positive(opposite) and not is_positive(operand):
                 body = (*body, PredicateAtom(self._recognise(opposite), (x,)))
             else:
@@ -544,6 +553,7 @@ class Translation:
         if isinstance(operand, str):
             self.disjoint(label, self.program.cls(operand))
             return
+        # Whoever is in the class for any reason, and in its complement, is a contradiction.
         for other in self.bodies(operand, _X):
             self.contradict((PredicateAtom(label, (_X,)), *other), _X)
         if isinstance(operand, ex.ObjectOneOf):
@@ -641,6 +651,8 @@ class Translation:
                 self._attempt(self._sub_class, operand, sup)
             return
         opposite = sup.operand if isinstance(sup, ex.ObjectComplementOf) else None
+        # Disjoint classes are watched as a table of pairs, not as clauses: a taxonomy has thousands
+        # of them.
         if isinstance(sub, str) and isinstance(opposite, str):
             self.disjoint(self._label(sub), self._label(opposite))
         for body in self.bodies(sub, _X):
@@ -802,6 +814,8 @@ class _Rules:
             program.uses_thing = True
             body = (*body, PredicateAtom(program.thing, (term,)))
             bound.add(term)
+        # Range restriction (safety): by repetition, as one computed value may be what another one
+        # needs.
         waiting = [atom for atom in body if isinstance(atom, (ComputedAtom, RangeAtom))]
         progress = True
         while waiting and progress:

@@ -77,6 +77,8 @@ class Classification:
             if name not in (THING, NOTHING):
                 program.cls(name)
         self._budget.look()
+        # The order matters: chains are spelt out before contexts are made, which know steps alone;
+        # and the hierarchy is read before the requirements add clauses that would enter it.
         report_counted_chains(program)
         spell_out_chains(program)
         self._report_partial()
@@ -200,12 +202,16 @@ class Classification:
 
     def _hierarchy(self) -> None:
         contexts = self._contexts
+        # The context of no class: what everybody is.
         everybody = contexts.context(())
         self._above[THING] = _named(everybody)
         if everybody.clash:
             # There is always some individual, so what nothing can be is a contradiction.
             nothing = PredicateAtom(self.program.nothing, (Constant(NOTHING),))
             self.program.clauses.append(Clause((), nothing))
+        # One context a class: its tokens are all told and derived subsumers at once, so no pair of
+        # classes is tested (Kazakov 2009; a tableau would test pairs, and needs told subsumers to
+        # leave most of them out).
         for name, predicate in tuple(self.program.classes.items()):
             context = contexts.context((predicate,))
             if context.clash:
@@ -235,6 +241,8 @@ class Classification:
                 self._add_clause((label,), PredicateAtom(program.nothing, (_X,)))
                 continue
             stated = PredicateAtom(label, (_X,))
+            # The forward engine makes no individuals: what the tree of required ones says of the
+            # named one at its root is added as clauses about that one.
             for head in dict.fromkeys(contexts.heads_of(context)):
                 if head != stated:
                     alone.add(head)
@@ -245,6 +253,9 @@ class Classification:
         if not labels or not relevant or program.unsupported:
             return  # What is left out is found by cases in any event.
         everything = contexts.context(relevant, bare=True)
+        # An individual in several classes may have to be more than each class says: tried for all
+        # relevant ones together, which is the worst case. Where that adds nothing, no combination
+        # does.
         if everything.clash or not self._follow_alone(relevant, alone):
             program.interacting = True
 
@@ -312,6 +323,7 @@ class Classification:
                     continue
                 if (condition.prop.name, condition.inverse) not in above:
                     continue
+                # A functional property: the one that is known is the one that must exist.
                 if condition.n == existential.n == 1:
                     self._only_neighbour(existential, condition)
                 elif condition.n > 1 and condition.origin is not None:
@@ -370,6 +382,8 @@ class Classification:
             if prop not in known and self._excludes(('self', prop)):
                 program.irreflexive.append(prop)
         pairs = set(program.disjoint_properties)
+        # Pairs of properties are as many as their number squared: what excludes is gathered once,
+        # and a pair is a test of sets.
         contradictions = self._contexts.rules.contradictions()
         above = {
             (prop, backwards): self._contexts.rules.roles_above((prop, backwards))

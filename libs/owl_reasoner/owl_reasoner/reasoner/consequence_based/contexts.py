@@ -141,6 +141,7 @@ class Contexts:
         """Return the completed context of a core; `bare`: without what classes alone imply."""
         found = self._open(frozenset(core), bare)
         self._budget.stage = 'classifying'
+        # The newest core first: it is completed before those that asked for it look again.
         while self._opened or self._waiting:
             # What an individual is by itself comes before what its neighbours make of it.
             self._complete(self._opened.pop() if self._opened else self._waiting.popitem()[0])
@@ -220,6 +221,8 @@ class Contexts:
         while self._changed and not context.clash:
             self._changed = False
             self._budget.count(len(context.edges) + 1)
+            # From what costs least to what costs most: classes by themselves, then edges, then
+            # merging and counting, which compare edges with each other.
             self._close(context)
             self._relate(context)
             for edge in tuple(context.edges):
@@ -238,6 +241,8 @@ class Contexts:
     def _enqueue_if_news(self, user: Context, context: Context) -> None:
         size = sum(len(edge.roles) + len(edge.core) for edge in context.edges)
         news = (context, len(context.tokens), context.clash, len(context.edges), size)
+        # A user looks again only at a state that it has not seen: contexts may ask for each other
+        # in a ring.
         if news not in user.done:
             user.done.add(news)
             self._waiting[user] = None
@@ -322,6 +327,7 @@ class Contexts:
             self._clash(context)
         elif target.begun:
             tokens = context.tokens
+            # Sizes stand for the sets themselves: tokens and roles only grow.
             seen = target, len(tokens), len(target.tokens), len(edge.roles)
             if seen != edge.seen:
                 edge.seen = seen
@@ -333,6 +339,9 @@ class Contexts:
                                 self._fire(context, edge, rule)
                         elif rule.xs <= tokens and target.names:
                             self._gap(context, rule.origin, _NOMINALS)
+                # What the neighbour makes of its successor goes into the core, and the edge leads
+                # to another context: contexts stay shared, and none holds what only one neighbour
+                # causes (Simancik, Kazakov and Horrocks 2011).
                 if len(edge.core) > size:
                     self._retarget(context, edge)
             self._join_parent(context, edge)
@@ -367,6 +376,7 @@ class Contexts:
                 continue
             if not _holds(condition.filler, context.tokens):
                 continue
+            # Which of several successors is the parent would be a choice: no Horn clause.
             if condition.n != 1:
                 if any(role in other.roles for other in target.edges):
                     self._case_gap(context, condition)
@@ -461,6 +471,8 @@ class Contexts:
             ]
             if sum(edge.count for edge in counted) < needed:
                 continue
+            # Two requirements may be met by one individual: an edge that another one serves as well
+            # counts no second time.
             counted = [edge for edge in counted if not _is_redundant(edge, counted)]
             if sum(edge.count for edge in counted) < needed:
                 continue
@@ -482,6 +494,7 @@ class Contexts:
         best = 0
         chosen: list[_Edge] = []
 
+        # Exact, by branching: there are few edges, and a greedy clique may miss the largest.
         def extend(place: int, total: int) -> None:
             nonlocal best
             self._budget.tick()

@@ -158,6 +158,8 @@ class RuleIndex:
             self._take_values(clause, body.tokens, body.datas, body.values)
         elif not body.roles:
             self._take_class(clause, body.tokens)
+        # Both ways round: the rule may fire from either end, and a context sees its own successors
+        # only.
         elif len(body.roles) == 1:
             (((one, other), roles),) = body.roles.items()
             self._take_edge(clause, one, other, frozenset(roles), body.tokens)
@@ -314,6 +316,7 @@ class RuleIndex:
         if index is None:
             index = self._of_neighbour[role] = {}
             for rule in self.of_role.get(role, ()):
+                # Under one token is enough: the rule needs all of them.
                 index.setdefault(next(iter(rule.ys), None), []).append(rule)
         yield from index.get(None, ())
         for token in tuple(tokens):

@@ -362,6 +362,9 @@ class CaseRules:
             )
         if expression not in known:
             name = self.fresh()
+            # A structural transformation that keeps polarity (Plaisted and Greenbaum, 1986): where
+            # a class only implies, its concept gets that half of the definition alone, and no
+            # search is made for the other.
             known[expression] = self.concept(name)  # first: the class may contain itself
             define(name, expression)
         return known[expression]
@@ -404,8 +407,11 @@ class CaseRules:
     def node_rule(self, body: frozenset[int], heads: Heads) -> None:
         """Add a rule about one individual."""
         body = body - _ALL or _ALL
+        # A tautology.
         if any(concept == ANYBODY or concept in body for _, concept in heads):
             return
+        # It is a choice for every individual. What absorption (Horrocks and Tobies, KR 2000) can
+        # turn into a rule with a body has one by now (`_Clause`).
         if body == _ALL and len(heads) > 1:
             self.always.append(heads)
             return
@@ -453,6 +459,9 @@ class CaseRules:
         if not self.roles.is_complex(prop):
             self.edge_rule(EdgeRule(body, self.roles.number(prop), _ALL, ((_Y, target),)))
             return
+        # A box over a complex role walks the automaton of its chains (Horrocks and Sattler,
+        # "Decidability of SHIQ with complex role inclusion axioms", 2004): a concept for each
+        # state, passed on with each step.
         steps = self.roles.automaton(prop)
         states: dict[int, int] = {}
         if concept == ANYBODY:
@@ -709,6 +718,8 @@ class _Clause:
             self._take(disjunct)
         if len(self._both) == 1 and not self._every:
             (both,) = self._both
+            # Distributed over the rest of the disjunction: without other heads nothing becomes a
+            # choice by that.
             if not self._heads or _is_negative(both):
                 for operand in both.operands:
                     self._apart(operand)
@@ -783,6 +794,9 @@ class _Clause:
             rules.universal(concept, every.prop, rules.positive(every.filler))
             return
         inline: ex.ObjectAllValuesFrom | None = None
+        # Absorption into the relation (role absorption; Tsarkov and Horrocks, 2004): one box
+        # becomes the rule's edge, so the rule fires where there is such a neighbour, instead of
+        # offering the box as a choice.
         for every in sorted(self._every, key=lambda one: _is_negative(one.filler)):
             simple, excludes = not rules.roles.is_complex(every.prop), _is_negative(every.filler)
             if inline is None and simple and not (self._never and excludes):
