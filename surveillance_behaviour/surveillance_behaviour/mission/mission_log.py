@@ -28,6 +28,11 @@ To go on with a mission (``launch.py --resume``), hand the same file to `robot_b
 `reasoner` as the parameter ``record``: the one goes on where `MissionRecord.left_at` says, and the
 visits, leg times and the battery's draw come from the record and from ``FILE.experience.json``
 beside it.
+
+The record is what happened, and where the mission stands follows from it. The engine's checkpoint
+(`state_machines.checkpoint`) would say in which state the machine was, in a second file that could
+contradict this one after a crash; and a state such as "on its way to R1" must not be gone on with
+before the robot has looked where it is, what the rules allow now, and whether it was charged.
 """
 
 from __future__ import annotations
