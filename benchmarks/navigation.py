@@ -35,6 +35,7 @@ import networkx
 import numpy as np
 import numpy.typing as npt
 import yaml
+from driven_robot import DrivenRobot
 from geometry_msgs.msg import Twist
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import dijkstra
@@ -51,10 +52,8 @@ from surveillance_controllers import geometry
 from surveillance_controllers.geometry import Scan
 from surveillance_controllers.motion.driving import Drive, State
 from surveillance_controllers.motion.navigator import Navigator
-from surveillance_controllers.motion.path_following import Velocity
 from surveillance_controllers.planning.grid_planning import (
     GridPlanner,
-    NoPathError,
     PlanningParameters,
 )
 from surveillance_runtime import node_table
@@ -286,60 +285,20 @@ def among_people(model: PeopleModel, seconds: float, seed: int, place: str) -> D
     rng = np.random.default_rng(seed)
     people = People(world.plan, model, np.random.default_rng(seed + 1)) if model.count else None
     robot = Robot(world, rng=rng, people=people)
-    drawn = plan_grid.draw(world.plan)
-    grid = drawn
-    doors = {door.name: door.segment for door in world.plan.doors.values()}
-    planner, navigator = GridPlanner(grid, doors=doors), Navigator()
-    navigator.set_map(grid)
-    navigator.move(robot.base.odometry)
-    angles, rooms = robot.lidar.angles, list(world.plan.place.rooms)
-    result = Drives()
-
-    def another_path(goal: Any) -> Any:
-        assert navigator.pose is not None
-        planner.set_obstacles(navigator.obstacles, navigator.obstacles_stay)
-        return planner.plan(navigator.pose[:2], goal)
-
-    def look() -> None:
-        ranges = robot.scan().astype(float)
-        navigator.move(robot.base.odometry)
-        begun = time.process_time()
-        scan = Scan(angles, ranges, robot.lidar.range_max)
-        velocity = navigator.see(scan, robot.time) or Velocity()
-        result.steps_ms.append((time.process_time() - begun) * 1e3)
-        robot.base.command(velocity.speed, velocity.turn)
-        robot.advance(0.1)
-
-    look()
-    while robot.time < seconds:
-        room = rooms[int(rng.integers(len(rooms)))]
-        goal = world.plan.place.positions[room][:2]
+    driven, result = DrivenRobot(robot), Drives()
+    driven.look()
+    for room, drive in driven.rooms(rng, lambda: robot.time >= seconds):
         result.drives += 1
-        try:
-            drive = Drive(another_path(goal))
-        except NoPathError as error:
-            result.failed[f'no path at first: {str(error).split("(")[0]}'] += 1
-            look()
+        if isinstance(drive, str):
+            result.failed[drive] += 1
             continue
-        navigator.task = drive
-        while not drive.state.ended and robot.time < seconds:
-            look()
-            if drive.state is State.ASKING:
-                try:
-                    drive.new_path(another_path(goal))
-                except NoPathError as error:
-                    drive.no_path(str(error))
-        navigator.task = None
         result.recoveries += drive.recoveries
         if drive.state is State.FAILED:
             result.failed[drive.reason.split('(')[0]] += 1
-        result.drives -= not drive.state.ended
-        assert navigator.pose is not None
-        in_room = world.place_at(*navigator.pose[:2]) == room
+        assert driven.navigator.pose is not None
+        in_room = world.place_at(*driven.navigator.pose[:2]) == room
         result.arrived += drive.state is State.ARRIVED and in_room
-        # As the mission does: it stays for a moment.
-        for _ in range(20):
-            look()
+    result.steps_ms = driven.steps_ms
     result.hours = robot.time / 3600
     result.contacts, result.metres = robot.base.collisions, robot.base.travelled
     return result
@@ -419,56 +378,14 @@ def kidnapped(world: World, seed: int) -> tuple[float | None, float]:
     """Carry a driving robot off; return when it knew its pose again, and how long it was wrong."""
     rng = np.random.default_rng(seed)
     robot = Robot(world, rng=np.random.default_rng(seed))
-    drawn = plan_grid.draw(world.plan)
-    grid = drawn
-    planner, navigator = GridPlanner(grid), Navigator()
-    navigator.set_map(grid)
-    free = grid.centres_of(np.argwhere(planner.cost > 0))
-    rooms = list(world.plan.place.rooms)
-    goal: Any = None
+    begun = found = wrong_since = None
+    longest = 0.0
 
-    def anywhere() -> geometry.Pose:
-        x, y = free[int(rng.integers(len(free)))]
-        return float(x), float(y), float(rng.uniform(-math.pi, math.pi))
-
-    def steer() -> None:
-        nonlocal goal
-        assert navigator.pose is not None
-        drive = navigator.task
-        assert drive is None or isinstance(drive, Drive)
-        anew = drive is None or drive.state.ended
-        if not anew and drive is not None and drive.state is not State.ASKING:
+    def stepped() -> None:
+        nonlocal found, wrong_since, longest
+        navigator = driven.navigator
+        if begun is None:
             return
-        if anew:
-            goal = world.plan.place.positions[rooms[int(rng.integers(len(rooms)))]][:2]
-        try:
-            path = planner.plan(navigator.pose[:2], goal)
-        except NoPathError as error:
-            if drive is not None:
-                drive.no_path(str(error))
-            return
-        if anew or drive is None:
-            navigator.task = Drive(path)
-        else:
-            drive.new_path(path)
-
-    def look() -> None:
-        navigator.move(robot.base.odometry)
-        scan = Scan(robot.lidar.angles, robot.scan().astype(float), robot.lidar.range_max)
-        velocity = navigator.see(scan, robot.time) or Velocity()
-        robot.base.command(velocity.speed, velocity.turn)
-        robot.advance(0.1)
-        steer()
-
-    robot.base.pose = robot.base.odometry = anywhere()
-    navigator.believe(robot.base.pose)
-    for _ in range(30):
-        look()
-    robot.base.pose = anywhere()
-    robot.base.push(0.0, 0.0, 0.0)
-    begun, found, wrong_since, longest = robot.time, None, None, 0.0
-    while robot.time - begun < 90.0 and (found is None or robot.time - begun < found + 5.0):
-        look()
         assert navigator.pose is not None
         right = math.dist(navigator.pose[:2], robot.base.pose[:2]) <= 0.5
         if right and not navigator.lost and found is None:
@@ -478,6 +395,27 @@ def kidnapped(world: World, seed: int) -> tuple[float | None, float]:
         else:
             wrong_since = robot.time if wrong_since is None else wrong_since
             longest = max(longest, robot.time - wrong_since)
+
+    driven = DrivenRobot(robot, stepped=stepped)
+    free = driven.grid.centres_of(np.argwhere(driven.planner.cost > 0))
+
+    def anywhere() -> geometry.Pose:
+        x, y = free[int(rng.integers(len(free)))]
+        return float(x), float(y), float(rng.uniform(-math.pi, math.pi))
+
+    def is_over() -> bool:
+        nonlocal begun
+        if begun is None and robot.time >= 3.0:
+            robot.base.pose = anywhere()
+            robot.base.push(0.0, 0.0, 0.0)
+            begun = robot.time
+        since = 0.0 if begun is None else robot.time - begun
+        return since >= 90.0 or (found is not None and since >= found + 5.0)
+
+    robot.base.pose = robot.base.odometry = anywhere()
+    driven.navigator.believe(robot.base.pose)
+    for _ in driven.rooms(rng, is_over):
+        pass
     return found, longest
 
 

@@ -23,19 +23,12 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 
+from driven_robot import DrivenRobot
 from localisation import Amcl, print_table
 
-from surveillance_controllers.geometry import Points, Pose, Scan, composed, relative
-from surveillance_controllers.motion.driving import Drive, State
-from surveillance_controllers.motion.navigator import Navigator
+from surveillance_controllers.geometry import Pose, Scan, composed, relative
+from surveillance_controllers.motion.driving import State
 from surveillance_controllers.motion.odometry import OdometryBuffer
-from surveillance_controllers.motion.path_following import DriveParameters, Velocity
-from surveillance_controllers.planning.grid_planning import (
-    GridPlanner,
-    NoPathError,
-    PlanningParameters,
-)
-from surveillance_runtime.place import plan_grid
 from surveillance_simulation.physics.model import PhysicsModel
 from surveillance_simulation.robot.base import BaseModel
 from surveillance_simulation.robot.lidar import LidarModel
@@ -44,7 +37,6 @@ from surveillance_simulation.world.world import read_world
 
 ROOT = Path(__file__).resolve().parent.parent
 WRONG = 0.3
-PERIOD = 0.1
 
 
 @dataclass
@@ -63,81 +55,39 @@ class Outcome:
 def patrol(robot: Robot, seconds: float, seed: int) -> Outcome:
     """Drive from room to room for simulated seconds, and compare each estimate with the truth."""
     world, outcome = robot.world, Outcome(robot)
-    rng = np.random.default_rng(seed)
-    grid = plan_grid.draw(world.plan)
-    doors = {door.name: door.segment for door in world.plan.doors.values()}
-    radius = robot.base.model.radius
-    planner = GridPlanner(grid, PlanningParameters(radius=radius), doors=doors)
-    navigator, parameters = Navigator(doors), DriveParameters(radius=radius)
-    navigator.set_map(grid)
     readings = OdometryBuffer()
-    amcl = Amcl(grid, robot.base.pose, np.random.default_rng(seed))
 
-    def read() -> None:
+    def seen(scan: Scan, stamp: float) -> None:
+        then = readings.at(np.array([stamp]))[0]
+        odometry: Pose = (float(then[0]), float(then[1]), float(then[2]))
+        amcl.step(odometry, Scan(scan.angles, scan.ranges, scan.range_max))
+        # AMCL tells map -> odom; who asks for the pose applies it to the last odometry.
+        now = composed(amcl.pose, relative(odometry, robot.base.odometry))
+        outcome.peer.append(math.dist(now[:2], robot.base.pose[:2]))
+
+    def moved() -> None:
         readings.add(robot.time, robot.base.odometry)
-        navigator.move(robot.base.odometry, robot.time)
 
-    def look() -> None:
-        robot.advance(PERIOD)
-        read()
-        told = robot.measure()
-        velocity = Velocity()
-        if told is not None:
-            stamp, angles = robot.time - told.age, robot.lidar.angles
-            ranges = np.asarray(told.ranges, float)
-            times = np.arange(len(angles)) * told.duration / len(angles)
-            scan = Scan(angles, ranges, robot.lidar.range_max, times=times if told.age else None)
-            velocity = navigator.see(scan, stamp) or Velocity()
-            then = readings.at(np.array([stamp]))[0]
-            odometry: Pose = (float(then[0]), float(then[1]), float(then[2]))
-            amcl.step(odometry, Scan(angles, ranges, robot.lidar.range_max))
-            # AMCL tells map -> odom; who asks for the pose applies it to the last odometry.
-            now = composed(amcl.pose, relative(odometry, robot.base.odometry))
-            outcome.peer.append(math.dist(now[:2], robot.base.pose[:2]))
-        robot.base.command(velocity.speed, velocity.turn)
-        if navigator.pose is not None:
-            outcome.errors.append(math.dist(navigator.pose[:2], robot.base.pose[:2]))
-            outcome.sure.append(not (navigator.lost or navigator.ambiguous))
+    def stepped() -> None:
+        if driven.navigator.pose is not None:
+            outcome.errors.append(math.dist(driven.navigator.pose[:2], robot.base.pose[:2]))
+            outcome.sure.append(not (driven.navigator.lost or driven.navigator.ambiguous))
 
-    def path_to(goal: tuple[float, float]) -> Points:
-        assert navigator.pose is not None
-        planner.set_obstacles(navigator.obstacles, navigator.obstacles_stay)
-        return planner.plan(navigator.pose[:2], goal)
-
-    read()
+    driven = DrivenRobot(robot, robot.base.model.radius, moved, seen, stepped)
+    amcl = Amcl(driven.grid, robot.base.pose, np.random.default_rng(seed))
+    moved()
     robot.measure()
-    while navigator.pose is None:
-        look()
-    rooms = list(world.plan.place.rooms)
-    while robot.time < seconds:
-        room = rooms[int(rng.integers(len(rooms)))]
-        goal = world.plan.place.positions[room][:2]
-        try:
-            drive = Drive(path_to(goal), parameters)
-        except NoPathError as error:
-            outcome.drives += 1
-            outcome.failed[f'no path: {str(error).split("(")[0]}'] += 1
-            look()
-            continue
-        navigator.task = drive
-        while not drive.state.ended and robot.time < seconds:
-            look()
-            if drive.state is State.ASKING:
-                try:
-                    drive.new_path(path_to(goal))
-                except NoPathError as error:
-                    drive.no_path(str(error))
-        navigator.task = None
-        if not drive.state.ended:
-            break
+    while driven.navigator.pose is None:
+        driven.look()
+    rng = np.random.default_rng(seed)
+    for room, drive in driven.rooms(rng, lambda: robot.time >= seconds):
         outcome.drives += 1
-        really = world.place_at(*robot.base.pose[:2]) == room
-        if drive.state is State.ARRIVED and really:
+        if isinstance(drive, str):
+            outcome.failed[drive] += 1
+        elif drive.state is State.ARRIVED and world.place_at(*robot.base.pose[:2]) == room:
             outcome.arrived += 1
         else:
             outcome.failed[drive.reason.split('(')[0] or 'in another room'] += 1
-        for _ in range(20):
-            look()
     return outcome
 
 
