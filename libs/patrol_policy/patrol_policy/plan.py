@@ -174,6 +174,7 @@ class Plan:
     def __init__(
         self, world: World, energy: Energy | None = None, before: Plan | None = None
     ) -> None:
+        # Processor time of this thread: a busy machine makes the search slower, not worse.
         self._deadline = time.thread_time() + MOST_SECONDS
         self._key = world.threshold, world.own_thresholds, world.rules
         self.rules = rules = rule_map(world, energy)
@@ -186,11 +187,14 @@ class Plan:
         self._observe(world, 100.0 if energy is None else world.level)
         work = FIRST_WORK * min(1.0, rules.count / FULL_FROM, FULL_UP_TO / rules.count)
         if before and before.places == self.places and before.stations == self.stations:
+            # A warm start: leg times that were learned change the map a little, and the round that
+            # was best is nearly that again.
             self._lap = before._lap
             self._begin([before.targets], min(work, WARM_WORK), before.course)
         else:
             tour = world.graph.tour
             self._lap = tour.length
+            # Both ways round: legs and what the rules forbid differ by direction.
             self._begin([tour.order, tour.order[::-1]], work)
 
     def fits(self, world: World, energy: Energy | None) -> bool:
@@ -335,6 +339,8 @@ class Plan:
             # A course that has not come to its charge yet looks better than it is.
             self._horizon += 2.0 * rules.energy.cycle_seconds
         simple = SIMPLE if rules.count <= SIMPLE_UP_TO else ()
+        # The simple policies are simulated first: what they come to is a limit for all that
+        # follows, and their walks are starts of the search.
         walks = [self._simulated(choose) for choose in simple]
         self._simple = min((walk.settled for walk in walks if not walk.cut), default=math.inf)
         starts = [rounds, *(list(rules.laps(walk.walk)) for walk in walks)]
@@ -351,6 +357,8 @@ class Plan:
                 break
             self._try(candidate)
         for walk in walks:
+            # A walk that comes back to a state that it had before is periodic: it can be followed
+            # as a course, with the waits that were simulated.
             if (back := walk.repeated_from(rules)) is not None and not walk.cut:
                 self._try(Course(tuple(walk.walk), back, patience=math.inf))
         self._explain_cut()

@@ -116,6 +116,7 @@ class RoundSearch:
         self._heat = FILLING_HEAT if fills else HEAT
         # A place with less time than others is visited more than once.
         self._filling = FILLING if fills or not rules.is_even else 0.0
+        # Always the same chance: the same map and state give the same round on every machine.
         self._draw = random.Random(0)
         self._penalty = PENALTY * rules.mean_leg
         self.work = 0.0
@@ -167,6 +168,7 @@ class RoundSearch:
         wait = length = times[-1] if times else 0.0
         if not self._rules.is_even:
             wait = self._longest_wait(walk, times, length)
+        # More breaches than these cost more than the limit: the count may stop there.
         most = (limit - wait) / max(self._penalty, 1e-9)
         breaches = self._breaches(walk, ends, times, length, most)
         return Round(targets, length, wait, tuple(breaches), short)
@@ -213,6 +215,8 @@ class RoundSearch:
         last = max((step for step, stop in enumerate(walk) if stop >= count), default=-1)
         if last < 0:
             return list(itertools.accumulate(seconds)), sum(seconds)
+        # A periodic walk has no beginning: the level at its first step is what is left since the
+        # last charge of the lap before.
         level = full - draw * sum(seconds[last + 1 :])
         # Of several charges none is a mere excuse for driving without exploring.
         charges = sum(stop >= count for stop in walk)
@@ -293,6 +297,9 @@ class RoundSearch:
         end = self.work + work
         while self.work < end and not self.finished:
             self.work += TRY_WORK
+            # Simulated annealing (Kirkpatrick, Gelatt and Vecchi, Science 1983) in cycles that get
+            # longer: a short one finds a round that will do, and the search may be ended after any
+            # of them.
             if self.work > self._cycle_end:
                 if not self._starts:
                     self._cycle *= 2.0
@@ -300,6 +307,8 @@ class RoundSearch:
                 self._take(self._starts.pop(0) if self._starts else self.best)
             cooling = (self._cycle_end - self.work) / self._cycle
             heat = self._heat * self._penalty * max(0.0, cooling)
+            # A rise of six times the heat is taken once in 400 tries: what costs more is not judged
+            # to its end.
             limit = self._cost + 6.0 * heat
             changes = self._changes
             chance = self._draw.random()
