@@ -63,6 +63,7 @@ from std_msgs.msg import UInt32
 from benchmarks.decisions import Comparison, SetClock, compare, legs_of, wrongly_urgent
 from benchmarks.hosts import Host, Network, may_be_made
 from benchmarks.machine_faults import SmallDisk, SteppedClock
+from benchmarks.processes import end_processes, memory_mb
 from state_machines.ros import ServiceCaller
 from surveillance_interfaces.srv import ArmorDirective
 from surveillance_runtime.discovery import prefer_quick_discovery
@@ -162,12 +163,7 @@ class Launcher:
 
     def end(self) -> None:
         """Stop the mission as Ctrl-C does."""
-        if self.process.poll() is None:
-            self.process.send_signal(signal.SIGINT)
-            try:
-                self.process.wait(20)
-            except subprocess.TimeoutExpired:
-                self.process.kill()
+        end_processes([self.process], 20)
         self._thread.join(5)
         self._log.close()
 
@@ -760,12 +756,11 @@ def _processes_of(folder: Path) -> Iterator[str]:
 def _held(process: int) -> tuple[float, int] | None:
     """Return megabytes of resident memory and open descriptors; None for a process that is gone."""
     try:
-        status = Path(f'/proc/{process}/status').read_text()
         descriptors = len(os.listdir(f'/proc/{process}/fd'))
     except OSError:
         return None
-    resident = [line for line in status.splitlines() if line.startswith('VmRSS')]
-    return (int(resident[0].split()[1]) / 1024, descriptors) if resident else None
+    resident = memory_mb(process)
+    return (resident, descriptors) if resident else None
 
 
 def _growth(usage: Iterable[Usage]) -> str:

@@ -27,7 +27,6 @@ import os
 import random
 import re
 import resource
-import signal
 import subprocess
 import sys
 import tempfile
@@ -54,6 +53,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 
+from benchmarks.processes import end_processes, memory_mb
 from benchmarks.whole_stack import ros_arguments
 from surveillance_runtime import node_table
 from surveillance_runtime.testing import claim_domain
@@ -239,12 +239,7 @@ class NodeProcess:
 
     def memory(self) -> float:
         """Return the highest resident size so far in MB; 0 when the process has ended."""
-        try:
-            status = Path(f'/proc/{self.process.pid}/status').read_text()
-        except OSError:
-            return 0.0
-        peak = [line for line in status.splitlines() if line.startswith('VmHWM')]
-        return int(peak[0].split()[1]) / 1024 if peak else 0.0
+        return memory_mb(self.process.pid, 'VmHWM')
 
     def lines_after(self, position: int) -> tuple[int, int]:
         """Return the present end of the output, and how many log lines came after a position."""
@@ -261,13 +256,7 @@ class NodeProcess:
 
     def end(self) -> None:
         """Stop the process."""
-        if self.process.poll() is None:
-            self.process.send_signal(signal.SIGINT)
-            try:
-                self.process.wait(5)
-            except subprocess.TimeoutExpired:
-                self.process.kill()
-                self.process.wait()
+        end_processes([self.process], 5)
         self._file.close()
 
 

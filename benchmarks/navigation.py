@@ -16,7 +16,6 @@ import math
 import os
 import random
 import re
-import signal
 import statistics
 import subprocess
 import sys
@@ -37,6 +36,7 @@ import numpy.typing as npt
 import yaml
 from driven_robot import DrivenRobot
 from geometry_msgs.msg import Twist
+from processes import cpu_seconds, end_processes
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import dijkstra
 from skimage.graph import MCP_Geometric
@@ -642,14 +642,7 @@ def processes(seconds: float) -> tuple[float, float, float]:
             rate, cpu = passed / (time.monotonic() - begun), passed / (_cpu(started) - used)
             return rate, cpu, _driven(poses[first:])
         finally:
-            for process in started:
-                process.send_signal(signal.SIGINT)
-            for process in started:
-                try:
-                    process.wait(15)
-                except subprocess.TimeoutExpired:
-                    process.kill()
-                    process.wait()
+            end_processes(started, 15)
             node.stop()
             spinner.stop()
             node.destroy_node()
@@ -662,11 +655,7 @@ def _driven(poses: Sequence[tuple[float, float, float]]) -> float:
 
 def _cpu(processes: Sequence[subprocess.Popen[bytes]]) -> float:
     """Return the CPU seconds that processes have used (Linux)."""
-    ticks = 0.0
-    for process in processes:
-        fields = Path(f'/proc/{process.pid}/stat').read_text().rpartition(') ')[2].split()
-        ticks += int(fields[11]) + int(fields[12])
-    return ticks / os.sysconf('SC_CLK_TCK')
+    return sum(cpu_seconds(process.pid) for process in processes)
 
 
 def _await(condition: Callable[[], Any], patience: float, pause: float = 0.05) -> None:

@@ -16,7 +16,6 @@ import json
 import os
 import random
 import re
-import signal
 import socket
 import struct
 import subprocess
@@ -35,6 +34,7 @@ from sensor_msgs.msg import CompressedImage, LaserScan
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
+from benchmarks.processes import cpu_seconds, end_processes
 from benchmarks.tables import table
 from surveillance_operator.page.hub import Hub
 from surveillance_operator.recording.bag import METADATA, BagWriter, TopicType
@@ -47,7 +47,6 @@ from tests.operator.browser import CHROMIUM, DRIVER, Viewer
 START = 1e9
 """Of the recordings that are made up here, seconds since 1970."""
 FULL_SPEED = ('-p', 'use_sim_time:=true', '-p', 'simulator:speed:=0.0')
-TICKS = os.sysconf('SC_CLK_TCK')
 PAGE_FILES = ROOT / 'surveillance_operator/surveillance_operator/page/static'
 
 Row = tuple[str, str, str]
@@ -81,14 +80,7 @@ def mission(folder: Path, domain: int, *options: str) -> Iterator[tuple[str, dic
     try:
         yield address, found
     finally:
-        process.send_signal(signal.SIGINT)
-        process.wait(20)
-
-
-def cpu_seconds(process: int) -> float:
-    """Return the processor time that a process has used, seconds."""
-    parts = Path(f'/proc/{process}/stat').read_text().rsplit(')', 1)[1].split()
-    return (int(parts[11]) + int(parts[12])) / TICKS
+        end_processes([process], 20)
 
 
 def megabytes(process: int) -> float:
