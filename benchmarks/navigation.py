@@ -36,7 +36,6 @@ import numpy.typing as npt
 import yaml
 from driven_robot import DrivenRobot
 from geometry_msgs.msg import Twist
-from processes import cpu_seconds, end_processes
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import dijkstra
 from skimage.graph import MCP_Geometric
@@ -44,6 +43,7 @@ from tables import table
 from whole_stack import ROOT, Stack, ros_arguments
 
 from benchmarks import regular_places
+from benchmarks.processes import cpu_seconds, end_processes
 from launcher.run import Run
 from launcher.run_processes import command, node_environ
 from patrol_policy.battery import PERCENTILE_99

@@ -127,6 +127,7 @@ class _WaitList:
                 add(handle)
         for waitable in self._waitables:
             waitable.add_to_wait_set(wait_set)
+        # The only place where this thread sleeps, and the interpreter's lock is let go.
         wait_set.wait(timeout)
         for waitable in self._waitables:
             if waitable.is_ready(wait_set):
@@ -210,6 +211,8 @@ class PatrolExecutor(SingleThreadedExecutor):
         if self._changed:
             self._changed = False
             self._gather()
+        # A group that a waiting coroutine holds admits no second callback: its entities are left
+        # out of the wait, or they would be ready again and again without being taken.
         held = frozenset(
             entity.callback_group
             for entity in self._waiting.values()
@@ -222,6 +225,9 @@ class PatrolExecutor(SingleThreadedExecutor):
         busy, everything = self._wait_lists[held]
         now = time.monotonic()
         try:
+            # Most of a second's messages come from few entities: these are looked at alone, often,
+            # and all together now and then. Putting every handle into a wait set costs more than
+            # the callbacks of a quiet node.
             if now >= self._choice_due:
                 busy.look_only_at(self._lately_called)
                 self._lately_called.clear()
@@ -247,6 +253,7 @@ class PatrolExecutor(SingleThreadedExecutor):
             'service': [each for node in nodes for each in node.services],
             'waitable': [each for node in nodes for each in node.waitables],
         }
+        # Making a wait list enters every handle: not for each change of a future, only for others.
         if entities != self._entities:
             self._close_wait_lists()
             self._entities = entities
@@ -281,6 +288,8 @@ class PatrolExecutor(SingleThreadedExecutor):
         try:
             if kind != 'timer' or _is_due(entity):
                 work = self._take[kind](entity)
+                # A callback that returned no coroutine is over: no task, which costs more than many
+                # callbacks.
                 if work is not None:
                     task = Task(work, executor=self)
                     _step(task)
@@ -297,6 +306,7 @@ class PatrolExecutor(SingleThreadedExecutor):
             went_on = False
             while self._new_tasks:
                 self._waiting[self._new_tasks.popleft()] = None
+            # All of them: that a future is done says nothing of who awaits it, and they are few.
             for task in list(self._waiting):
                 try:
                     _step(task)

@@ -79,6 +79,7 @@ class Derivation:
         def forget(_: str) -> None:
             snapshots.pop(cls, None)
 
+        # One hook a class, however often it is asked for: hooks stay as long as the engine.
         if predicate not in self._watched:
             self._watched.add(predicate)
             predicate.on_insert.append(forget)
@@ -199,6 +200,9 @@ class Derivation:
     def bring_up_to_date(self) -> None:
         """Derive what follows now, with as little work as the change allows."""
         engine, told = self.engine, self._told
+        # A change of classes is a new classification: it takes a second where the ontology is
+        # large, and tells which clauses the engine's program lacks or has too many of. The facts
+        # stay.
         if engine is None or told.schema_changed or not self._fits(engine):
             self._classify()
             change = self._change_of(engine)
@@ -268,10 +272,13 @@ class Derivation:
         assert self.classification is not None
         engine = self.engine = Engine(self.classification.program, self._told, self.budget)
         if old is not None:
+            # A derived value keeps the form in which users saw it.
             engine.reader.take_spelling(old.reader)
         self._told.settle()
         assertions = [axiom for axiom in self._told.axioms if is_assertion(axiom)]
         self.completion = self._completion_of(engine)
+        # Millions of facts come, none of them garbage: the collector would walk them again and
+        # again.
         with uncollected():
             engine.update(assertions, ())
             self.completion.run(self._told.axioms)

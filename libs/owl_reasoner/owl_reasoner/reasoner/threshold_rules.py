@@ -102,6 +102,8 @@ def split_rule(clause: Clause) -> ComparisonSplit | None:
         left, right = (_linear(term, forms) for term in comparison.terms)
     except ValueError:
         return None
+    # Exact fractions, as the built-ins compare: floats would put keys at the limit on the wrong
+    # side.
     difference = _sum([(sign, left), (-sign, right)])  # holds where this is > 0 (or >= 0)
     components = _components(facts)
     linked = [
@@ -113,6 +115,8 @@ def split_rule(clause: Clause) -> ComparisonSplit | None:
     keyed_parts = [
         part for part in components if outputs & {term for atom in part for term in atom.terms}
     ]
+    # With three parts, or a head over both, the heads depend on pairs of rows: that is an ordinary
+    # join.
     if len(components) != 2 or len(linked) != 2 or len(keyed_parts) != 1:
         return None
     keyed = keyed_parts[0]
@@ -195,8 +199,12 @@ class ThresholdIndex:
         self._keyed: dict[Row, Any] = {}
         self._reaches: list[tuple[Any, Row]] = []
         self._reaching: dict[Row, Any] = {}
+        # Rows with a value that is no exact number (a double, say): compared one by one, as the
+        # built-ins do, since a sorted list needs a total order.
         self._odd_keys: set[Row] = set()
         self._odd_reaches: set[Row] = set()
+        # New keys are put in their places when a reach asks for them: at a start all come at once,
+        # and one sort serves them.
         self._unsorted: list[tuple[Any, Row]] = []
         self._lost: set[tuple[bool, Row]] = set()
         self._emitted: Any = None
@@ -213,6 +221,8 @@ class ThresholdIndex:
                 arguments = (context, body, atom, atom.terms, self._reach_terms)
                 gain = compile_call(*arguments, self._gain_reach, origin)
                 predicate.on_insert.append(gain)
+                # The new reach is known before the old one goes: a clock that moves on retracts one
+                # time and asserts another, and heads below both never go.
                 predicate.early.append(gain)
                 predicate.on_delete.append(compile_call(*arguments, self._lose_reach, origin))
         self._key_support = compile_support(context, split.keyed, head.terms, self._key_terms)
@@ -281,6 +291,7 @@ class ThresholdIndex:
     def _sort(self) -> None:
         fresh = self._unsorted
         if fresh:
+            # Inserting moves half of the list in memory, which is fast; sorting looks at all of it.
             if len(fresh) > 16:
                 self._keys += fresh
                 self._keys.sort()
@@ -331,6 +342,8 @@ class ThresholdIndex:
             self._overdelete_head(keyed)
         if self._emitted is None:
             return
+        # Only what lies between the old reach and the best one that is sure to stay may have to go;
+        # the rest is not looked at.
         left = self._proven_reach()
         if left is None or left < self._emitted:
             self._sort()

@@ -442,6 +442,8 @@ class Translation:
                 decided_by = self.program.data(expression.prop), 0
         elif isinstance(expression, ex.ObjectComplementOf) and isinstance(expression.operand, str):
             self._complements[expression.operand] = label
+        # Not being in a class cannot be derived by Horn clauses from what is absent (open world):
+        # reported, unless the hypertableau takes over.
         if isinstance(expression, _NEGATIVE):
             text = self._sentence(
                 f'not all members of {expression_text(expression)} are recognised'
@@ -612,6 +614,7 @@ class Translation:
 
     def _complement_labels(self) -> None:
         """State that what is disjoint from a class belongs to its complement, where asked for."""
+        # At last, when all that excludes a class is known.
         for iri, label in self._complements.items():
             for other in self.program.cls(iri).disjoint:
                 if other is not label:

@@ -432,6 +432,7 @@ class Contexts:
                     self._unite(context, counted[0], other)
                 if any(edge.count > 1 for edge in counted):
                     self._clash(context)
+        # Two edges to one named individual are one edge.
         named = [edge for edge in context.edges if edge.target.names]
         if any(edge.count > 1 for edge in named):
             self._clash(context)
@@ -544,6 +545,7 @@ class Contexts:
             return
         for held in tuple(context.values):
             self._along_value(context, held)
+        # Fewer values first, then counting them: merging changes the count.
         for condition in self._at_most_values:
             if _holds(condition.label, context.tokens):
                 self._limit_values(context, condition)
@@ -574,6 +576,7 @@ class Contexts:
                         self._changed = True
                 elif not rule.props <= held.props:
                     continue
+                # All that the value may be suits the rule; a part of it would be a case.
                 elif held.values.within(rule.values):
                     if head[0] == 'x':
                         self._add(context, head[1])

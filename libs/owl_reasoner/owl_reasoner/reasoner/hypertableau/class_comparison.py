@@ -53,6 +53,10 @@ class ClassComparison:
         A class that can have no members is below owl:Nothing.
         """
         models = self._models
+        # First a model of each class, then only the pairs that no model refutes: classification by
+        # models, as in HermiT (Glimm, Horrocks, Motik and Stoilos, "Optimising ontology
+        # classification", ISWC 2010). What the consequence-based hierarchy knows stands for told
+        # subsumers and is not asked at all.
         wanted = [(cls,) for cls in classes if not known(cls, NOTHING)]
         for cls, *_ in self._impossible(wanted):
             yield cls, NOTHING
@@ -94,9 +98,12 @@ class ClassComparison:
                 models.look(*question)
                 is_complete = self._look_at_other(question)
                 few = sum(1 for _ in search.model.alive()) < _MOST_KEPT
+                # A class that comes later is often blocked by individuals of an earlier model: its
+                # own is then small.
                 if self._keeps and few and is_complete:
                     search.hold()
                     start = search.mark()
+            # It contradicts what was chosen for the individuals, and perhaps nothing else.
             elif search.depends:
                 again.append(question)
             else:

@@ -155,16 +155,21 @@ class IncrementalCases:
                 break
             other = self._model()
             for model in self._models[:-1]:
+                # Models that differ where they can: a fact that follows is in all of them, so what
+                # one lacks is refuted without a search.
                 other.search.avoid(model.choices)
             if not other.build(self._below):
                 return False
             other.search.forget_models()
             before = len(by_choice)
             by_choice = [fact for fact in by_choice if other.has(fact)]
+            # It refuted nothing that the others had not: a further one would cost as much with each
+            # change.
             if len(by_choice) == before:
                 self._models.pop()
                 break
         unknown = {fact: None for fact in by_choice if not known(fact)}
+        # Each open fact costs a search: beyond so many, reasoning from nothing is cheaper.
         if len(unknown) > _MOST_ASKED:
             return False
         if unknown:
@@ -217,6 +222,8 @@ class IncrementalCases:
             if self._is_closed and not self._knows_individuals(axiom):
                 return False
             self._changing[axiom] = self._writer.prepared(axiom)
+        # Assertions that were never retracted before may stay for good: with many of them the
+        # models rest on too little.
         come = len(self._changing) - _MOST_ADDED
         return come <= 0 or sum(axiom not in self._history for axiom in self._changing) <= come
 
@@ -261,6 +268,8 @@ class IncrementalCases:
                     continue
                 if choices:
                     opened[fact] = None
+                # It follows now, by no choice; with 0 before it followed without the change and is
+                # yielded above.
                 elif before.get(fact, 1):
                     yield fact
         for other in others:

@@ -103,6 +103,8 @@ class CaseJoins:
         self._of_prop: dict[str, list[_Plan]] = {}
         for rule in model.rules.named:
             for atom in rule.body:
+                # A plan for each atom that facts can make true: whichever comes last begins the
+                # join (semi-naive evaluation inside the search).
                 if isinstance(atom, FactAtom):
                     self._index(_Plan(rule, atom, _ordered(rule.body, atom)))
 
@@ -238,6 +240,8 @@ class CaseJoins:
         only = term.value if isinstance(term, Constant) else self._set(match.given[term])[0].only
         if only is None:
             return self._having(atom.prop)
+        # By the value, not by everybody: beside those that have it only those whose value is open
+        # may turn out to.
         values = (*model.holding.get(only, ()), *model.holding[None])
         owners = dict.fromkeys(model.owner[v] for v in values if not model.is_gone(v))
         return [x for x in owners if not model.is_gone(x) and model.names[x]]
@@ -321,6 +325,8 @@ class CaseJoins:
             if apart is not None:
                 yield match._replace(choices=choices | apart)
             else:
+                # Whether they differ is open: the rule becomes an alternative to their being the
+                # same.
                 against = (*match.against, Same(x, y))
                 yield match._replace(choices=choices, against=against)
 

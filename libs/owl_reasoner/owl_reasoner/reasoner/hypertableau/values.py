@@ -44,6 +44,8 @@ class CaseValues:
         for v in tuple(model.values[x]):
             self._apply_rules(x, v)
         self._join_known(x)
+        # What rules made of the values may add concepts, and these further values: counting waits
+        # for them.
         if model.queue:
             model.revalue[x] = None
             return
@@ -66,6 +68,7 @@ class CaseValues:
         values = needed.values & self._rules.range_of(needed.prop)
         if values.size < needed.n:
             raise ClashError(choices)
+        # The whole set: which values they are is known, and no case is left.
         if values.size == needed.n:
             for value in values.members():
                 model.value(x, needed.prop, point(value), choices)
@@ -129,10 +132,13 @@ class CaseValues:
                     unsure.append(v)
         if len(counted) + len(unsure) <= limit.n:
             return
+        # Whether it counts is a case of its own: stated first, the count is then certain in each
+        # case.
         for v in unsure:
             self._either([In(v, ~limit.values), In(v, limit.values)], 0)
         if len(counted) <= limit.n:
             return
+        # The smallest sets first: known values, of which two are seen to differ without a choice.
         counted.sort(key=lambda v: (model.sets[v][0].size, v))
         chosen = counted[: limit.n + 1]
         for v in chosen:
@@ -154,6 +160,8 @@ class CaseValues:
             for v in there
             if model.sets[v][0].size < len(there)
         }
+        # Only a set no larger than the values to differ from can run out: strings and numbers
+        # without end never do.
         small = [v for v, found in others.items() if model.sets[v][0].size <= len(found)]
         for group in _joined(small, others):
             if not self._have_values(group, others):
@@ -166,6 +174,8 @@ class CaseValues:
         """Tell whether each of a group can have a value that no other it differs from has."""
         sets = self._model.sets
         members = {v: tuple(sets[v][0].members()) for v in group}
+        # All different from each other: a matching, in polynomial time. In general it is the
+        # colouring of a graph, so it branches, the smallest sets first.
         if all(len(set(others[v]) & members.keys()) == len(group) - 1 for v in group):
             return _all_matched(members)
         group.sort(key=lambda v: len(members[v]))
