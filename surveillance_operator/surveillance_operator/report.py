@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import base64
 import contextlib
+import io
 import json
 import math
 import sys
 import time
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
 from html import escape
 from itertools import groupby, pairwise
 from pathlib import Path
@@ -22,7 +25,6 @@ from surveillance_runtime.files import INCIDENTS, PLACE, RECORD, RECORDING, File
 from surveillance_runtime.place import read_place_file
 from surveillance_runtime.place.drawing import Run, draw_place
 from surveillance_runtime.place.floor_plan import FloorPlan
-from surveillance_runtime.place.occupancy_grid import outlines
 
 NAME, PICTURE = 'report.html', 'report.png'
 MOST_LINES = 2000
@@ -34,11 +36,8 @@ table{border-collapse:collapse;width:100%}
 td,th{padding:.2rem .7rem .2rem 0;text-align:left;vertical-align:top;border-bottom:1px solid #8886}
 .n{text-align:right;font-variant-numeric:tabular-nums;white-space:nowrap}
 .late{font-weight:700}th.w{width:55%}
-svg{width:100%;height:2rem;display:block}svg.map{height:auto;max-height:32rem}
-.wall{stroke:currentColor;stroke-width:.12}.door{stroke:Canvas;stroke-width:.16}
-.way{fill:none;stroke:#5b9bd5;stroke-width:.1;stroke-opacity:.7}
-.map text{font-size:.7px;font-weight:600;text-anchor:middle;fill:currentColor;paint-order:stroke;
-stroke:Canvas;stroke-width:.15px}
+svg{width:100%;height:2rem;display:block}
+.map{display:block;max-width:100%;height:auto;margin:auto;border-radius:6px}
 .strip{fill:#5b9bd5}.limit{stroke:#b3132b;stroke-dasharray:4 3}
 @media(max-width:40rem){.w{display:none}
 .long tr{display:grid;grid-template-columns:4rem 1fr 1fr;border-bottom:1px solid #8886}
@@ -99,40 +98,17 @@ def _material(folder: Path) -> tuple[Sequence[Event], FloorPlan | None, Run | No
 
 
 def _map(plan: FloorPlan, run: Run) -> str:
-    """Return the place with the ways driven, as SVG; y points up in it."""
-    lines: list[Iterable[Sequence[float]]] = [
-        (wall.start, wall.end) for wall in plan.walls.values()
-    ]
-    if plan.map is not None:
-        lines += [line.tolist() for line in outlines(plan.map.grid, plan.map.resolution)]
-    walls, ways = _drawn(lines), _drawn(run.driven)
-    doors = _drawn(door.ends for door in plan.doors.values())
-    names = ''.join(
-        f'<text x="{x:.2f}" y="{-y:.2f}">{escape(name)}</text>'
-        for name, (x, y) in _labels(plan.place.positions).items()
-    )
-    west, south, east, north = plan.bounds
-    box = west - 0.5, -north - 0.5, east - west + 1.0, north - south + 1.0
+    """Return the picture of the place with the ways driven, inside of the page.
+
+    The waits are the page's own table, so the picture is without them.
+    """
+    picture = io.BytesIO()
+    way = replace(run, waits={})
+    draw_place(plan, 'The way driven', facts(plan), way).save(picture, 'PNG', optimize=True)
+    data = base64.b64encode(picture.getvalue()).decode()
     return (
-        f'<svg class="map" role="img" aria-label="The place with the way driven" '
-        f'viewBox="{" ".join(f"{each:.2f}" for each in box)}"><path class="wall" d="{walls}"/>'
-        f'<path class="door" d="{doors}"/><path class="way" d="{ways}"/>{names}</svg>'
+        f'<img class="map" alt="The place with the way driven" src="data:image/png;base64,{data}">'
     )
-
-
-def _drawn(lines: Iterable[Iterable[Sequence[float]]]) -> str:
-    """Return lines through points as the data of an SVG path."""
-    return ''.join('M' + 'L'.join(f'{x:.2f} {-y:.2f}' for x, y, *_ in line) for line in lines)
-
-
-def _labels(points: Mapping[str, Sequence[float]]) -> dict[str, tuple[float, float]]:
-    """Return where names stand: above their place, or below where another one is close above."""
-    found = {}
-    for name, (x, y, *_) in points.items():
-        others = (each for other, each in points.items() if other != name)
-        crowded = any(abs(each[0] - x) < 2.0 and 0.0 <= each[1] - y < 2.0 for each in others)
-        found[name] = (x, y - 0.9) if crowded else (x, y + 0.4)
-    return found
 
 
 def _fastest(events: Sequence[Event]) -> float:
