@@ -31,7 +31,7 @@ from surveillance_runtime.run_options import (
 )
 
 NOT_RECORDED = 'off'
-RECORDER, MARKERS, PAGE = 'mission_recorder', 'mission_markers', 'mission_page'
+RECORDER, MARKERS, PAGE = node_table.RECORDER, node_table.MARKERS, 'mission_page'
 OBSERVER = 'observer'
 _REMAP = re.compile(r'[~/\w]+:=[~/\w]+\Z', re.ASCII)
 _NAMESPACE = re.compile(r'/?[A-Za-z]\w*(/[A-Za-z]\w*)*\Z', re.ASCII)

@@ -23,11 +23,13 @@ from launch_ros.actions import Node
 
 from launch import LaunchContext, LaunchDescription
 from surveillance_runtime.configuration import Configuration, Entry, Layer
-from surveillance_runtime.files import RECORD, RECORDING
+from surveillance_runtime.files import PLACE, RECORD, RECORDING
 from surveillance_runtime.launch_protocol import EXIT_CANNOT_START, EXIT_NOT_NOW
+from surveillance_runtime.node_table import MARKERS, RECORDER, find, select
 from surveillance_runtime.node_table import Node as NodeOfTable
-from surveillance_runtime.node_table import find, select
 from surveillance_runtime.parameters import ParameterError
+from surveillance_runtime.place.fleet import MOST_ROBOTS
+from surveillance_runtime.place.writing import copy_place
 from surveillance_runtime.profile import (
     check_behaviour,
     find_profile,
@@ -52,8 +54,7 @@ from surveillance_runtime.run_parameters import (
     watch_entries,
     write_parameters,
 )
-
-MARKERS, RECORDER = 'mission_markers', 'mission_recorder'
+from surveillance_runtime.team import Choice, TeamPart, team_parts
 
 ARGUMENTS = [
     DeclareLaunchArgument(
@@ -75,56 +76,75 @@ def start_nodes(context: LaunchContext) -> list[Node]:
     """
     given = {each.name: LaunchConfiguration(each.name).perform(context) for each in ARGUMENTS}
     mode, behaviour = given['mode'], given['behaviour']
-    if given['robots']:
-        raise ParameterError(
-            f'robots {given["robots"]!r}: python3 launch.py --robots starts a fleet; here one '
-            'robot is started at a time, see docs/fleet.md'
-        )
     config = Path(get_package_share_directory('surveillance_behaviour'), 'config')
     robot = read_profile(find_profile(config, given['robot']))
     check_behaviour(robot, behaviour)
-    namespace = given['namespace'] or robot.profile.namespace
-    nodes = select(
-        mode,
-        behaviour,
-        _names(given['only']),
-        left_out(given['simulator'], _names(given['without'])),
-        monitored=robot.profile.is_monitored,
-    )
-    names = [node.name for node in nodes]
     at = Path(given['map']) if given['map'] else None
+    choice = Choice(
+        _names(given['only']),
+        _names(given['without']),
+        lambda only, without: select(
+            mode,
+            behaviour,
+            only,
+            left_out(given['simulator'], without),
+            monitored=robot.profile.is_monitored,
+        ),
+        lambda _only: tuple(_observers(given)),
+    )
+    parts = team_parts(
+        place_file(config, behaviour, at),
+        _count(given['robots']),
+        robot.profile.body.reach,
+        given['namespace'] or robot.profile.namespace,
+        choice,
+    )
     folder = Path(tempfile.mkdtemp(prefix='surveillance-'))
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    return [node for part in parts for node in _nodes_of(part, given, config, part.folder(folder))]
+
+
+def _nodes_of(part: TeamPart, given: Mapping[str, str], config: Path, folder: Path) -> list[Node]:
+    """Return the nodes of one part: of the only robot, of a robot of a fleet, or shared."""
+    mode, behaviour = given['mode'], given['behaviour']
+    robot = read_profile(find_profile(config, part.profile or given['robot']))
+    names = [node.name for node in part.nodes]
+    at = Path(given['map']) if given['map'] else None
+    folder.mkdir(exist_ok=True)
     merged = Configuration(
         run_layers(
             config,
             behaviour,
             place=at,
             robot=robot,
+            chosen=part.entries,
             files=[Path(given['params'])] if given['params'] else [],
             options=[
                 *mode_entries(mode, prompts=False),
                 *simulator_entries(given['simulator']),
                 *unmonitored_entries(robot, names),
-                *_traces(given, folder),
+                *_traces(given, folder, part, place_file(config, behaviour, at)),
             ],
         )
     )
     merged.check()
-    place = merged.place('simulator', full_name(namespace, 'simulator'))
+    place = merged.place('simulator', full_name(part.namespace, 'simulator'))
     # The store of the ontology outlives the launch, and the next one may be in another building.
     named = place_name(place_file(config, behaviour, at), place)
     entry = for_node('armor_server', 'place', named, 'the place')
     merged = Configuration((Layer(entry.origin, (entry,)), *merged.layers))
-    nodes = (*nodes, *_observers(given))
-    renamed = [*_remaps(given['remap']), *remappings(robot.profile, names, mode)]
-    files = write_parameters(folder, namespace, merged, nodes)
+    renamed = [
+        *_remaps(given['remap']),
+        *part.renamed,
+        *remappings(robot.profile, names, mode),
+    ]
+    files = write_parameters(folder, part.namespace, merged, part.everyone)
     return [
         Node(
             package=node.package,
             executable=node.name,
             name=node.name,
-            namespace=namespace,
+            namespace=part.namespace,
             parameters=[str(files[node.name])],
             remappings=renamed,
             ros_arguments=['--log-level', given['log_level']],
@@ -134,8 +154,21 @@ def start_nodes(context: LaunchContext) -> list[Node]:
             respawn_delay=1.0,
             on_exit=stop_if_unusable,
         )
-        for node in nodes
+        for node in part.everyone
     ]
+
+
+def _count(text: str) -> int | None:
+    """Return how many robots are asked for; None: as the place says.
+
+    Raises:
+        ParameterError: The text is no number from 1 to `MOST_ROBOTS`.
+    """
+    if not text:
+        return None
+    if not text.isascii() or not text.isdigit() or not 1 <= int(text) <= MOST_ROBOTS:
+        raise ParameterError(f'robots {text!r}: expected a number from 1 to {MOST_ROBOTS}')
+    return int(text)
 
 
 def _names(text: str) -> list[str]:
@@ -171,15 +204,15 @@ def _observers(given: Mapping[str, str]) -> list[NodeOfTable]:
     return [find(name) for name in names]
 
 
-def _traces(given: Mapping[str, str], folder: Path) -> Iterator[Entry]:
-    """Yield where the run leaves its files, and what the page is told."""
+def _traces(given: Mapping[str, str], folder: Path, part: TeamPart, place: Path) -> Iterator[Entry]:
+    """Yield where a part of the run leaves its files, and what the page is told."""
+    kept = part.folder(Path(given['record'])) if given['record'] else folder
     if given['record']:
-        kept = Path(given['record'])
         kept.mkdir(parents=True, exist_ok=True)
+        copy_place(place, kept / PLACE)
         yield from record_entries(kept / RECORD)
         yield for_node(RECORDER, 'folder', str(kept / RECORDING), 'record')
     if given['watch']:
-        kept = Path(given['record']) if given['record'] else folder
         yield from watch_entries(kept, Path(given['watch']))
     if given['stage']:
         yield stage_entry(Path(given['stage']))

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from textwrap import wrap
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 from state_machines.exceptions import CallError, UnavailableError
 from surveillance_controllers.manual.commands import (
@@ -22,6 +22,7 @@ from surveillance_controllers.manual.commands import (
     Command,
     CommandError,
     Grammar,
+    ParsedCommand,
     number,
 )
 from surveillance_runtime.configuration import declared, read_schema
@@ -199,6 +200,12 @@ _COMMANDS = (
         lambda a: a.stop(True),
     ),
     _command('release', 'Let a stopped robot move again.', lambda a: a.stop(False)),
+    _command(
+        'out',
+        "Take the robot out of its fleet's patrol; the others have its places.",
+        lambda a: a.take_out(True),
+    ),
+    _command('in', 'Put it back.', lambda a: a.take_out(False)),
     _command('pause', 'Stand, and enter no further state.', lambda a: a.machine('pause')),
     _command('step', 'Enter one state, then pause.', lambda a: a.machine('step')),
     _command('resume', 'Go on.', lambda a: a.machine('resume')),
@@ -232,10 +239,24 @@ _COMMANDS = (
     ),
     _command('known', 'Show what is known of a place, with its proofs.', _known, _PLACE),
 )
+ALL_WORDS = ('pause', 'go', 'stop', 'release', 'out', 'in')
+_ROBOTS = Command(('robots',), (), 'Show the robots of a fleet.')
+_ROBOT = Command(
+    ('robot',), (_word('NAME', 'the name of a robot'),), 'Speak to this robot of a fleet.'
+)
+_ALL = Command(
+    ('all',),
+    (_word('WORD', ', '.join(ALL_WORDS), lambda: ALL_WORDS),),
+    'Have all robots of a fleet do it.',
+)
 WHY = Command(('why',), (), 'Say why the robot goes where it goes.')
 EXIT_NODE = 'exit NODE'
 GRAMMAR = Grammar(
-    (*(c for group in CONTROLLED.values() for c in group), *(c for c, _ in _COMMANDS))
+    (
+        *(c for group in CONTROLLED.values() for c in group),
+        *(c for c, _ in _COMMANDS),
+        *(_ROBOTS, _ROBOT, _ALL),
+    )
 )
 _CONTROLLER_OF = {command.name: name for name, group in CONTROLLED.items() for command in group}
 _DOES = {command.name: do for command, do in _COMMANDS}
@@ -254,6 +275,19 @@ class Answer:
     text: str
     who: str = ''
     ends: bool = False
+
+
+class Fleet(Protocol):
+    """The robots that a console speaks to."""
+
+    def lines(self) -> list[str]:
+        """Return what each robot does."""
+
+    def choose(self, robot: str) -> str:
+        """Speak to a robot from now on; raises `ValueError` where there is none of that name."""
+
+    def tell_all(self, word: str) -> str:
+        """Have all do one of `ALL_WORDS`; raises `ValueError` or `CallError`."""
 
 
 def help_text(columns: int = 1000) -> str:
@@ -292,7 +326,11 @@ def completions(text: str) -> list[str]:
 
 
 def answer(
-    line: str, actions: MissionActions, why: Callable[[], str], columns: int = 1000
+    line: str,
+    actions: MissionActions,
+    why: Callable[[], str],
+    columns: int = 1000,
+    fleet: Fleet | None = None,
 ) -> list[Answer]:
     """Do what a line says, and return what came of it.
 
@@ -301,6 +339,7 @@ def answer(
         actions: Does it.
         why: The present decision in words.
         columns: Of the terminal.
+        fleet: All robots; None: there is one.
     """
     words = line.split()
     if [word.lower() for word in words] == ['why']:
@@ -322,9 +361,24 @@ def answer(
     if command.name in _CONTROLLER_OF:
         return [_told(actions, _CONTROLLER_OF[command.name], line)]
     try:
+        if command.name in (_ROBOTS.name, _ROBOT.name, _ALL.name):
+            return [Answer(_of_fleet(command, fleet))]
         return [Answer(_DOES[command.name](actions, *command.values))]
     except (ValueError, CallError) as error:
         return [Answer(f'{command.name}: {error}')]
+
+
+def _of_fleet(command: ParsedCommand, fleet: Fleet | None) -> str:
+    if fleet is None:
+        raise ValueError('this robot is alone')
+    if command.name == _ROBOTS.name:
+        return '\n'.join(fleet.lines())
+    word = str(command.values[0])
+    if command.name == _ROBOT.name:
+        return fleet.choose(word)
+    if word not in ALL_WORDS:
+        raise ValueError(f'{word!r}: expected {nearest(word, ALL_WORDS)}')
+    return fleet.tell_all(word)
 
 
 def _exit(name: str, actions: MissionActions) -> Answer:

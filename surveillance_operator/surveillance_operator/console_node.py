@@ -23,13 +23,16 @@ from surveillance_operator.console_commands import (
     help_text,
     wrapped,
 )
-from surveillance_operator.mission_actions import MissionActions
-from surveillance_operator.mission_feed import MissionFeed
+from surveillance_operator.fleet_actions import ALL, WORDS, FleetActions
+from surveillance_operator.fleet_feed import FleetFeed
+from surveillance_operator.fleet_table import fleet_lines
 from surveillance_operator.snapshot import Snapshot, why
 from surveillance_runtime.logging import clean, print_lines
 from surveillance_runtime.node import PatrolNode
+from surveillance_runtime.node_table import name_for
 from surveillance_runtime.process import run_node
 from surveillance_runtime.qos import STATE_QOS
+from surveillance_runtime.suggestions import nearest
 
 FEED_PERIOD = 0.5
 """Seconds between two looks at what the status line shows."""
@@ -52,13 +55,14 @@ class ConsoleNode(PatrolNode):
             maximum=3600.0,
         )
         self._timeout = timeout
-        self._actions = MissionActions(self, timeout)
-        self._feed = MissionFeed(self, FEED_PERIOD)
+        self._robot = self.parameter(
+            'robot', '', 'The robot of a fleet that is spoken to first; empty: the first one.'
+        )
         self._left_out = 0
-        for name in CONTROLLED:
-            self.create_subscription(
-                String, f'{name}/announcement', partial(self._on_announcement, name), STATE_QOS
-            )
+        self._met: set[str] = set()
+        self._feed = FleetFeed(self, FEED_PERIOD, lambda name, _new, _told: self._meet(name))
+        self._actions = FleetActions(self, lambda: self._feed.robots, timeout)
+        self._meet('')
         self._console = Console(
             'console', self._on_line, completions, source=console_source, status=self._status
         )
@@ -67,8 +71,42 @@ class ConsoleNode(PatrolNode):
             _tell('You can type these commands:\n' + help_text(_columns()))
         self.spawn(self._read)
 
+    @property
+    def robot(self) -> str:
+        """The robot that is spoken to; one that is alone has no name."""
+        known = self._feed.robots
+        return self._robot if self._robot in known else known[0]
+
+    def lines(self) -> list[str]:
+        """Return what each robot of the fleet does."""
+        if self._feed.robots == ('',):
+            raise ValueError('this robot is alone')
+        return fleet_lines(self._feed.see())
+
+    def choose(self, robot: str) -> str:
+        """Speak to another robot of the fleet."""
+        if robot not in (known := self._feed.robots):
+            raise ValueError(f'{robot!r}: expected {nearest(robot, filter(None, known))}')
+        self._robot = robot
+        return f'you speak to {robot}'
+
+    def tell_all(self, word: str) -> str:
+        """Have all robots do something."""
+        return self._actions.told(ALL, WORDS[word][1]).replace('; ', '\n')
+
+    def _meet(self, robot: str) -> None:
+        """Hear what the controllers of a robot announce."""
+        if robot in self._met:
+            return
+        self._met.add(robot)
+        for name in map(partial(name_for, robot), CONTROLLED):
+            self.create_subscription(
+                String, f'{name}/announcement', partial(self._on_announcement, name), STATE_QOS
+            )
+
     def _status(self) -> str:
-        return status_line(self._feed.snapshot)
+        name = self.robot
+        return status_line(self._feed.snapshot(name), name)
 
     def _on_announcement(self, controller: str, message: String) -> None:
         allowance = self.get_logger().lines
@@ -87,7 +125,8 @@ class ConsoleNode(PatrolNode):
     def _on_line(self, line: str) -> None:
         if self.ended.is_set():
             return  # a pipe has more lines than the `exit`
-        for each in answer(line, self._actions, self._why, _columns()):
+        actions = self._actions.of(self.robot)
+        for each in answer(line, actions, self._why, _columns(), fleet=self):
             if each.ends:
                 self.finish()
             elif each.text:
@@ -95,14 +134,14 @@ class ConsoleNode(PatrolNode):
 
     def _why(self) -> str:
         deadline = time.monotonic() + self._timeout
-        while (said := why(self._feed.snapshot)) is None:
+        while (said := why(self._feed.snapshot(self.robot))) is None:
             # The feed of a console that was just opened has not heard of it yet.
             if time.monotonic() > deadline or self.stopping.wait(FEED_PERIOD):
                 return 'no decision yet'
         return '\n'.join(said)
 
 
-def status_line(snapshot: Snapshot) -> str:
+def status_line(snapshot: Snapshot, robot: str = '') -> str:
     """Return the mission in one line: what it does, where, how much charge is left."""
     status = snapshot.status
     if status is None or not snapshot.nodes:
@@ -110,7 +149,8 @@ def status_line(snapshot: Snapshot) -> str:
     battery = '–' if snapshot.battery is None else f'{snapshot.battery:.0f} %'
     paused = 'PAUSED · ' if snapshot.paused else ''
     paused = 'STOPPED · ' if snapshot.stopped else paused
-    return f' {paused}{status.state} · {status.whereabouts} · battery {battery} '
+    who = f'{robot} · ' if robot else ''
+    return f' {who}{paused}{status.state} · {status.whereabouts} · battery {battery} '
 
 
 def _tell(text: str, controller: str = '') -> None:

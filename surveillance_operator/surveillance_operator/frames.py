@@ -185,7 +185,8 @@ def _history(snapshot: Snapshot) -> Any:
     }
 
 
-def _events(snapshot: Snapshot) -> Any:
+def events_of(snapshot: Snapshot) -> Any:
+    """Return the latest events, as `merged_events` takes them."""
     # A third value says that the event is of the place.
     return [[round(at, 1), text, *([1] if shared else [])] for at, text, shared in snapshot.events]
 
@@ -250,7 +251,7 @@ PARTS: Mapping[str, tuple[tuple[str, ...], Callable[[Snapshot], Any]]] = {
     'shares': (('share',), shares),
     'out': (('share',), is_out),
     'troubles': (('status', 'stopped', 'nodes', 'ended', 'health', 'namespace'), troubles),
-    'events': (('events',), _events),
+    'events': (('events',), events_of),
     'history': (('history',), _history),
 }
 """Each part with the snapshot's fields that it comes from."""

@@ -73,6 +73,14 @@ class MissionRecorder(PatrolNode):
             'Most of all recordings beside this one to keep, gigabytes; the oldest are deleted.',
             minimum=0.0,
         )
+        others = self.parameter(
+            'other_robots',
+            (),
+            "Namespaces of a fleet's other robots, whose topics their own recorders keep.",
+            of=str,
+            read_only=True,
+        )
+        self._left_out = tuple(f'{namespace.rstrip("/")}/' for namespace in others)
         megabytes = self.parameter('segment_size', 128.0, 'Megabytes of a file.', minimum=0.1)
         seconds = self.parameter('segment_age', 3600.0, 'Seconds of a file.', minimum=1.0)
         path = Path(folder)
@@ -159,6 +167,8 @@ class MissionRecorder(PatrolNode):
     def _find_topics(self) -> None:
         for topic, types in self.get_topic_names_and_types():
             if topic in self._subscriptions_by_topic or topic in self._unknown:
+                continue
+            if topic.startswith(self._left_out):
                 continue
             offers = [
                 each

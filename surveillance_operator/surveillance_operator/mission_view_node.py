@@ -8,12 +8,14 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 from rich.console import Console
 
 from state_machines.exceptions import CallError
-from surveillance_operator.mission_feed import MissionFeed
+from surveillance_operator.fleet_actions import ALL
+from surveillance_operator.fleet_feed import FleetFeed
 from surveillance_operator.snapshot import Change, Snapshot
 from surveillance_operator.stop_button import StopButton
 from surveillance_operator.watch.view import show_moving, show_once
@@ -34,42 +36,57 @@ class MissionViewNode(PatrolNode):
         self._timeout = self.parameter(
             'timeout', 5.0, 'With once: longest wait for a mission, seconds.', minimum=0.1
         )
+        self._robot = self.parameter(
+            'robot', '', 'The robot of a fleet that is drawn first; empty: the first one.'
+        )
         self._console = Console(highlight=False)
         self._draws = self._once or (
             self._console.is_terminal and not self._console.is_dumb_terminal
         )
         self._said = ''
-        self._stop: StopButton | None = None
-        self._feed = MissionFeed(self, POLL_PERIOD, self._tell)
+        self._stops: dict[str, StopButton] = {}
+        self._feed = FleetFeed(self, POLL_PERIOD, self._tell)
         if self._draws:
             if not self._once:
-                self._stop = StopButton(self)
+                self._stops[''] = StopButton(self)
             self.spawn(self._draw, 'display')
         else:
             self._print(f'watching {self.snapshot.where}')
 
     @property
     def snapshot(self) -> Snapshot:
-        """All that is known."""
-        return self._feed.snapshot
+        """All that is known of the robot that is alone, or of what the robots of a fleet share."""
+        return self._feed.snapshot('')
 
-    def see(self) -> Snapshot:
+    def see(self) -> dict[str, Snapshot]:
         """Return all that is known, at the mission's present time, or the time of its end."""
-        return self._feed.see()
+        seen = self._feed.see()
+        if self._stops:
+            for robot in seen.keys() - self._stops.keys():
+                self._stops[robot] = StopButton(self, robot)  # found before it is needed
+        return seen
 
-    def _tell(self, _new: Snapshot, told: Sequence[Change]) -> None:
+    def _tell(self, robot: str, _new: Snapshot, told: Sequence[Change]) -> None:
         if not self._draws:
             at = time.strftime('%H:%M:%S')
             for each in told:
-                self._print(f'{at} {each.text} {each.detail}'.rstrip())
+                if robot and each.shared:
+                    continue  # it is told with what all robots share
+                who = f'{robot}: ' if robot else ''
+                self._print(f'{at} {who}{each.text} {each.detail}'.rstrip())
 
     def _draw(self) -> None:
         try:
             if not self._once:
                 show_moving(
-                    self.see, self.stopping, self._console, self._press_stop, lambda: self._said
+                    self.see,
+                    self.stopping,
+                    self._console,
+                    self._press_stop,
+                    lambda: self._said,
+                    self._robot,
                 )
-            elif not show_once(self.see, self.stopping, self._console, self._timeout):
+            elif not show_once(self.see, self.stopping, self._console, self._timeout, self._robot):
                 where = f'{self.snapshot.where} within {self._timeout:g} s'
                 print(f'watch: no mission on {where}', file=sys.stderr)
                 self.fail('no mission')
@@ -78,18 +95,21 @@ class MissionViewNode(PatrolNode):
         finally:
             self.finish()
 
-    def _press_stop(self, stop: bool) -> None:
-        """Stop the robot, or release it, on a thread of its own."""
+    def _press_stop(self, stop: bool, robot: str) -> None:
+        """Stop a robot or all of them, or release them, each on a thread of its own."""
+        done: dict[str, str] = {}
 
-        def press() -> None:
-            assert self._stop is not None
+        def press(name: str) -> None:
             try:
-                self._said = self._stop.press(stop)
+                said = self._stops[name].press(stop)
             except CallError as error:
-                self._said = f'NOT {"stopped" if stop else "released"}: {error}'
+                said = f'NOT {"stopped" if stop else "released"}: {error}'
+            done[name] = f'{name}: {said}' if name else said
+            self._said = '; '.join(done[each] for each in sorted(done))
 
-        self._said = 'stopping the robot' if stop else 'releasing it'
-        self.spawn(press, 'stop')
+        self._said = 'stopping' if stop else 'releasing'
+        for name in self._feed.robots if robot == ALL else (robot,):
+            self.spawn(partial(press, name), 'stop')
 
     def _print(self, line: str) -> None:
         try:

@@ -50,8 +50,12 @@ def main(argv: Sequence[str] | None = None) -> int:
         'watch',
         'Shows a running mission, simulated or real, until q or Ctrl-C: the map with robot, doors '
         'and obstacles, what the robot does and why. Keys: s stops the robot, r releases it, '
-        'p holds the picture, d shows the decision, n the nodes, e the events. Where the output is '
-        'no terminal, it prints a line for each change.',
+        'p holds the picture, d shows the decision, n the nodes, e the events, f the robots of a '
+        'fleet, of which 1 to 9 choose one; S stops all, R releases all. Where the output is no '
+        'terminal, it prints a line for each change.',
+    )
+    parser.add_argument(
+        '--robot', default='', metavar='NAME', help='the robot of a fleet to be drawn first'
     )
     parser.add_argument('--once', action='store_true', help='print one picture and end')
     parser.add_argument(
@@ -66,7 +70,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         parser.error(f'--timeout {options.timeout:g}: expected 0.1 seconds or more')
     arguments = ros_arguments(parser, options)
     arguments += ['-p', f'once:={str(options.once).lower()}', '-p', f'timeout:={options.timeout}']
-    return mission_view_node.main(arguments)
+    return mission_view_node.main([*arguments, *_robot(options)])
 
 
 def console(argv: Sequence[str] | None = None) -> int:
@@ -76,7 +80,16 @@ def console(argv: Sequence[str] | None = None) -> int:
         'One prompt for a running mission: answers in mode MANUAL, doors, rooms, obstacles, '
         'policy, why, go, stop, pause. `help` lists the commands.',
     )
-    return console_node.main(ros_arguments(parser, parser.parse_args(argv)))
+    parser.add_argument(
+        '--robot', default='', metavar='NAME', help='the robot of a fleet to speak to first'
+    )
+    options = parser.parse_args(argv)
+    arguments = ros_arguments(parser, options)
+    return console_node.main([*arguments, *_robot(options)])
+
+
+def _robot(options: argparse.Namespace) -> list[str]:
+    return ['-p', f'robot:={options.robot!r}'] if options.robot else []
 
 
 if __name__ == '__main__':

@@ -13,6 +13,7 @@ BEHAVIOURS = ('surveillance', 'patrol')
 DEFAULT_BEHAVIOUR = BEHAVIOURS[0]
 LOG_LEVELS = ('debug', 'info', 'warn', 'error', 'fatal')
 CONSOLE = 'console'
+RECORDER, MARKERS = 'mission_recorder', 'mission_markers'
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,8 @@ from typing import Any
 import pytest
 
 from launcher.run import Run
-from launcher.run_configuration import configuration
+from launcher.run_configuration import configuration, profile_of
+from launcher.team import parts
 from surveillance_runtime.configuration import Configuration, file_layer
 from surveillance_runtime.files import FileError
 from surveillance_runtime.node_table import BEHAVIOURS, MODES, find, select
@@ -81,7 +82,7 @@ def start(monkeypatch, tmp_path):
 
 def settings(node: StartedNode) -> dict[str, object]:
     """Return what a node reads from its file."""
-    full_name = f'{node.namespace}/{node.name}' if node.namespace else f'/{node.name}'
+    full_name = '/'.join(('', *filter(None, (node.namespace.strip('/'), node.name))))
     merged = Configuration((file_layer(node.parameters[0]),))
     return {name: each.value for name, each in merged.resolve(node.name, full_name).items()}
 
@@ -152,6 +153,40 @@ def test_its_arguments_are_options_of_launch_py(start, tmp_path):
         start(mode='ROBOT', robot='turtlebot3_burger', behaviour='patrol')
     with pytest.raises(FileError, match=r"--robot 'turtlebot3_burgr'.*'turtlebot3_burger'"):
         start(robot='turtlebot3_burgr')
+
+
+def test_it_starts_the_fleet_that_launch_py_starts(start, tmp_path):
+    nodes = start(robots='3', record=str(tmp_path / 'it'), web='true')
+    run = Run(robots=3, record='runs', web=True)
+    wanted = parts(run, ROOT / 'config', profile_of(ROOT / 'config', run))
+    same = {
+        (f'/{part.robot}' if part.robot else None, node.name)
+        for part in wanted
+        for node in part.everyone
+    }
+    assert {(f'/{n.namespace}' if n.namespace else None, n.name) for n in nodes} == same
+    for part in wanted:
+        merged = configuration(ROOT / 'config', part.run, fleet=part.entries)
+        for node in part.nodes:
+            (own,) = [
+                n for n in nodes if n.name == node.name and n.namespace == (part.namespace or '')
+            ]
+            full = f'/{part.robot}/{node.name}' if part.robot else f'/{node.name}'
+            known = merged.resolve(node.name, full).items()
+            values = {name: each.value for name, each in known if name not in PER_RUN}
+            assert {k: v for k, v in settings(own).items() if k not in PER_RUN} == values
+            assert set(part.renamed) <= set(own.remappings)
+    by_robot = {n.namespace: settings(n) for n in nodes if n.name == 'mission_recorder'}
+    assert by_robot['robot2']['folder'] == str(tmp_path / 'it' / 'robot2' / 'recording')
+    assert by_robot['robot2']['other_robots'] == ['/robot1', '/robot3']
+    assert (tmp_path / 'it' / 'robot2' / 'place.yaml').is_file()
+    named = tmp_path / 'named.yaml'
+    place = (ROOT / 'config' / 'seven_rooms.yaml').read_text()
+    named.write_text(f'{place}    robots:\n      anna: {{start: [10.0, 8.0, 0.0]}}\n')
+    assert {n.namespace for n in start(map=str(named))} == {'', 'anna'}
+    for wrong in ('0', 'two', '101'):
+        with pytest.raises(ParameterError, match=f"robots '{wrong}': expected a number from 1"):
+            start(robots=wrong)
 
 
 def test_each_place_has_a_store_of_its_own(start, tmp_path):

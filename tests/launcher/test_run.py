@@ -386,7 +386,7 @@ def test_everything_that_only_looks_on_gets_a_process(tmp_path, composed):
     watch = tmp_path / 'watch.yaml'
     run = Run(web=True, watch=watch, record=str(tmp_path), composed=composed)
     nodes, observers = run.nodes(), run.observers()
-    part = Part(run, nodes=nodes, observers=observers)
+    part = Part(run=run, nodes=nodes, observers=observers)
     files = {node.name: tmp_path / node.name for node in part.everyone}
     started = ' '.join(word for each in programs_of(part, files, {}) for word in each.command)
     assert {'observer', 'mission_page', 'mission_recorder'} <= {node.name for node in observers}

@@ -6,6 +6,7 @@ The page of a robot that is alone is that of a fleet of one; `test_page_states.p
 from __future__ import annotations
 
 import asyncio
+import io
 import json
 from collections.abc import Iterator
 from dataclasses import replace
@@ -16,6 +17,7 @@ import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import PoseWithCovarianceStamped
 from rclpy.qos import QoSProfile
+from rich.console import Console
 from std_msgs.msg import UInt8
 from std_srvs.srv import SetBool, Trigger
 
@@ -23,6 +25,7 @@ from patrol_policy.world import Decision
 from state_machines.exceptions import CallError
 from surveillance_interfaces.msg import DoorStates, FleetRobot, MissionStatus
 from surveillance_operator import fleet_feed, mission_feed
+from surveillance_operator.console_commands import answer, completions
 from surveillance_operator.fleet_actions import WORDS, FleetActions
 from surveillance_operator.fleet_feed import FleetFeed
 from surveillance_operator.fleet_table import fleet_lines
@@ -39,6 +42,7 @@ from surveillance_operator.snapshot import (
     follow,
     troubles,
 )
+from surveillance_operator.watch.view import MissionView
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.place.occupancy_grid import Grid
 from surveillance_runtime.qos import STATE_QOS
@@ -272,6 +276,60 @@ def test_taking_out_a_robot_that_is_alone_is_one_line(graph: Any) -> None:
     alone = FleetActions(graph.add(PatrolNode, name='hands'), lambda: ('',), timeout=0.1)
     with pytest.raises(CallError, match='robot_behavior is not running'):
         alone.told('all', WORDS['out'][1])
+
+
+def picture(**fields: Any) -> str:
+    file = io.StringIO()
+    console = Console(file=file, width=100, height=34)
+    console.print(MissionView(FLEET['anna'], whole=False, fleet=FLEET, robot='anna', **fields))
+    return file.getvalue()
+
+
+def test_the_terminal_shows_the_robots_and_the_one_that_was_chosen() -> None:
+    shown = picture()
+    assert shown.splitlines()[0].startswith(' anna · surveillance')
+    for line in ('1 anna A on its way to B', '2 bert A on its way to B', 'B is for anna'):
+        assert line in shown
+    on_map = [line[:50] for line in shown.splitlines()]
+    assert all(any(name in line for line in on_map) for name in ('bert', 'carl'))
+    assert shown.count('door D closed') == 1
+    assert 'anna begins' in picture(page='events')
+    assert 'bert begins' in picture(page='events')
+    assert 'shares A, B, next B' in picture(page='robots')
+    for width in range(40, 120, 7):
+        file = io.StringIO()
+        view = MissionView(FLEET['bert'], fleet=FLEET, robot='bert')
+        Console(file=file, width=width, height=20).print(view)
+        assert max(map(len, file.getvalue().splitlines())) <= width
+
+
+class Prompt:
+    """The robots behind a console."""
+
+    def lines(self) -> list[str]:
+        return ['anna', 'bert']
+
+    def choose(self, robot: str) -> str:
+        return f'you speak to {robot}'
+
+    def tell_all(self, word: str) -> str:
+        return f'all {word}'
+
+
+def test_the_console_speaks_to_one_robot_or_to_all() -> None:
+    def told(line: str) -> str:
+        actions: Any = None
+        (said,) = answer(line, actions, lambda: '', fleet=Prompt())
+        return said.text
+
+    assert told('robots') == 'anna\nbert'
+    assert told('robot bert') == 'you speak to bert'
+    assert told('all stop') == 'all stop'
+    assert told('all sto') == "all: 'sto': expected 'stop'"
+    nobody: Any = None
+    (alone,) = answer('all stop', nobody, lambda: '')
+    assert alone.text == 'all: this robot is alone'
+    assert completions('all p') == ['pause']
 
 
 # --- in a real browser ---

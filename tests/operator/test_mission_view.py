@@ -256,5 +256,5 @@ def test_a_single_picture_in_a_pipe_is_as_wide_as_columns_says(monkeypatch):
     for columns, width in (('', 100), ('60', 60)):
         monkeypatch.setenv('COLUMNS', columns)
         file = io.StringIO()
-        assert show_once(whole, Interrupt(), Console(file=file), timeout=5.0)
+        assert show_once(lambda: {'': whole()}, Interrupt(), Console(file=file), timeout=5.0)
         assert max(map(len, file.getvalue().splitlines())) == width

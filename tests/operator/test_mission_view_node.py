@@ -102,7 +102,7 @@ def test_it_gathers_what_topics_ontology_and_parameters_tell(graph: Any) -> None
             and 'planner_controller' in view.snapshot.nodes
         )
     )
-    seen = view.see()
+    seen = view.see()['']
     assert seen.battery == 15.0
     assert seen.status is not None
     assert seen.status.state == 'MOVE'
@@ -152,14 +152,14 @@ def test_the_next_mission_begins_with_an_empty_picture(graph: Any) -> None:
     battery = say(graph, '/alone/battery_level', UInt8(data=50))
     clock = say(graph, '/clock', Clock(clock=Time(sec=100)))
     graph.until(lambda: view.snapshot.battery == 50 and view.snapshot.nodes)
-    graph.until(lambda: view.see().now == 100.0)
+    graph.until(lambda: view.see()[''].now == 100.0)
     for publisher in (status, battery, clock):
         graph.node.destroy_publisher(publisher)
     graph.until(lambda: not view.snapshot.nodes)
-    frozen = view.see()
+    frozen = view.see()['']
     assert frozen.status is not None
     assert frozen.status.state == 'FIRST'
-    assert view.see().now == frozen.now
+    assert view.see()[''].now == frozen.now
     reports = say(graph, '/diagnostics', DiagnosticArray(status=[DiagnosticStatus(name='x')]), 10)
 
     def reported() -> bool:  # an observer of the mission, which goes on
@@ -167,14 +167,14 @@ def test_the_next_mission_begins_with_an_empty_picture(graph: Any) -> None:
         return 'x' in view.snapshot.health
 
     graph.until(reported)
-    assert view.see().status == frozen.status
-    assert view.see().now == 100.0  # no wait grows by the time of day
+    assert view.see()[''].status == frozen.status
+    assert view.see()[''].now == 100.0  # no wait grows by the time of day
 
     say(graph, '/alone/mission_status', MissionStatus(state='SECOND'))
     graph.until(lambda: view.snapshot.status and view.snapshot.status.state == 'SECOND')
     assert view.snapshot.battery is None
     assert view.snapshot.history.battery == ()
-    assert view.see().now > 1e9
+    assert view.see()[''].now > 1e9
     assert any('waiting for the next mission' in each.text for each in view.snapshot.events)
 
 

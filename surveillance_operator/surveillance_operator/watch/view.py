@@ -14,10 +14,11 @@ import sys
 import termios
 import time
 import tty
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import zip_longest
 from textwrap import wrap
+from typing import Any
 
 import numpy as np
 from rich.console import Console, ConsoleOptions, RenderResult
@@ -27,8 +28,10 @@ from rich.style import Style
 from rich.text import Text
 
 from state_machines import Interrupt
-from surveillance_operator.frames import health
-from surveillance_operator.snapshot import Event, Snapshot, why
+from surveillance_operator.fleet_actions import ALL
+from surveillance_operator.fleet_table import fleet_lines
+from surveillance_operator.frames import events_of, health, merged_events
+from surveillance_operator.snapshot import Pose, Snapshot, doing, troubles, why
 from surveillance_operator.watch import raster
 from surveillance_operator.watch.raster import Canvas, Frame, rasterise
 from surveillance_runtime.place.occupancy_grid import Box
@@ -52,10 +55,12 @@ KEYS = {
     'd': 'decision',
     'n': 'nodes',
     'e': 'events',
+    'f': 'robots',
 }
 """Keys that choose a page; `p` holds the picture, `q` ends, `s` stops the robot and `r` releases
-it."""
+it; of a fleet a digit chooses the robot, `S` stops all and `R` releases all."""
 STOP_KEYS = {'s': True, 'r': False}
+FLEET_NOTE = 's STOP · S STOP ALL · r, R release · 1-9 robot · f robots · q quit · d n e pages'
 BAR = 20
 MARGIN = 1.5
 """Around the places, where there is no map, metres."""
@@ -78,6 +83,8 @@ HEADER = Style(color='black', bgcolor='deep_sky_blue1', bold=True)
 ALARM = Style(color='white', bgcolor='red3', bold=True)
 DIM = Style(dim=True)
 ROBOT = Style(color='black', bgcolor='yellow1', bold=True)
+OTHER = Style(color='black', bgcolor='deep_sky_blue1', bold=True)
+FLEET_COLOURS = ('yellow1', 'deep_sky_blue1', 'hot_pink', 'spring_green2', 'medium_purple1')
 LABEL = Style(color='white', bold=True)
 URGENT = Style(color='red1', bold=True)
 HERE = Style(color='yellow1', bold=True)
@@ -93,12 +100,26 @@ class MissionView:
         whole: Fill the terminal, down to its last line.
         page: What to show, one of the values of `KEYS`.
         note: Stands in the last line.
+        fleet: All robots by their names; what they share has none. Empty: the robot is alone.
+        robot: The name of the one that is drawn.
     """
 
     def __init__(
-        self, snapshot: Snapshot, *, whole: bool = True, page: str = 'map', note: str = ''
+        self,
+        snapshot: Snapshot,
+        *,
+        whole: bool = True,
+        page: str = 'map',
+        note: str = '',
+        fleet: Mapping[str, Snapshot] | None = None,
+        robot: str = '',
     ) -> None:
         self._snapshot = snapshot
+        self._robot = robot
+        self._fleet = dict(fleet or {}) if robot else {}
+        self._events = merged_events(
+            {name: events_of(each) for name, each in (self._fleet or {'': snapshot}).items()}
+        )
         self._whole = whole
         self._page = page
         self._note = note
@@ -109,10 +130,10 @@ class MissionView:
         colours = console.color_system is not None and not console.no_color
         body = height - (2 if self._note else 1)
         if self._page != 'map':
-            lines = _wrapped(console, PAGES[self._page](self._snapshot), width)
+            lines = _wrapped(console, self._page_lines(), width)
             rows = _rendered(console, options, lines[:body], width)
         elif width >= SIDE_BY_SIDE:
-            picture = draw_map(self._snapshot, width - LEAST_PANEL - 1, body, colours=colours)
+            picture = self._map(width - LEAST_PANEL - 1, body, colours=colours)
             used = max(Segment.get_line_length(line) for line in picture)
             panel = self._panel(console, options, width - used - 1, body)
             rows = [
@@ -120,9 +141,9 @@ class MissionView:
                 for line, beside in zip_longest(picture, panel)
             ]
         else:
-            picture = draw_map(self._snapshot, width, max(3, body // 2), colours=colours)
+            picture = self._map(width, max(3, body // 2), colours=colours)
             rows = [*picture, *self._panel(console, options, width, max(0, body - len(picture)))]
-        title = header_line(self._snapshot)
+        title = header_line(self._snapshot, self._robot)
         title.pad_right(max(0, width - len(title)))
         rows = [*_rendered(console, options, [title], width), *rows][: body + 1]
         if self._whole:
@@ -133,6 +154,41 @@ class MissionView:
             if number:
                 yield Segment.line()
             yield from Segment.adjust_line_length(row, width)
+
+    def _map(self, columns: int, rows: int, *, colours: bool) -> Lines:
+        others = {
+            name: each.pose
+            for name, each in self._fleet.items()
+            if name and name != self._robot and each.pose is not None
+        }
+        return draw_map(self._snapshot, columns, rows, colours=colours, others=others)
+
+    def _page_lines(self) -> list[Text]:
+        if self._page == 'events':
+            return [_event(each) for each in reversed(self._events)] or [_dim('no events yet')]
+        if self._page == 'robots':
+            if not self._fleet:
+                return [_dim('this robot is alone')]
+            return [Text(line) for line in fleet_lines(self._fleet)]
+        return PAGES[self._page](self._snapshot)
+
+    def _robot_lines(self) -> list[Text]:
+        """Return what the robots of a fleet do, with the keys that choose them."""
+        names = [name for name in self._fleet if name]
+        lines = []
+        for number, name in enumerate(names, 1):
+            each = self._fleet[name]
+            wrong = troubles(each)
+            style = 'bold' if name == self._robot else ''
+            place = each.status.place if each.status else ''
+            lines.append(
+                Text.assemble(
+                    (f'{number} {name} ', style or robot_colour(names, name)),
+                    f'{place} {"; ".join(wrong) or doing(each)}',
+                    style=URGENT if wrong else style,
+                )
+            )
+        return lines
 
     def _panel(
         self, console: Console, options: ConsoleOptions, width: int, height: int
@@ -147,7 +203,10 @@ class MissionView:
             decision[most - 1].append('…')
         fixed += [*decision[:most], *doors]
         places = place_lines(snapshot, width)
-        told = snapshot.events[-MOST_EVENTS:]
+        robots = self._robot_lines()
+        if robots:
+            fixed = [_title('robots', width), *robots, _title(self._robot, width), *fixed]
+        told = self._events[-MOST_EVENTS:]
         texts = [_event(each) for each in told]
         # The places come before all but the latest events.
         room = max(0, height - len(fixed) - 2)
@@ -166,7 +225,12 @@ class MissionView:
         return _rendered(console, options, lines[:height], width)
 
 
-def header_line(snapshot: Snapshot) -> Text:
+def robot_colour(names: Sequence[str], name: str) -> str:
+    """Return the colour of a robot of a fleet, by its place among the names."""
+    return FLEET_COLOURS[list(names).index(name) % len(FLEET_COLOURS)]
+
+
+def header_line(snapshot: Snapshot, robot: str = '') -> Text:
     """Return which mission this is, or that there is none."""
     if not snapshot.nodes:
         text = 'the mission has ended' if snapshot.status else 'no mission yet'
@@ -175,8 +239,11 @@ def header_line(snapshot: Snapshot) -> Text:
         ended = ', '.join(sorted(snapshot.ended))
         return Text(f' ended: {ended} · {snapshot.where} ', style=ALARM)
     if snapshot.stopped:
-        return Text(f' STOPPED until a person releases it (r) · {snapshot.where} ', style=ALARM)
+        who = f'{robot} is ' if robot else ''
+        text = f' {who}STOPPED until a person releases it (r) · {snapshot.where} '
+        return Text(text, style=ALARM)
     name = snapshot.status.machine if snapshot.status else 'mission'
+    name = f'{robot} · {name}' if robot else name
     mode = f' in mode {snapshot.mode}' if snapshot.mode else ''
     mode += ' · PAUSED' if snapshot.paused else ''
     return Text(f' {name}{mode} · {snapshot.where} ', style=HEADER)
@@ -262,21 +329,15 @@ def node_page(snapshot: Snapshot) -> list[Text]:
     return lines or [_dim('no nodes')]
 
 
-def event_page(snapshot: Snapshot) -> list[Text]:
-    """Return the latest events, newest first."""
-    told = [_event(each) for each in reversed(snapshot.events)]
-    return told or [_dim('no events yet')]
-
-
-def _event(event: Event) -> Text:
-    at, text, _ = event
-    return Text.assemble((time.strftime('%H:%M:%S', time.localtime(at)), DIM), ' ', text)
+def _event(event: Sequence[Any]) -> Text:
+    at, robot, text = event
+    who = (f'{robot} ', 'bold') if robot else ''
+    return Text.assemble((time.strftime('%H:%M:%S', time.localtime(at)), DIM), ' ', who, text)
 
 
 PAGES: dict[str, Callable[[Snapshot], list[Text]]] = {
     'decision': decision_page,
     'nodes': node_page,
-    'events': event_page,
 }
 
 
@@ -307,9 +368,22 @@ def place_lines(snapshot: Snapshot, width: int) -> list[Text]:
     return lines
 
 
-def draw_map(snapshot: Snapshot, columns: int, rows: int, *, colours: bool) -> Lines:
+def draw_map(
+    snapshot: Snapshot,
+    columns: int,
+    rows: int,
+    *,
+    colours: bool,
+    others: Mapping[str, Pose] | None = None,
+) -> Lines:
     """Return the map with all that is on it, or a sketch of the places; a line for what is
     missing.
+
+    Args:
+        snapshot: What is known.
+        columns, rows: Of the picture.
+        colours: Whether there are any.
+        others: Where the other robots of a fleet are.
     """
     notes = []
     if snapshot.grid is None:
@@ -343,6 +417,9 @@ def draw_map(snapshot: Snapshot, columns: int, rows: int, *, colours: bool) -> L
             canvas.mark(x, y, '○', LABEL)
     for place, (x, y) in snapshot.positions.items():
         canvas.label(x, y, place, URGENT if place in snapshot.urgent else LABEL)
+    for name, pose in (others or {}).items():
+        canvas.arrow(pose, OTHER)
+        canvas.label(pose[0], pose[1], name, OTHER)
     place = snapshot.status.place if snapshot.status else ''
     if snapshot.pose is not None:
         canvas.arrow(snapshot.pose, ROBOT)
@@ -396,7 +473,8 @@ def _rendered(
     return rendered
 
 
-See = Callable[[], Snapshot]
+See = Callable[[], Mapping[str, Snapshot]]
+"""Returns all robots by their names; one that is alone has none."""
 
 
 @dataclass
@@ -404,13 +482,21 @@ class _Chosen:
     """What the keys chose."""
 
     page: str = 'map'
-    held: Snapshot | None = None
+    robot: str = ''
+    held: Mapping[str, Snapshot] | None = None
     ended: bool = False
 
-    def press(self, key: str, seen: Snapshot) -> None:
+    def drawn(self, seen: Mapping[str, Snapshot]) -> str:
+        """Return the name of the robot that is drawn."""
+        return self.robot if self.robot in seen else next(iter(seen), '')
+
+    def press(self, key: str, seen: Mapping[str, Snapshot]) -> None:
         """Handle a key; one without a meaning changes nothing."""
+        names = [name for name in seen if name]
         if key == 'q':
             self.ended = True
+        elif key.isdigit() and 1 <= int(key) <= len(names):
+            self.robot = names[int(key) - 1]
         elif key == 'p':
             self.held = seen if self.held is None else None
         elif key in KEYS:
@@ -421,8 +507,9 @@ def show_moving(
     see: See,
     stopping: Interrupt,
     console: Console,
-    press_stop: Callable[[bool], None] = lambda _stop: None,
+    press_stop: Callable[[bool, str], None] = lambda _stop, _robot: None,
     said: Callable[[], str] = lambda: '',
+    robot: str = '',
 ) -> None:
     """Draw on the terminal's other screen until `q` or told to stop; give the first one back.
 
@@ -430,21 +517,26 @@ def show_moving(
         see: Returns what is known.
         stopping: Ends it.
         console: The terminal.
-        press_stop: Called with True to stop the robot, False to release it; must not block.
+        press_stop: Called with True to stop a robot, False to release it, and its name, or that
+            all are meant; must not block.
         said: What came of that, shown in the last line.
+        robot: The robot of a fleet that is drawn first.
     """
-    chosen = _Chosen()
+    chosen = _Chosen(robot=robot)
     with (
         _keyboard() as read_keys,
         Live(console=console, screen=True, auto_refresh=False) as live,
     ):
         while not stopping.is_set() and not chosen.ended:
             seen = chosen.held or see()
-            shown = 'HELD: p continues' if chosen.held else said() or KEY_NOTE
-            live.update(MissionView(seen, page=chosen.page, note=shown), refresh=True)
+            name = chosen.drawn(seen)
+            usual = FLEET_NOTE if name else KEY_NOTE
+            shown = 'HELD: p continues' if chosen.held else said() or usual
+            view = MissionView(seen[name], page=chosen.page, note=shown, fleet=seen, robot=name)
+            live.update(view, refresh=True)
             for key in read_keys(PERIOD, stopping):
-                if key in STOP_KEYS:
-                    press_stop(STOP_KEYS[key])
+                if key.lower() in STOP_KEYS:
+                    press_stop(STOP_KEYS[key.lower()], ALL if key.isupper() else name)
                 chosen.press(key, seen)
 
 
@@ -476,19 +568,28 @@ def _keyboard() -> Iterator[Callable[[float, Interrupt], str]]:
         termios.tcsetattr(keyboard, termios.TCSADRAIN, before)
 
 
-def show_once(see: See, stopping: Interrupt, console: Console, timeout: float) -> bool:
+def show_once(
+    see: See, stopping: Interrupt, console: Console, timeout: float, robot: str = ''
+) -> bool:
     """Draw one picture once there is a mission; return whether there was one within the time."""
     deadline = time.monotonic() + timeout
-    while see().status is None:
+    while all(each.status is None for each in see().values()):
         if time.monotonic() > deadline or stopping.wait(PERIOD / 4):
             return False
     settled = time.monotonic() + SETTLING
-    while not _is_complete(see()) and time.monotonic() < settled and not stopping.wait(PERIOD / 4):
+    while not _are_complete(see()) and time.monotonic() < settled and not stopping.wait(PERIOD / 4):
         pass
     if not console.is_terminal:
         console.size = shutil.get_terminal_size(PLAIN_SIZE)
-    console.print(MissionView(see(), whole=False))
+    seen = see()
+    name = _Chosen(robot=robot).drawn(seen)
+    console.print(MissionView(seen[name], whole=False, fleet=seen, robot=name))
     return True
+
+
+def _are_complete(seen: Mapping[str, Snapshot]) -> bool:
+    """Tell whether all that each robot of a simulated mission tells has come."""
+    return all(_is_complete(each) for name, each in seen.items() if name or len(seen) == 1)
 
 
 def _is_complete(snapshot: Snapshot) -> bool:
