@@ -8,7 +8,7 @@ from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
-from patrol_policy.promises import LATER, NEVER, UNKNOWN, WITHIN, Promise
+from patrol_policy.promises import CLOSED, LATER, NEVER, UNKNOWN, WITHIN, Promise
 from patrol_policy.world import Decision
 from surveillance_behaviour.map_from_markers.assembly import PlaceNote
 from surveillance_interfaces.msg import Decision as DecisionMessage
@@ -40,6 +40,7 @@ _LEVELS = {
     WITHIN: DiagnosticStatus.OK,
     LATER: DiagnosticStatus.WARN,
     NEVER: DiagnosticStatus.ERROR,
+    CLOSED: DiagnosticStatus.STALE,
     UNKNOWN: DiagnosticStatus.STALE,
 }
 
@@ -49,14 +50,14 @@ def promises_message(
 ) -> DiagnosticArray:
     """Return what can be kept of the places: a status each, with the hours of those that have some.
 
-    The level is OK within the threshold, WARN later, ERROR never, STALE where it is not known; the
-    values are ``threshold`` and ``wait`` in seconds, and ``hours``.
+    The level is OK within the threshold, WARN later, ERROR never, STALE while it is closed or not
+    known; the values are ``threshold`` and ``wait`` in seconds, and ``hours``.
     """
     message = DiagnosticArray()
     message.header.stamp = stamp
     for each in promises:
         values = {'threshold': f'{each.threshold:g}', 'wait': f'{each.wait:g}'}
-        values['hours'] = hours.get(each.place, '')
+        values |= {'hours': hours.get(each.place, ''), 'verdict': each.verdict}
         message.status.append(
             DiagnosticStatus(
                 level=_LEVELS[each.verdict],
@@ -82,7 +83,9 @@ def promises_from(message: DiagnosticArray) -> tuple[tuple[Promise, ...], dict[s
         values = {entry.key: entry.value for entry in each.values}
         try:
             threshold, wait = float(values['threshold']), float(values['wait'])
-            verdict = verdicts[each.level]
+            verdict = values.get('verdict', '')
+            if _LEVELS.get(verdict) != each.level:
+                verdict = verdicts[each.level]
         except (KeyError, ValueError):
             raise ValueError(
                 f'promise of {each.name!r}: expected a level and numbers threshold and wait'

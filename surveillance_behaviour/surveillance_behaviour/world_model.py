@@ -219,7 +219,6 @@ class WorldModel:
             world = self.world = self._refreshed(now, interrupt, avoided)
         self._check_threshold(world)
         self._check_rules(interrupt)
-        self._tell_promises(world)
         return world
 
     def _refreshed(self, now: float, interrupt: Interrupt, avoided: frozenset[str]) -> World:
@@ -424,7 +423,8 @@ class WorldModel:
         """Say what can be kept of the places, at the start and when what it rests on changes."""
         battery, settings = self.battery(), self.settings
         about = (
-            world.graph,
+            self._memory.plan,
+            world.graph.places,
             world.threshold,
             settings.policy,
             settings.recharge_rooms,
@@ -434,8 +434,9 @@ class WorldModel:
         )
         if about == self._told_about:
             return
-        self._told_about = about
         found = self.promised = self.promises(world)
+        # The first time there was no plan yet.
+        self._told_about = (self._memory.plan, *about[1:])
         self._promise(found)
         told = verdicts(found)
         if any(self._told.get(place, '') != verdict for place, verdict in told.items()):
@@ -462,7 +463,9 @@ class WorldModel:
         Raises:
             CallError: The ontology cannot be asked.
         """
-        return self.look(now, interrupt).place
+        world = self.look(now, interrupt)
+        self._tell_promises(world)
+        return world.place
 
     def decide(
         self,
@@ -504,6 +507,8 @@ class WorldModel:
                 self.experience.requested = ''
             self._warn(f'{error}: continuing without it')
             decision = decide(replace(world, requested=''), battery, self.settings)
+        # Of the same plan: nothing is planned for it.
+        self._tell_promises(world)
         decision = self._in_traffic(decision, world, interrupt)
         self._target = decision.target
         if decision.rule == RECHARGE and not self.experience.sent_to_charge:

@@ -190,8 +190,7 @@ def why_closed(world: World, place: str) -> str:
     if closes is None or place not in world.graph.index or world.place not in world.graph.index:
         return ''
     # It must be able to leave again, too: as long as the longest leg out of it may take.
-    ways = world.graph.leg_seconds[place]
-    seconds = world.graph.move(world.place, place) + max(ways.values(), default=0.0)
+    seconds = world.graph.move(world.place, place) + world.graph.longest_exit(place)
     seconds *= 1.0 + PERCENTILE_99 * world.time_spread
     if seconds < closes:
         return ''
@@ -354,8 +353,13 @@ def world_with_charge(world: World, battery: Battery) -> World:
     level = 100.0 if battery.level is None else battery.level
     optional = dict.fromkeys(world.openings.optional, math.inf)
     own = {**world.own_thresholds, **optional}
-    gone = [place for place in world.openings.closed if place in world.graph.index]
-    graph = world.graph
+    openings, graph = world.openings, world.graph
+    # What opens soon is part of the plan, though it is not entered before.
+    gone = [
+        place
+        for place in openings.closed
+        if place in graph.index and openings.opens_in.get(place, math.inf) > world.look_ahead
+    ]
     if gone:
         graph = world.memory.without(graph, frozenset(gone), world.place)
     changed = {place: classes_of(world, place) for place in own}
@@ -396,6 +400,9 @@ def _too_far(world: World, place: str, energy: Energy) -> str:
 def _stay(world: World, settings: DecisionSettings, why: str) -> Decision:
     """Stay at the station, or go to the nearest one to stay there."""
     within = stations_within_reach(world, settings.recharge_rooms)
+    if not within and world.openings.opens_in:
+        reason = f'{why}, nor any way to a station: the robot waits in {world.place}'
+        return _straight_to(world, world.place, QUIET, 'station', reason, {world.place: 0.0})
     if not within:
         raise NowhereToGoError(f'{why}, and no station can be reached from {world.place}')
     if world.place in within:

@@ -122,6 +122,17 @@ class PatrolGraph:
                     heapq.heappush(pending, (seconds + leg, before, station))
         return away, leads_to
 
+    def longest_exit(self, place: str) -> float:
+        """Return the seconds of driving over the longest leg out of a place."""
+        return max(self.leg_seconds[place].values(), default=0.0)
+
+    @cached_property
+    def cheapest_entries(self) -> float:
+        """Seconds for entering each place once from its nearest neighbour: no tour is shorter."""
+        ways = self.ways
+        entries = (min((ways[o][p] for o in others), default=0.0) for p, others in enumerate(ways))
+        return sum(entries)
+
     @cached_property
     def adjacency(self) -> csr_array:
         """The seconds of the legs, exploring included, as a sparse matrix."""

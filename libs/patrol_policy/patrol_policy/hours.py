@@ -21,8 +21,8 @@ twice, and a stretch within them is in force both times.
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from datetime import datetime, timedelta, tzinfo
 
 from patrol_policy.suggestions import closest_name
@@ -89,23 +89,41 @@ class WeeklyHours:
             kinds: Of ``must``, ``may``, ``not``.
             most: How far is looked ahead.
         """
-        # Time is counted in UTC, so that a clock that is set in between is passed as it comes.
-        zone, begin = moment.tzinfo, moment.timestamp()
-        if self.at(moment) in kinds:
-            return timedelta(0)
-        for second in self._changes(moment, most):
-            if self.at(datetime.fromtimestamp(second, zone)) in kinds:
-                return timedelta(seconds=second - begin)
+        begin = moment.timestamp()
+        for start, _, kind in self.schedule(begin, begin + most.total_seconds(), moment.tzinfo):
+            if kind in kinds:
+                return timedelta(seconds=max(0.0, start - begin))
         return most
 
-    def _changes(self, moment: datetime, most: timedelta) -> list[float]:
-        """Return when something may change from a moment on, seconds since 1970.
+    def schedule(
+        self, begin: float, end: float, zone: tzinfo | None
+    ) -> tuple[tuple[float, float, str], ...]:
+        """Return what holds from a moment to another one: begin, end and kind of each stretch.
 
-        Beside the ends of the stretches each full hour counts: a clock is set at one.
+        Args:
+            begin: Seconds since 1970.
+            end: The same.
+            zone: Of the clock on the wall; None: that of the machine.
         """
-        begin = moment.timestamp()
-        end = begin + most.total_seconds()
-        edges = {minute % 60 for first, last, _ in self.stretches for minute in (first, last)} | {0}
+        # Time is counted in UTC, so that a clock that is set in between is passed as it comes.
+        found: list[tuple[float, float, str]] = []
+        for start in (begin, *self._changes(begin, end)):
+            moment = datetime.fromtimestamp(start, zone)
+            kind = self.at(moment)
+            if not found or found[-1][2] != kind:
+                if found:
+                    found[-1] = (found[-1][0], start, found[-1][2])
+                found.append((start, end, kind))
+        return tuple(found)
+
+    def _changes(self, begin: float, end: float) -> list[float]:
+        """Return when something may change between two moments, seconds since 1970.
+
+        Beside the ends of the stretches each full hour counts: a clock is set at one. Time zones
+        differ from UTC by quarters of an hour.
+        """
+        ends = {minute for first, last, _ in self.stretches for minute in (first, last)} | {0}
+        edges = {(minute + shift) % 60 for minute in ends for shift in (0, 15, 30, 45)}
         hour = begin - begin % 3600.0
         found = []
         while hour <= end:
@@ -153,8 +171,10 @@ def _times(text: str) -> tuple[int, int]:
     return begin, end % DAY
 
 
-LOOK_AHEAD = timedelta(days=1)
-"""How far is looked for the time at which a place must be left."""
+KNOWN_AHEAD, KNOWN_BACK = 8 * 86_400.0, 86_400.0
+"""So far ahead and back it is worked out when places are open, seconds."""
+LOOK_AHEAD = 86_400.0
+"""How far is looked for the time at which a place must be left, seconds."""
 
 
 @dataclass(frozen=True)
@@ -166,12 +186,19 @@ class Openings:
         optional: The places that may be entered and are not URGENT.
         closes_in: Seconds until each open place must be left; those that close within a day.
         quiet_for: Seconds for which the robot has to stay at its station; 0: it has not.
+        opens_in: Seconds until each closed place opens; those that do within a week.
+        windows: From when to when places with hours are open and the robot may go there, seconds
+            since 1970, from a day ago up to a week ahead.
+        has_quiet: Whether there are quiet hours at all.
     """
 
     closed: Mapping[str, str]
     optional: frozenset[str]
     closes_in: Mapping[str, float]
     quiet_for: float = 0.0
+    opens_in: Mapping[str, float] = field(default_factory=dict)
+    windows: Mapping[str, tuple[tuple[float, float], ...]] = field(default_factory=dict)
+    has_quiet: bool = False
 
 
 @dataclass(frozen=True)
@@ -189,6 +216,9 @@ class Calendar:
     quiet: WeeklyHours | None = None
     keep_out: frozenset[str] = frozenset()
     zone: tzinfo | None = None
+    _known: dict[WeeklyHours, _Known] = field(
+        default_factory=dict, init=False, repr=False, compare=False
+    )
 
     def in_words(self) -> dict[str, str]:
         """Return the hours of each place that has some, as they were written."""
@@ -201,24 +231,105 @@ class Calendar:
         Args:
             now: Seconds since 1970.
         """
-        moment = datetime.fromtimestamp(now, self.zone).astimezone(self.zone)
         closed = dict.fromkeys(self.keep_out, 'it is a keep-out place')
-        optional, closes_in = set(), {}
+        optional, closes_in, opens_in = set(), {}, {}
+        windows: dict[str, tuple[tuple[float, float], ...]] = {}
         for place, hours in self.hours.items():
-            kind = hours.at(moment)
+            if place in self.keep_out:
+                continue
+            known = self._known_of(hours, now)
+            windows[place] = known.windows
+            kind = known.kind_at(now)
             if kind == NOT:
-                closed.setdefault(place, f'it is closed now ({hours.text})')
+                begin = next((begin for begin, _ in known.open if begin > now), None)
+                when = ''
+                if begin is not None:
+                    opens_in[place] = begin - now
+                    when = f'until {datetime.fromtimestamp(begin, self.zone):%a %H:%M} '
+                closed[place] = f'it is closed {when or "now "}({hours.text})'
                 continue
             if kind == MAY:
                 optional.add(place)
-            left = hours.until(moment, frozenset({NOT}), LOOK_AHEAD)
+            left = next((end for begin, end in known.open if begin <= now < end)) - now
             if left < LOOK_AHEAD:
-                closes_in[place] = left.total_seconds()
+                closes_in[place] = left
         quiet_for = 0.0
-        if self.quiet is not None and self.quiet.at(moment) == MUST:
-            left = self.quiet.until(moment, frozenset({MAY, NOT}), LOOK_AHEAD)
-            quiet_for = left.total_seconds()
-        return Openings(closed, frozenset(optional), closes_in, quiet_for)
+        if self.quiet is not None:
+            known = self._known_of(self.quiet, now)
+            if known.kind_at(now) == MUST:
+                ends = (end for begin, end, _ in known.stretches if begin <= now < end)
+                quiet_for = min(next(ends) - now, LOOK_AHEAD)
+        return Openings(
+            closed,
+            frozenset(optional),
+            closes_in,
+            quiet_for,
+            opens_in,
+            windows,
+            self.quiet is not None,
+        )
+
+    def _known_of(self, hours: WeeklyHours, now: float) -> _Known:
+        """Return what is worked out of some hours; anew once a day, and when the clock is set."""
+        known = self._known.get(hours)
+        if known is None or not known.begin + KNOWN_BACK <= now < known.begin + 2.0 * KNOWN_BACK:
+            # By whole hours, so that it is the same wherever in the day it is asked for.
+            begin = now - now % 3600.0 - KNOWN_BACK
+            end = begin + KNOWN_BACK + KNOWN_AHEAD
+            stretches = hours.schedule(begin, end, self.zone)
+            free = _joined((b, e) for b, e, kind in stretches if kind != NOT)
+            quiet: list[tuple[float, float]] = []
+            if self.quiet is not None and hours is not self.quiet:
+                all_quiet = self.quiet.schedule(begin, end, self.zone)
+                quiet = [(b, e) for b, e, kind in all_quiet if kind == MUST]
+            windows = tuple(_without(free, quiet))
+            known = self._known[hours] = _Known(begin, stretches, free, windows)
+        return known
+
+
+@dataclass(frozen=True)
+class _Known:
+    """What some hours come to in a stretch of time, seconds since 1970.
+
+    Attributes:
+        begin: From when on it is known.
+        stretches: Begin, end and what holds.
+        open: Begin and end of what is open.
+        windows: The same without the quiet hours.
+    """
+
+    begin: float
+    stretches: tuple[tuple[float, float, str], ...]
+    open: tuple[tuple[float, float], ...]
+    windows: tuple[tuple[float, float], ...]
+
+    def kind_at(self, now: float) -> str:
+        return next(kind for begin, end, kind in self.stretches if begin <= now < end)
+
+
+def _joined(stretches: Iterable[tuple[float, float]]) -> tuple[tuple[float, float], ...]:
+    """Return stretches in order, those that touch as one."""
+    found: list[tuple[float, float]] = []
+    for begin, end in stretches:
+        if found and found[-1][1] >= begin:
+            found[-1] = (found[-1][0], end)
+        else:
+            found.append((begin, end))
+    return tuple(found)
+
+
+def _without(
+    stretches: Iterable[tuple[float, float]], gone: Sequence[tuple[float, float]]
+) -> Iterator[tuple[float, float]]:
+    """Yield what is left of stretches without others, which are in order."""
+    for begin, end in stretches:
+        for first, last in gone:
+            if first < end and last > begin:
+                if first > begin:
+                    yield begin, first
+                begin = max(begin, last)
+        if begin < end:
+            yield begin, end
 
 
 NO_CALENDAR = Calendar({})

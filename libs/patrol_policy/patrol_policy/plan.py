@@ -61,6 +61,8 @@ PHASE_STEPS = 60_000
 ACCEPTED = 1.03
 """A wait from visit to visit of so many bounds is accepted for shorter first waits. The round may
 be a little longer than it need be itself, and both together are to stay below 1.05."""
+MOST_POSITIONS = 60
+"""So many positions of a lap are tried for a visit of a place that opens or closes soon."""
 SKIPS = (0.0, 0.3, 0.6)
 """Targets visited more lately than this may be skipped, in lengths of the round."""
 SIMPLE: tuple[Choice, ...] = (oldest, lookahead)
@@ -118,6 +120,14 @@ class Course:
                     return target
             elif target != place and target not in state.avoided:
                 idle = state.now - state.seen[target]
+                if target in rules.windows:
+                    leg = rules.away[place][target]
+                    opens = rules.opens_in(target, state.now)
+                    if not rules.is_open(target, state.now + max(0.0, opens - leg), leg) or (
+                        opens - leg > self.patience
+                    ):
+                        state.position = self.after(state.position)
+                        continue
                 gate = rules.gates[target] if idle >= self.skip else -2
                 if gate == -1:
                     return target
@@ -177,6 +187,9 @@ class Plan:
         # Processor time of this thread: a busy machine makes the search slower, not worse.
         self._deadline = time.thread_time() + MOST_SECONDS
         self._key = world.threshold, world.own_thresholds, world.rules
+        # What opens or closes later than that is looked at then.
+        until = world.next_change(world.now + world.look_ahead) - world.look_ahead
+        self._serves = world.now - HALF_OPEN, until
         self.rules = rules = rule_map(world, energy)
         self._work = 0.0
         self.cut = ''
@@ -204,6 +217,8 @@ class Plan:
         """
         planned, graph = self.rules.graph, world.graph
         if self._key != (world.threshold, world.own_thresholds, world.rules):
+            return False
+        if not self._serves[0] <= world.now < self._serves[1]:
             return False
         mine = self.rules.energy
         if energy is not mine and (energy is None or not energy.alike(mine)):
@@ -269,6 +284,13 @@ class Plan:
         """Whether it is proven what the course comes to: it leads back to where it was."""
         return self._outcome.back is not None
 
+    @property
+    def missed(self) -> frozenset[str]:
+        """Places that close before the course comes to them, as far as it was looked ahead."""
+        rules = self.rules
+        entered = {rules.places[stop] for stop in self._outcome.walk}
+        return frozenset(self.places[place] for place in rules.windows if place not in entered)
+
     def settled_waits(self) -> list[float]:
         """Return for each place the wait from visit to visit that the course leaves, seconds.
 
@@ -277,6 +299,8 @@ class Plan:
         rules, outcome, state = self.rules, self._outcome, self._began.fresh()
         begin = outcome.repeated_from(rules)
         waits = [math.inf] * rules.count
+        for place in rules.windows:
+            waits[place] = outcome.waits[place]
         if begin is None:
             for place in {rules.places[stop] for stop in outcome.walk}:
                 waits[place] = outcome.waits[place]
@@ -289,7 +313,7 @@ class Plan:
             for step in rules.path(state.place, stop):
                 rules.go(state, step)
             place = rules.places[stop]
-            if place in seen:
+            if place in seen and place not in rules.windows:
                 known = 0.0 if math.isinf(waits[place]) else waits[place]
                 waits[place] = max(known, state.now - seen[place])
             seen[place] = state.now
@@ -356,6 +380,10 @@ class Plan:
             if self._work > end or self._is_finished() or self._late():
                 break
             self._try(candidate)
+        for candidate in self._in_time():
+            if self._late():
+                break
+            self._try(candidate)
         for walk in walks:
             # A walk that comes back to a state that it had before is periodic: it can be followed
             # as a course, with the waits that were simulated.
@@ -403,6 +431,25 @@ class Plan:
             yield replace(first, skip=skip * self._bound, patience=patience)
         for further in itertools.zip_longest(*(each[2:] for each in ways)):
             yield from filter(None, further)
+
+    def _in_time(self) -> Iterator[Course]:
+        """Yield the best course with one more visit on the first lap of a place that opens or
+        closes soon, whatever closes first."""
+        windows = self.rules.windows
+
+        def closes(place: int) -> tuple[float, float]:
+            known = [(last, first) for first, last in windows[place] if last > self._state.now]
+            return min(known, default=(math.inf, math.inf))
+
+        for place in sorted(windows, key=closes):
+            course = self._course
+            begun = course.back > 0
+            way, lap = course.targets[: course.back], course.targets[course.back :]
+            way = way if begun else lap
+            for position in range(0, len(way) + 1, max(1, len(way) // MOST_POSITIONS)):
+                targets = (*way[:position], place, *way[position:], *lap)
+                for patience in (course.patience, math.inf):
+                    yield replace(course, targets=targets, back=len(way) + 1, patience=patience)
 
     def _is_finished(self) -> bool:
         """Return whether no better course is looked for."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from patrol_policy.battery import Battery, Energy
 from patrol_policy.decision import (
@@ -22,6 +22,7 @@ from patrol_policy.plan import plan_of
 from patrol_policy.world import World
 
 WITHIN, LATER, NEVER, UNKNOWN = 'within', 'later', 'never', 'unknown'
+CLOSED = 'closed'
 SLIGHTLY = 1.25
 """What waits up to so many thresholds is late by little: drives are not that exact."""
 MOST_NAMES = 8
@@ -36,7 +37,8 @@ class Promise:
 
     Attributes:
         place: The place.
-        verdict: ``within`` its threshold, ``later``, ``never``, or ``unknown``.
+        verdict: ``within`` its threshold, ``later``, ``never``, ``unknown``, or ``closed``: it is
+            not promised before it opens.
         threshold: Seconds that it may go unvisited; inf: as long as it likes.
         wait: The longest time from visit to visit, seconds; inf: it is not visited.
         words: The same as a sentence.
@@ -54,28 +56,39 @@ def promises(
 ) -> tuple[Promise, ...]:
     """Return what can be kept of each place, by its name.
 
+    The next decision follows the plan that this is read from.
+
     Args:
-        world: What is known of the surroundings; nothing of it is changed.
+        world: What is known of the surroundings.
         battery: What is known of the battery.
         settings: Of decisions.
         places: All places, also those that no open door leads to.
     """
-    asked = world_with_charge(replace(world, memory=world.memory.for_a_question()), battery)
+    asked = world_with_charge(world, battery)
     names = sorted({*world.graph.places, *places} | world.openings.closed.keys())
     energy = energy_of(asked, battery, settings)
     waits: dict[str, float] = {}
+    missed: frozenset[str] = frozenset()
     cut, proven = '', False
     if settings.policy == 'tour' and world.place in asked.graph.index:
         plan = plan_of(asked, energy)
         waits = dict(zip(plan.places, plan.settled_waits(), strict=True))
         cut = plan.cut or 'none of the ways that were looked at leads there'
-        proven = plan.repeats
+        proven, missed = plan.repeats, plan.missed
     found = []
     for place in names:
         threshold = asked.threshold_of(place)
         never = _why_never(place, world, asked, battery, settings, energy)
         wait = waits.get(place, math.inf)
-        if never:
+        opens, closes = (
+            which.get(place) for which in (world.openings.opens_in, world.openings.closes_in)
+        )
+        if opens is not None or (place in missed and wait > threshold):
+            words = f'{place}: not visited before it closes in {closes or 0.0:.0f} s'
+            if place in world.openings.closed:
+                words = f'{place}: not visited now, {world.openings.closed[place]}'
+            found.append(Promise(place, CLOSED, threshold, math.inf, words))
+        elif never:
             found.append(Promise(place, NEVER, threshold, math.inf, f'{place}: {never}'))
         elif math.isinf(wait) and proven:
             words = (
@@ -94,7 +107,9 @@ def promises(
 
 def _timely(place: str, wait: float, threshold: float, world: World) -> Promise:
     """Return the promise for a place that is visited again and again."""
-    hours = ' while it is open' if place in world.openings.closes_in else ''
+    hours = ' while it is open' if place in world.openings.windows else ''
+    if world.openings.has_quiet:
+        hours += ' outside the quiet hours'
     if wait <= threshold + ROUNDING:
         words = f'{place}: visited every {wait:.0f} s at the latest{hours}'
         if math.isfinite(threshold):
@@ -117,7 +132,7 @@ def _why_never(
 ) -> str:
     """Return why a place is not visited as things are; empty: it is."""
     if place in world.openings.closed:
-        return f'not visited now, {world.openings.closed[place]}'
+        return f'never visited, {world.openings.closed[place]}'
     if place not in world.graph.index:
         return 'never visited, no open door leads to it'
     if place not in asked.graph.index:

@@ -20,7 +20,7 @@ from functools import cached_property
 
 import numpy as np
 
-from patrol_policy.battery import Energy
+from patrol_policy.battery import PERCENTILE_99, Energy
 from patrol_policy.graph import PatrolGraph
 from patrol_policy.world import World
 
@@ -52,6 +52,9 @@ class RuleMap:
         urgent: The position of URGENT in the rules; `NEVER` when it is not among them.
         own: Thresholds of places that differ, by index; inf: the place never is URGENT.
         energy: What the charge comes to; None: the battery does not matter.
+        windows: When places are open that are not always, by index: begin and end of each stretch,
+            seconds of the patrol's clock.
+        slower: How many times as long as expected nearly all drives take at most.
 
     Attributes:
         leg_seconds: For each stop, the seconds to each neighbour, exploring included.
@@ -70,8 +73,12 @@ class RuleMap:
         urgent: int,
         own: Mapping[int, float] | None = None,
         energy: Energy | None = None,
+        windows: Mapping[int, Sequence[tuple[float, float]]] | None = None,
+        slower: float = 1.0,
     ) -> None:
         self.graph, self.threshold, self.energy = graph, threshold, energy
+        self.windows, self._slower = windows or {}, slower
+        self._exits = {place: graph.longest_exit(graph.places[place]) for place in self.windows}
         self.ranks, self.urgent = list(ranks), urgent
         self.count = count = len(graph.places)
         own = own or {}
@@ -287,6 +294,9 @@ class RuleMap:
         if self.energy:
             within = self.energy.within_range
             ways = [other for other in ways if within[other]]
+        if self.windows:
+            legs = self.leg_seconds[state.place]
+            ways = [o for o in ways if o not in self.windows or self.is_open(o, now, legs[o])]
         for other in ways:
             rank = ranks[other]
             if rank > urgent and now - seen[other] > overdue[other]:
@@ -296,6 +306,48 @@ class RuleMap:
             elif rank == best:
                 found.append(other)
         return found
+
+    # Hours.
+
+    def is_open(self, place: int, now: float, seconds: float) -> bool:
+        """Return whether a way to a place may be begun: it is open, and can be left in time.
+
+        Args:
+            place: One of `windows`.
+            now: When the robot sets out.
+            seconds: That the way takes, exploring included.
+        """
+        end = now + self._slower * (seconds + self._exits[place])
+        return any(first <= now and end < last for first, last in self.windows[place])
+
+    def opens_in(self, place: int, now: float) -> float:
+        """Return the seconds until a place is open; inf: it is not known to be again."""
+        return min(
+            (max(0.0, first - now) for first, last in self.windows[place] if last > now),
+            default=math.inf,
+        )
+
+    def waited(self, place: int, since: float, now: float) -> float:
+        """Return how long a place waits; the next time in which it is closed does not count.
+
+        A place that is missed for all the time that it is open has waited through the time in which
+        it is closed after that.
+        """
+        windows = self.windows.get(place)
+        if windows is None:
+            return now - since
+        closed = -math.inf
+        for first, last in (*windows, (math.inf, math.inf)):
+            if first > since and closed < now:
+                return now - since - max(0.0, min(first, now) - max(closed, since))
+            closed = last
+        return now - since
+
+    @cached_property
+    def last_change(self) -> float:
+        """When a place opens or closes for the last time, as far as is known, seconds."""
+        times = (t for windows in self.windows.values() for pair in windows for t in pair)
+        return max((t for t in times if math.isfinite(t)), default=-math.inf)
 
     # Rounds.
 
@@ -453,7 +505,7 @@ def roll_out(
     seen, met, slack, places = at.seen, at.met, rules.slack, rules.places
     end = at.now + horizon
     settled = first = 0.0
-    waits = [0.0] * rules.count
+    windows, waits = rules.windows, [0.0] * rules.count
     walk: list[int] = []
     # Comparing all ages at each step would be slow: only visits of one place are compared.
     anchor = min(rules.wanted, key=lambda place: len(rules.leg_seconds[place]), default=at.place)
@@ -470,23 +522,26 @@ def roll_out(
         rules.go(at, choice)
         walk.append(choice)
         place = places[choice]
-        wait, seen[place] = at.now - seen[place], at.now
+        wait = rules.waited(place, seen[place], at.now) if windows else at.now - seen[place]
+        seen[place] = at.now
         waits[place] = max(waits[place], wait)
         if met[place]:
             settled = max(settled, wait - slack[place])
         else:
             met[place] = True
             first = max(first, wait - slack[place])
-        if place == anchor:
+        if place == anchor and at.now > rules.last_change:
             key = (at.position, round(at.level, 2), *(round(at.now - last, 3) for last in seen))
             if key in states:
                 back = states[key]
                 break
             states[key] = len(walk)
-    if back is None:
-        waits = [max(wait, at.now - last) for wait, last in zip(waits, seen, strict=True)]
-        ends = (at.now - seen[place] - slack[place] for place in rules.wanted)
-        settled = max(settled, *ends, 0.0)
+    # What still waits: where the walk repeats itself only places that have closed may, for long.
+    for place in range(rules.count) if back is None else windows:
+        is_closed = place in windows and rules.opens_in(place, at.now) > 0.0
+        wait = rules.waited(place, seen[place], max(at.now, end) if is_closed else at.now)
+        waits[place] = max(waits[place], wait)
+        settled = max(settled, wait - slack[place])
     return Outcome(settled, max(first, settled), waits, walk, back, cut)
 
 
@@ -500,7 +555,22 @@ def rule_map(world: World, energy: Energy | None = None) -> RuleMap:
         ranks.append(min(positions, default=len(rules)))
     urgent = rules.index(URGENT) if URGENT in rules else NEVER
     own = {index[p]: seconds for p, seconds in world.own_thresholds.items() if p in index}
-    return RuleMap(world.graph, world.threshold, ranks, urgent, own, energy)
+    ahead, windows = world.now + world.look_ahead, {}
+    for place, stretches in world.openings.windows.items():
+        known = tuple(_known_until(stretches, ahead))
+        if place in index and any(world.now < when <= ahead for pair in known for when in pair):
+            windows[index[place]] = known
+    slower = 1.0 + PERCENTILE_99 * world.time_spread
+    return RuleMap(world.graph, world.threshold, ranks, urgent, own, energy, windows, slower)
+
+
+def _known_until(
+    stretches: Iterable[tuple[float, float]], ahead: float
+) -> Iterator[tuple[float, float]]:
+    """Yield stretches as far as a plan knows them: what changes later changes the plan then."""
+    for begin, end in stretches:
+        if begin <= ahead:
+            yield begin, end if end <= ahead else math.inf
 
 
 def oldest(rules: RuleMap, state: State) -> int:

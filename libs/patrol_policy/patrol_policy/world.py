@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import random
 from collections.abc import Mapping
 from copy import copy
@@ -17,6 +18,9 @@ from patrol_policy.fleet.assignment import FleetOutlook, Share
 from patrol_policy.fleet.docks import DockSlot
 from patrol_policy.graph import PatrolGraph
 from patrol_policy.hours import ALWAYS_OPEN, Openings
+
+ROUNDS_AHEAD = 3.0
+"""A plan knows the hours for so many times what entering each place once takes."""
 
 
 @dataclass(eq=False)
@@ -117,6 +121,19 @@ class World:
     def threshold_of(self, place: str) -> float:
         """Return the seconds after which a place is URGENT."""
         return self.own_thresholds.get(place, self.threshold)
+
+    @property
+    def look_ahead(self) -> float:
+        """For how many seconds a plan knows when places open and close: about two tours."""
+        return ROUNDS_AHEAD * self.graph.cheapest_entries
+
+    def next_change(self, after: float) -> float:
+        """Return when a place opens or closes next after a moment; inf: not within a week."""
+        windows = self.openings.windows.values()
+        return min(
+            (when for stretches in windows for pair in stretches for when in pair if when > after),
+            default=math.inf,
+        )
 
     @cached_property
     def idleness(self) -> NDArray[np.float64]:

@@ -9,6 +9,7 @@ import pytest
 
 from patrol_policy.decision import QUIET, Rules
 from patrol_policy.hours import MAY, MUST, NOT, Calendar, WeeklyHours
+from patrol_policy.promises import CLOSED, LATER, WITHIN, lines, promises
 from patrol_policy.simulation import Patrol
 
 from .worlds import seven_rooms
@@ -53,6 +54,63 @@ def test_hours_follow_the_clock_on_the_wall_when_it_is_set() -> None:
     # Back, on 27 October 2024: from 03:00 to 02:00. It lasts 3 h.
     inside = datetime(2024, 10, 27, 2, 0, tzinfo=ROME)
     assert hours.until(inside, frozenset({NOT}), day) == timedelta(hours=3)
+
+
+def test_hours_of_a_zone_that_differs_by_half_an_hour_end_when_they_do() -> None:
+    zone = ZoneInfo('Asia/Kolkata')
+    calendar = Calendar({'R3': WeeklyHours.parse('daily 08:00-18:00')}, zone=zone)
+    now = datetime(2024, 5, 6, 17, 50, tzinfo=zone).timestamp()
+    assert calendar.at(now).closes_in == {'R3': 600.0}
+    assert calendar.at(now + 600.0).opens_in == {'R3': 14 * 3600.0}
+
+
+def opened(text: str, stop: float, hour: int, days: float) -> Patrol:
+    """Return a patrol that begins at an hour, where R3 has hours."""
+    calendar = Calendar({'R3': WeeklyHours.parse(text)}, zone=ROME)
+    begin = datetime(2024, 5, 6, hour, 0, tzinfo=ROME).timestamp()
+    graph = seven_rooms(stop)
+    threshold = 0.9 * graph.tour.length
+    patrol = Patrol(graph, Rules(), 'tour', threshold, 'E', calendar=calendar, began=begin)
+    for decision in patrol.until(begin + 86_400.0 * days):
+        if decision.place == 'R3':
+            assert not calendar.at(patrol.now).closed
+    return patrol
+
+
+@pytest.mark.parametrize('hour', [6, 7])
+def test_a_place_that_is_open_for_less_than_a_round_is_visited_before_it_closes(hour: int) -> None:
+    # A round takes 2,248 s, and it is open for 900.
+    patrol = opened('daily 08:00-08:15', 200.0, hour, 0.15)
+    visited = datetime.fromtimestamp(patrol.visited_at['R3'], ROME)
+    assert (visited.hour, visited.minute) < (8, 15)
+    assert (visited.hour, visited.minute) >= (8, 0)
+
+
+def test_what_opens_later_is_not_promised_before() -> None:
+    patrol = opened('daily 08:00-08:15', 200.0, 5, 0.001)
+    told = promises(patrol.world(), patrol.known_battery(), patrol.settings)
+    by_place = {each.place: each for each in told}
+    assert by_place['R3'].verdict == CLOSED
+    assert by_place['R3'].words == (
+        'R3: not visited now, it is closed until Mon 08:00 (daily 08:00-08:15)'
+    )
+    assert 'R3' not in lines(told)[0]
+    patrol.now += 3 * 3600.0
+    told = promises(patrol.world(), patrol.known_battery(), patrol.settings)
+    by_place = {each.place: each for each in told}
+    assert by_place['R3'].verdict in (WITHIN, LATER)
+    assert ' while it is open' in by_place['R3'].words
+
+
+def test_a_robot_behind_a_place_that_has_closed_waits_until_it_opens() -> None:
+    calendar = Calendar({'C2': WeeklyHours.parse('daily 08:00-18:00')}, zone=ROME)
+    begin = datetime(2024, 5, 6, 19, 0, tzinfo=ROME).timestamp()
+    graph = seven_rooms(60.0)
+    patrol = Patrol(graph, Rules(), 'tour', 900.0, 'E', calendar=calendar, began=begin)
+    patrol.place = 'R4'
+    decision = patrol.step()
+    assert (decision.rule, decision.place) == (QUIET, 'R4')
+    assert 'nor any way to a station: the robot waits in R4' in decision.reason
 
 
 def test_a_simulated_week_keeps_to_the_calendar() -> None:

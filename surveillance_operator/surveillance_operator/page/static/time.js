@@ -73,7 +73,7 @@ export function drawStrips(root, state, now) {
 
 // What can be kept of each place, those that cannot first.
 export function showPromises({promises}) {
-  const order = ['never', 'later', 'unknown', 'within'];
+  const order = ['never', 'later', 'unknown', 'closed', 'within'];
   const found = names(promises).sort((a, b) => order.indexOf(promises[a].verdict) - order.indexOf(promises[b].verdict));
   const kept = found.filter((name) => promises[name].verdict === 'within').length;
   $('promises').hidden = !found.length;
