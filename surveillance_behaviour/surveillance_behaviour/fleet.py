@@ -30,7 +30,7 @@ SILENT_STEADY = 2.0
 """A robot is not silent before it has said nothing for this long by the steady clock, seconds: fast
 simulated time may pass quicker than messages travel."""
 STANDS_AFTER = 60.0
-"""A robot that is on its way for so much longer than usual stands, seconds."""
+"""A robot that is on one way, or waits to go it, for longer than this stands, seconds."""
 
 
 @dataclass(frozen=True)
@@ -206,7 +206,9 @@ class FleetKnowledge:
             return [*known, self._own.intention]
 
     def standing(self, now: float) -> dict[str, str]:
-        """Return the robots that are on one way for too long or silent, with a sentence on each."""
+        """Return the robots that are on one way, or wait for it, for too long, and the silent ones,
+        with a sentence on each.
+        """
         found = {}
         with self._lock:
             for name, heard in self._heard.items():
@@ -219,6 +221,11 @@ class FleetKnowledge:
                     found[name] = (
                         f'{name} has been on its way from {intention.place} to '
                         f'{intention.heading_to} for {now - since:.0f} s'
+                    )
+                elif intention.heading_to and now - since > STANDS_AFTER:
+                    found[name] = (
+                        f'{name} has waited in {intention.place} for {now - since:.0f} s to go to '
+                        f'{intention.heading_to}'
                     )
         return found
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 import math
 import queue
+import re
 import time
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
@@ -35,7 +36,7 @@ from surveillance_controllers.controller_parameters import door_segments, place_
 from surveillance_controllers.geometry import Scan, composed, relative
 from surveillance_controllers.motion.place_locator import PlaceLocator
 from surveillance_controllers.motion.transforms import ScanReader
-from surveillance_interfaces.msg import MarkerDetectionArray, RobotPlace
+from surveillance_interfaces.msg import FleetRobot, MarkerDetectionArray, RobotPlace
 from surveillance_interfaces.srv import ConsoleCommand, ReferenceName
 from surveillance_ontology.armor_client import (
     ArmorClient,
@@ -51,6 +52,7 @@ from surveillance_perception.observation.day_book import DayBook
 from surveillance_perception.observation.events import Event, EventBook, EventState
 from surveillance_perception.observation.evidence import EvidenceStore
 from surveillance_perception.observation.observations import Kind, Observation
+from surveillance_perception.observation.other_robots import OtherRobots
 from surveillance_perception.observation.persons import Person, load_finder
 from surveillance_perception.observation.reference_views import ReferenceViews, Viewpoint
 from surveillance_perception.observation.viewpoints import Viewpoints
@@ -88,6 +90,8 @@ STILL = 0.02
 FACTS_PERIOD = 10.0
 """Seconds after which it is looked whether the ontology still has the events."""
 _GOING_ON = (EventState.OPEN, EventState.ACKNOWLEDGED)
+MOST_PEERS = 100
+_NAME = re.compile(r'[A-Za-z][A-Za-z0-9_]*\Z', re.ASCII)
 MOST_TOLD = 200
 """So many events are published, the newest."""
 
@@ -147,6 +151,7 @@ class Observer(PatrolNode):
 
     Attributes:
         sweeps: How many sweeps of the lidars were compared.
+        others: Where the other robots of a fleet are.
     """
 
     def __init__(self, **node_options: Any) -> None:
@@ -172,11 +177,14 @@ class Observer(PatrolNode):
         self._facts: list[EventFact] = []
         self._facts_changed = Interrupt()
         self._robot = self.get_namespace().strip('/') or ROBOT
+        self._robot_name = self._robot.rpartition('/')[2]
         self.sweeps = 0
         self._told: dict[int, EventState] = {}
         self._book = EventBook(told=self._on_event)
         self._pictures = self._store()
         self._days = DayBook(datetime.fromtimestamp)
+        self.others = OtherRobots(self._settings.radius)
+        self._peers: dict[str, StateSubscription[PoseWithCovarianceStamped]] = {}
         self._watcher = Watcher(
             self._rules(tuple(places)),
             self._book,
@@ -193,6 +201,7 @@ class Observer(PatrolNode):
             store=self._pictures,
             views=self._views(),
             verify_seconds=self._settings.verify_seconds,
+            others=self.others,
         )
         self._kept = KeptFile(self._settings.state_file, 'starting without it')
         self._complain(self._kept.read(self._restore))
@@ -226,6 +235,10 @@ class Observer(PatrolNode):
             self.create_subscription(
                 Image, 'camera/rgb/image_raw', self._on_image, SENSOR_QOS, raw=True
             )
+        # The names of the fleet's other robots; a robot that is alone hears nothing there.
+        self.create_subscription(
+            FleetRobot, 'fleet_robots', self._on_fleet, QoSProfile(depth=MOST_WAITING)
+        )
         self.create_service(ConsoleCommand, 'observer/command', self._on_command)
         self.create_timer(ASSESS_PERIOD, lambda: self._later(self._assess))
         self.create_timer(KEEP_PERIOD, lambda: self._later(self._keep))
@@ -336,6 +349,28 @@ class Observer(PatrolNode):
                     # map <- odom = (map <- base) (base <- odom)
                     self._odom_in_map = composed(pose, relative(odometry, (0.0, 0.0, 0.0)))
             self._pair()
+
+    def _on_fleet(self, message: FleetRobot) -> None:
+        """Hear from now on where another robot of the fleet is."""
+        name = message.robot
+        if name == self._robot_name or name in self._peers or len(self._peers) >= MOST_PEERS:
+            return
+        above = self.get_namespace().rstrip('/').rpartition('/')[0]
+        topic = f'{above}/{name}/amcl_pose'
+        if not _NAME.match(name):
+            self.get_logger().error(
+                f'fleet_robots: {name[:40]!r} is no name of a robot', throttle_duration_sec=60.0
+            )
+            return
+        self._peers[name] = StateSubscription(
+            self, PoseWithCovarianceStamped, topic, partial(self._on_peer, name), raw=True
+        )
+
+    def _on_peer(self, name: str, serialized: bytes) -> None:
+        with conversions.refusing(self, f'{name}/amcl_pose'):
+            x, y, _ = pose_of_serialized(serialized)
+            stamp = stamp_of_serialized(serialized)
+            self._work.put(lambda: self.others.hear(name, x, y, stamp))
 
     def _on_odometry(self, serialized: bytes) -> None:
         with conversions.refusing(self, 'odom'):

@@ -15,7 +15,7 @@ from std_msgs.msg import String
 from state_machines import Interrupt
 from state_machines.ros import ServiceCaller
 from surveillance_controllers.observer_node import Observer
-from surveillance_interfaces.msg import RobotPlace
+from surveillance_interfaces.msg import FleetRobot, RobotPlace
 from surveillance_interfaces.srv import ConsoleCommand
 from surveillance_runtime.incidents import Cause
 from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
@@ -103,3 +103,22 @@ def test_a_box_is_told_with_a_picture_and_a_person_calls_it_normal(graph, tmp_pa
     graph.remove(node)
     kept = json.loads((tmp_path / 'observer.json').read_text())
     assert kept['book']['events'][0]['state'] == 'normal'
+
+
+def test_it_hears_of_the_other_robots_of_its_fleet_and_where_they_are(graph):
+    node = graph.add(Observer, {'camera': False})
+    fleet = graph.node.create_publisher(FleetRobot, 'fleet_robots', 10)
+    poses = graph.node.create_publisher(PoseWithCovarianceStamped, 'b/amcl_pose', STATE_QOS)
+    pose = PoseWithCovarianceStamped()
+    pose.pose.pose.position.x, pose.pose.pose.position.y = 4.0, 1.0
+    pose.pose.pose.orientation.w = 1.0
+
+    def heard() -> bool:
+        fleet.publish(FleetRobot(robot='b'))
+        fleet.publish(FleetRobot(robot='not a name'))
+        pose.header.stamp = graph.node.get_clock().now().to_msg()
+        poses.publish(pose)
+        now = 1e-9 * graph.node.get_clock().now().nanoseconds
+        return list(node.others.at(now)) == [(4.0, 1.0)]
+
+    graph.until(heard)

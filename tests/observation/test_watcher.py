@@ -15,6 +15,7 @@ import yaml
 from surveillance_perception.observation.events import EventBook, EventState
 from surveillance_perception.observation.evidence import EvidenceStore
 from surveillance_perception.observation.observations import Kind, Observation
+from surveillance_perception.observation.other_robots import OtherRobots
 from surveillance_perception.observation.persons import Person
 from surveillance_perception.observation.reference_views import ReferenceViews
 from surveillance_perception.observation.watch_rules import rule_from
@@ -92,6 +93,7 @@ class Round:
         find_persons=None,
         verify_seconds: float = 0.0,
     ) -> None:
+        self.others = OtherRobots(0.25)
         self.looks: list[Look] = []
         self.told: list[Observation] = []
         self.alerts: list[int] = []
@@ -115,6 +117,7 @@ class Round:
             find_persons=find_persons,
             verify_seconds=verify_seconds,
             looked=self.looks.append,
+            others=self.others,
         )
         self.watcher.use_map(room())
 

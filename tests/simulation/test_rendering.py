@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import cv2
 import numpy as np
@@ -12,6 +13,7 @@ from marker_detection import CameraModel, FusedPositions, MarkerDetector, pose_o
 from surveillance_runtime.place import PlaceError
 from surveillance_runtime.place.floor_plan import Marker
 from surveillance_simulation.camera.model import LIGHTINGS, Camera, Conditions, expose, lit
+from surveillance_simulation.camera.mujoco_rendering import MujocoRenderer
 from surveillance_simulation.camera.rendering import Renderer
 from surveillance_simulation.world import textures
 from surveillance_simulation.world.world import World, read_world
@@ -222,3 +224,30 @@ def test_two_panels_with_one_id_can_be_staged_and_are_found_as_such() -> None:
     assert both is not None
     places = sorted((each.position for each in both), key=lambda place: float(place[1]))
     assert np.allclose(places, [[0.06, 0.5, 1.0], [0.06, 1.5, 1.0]], atol=0.05)
+
+
+@pytest.mark.parametrize('renderer', [Renderer, MujocoRenderer])
+def test_a_robots_camera_shows_the_other_robots_and_not_itself(renderer: Any) -> None:
+    if renderer is MujocoRenderer:
+        pytest.importorskip('mujoco')
+    world = two_rooms()
+    x, y, _ = world.plan.start
+    pose = camera_pose(x, y, 0.6, 0.0)
+
+    def pictures() -> dict[str, np.ndarray]:
+        found = {}
+        for robot in ('robot1', 'robot2'):
+            camera = renderer(world, CAMERA, robot)
+            found[robot] = expose(camera.ideal(pose), CLEAN, np.random.default_rng(0))
+            camera.close()
+        return found
+
+    before = pictures()
+    world.move_robot('robot2', x + 1.2, y, 0.25)
+    after = pictures()
+    changed_part = (np.abs(after['robot1'].astype(int) - before['robot1']).max(axis=2) > 20).mean()
+    assert 0.02 < changed_part < 0.4
+    # Its own body is where its camera is.
+    assert np.array_equal(after['robot2'], before['robot2'])
+    world.move_robot('robot2', x - 1.2, y, 0.25)
+    assert np.array_equal(pictures()['robot1'], before['robot1'])

@@ -35,6 +35,7 @@ from surveillance_perception.observation.floor import (
 from surveillance_perception.observation.habits import Habits
 from surveillance_perception.observation.motion import WalkFinder
 from surveillance_perception.observation.observations import Kind, Observation
+from surveillance_perception.observation.other_robots import OtherRobots
 from surveillance_perception.observation.persons import Person, Picture
 from surveillance_perception.observation.reference_views import (
     ReferenceView,
@@ -149,6 +150,7 @@ class Watcher:
         store: Keeps pictures; None: nothing is kept.
         views: How each viewpoint looks normally.
         verify_seconds: An alert that is not sure waits so long for a second look.
+        others: The other robots of a fleet, which are no news; None: there are none.
     """
 
     def __init__(
@@ -169,6 +171,7 @@ class Watcher:
         store: EvidenceStore | None = None,
         views: ReferenceViews | None = None,
         verify_seconds: float = 0.0,
+        others: OtherRobots | None = None,
     ) -> None:
         self.rules = tuple(rules)
         self.book = book
@@ -183,6 +186,7 @@ class Watcher:
         self._ways: Ways | None = None
         self._walks = WalkFinder()
         self._verify_seconds = verify_seconds
+        self._others = others
         self._doubts: dict[int, float] = {}
         self._habits = Habits()
         self._persons = 0
@@ -294,6 +298,9 @@ class Watcher:
             met: Whether something was met there, (n,).
             stamp: Seconds since 1970.
         """
+        if self._others is not None:
+            apart = self._others.apart(ends, stamp)
+            ends, met = ends[apart], met[apart]
         self._last, self._at = (sensor, ends[met]), sensor
         if self._grid is not None:
             if self._visit is None:
@@ -509,6 +516,8 @@ class Watcher:
             return
         self._look_for_persons(picture, stamp)
         if viewpoint is None:
+            return
+        if self._others is not None and self._others.may_be_seen((viewpoint[0], viewpoint[1]), stamp):
             return
         known = self._views.at(viewpoint)
         if known is None:

@@ -7,6 +7,7 @@ wherever a picture is wanted.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -33,8 +34,13 @@ _FURTHEST = 500.0
 class MujocoRenderer:
     """Takes pictures of one world with one camera. All pictures must be taken in one thread."""
 
-    def __init__(self, world: World, camera: Camera) -> None:
+    def __init__(self, world: World, camera: Camera, robot: str = '') -> None:
         """Prepare pictures.
+
+        Args:
+            world: What is seen.
+            camera: What sees.
+            robot: The robot that carries it, which is not in its own pictures.
 
         Raises:
             ImportError: MuJoCo is not installed.
@@ -44,22 +50,23 @@ class MujocoRenderer:
             raise ImportError("renderer 'mujoco': expected the package mujoco (pip install mujoco)")
         self._world = world
         self._camera = camera
+        self._robot = robot
         self._version = -1
         self._model: Any = None
         self._renderer: Any = None
         self._drawn: Any = None
-        self._people: tuple[Thing, ...] = ()
+        self._movers: tuple[Thing, ...] = ()
         self._lamps: LampLight | None = None
         self.refresh()
 
     def refresh(self) -> None:
         """Take over what has changed in the world since the last time."""
-        people = self._world.people
+        movers = self._world.movers(self._robot)
         # Who stands still stands otherwise than who walks: all are placed anew for each picture.
-        if self._version != self._world.drawn_version or len(people) != len(self._people):
-            self._model = _model(self._world, self._camera)
+        if self._version != self._world.drawn_version or len(movers) != len(self._movers):
+            self._model = _model(self._world, self._camera, movers)
             self._version = self._world.drawn_version
-        self._people = people
+        self._movers = movers
         self._lamps = LampLight.of(self._world, self._lamps)
 
     def close(self) -> None:
@@ -82,7 +89,7 @@ class MujocoRenderer:
         mujoco.mju_mat2Quat(quaternion, turn.ravel())
         self._model.cam_pos[0] = camera_pose[:3, 3]
         self._model.cam_quat[0] = quaternion
-        for body, each in enumerate(self._people, start=1):  # body 0 is the world
+        for body, each in enumerate(self._movers, start=1):  # body 0 is the world
             self._model.body_pos[body] = each.x, each.y, 0.0
             self._model.body_quat[body] = about_z(each.yaw)
         data = mujoco.MjData(self._model)
@@ -98,7 +105,7 @@ class MujocoRenderer:
         return self._lamps.shine(picture, nearness.astype(np.float32), self._camera, camera_pose)
 
 
-def _model(world: World, camera: Camera) -> Any:
+def _model(world: World, camera: Camera, movers: Sequence[Thing]) -> Any:
     spec = mujoco.MjSpec()
     spec.visual.global_.offwidth, spec.visual.global_.offheight = camera.width, camera.height
     spec.visual.headlight.ambient = [0.6, 0.6, 0.6]
@@ -132,7 +139,7 @@ def _model(world: World, camera: Camera) -> Any:
     for thing in world.things.values():
         if thing.kind != 'person':
             add_thing(spec.worldbody, thing, _painted)
-    for each in world.people:
+    for each in movers:
         add_thing(spec.worldbody.add_body(), each.moved(0.0, 0.0, 0.0), _painted)
     for name, panel in world.panels.items():
         if panel.state != 'gone':

@@ -28,14 +28,20 @@ _CEILING = (196.0, 198.0, 200.0)
 class Renderer:
     """Takes pictures of one world with one camera, keeping what does not change between them."""
 
-    def __init__(self, world: World, camera: Camera) -> None:
+    def __init__(self, world: World, camera: Camera, robot: str = '') -> None:
         """Prepare pictures.
+
+        Args:
+            world: What is seen.
+            camera: What sees.
+            robot: The robot that carries it, which is not in its own pictures.
 
         Raises:
             PlaceError: A marker's dictionary or id does not exist.
         """
         self._world = world
         self._camera = camera
+        self._robot = robot
         matrix = camera.matrix
         matrix[:2] *= _FINER
         # The centre of pixel 0 stays the centre of the block of fine pixels that it is made of.
@@ -60,8 +66,8 @@ class Renderer:
             self._standing = faces_of(self._world)
             self._version = self._world.drawn_version
             self._shrunk.clear()
-        people = [face for each in self._world.people for face in thing_faces(each)]
-        self._faces = self._standing + people
+        movers = self._world.movers(self._robot)
+        self._faces = self._standing + [face for each in movers for face in thing_faces(each)]
         self._lamps = LampLight.of(self._world, self._lamps)
 
     def close(self) -> None:

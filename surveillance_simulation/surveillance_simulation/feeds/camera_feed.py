@@ -97,7 +97,7 @@ class CameraFeed:
         )
         robot.world.wall_brightness = options.wall_brightness
         take = MujocoRenderer if options.renderer == 'mujoco' else Renderer
-        self._renderer: Renderer | MujocoRenderer = take(robot.world, self._camera)
+        self._renderer: Renderer | MujocoRenderer = take(robot.world, self._camera, robot.name)
         self._next = 0.0
         self._rng = np.random.default_rng(seed)
         self._changing = changing

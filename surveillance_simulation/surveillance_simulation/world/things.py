@@ -1,4 +1,5 @@
-"""What stands or walks in a place, made of boxes and cylinders: barrels, boxes, chairs, people.
+"""What stands or goes about in a place, made of boxes and cylinders: barrels, boxes, chairs,
+people, and robots as others see them.
 
 A thing is the same to all sensors: the lidar meets the parts that its plane cuts, the camera sees
 all of them.
@@ -60,7 +61,7 @@ class Thing:
 
     Attributes:
         name: Its own name.
-        kind: barrel, box, chair or person.
+        kind: barrel, box, chair, person or robot.
         x, y, yaw: Where it is, metres and rad.
         parts: What it is made of.
     """
@@ -87,6 +88,7 @@ class Thing:
 
 BARREL_HEIGHT = 0.8
 _ORANGE, _BROWN, _WOOD = (224, 104, 28), (150, 108, 62), (96, 62, 36)
+_CASE, _ARM = (62, 66, 72), (148, 152, 158)
 _TROUSERS, _SHIRT, _SKIN, _HAIR = (40, 48, 84), (176, 36, 44), (214, 168, 138), (52, 36, 26)
 
 
@@ -148,6 +150,15 @@ def person(name: str, x: float, y: float, yaw: float) -> Thing:
         limb(0.0, 0.2, 1.69, 1.75, _HAIR),
     )
     return _checked(Thing(name, 'person', x, y, yaw, parts))
+
+
+def robot(name: str, x: float, y: float, radius: float) -> Thing:
+    """Return a robot as others see it: a round base of a radius, metres, with its arm upright."""
+    parts = (
+        Part(Shape.CYLINDER, 0.0, 0.0, 2.0 * radius, 2.0 * radius, 0.02, 0.32, _CASE),
+        Part(Shape.CYLINDER, 0.0, 0.0, 0.1, 0.1, 0.32, 0.75, _ARM),
+    )
+    return _checked(Thing(name, 'robot', x, y, 0.0, parts))
 
 
 def discs_of(things: Iterable[Thing]) -> boxes.Array:

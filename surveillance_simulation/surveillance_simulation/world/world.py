@@ -25,6 +25,7 @@ from surveillance_runtime.place.regions import Regions
 from surveillance_runtime.suggestions import nearest
 from surveillance_simulation.world.map_surface import MapSurface
 from surveillance_simulation.world.things import Thing, barrel, boxes_of, discs_of, person
+from surveillance_simulation.world.things import robot as robot_thing
 
 MARKER_STATES = ('whole', 'broken', 'covered', 'gone')
 LEAF_THICKNESS = 0.04
@@ -125,6 +126,11 @@ class World:
             for number, (x, y, _, yaw) in enumerate(self._people.tolist())
         )
         return (*standing, *walking)
+
+    def movers(self, robot: str = '') -> tuple[Thing, ...]:
+        """Return the people and the other robots, as the camera of a robot sees them."""
+        others = sorted((name, body) for name, body in self._robots.items() if name != robot)
+        return (*self.people, *(robot_thing(name, *body) for name, body in others))
 
     @property
     def bodies(self) -> boxes.Array:
