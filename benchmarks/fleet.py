@@ -138,7 +138,8 @@ def compare(maps: Iterable[tuple[str, PatrolGraph]]) -> None:
     names = ['shared', 'cyclic', 'partition', 'CR', 'SEBS']
     steady = [['longest / (tour / k)', 'places', 'k', 'plan', 'optimum', *names]]
     killed = [['killed: / (tour / (k-1))', 'k', '2(k-1)/k', *names]]
-    charged = [['charging', 'k', 'longest / (tour / k)', 'stranded', 'charges', 'docks']]
+    charged = [['charging', 'k', 'longest / (tour / k)', 'longest / bound']]
+    charged[0] += ['stranded', 'charges', 'docks']
     ratios: list[float] = []
     proven: list[float] = []
     behind: list[str] = []
@@ -199,8 +200,15 @@ def charging(graph: PatrolGraph, team: int) -> list[str]:
         battery=FleetBattery(4.0 * tour, 0.5 * tour),
     )
     run.until(3.0 * ROUNDS * tour)
-    wait = run.longest(LEFT_OUT * tour) / (tour / team)
-    return [f'{wait:.3f}', f'{run.strandings}', f'{len(run.charges)}', f'{len(docks)}']
+    wait = run.longest(LEFT_OUT * tour)
+    # While one charges, and that is so often, the others cannot do better than their own plan.
+    away = math.ceil(team * 0.5 / (4.0 + 0.5) - 1e-9)
+    bound = fleet_plan(graph, team - away).wait if team > away else math.inf
+    return [
+        f'{wait / (tour / team):.3f}',
+        f'{wait / bound:.3f}',
+        *(f'{run.strandings}', f'{len(run.charges)}', f'{len(docks)}'),
+    ]
 
 
 def scale(places: int, team: int) -> None:

@@ -215,18 +215,14 @@ class FleetKnowledge:
                 intention, since = self._since[name]
                 if heard.facts.robot.taken_out:
                     continue
+                # The same words while it lasts: each other text would be told anew.
                 if self._is_silent(heard, now):
-                    found[name] = f'{name} has not been heard for {now - heard.at:.0f} s'
-                elif intention.is_moving and now - since > STANDS_AFTER:
-                    found[name] = (
-                        f'{name} has been on its way from {intention.place} to '
-                        f'{intention.heading_to} for {now - since:.0f} s'
-                    )
+                    limit = max(self.settings.silent_after, SILENT_STEADY)
+                    found[name] = f'{name} has not been heard for more than {limit:g} s'
                 elif intention.heading_to and now - since > STANDS_AFTER:
-                    found[name] = (
-                        f'{name} has waited in {intention.place} for {now - since:.0f} s to go to '
-                        f'{intention.heading_to}'
-                    )
+                    way = f'from {intention.place} to {intention.heading_to}'
+                    what = 'been on its way' if intention.is_moving else 'waited to go'
+                    found[name] = f'{name} has {what} {way} for more than {STANDS_AFTER:g} s'
         return found
 
 

@@ -636,8 +636,8 @@ class WorldModel:
             limits.require_recharge,
             max(level for level in energy.least if math.isfinite(level)),
         )
-        seconds = energy.charge_seconds(0, min(least, 100.0))
-        facts['charge_seconds'] = seconds
+        # What it would take now: a full battery needs no time at a dock yet.
+        facts['charge_seconds'] = energy.charge_seconds(0, battery.level)
         facts['runs_until'] = world.now + max(0.0, battery.level - least) / energy.draw
         if dock is not None:
             facts['charging_until'] = world.now + energy.charge_seconds(0, battery.level)

@@ -257,7 +257,7 @@ class Fleet:
         chance, names = self.chance, sorted(self.robots)
         one = chance.choice(names)
         seconds = chance.choice((5.0, 5.0, 5.0, 30.0, 30.0, 120.0))
-        kind = chance.randrange(6)
+        kind = chance.randrange(7)
         if kind == 0:
             self.cut({one}, seconds)
         elif kind == 1:
@@ -268,8 +268,13 @@ class Fleet:
             self.lose(0.2, 0.2, seconds)
         elif kind == 4:
             self.kill(one, seconds)
-        else:
+        elif kind == 5:
             self.kill(one, seconds, cut=True)
+        else:
+            # What it did meanwhile only its files know.
+            self.network.down.add(one)
+            self.run(seconds)
+            self.kill(one, 5.0, cut=True)
 
     def settle(self, seconds: float = 40.0) -> None:
         """Let all hear of all again, then compare with the truth."""

@@ -265,17 +265,17 @@ def test_a_robot_that_stands_on_its_way_is_told_of() -> None:
     air.now = 70.0
     second.fleet.repeat()
     assert first.fleet.standing(air.now) == {
-        'robot2': 'robot2 has been on its way from C1 to R1 for 70 s'
+        'robot2': 'robot2 has been on its way from C1 to R1 for more than 60 s'
     }
     second.fleet.tell(intention=Intention('robot2', 'C1', 'R2', 75.0))
     assert not first.fleet.standing(air.now)
     air.now = 140.0
     second.fleet.repeat()
     assert first.fleet.standing(air.now) == {
-        'robot2': 'robot2 has waited in C1 for 70 s to go to R2'
+        'robot2': 'robot2 has waited to go from C1 to R2 for more than 60 s'
     }
     air.now = 170.0
-    assert first.fleet.standing(170.0) == {'robot2': 'robot2 has not been heard for 30 s'}
+    assert first.fleet.standing(170.0) == {'robot2': 'robot2 has not been heard for more than 10 s'}
 
 
 def test_a_robot_is_taken_out_and_put_back() -> None:

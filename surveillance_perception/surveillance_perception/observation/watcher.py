@@ -517,7 +517,8 @@ class Watcher:
         self._look_for_persons(picture, stamp)
         if viewpoint is None:
             return
-        if self._others is not None and self._others.may_be_seen((viewpoint[0], viewpoint[1]), stamp):
+        camera = viewpoint[0], viewpoint[1]
+        if self._others is not None and self._others.may_be_seen(camera, stamp):
             return
         known = self._views.at(viewpoint)
         if known is None:

@@ -61,7 +61,7 @@ class FleetRobot:
         charging_until: When it has charged enough; None: it does not charge.
         dock: The dock it stands at or drives to in order to charge.
         runs_until: When its battery reaches its reserve; None: it need not charge.
-        charge_seconds: How long a charge takes.
+        charge_seconds: How long a charge would take now.
         taken_out: Whether a person took it out of the patrol.
     """
 

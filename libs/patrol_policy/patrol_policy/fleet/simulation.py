@@ -61,6 +61,11 @@ class FleetBattery:
     run_seconds: float
     charge_seconds: float
 
+    def needed(self, runs_until: float, now: float) -> float:
+        """Return how long a charge takes that begins now, seconds."""
+        left = max(0.0, runs_until - now) / self.run_seconds
+        return self.charge_seconds * max(0.0, 1.0 - left)
+
 
 @dataclass
 class FleetPatrol:
@@ -95,7 +100,6 @@ class FleetPatrol:
                 name,
                 place,
                 runs_until=self.battery.run_seconds if self.battery else None,
-                charge_seconds=self.battery.charge_seconds if self.battery else 0.0,
             )
             for name, place in self.starts.items()
         }
@@ -109,6 +113,7 @@ class FleetPatrol:
         heapq.heapify(self._due)
         self._ahead: dict[str, list[str]] = {name: [] for name in self.starts}
         self._failed: set[str] = set()
+        self._slots: dict[str, float] = {}
 
     def until(self, end: float) -> None:
         """Go on until ``end``, seconds."""
@@ -160,7 +165,10 @@ class FleetPatrol:
             out = self._outage(name)
             heard = self.now if out is None else out.begin
             if robot.heard_at != heard:
-                self.robots[name] = replace(robot, heard_at=heard)
+                robot = self.robots[name] = replace(robot, heard_at=heard)
+            if self.battery is not None and robot.runs_until is not None:
+                needed = self.battery.needed(robot.runs_until, self.now)
+                self.robots[name] = replace(robot, charge_seconds=needed)
 
     def _step(self, name: str) -> None:
         """Enter the next place of the way, or decide anew."""
@@ -186,14 +194,14 @@ class FleetPatrol:
             if robot.runs_until is not None:
                 # It waits for its slot, and for the robot that still charges.
                 begin = max(
-                    robot.charging_until - self.battery.charge_seconds,
+                    self._slots[name],
                     *(end for _, dock, _, end in self.charges if dock == robot.place),
                     self.now,
                 )
                 if begin > self.now:
                     heapq.heappush(self._due, (begin, name))
                     return
-                end = self.now + self.battery.charge_seconds
+                end = self.now + self.battery.needed(robot.runs_until, self.now)
                 self.charges.append((name, robot.place, self.now, end))
                 self.robots[name] = replace(robot, charging_until=end, runs_until=None)
                 heapq.heappush(self._due, (end, name))
@@ -215,6 +223,7 @@ class FleetPatrol:
         self.decisions.append((self.now, name, choice))
         changes = replace(self.robots[name], share=choice.share or self.robots[name].share)
         if choice.slot is not None:
+            self._slots[name] = choice.slot.begin
             changes = replace(changes, dock=choice.slot.dock, charging_until=choice.slot.end)
         self.robots[name] = changes
         place = changes.place
