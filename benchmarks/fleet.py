@@ -24,6 +24,9 @@ SEBS      gain against others' intentions (Portugal and Rocha 2013); its gain li
     python benchmarks/fleet.py --quick            fewer
     python benchmarks/fleet.py --graph FOLDER     maps of patrolling_sim
     python benchmarks/fleet.py --live --hours 1   the real programs in a simulated place with people
+    python benchmarks/fleet.py --faults 1000      kills and cuts of a fleet of three in this process
+    python benchmarks/fleet.py --armor 60         the ontology under ten robots, for 60 s
+    python benchmarks/fleet.py --composed 60      eight whole stacks, one process each, for 60 s
 """
 
 from __future__ import annotations
@@ -31,6 +34,8 @@ from __future__ import annotations
 import argparse
 import math
 import random
+import sys
+import tempfile
 import time
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
@@ -245,6 +250,35 @@ def scale(places: int, team: int) -> None:
     )
 
 
+def fail(count: int) -> None:
+    """Print what so many kills and cuts in a fleet of three cost, judged by the truth."""
+    root = str(Path(__file__).resolve().parents[1])
+    if root not in sys.path:
+        sys.path.insert(0, root)
+    from tests.behaviour.fleet_faults import Fleet
+
+    with tempfile.TemporaryDirectory(prefix='fleet-') as folder:
+        fleet = Fleet(3, Path(folder))
+        fleet.run(300.0)
+        for number in range(count):
+            fleet.fail()
+            fleet.settle()
+            if number % 10 == 9:
+                fleet.run(60.0)
+                fleet.look_for_doubles()
+                fleet.forget(600.0)
+        visits = sum(robot.entered for robot in fleet.robots.values())
+    rows = [['fault', 'made'], *([kind, f'{made}'] for kind, made in sorted(fleet.faults.items()))]
+    print(table(rows))
+    print(
+        f'{count} faults in {fleet.now / 3600.0:.1f} simulated hours, {visits} visits: '
+        f'{len(fleet.lost)} lost, {len(fleet.invented)} invented, {len(fleet.twice)} twice URGENT, '
+        f'{len(fleet.behind)} left behind'
+    )
+    for each in (*fleet.lost, *fleet.invented, *fleet.twice, *fleet.behind)[:20]:
+        print(f'  {each}')
+
+
 def _silent(robot: FleetRobot) -> FleetRobot:
     return replace(robot, heard_at=-1e6)
 
@@ -254,12 +288,27 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
     parser.add_argument('--quick', action='store_true', help='fewer maps')
     parser.add_argument('--graph', type=Path, help='a folder of patrolling_sim maps')
+    parser.add_argument('--faults', type=int, metavar='N', help='kills and cuts')
+    parser.add_argument('--armor', type=float, metavar='SECONDS', help='calls of ten robots')
+    parser.add_argument('--composed', type=float, metavar='SECONDS', help='eight whole stacks')
     parser.add_argument('--live', action='store_true', help='the real programs in a simulation')
     parser.add_argument('--hours', type=float, default=1.0, help='simulated, of --live')
     parser.add_argument('--robots', type=int, default=4, help='of --live')
     parser.add_argument('--people', type=int, default=2, help='who walk about, of --live')
     parser.add_argument('--map', type=Path, action='append', help='a place, of --live')
     words = parser.parse_args()
+    if words.faults is not None:
+        fail(words.faults)
+        return
+    if words.armor is not None or words.composed is not None:
+        from fleet_load import CONFIG, armor_under, composed
+
+        place = words.map[0] if words.map else CONFIG / 'office.yaml'
+        if words.armor is not None:
+            armor_under(10, words.armor, place)
+        if words.composed is not None:
+            composed(8, words.composed, place)
+        return
     if words.live:
         from fleet_live import CONFIG, compare_places
 

@@ -108,6 +108,7 @@ class Robot:
         self.world.visited_at = fleet.visited_at
         self.visits: list[tuple[float, float, str]] = [(fleet.now, fleet.now, start)]
         self.decisions: list[tuple[float, Decision]] = []
+        self.entered = 0
         self.runs = False
         self.going, self.due = '', 0.0
         self.begin()
@@ -170,6 +171,7 @@ class Robot:
             place, self.going = self.going, ''
             self.world.is_in = place
             self.visits.append((now, now, place))
+            self.entered += 1
             self.model.arrived(place, now)
             self.written.write('visit', now, place=place, distance=1.0)
         try:
@@ -304,6 +306,26 @@ class Fleet:
             last = robot.decisions[-1][0] if robot.decisions else -math.inf
             if self.now - last > LEFT_BEHIND:
                 self.behind.append(f'{self.now:.0f} s: {robot.name} has decided nothing')
+
+    def forget(self, seconds: float) -> None:
+        """Forget decisions that are so old, and all older visits of a place but its last one."""
+        latest = {
+            place: max(
+                begin
+                for r in self.robots.values()
+                for begin, _, where in r.visits
+                if where == place
+            )
+            for place in {where for r in self.robots.values() for *_, where in r.visits}
+        }
+        for robot in self.robots.values():
+            limit = self.now - seconds
+            robot.decisions = [each for each in robot.decisions if each[0] > limit][-100:]
+            robot.visits = [
+                each
+                for each in robot.visits
+                if each[1] > limit or each[0] == latest[each[2]] or each is robot.visits[-1]
+            ]
 
     def look_for_doubles(self) -> None:
         """Find places that were URGENT to a robot although another one had just been there, after

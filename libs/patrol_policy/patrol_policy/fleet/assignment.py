@@ -226,7 +226,8 @@ def choose(
 ) -> FleetChoice:
     """Return what one robot does next, once it has arrived and explored where it is.
 
-    It charges when its slot at a dock begins; else it goes on along its group's tour, or stays
+    It charges when its slot at a dock begins, or before that when its tour passes the free dock for
+    the last time; else it goes on along its group's tour, or stays
     while the robot ahead is nearer than the equal distance.
 
     Raises:
@@ -247,7 +248,16 @@ def choose(
     onward = _next(group, share.stop) if reached else share
     mine = _mine(group, assignment, robots, me, onward)
     slot, leave = _slot(graph, robots, me, onward.stop, now, settings, assignment)
-    if slot is not None and now >= leave:
+    # Who comes by a free dock on its tour, and would be late the next time, charges now.
+    passes = (
+        slot is not None
+        and me.place == slot.dock == share.stop
+        and slot.begin - now < group.length
+        and not any(other.dock == slot.dock for other in robots if other.name != name)
+    )
+    if slot is not None and passes:
+        slot = replace(slot, begin=now, end=now + me.charge_seconds, late=0.0)
+    if slot is not None and (passes or now >= leave):
         late = f', {slot.late:.0f} s late: the docks are too few' if slot.late > 1.0 else ''
         reason = (
             f'charging at {slot.dock} from {_clock(slot.begin, settings)} '
