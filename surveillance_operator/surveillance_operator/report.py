@@ -37,7 +37,7 @@ td,th{padding:.2rem .7rem .2rem 0;text-align:left;vertical-align:top;border-bott
 .n{text-align:right;font-variant-numeric:tabular-nums;white-space:nowrap}
 .late{font-weight:700}th.w{width:55%}
 svg{width:100%;height:2rem;display:block}
-.map{display:block;max-width:100%;height:auto;margin:auto;border-radius:6px}
+.map{display:block;max-width:100%;max-height:44rem;margin:auto;border-radius:6px}
 .strip{fill:#5b9bd5}.limit{stroke:#b3132b;stroke-dasharray:4 3}
 @media(max-width:40rem){.w{display:none}
 .long tr{display:grid;grid-template-columns:4rem 1fr 1fr;border-bottom:1px solid #8886}
@@ -100,11 +100,11 @@ def _material(folder: Path) -> tuple[Sequence[Event], FloorPlan | None, Run | No
 def _map(plan: FloorPlan, run: Run) -> str:
     """Return the picture of the place with the ways driven, inside of the page.
 
-    The waits are the page's own table, so the picture is without them.
+    The page tells the summary and the waits itself, so the picture is without them.
     """
     picture = io.BytesIO()
-    way = replace(run, waits={})
-    draw_place(plan, 'The way driven', facts(plan), way).save(picture, 'PNG', optimize=True)
+    way = replace(run, waits={}, summary=facts(plan))
+    draw_place(plan, 'The way driven', '', way).save(picture, 'PNG', optimize=True)
     data = base64.b64encode(picture.getvalue()).decode()
     return (
         f'<img class="map" alt="The place with the way driven" src="data:image/png;base64,{data}">'
