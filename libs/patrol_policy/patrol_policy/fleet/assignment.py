@@ -481,7 +481,7 @@ def _hold(
             left = float(graph.distances[graph.index[robot.place], graph.index[theirs.stop]])
             left -= max(0.0, now - robot.since)
             # One that is farther than a leg is not on the tour yet: it will begin at its stop.
-            at -= max(0.0, left) if left <= group.legs[number - 1] else 0.0
+            at -= max(0.0, left) if left <= group.leg_seconds[number - 1] else 0.0
         gap = (at - here) % group.length
         if min(gap, group.length - gap) < 1e-6:
             if (me.since, me.name) < (robot.since, robot.name):

@@ -41,18 +41,18 @@ class Group:
 
     Attributes:
         stops: The places in the order of the tour; after the last one comes the first.
-        legs: Seconds from each stop to the next one, exploring there included.
+        leg_seconds: From each stop to the next one, exploring there included.
         robots: How many robots follow one another on it.
     """
 
     stops: tuple[str, ...]
-    legs: tuple[float, ...]
+    leg_seconds: tuple[float, ...]
     robots: int
 
     @cached_property
     def length(self) -> float:
         """Seconds of one round."""
-        return sum(self.legs)
+        return sum(self.leg_seconds)
 
     @property
     def wait(self) -> float:
@@ -62,7 +62,7 @@ class Group:
     @cached_property
     def offsets(self) -> NDArray[np.float64]:
         """Seconds from the first stop to each, shape (stops,)."""
-        return np.concatenate([[0.0], np.cumsum(self.legs[:-1])])
+        return np.concatenate([[0.0], np.cumsum(self.leg_seconds[:-1])])
 
     @cached_property
     def position(self) -> dict[str, int]:
@@ -126,7 +126,8 @@ def balanced(tours: Sequence[Group], robots: int) -> FleetPlan | None:
         counts[worst] += 1
     return FleetPlan(
         tuple(
-            Group(tour.stops, tour.legs, count) for tour, count in zip(tours, counts, strict=True)
+            Group(tour.stops, tour.leg_seconds, count)
+            for tour, count in zip(tours, counts, strict=True)
         )
     )
 
