@@ -414,6 +414,7 @@ def kidnapped(world: World, seed: int) -> tuple[float | None, float]:
 
     robot.base.pose = robot.base.odometry = anywhere()
     driven.navigator.believe(robot.base.pose)
+    driven.look()
     for _ in driven.rooms(rng, is_over):
         pass
     return found, longest

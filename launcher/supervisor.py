@@ -35,7 +35,7 @@ from surveillance_runtime.launch_protocol import (
 )
 
 START_WITHIN = 1.5
-"""Seconds after which a process that did not say that it is up no longer holds the next one up."""
+"""Seconds for which the next process waits at most until this one says that it is up."""
 STOP_LEADERS_WITHIN = 1.2
 """Seconds that the processes which use the others have before those are told to stop as well."""
 STOP_WITHIN, STOP_AT_MOST = 2.5, 12.0

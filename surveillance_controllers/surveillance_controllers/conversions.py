@@ -100,8 +100,7 @@ LONGEST_RANGE = 1000.0
 LONGEST_SWEEP = 2.0
 """No lidar turns slower, seconds: what a scan says beyond that counts for nothing."""
 LEAST_TOLD = 0.05
-"""A scan of which a smaller share of the rays tells something is that of a lidar that is covered or
-broken."""
+"""Share of a scan's rays that must tell something; below it the lidar is covered or broken."""
 
 
 def twist_from(velocity: Velocity) -> Twist:

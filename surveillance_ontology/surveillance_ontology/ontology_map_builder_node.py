@@ -62,8 +62,8 @@ PLACE_SECONDS = 2.0
 APART = 0.5
 """Metres; whoever adds a room whose point is nearer than this to another's is told."""
 PATIENCE = 1.0
-"""Steady seconds after which an ontology that contradicts itself is built anew: who knows where the
-robot is, or changes two facts one after the other, may end the contradiction before."""
+"""Steady seconds after which a contradictory ontology is built anew. Before that another node may
+end the contradiction: one that tells where the robot is, or changes two facts in two steps."""
 
 
 class OntologyMapBuilder(PatrolNode):

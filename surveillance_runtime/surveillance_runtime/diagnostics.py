@@ -44,8 +44,8 @@ HANGS = 3.0
 BEAT_PERIOD = 0.25
 """Seconds of real time between two heartbeats."""
 SLEPT_AFTER = 18.0
-"""Seconds for which no thread ran after which this process says that it slept, as on a machine
-that froze. An executor alone that is late says nothing: DDS has threads of its own.
+"""If no thread ran for so many seconds, this process says that it slept, as on a frozen machine. An
+executor that is late alone says nothing: DDS has threads of its own.
 
 After 20 s DDS forgets a silent peer. Of two that were frozen together sometimes only one forgets
 the other, and then they do not find each other any more (Fast DDS 155, 457)."""

@@ -54,7 +54,7 @@ class NotNowError(ValueError):
 
 
 def launch_of_process() -> tuple[str, float]:
-    """Return who started this process, by host and process, and the seconds that that has run.
+    """Return who started this process (host and process), and for how many seconds that has run.
 
     All processes of one launch have one parent: `launch.py`, `ros2 launch` or `ros2 run`.
     """

@@ -157,7 +157,7 @@ class ParameterSpec:
         raise self.error(whole)
 
     def _usual(self) -> float:
-        """Return the default that is not finite, which says that such values make sense; else 0."""
+        """Return the infinite default, if there is one: then infinite values make sense; else 0."""
         defaults = self.default if isinstance(self.default, list | tuple) else [self.default]
         return next((d for d in defaults if isinstance(d, float) and not math.isfinite(d)), 0.0)
 

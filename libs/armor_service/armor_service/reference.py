@@ -241,9 +241,10 @@ class Reference:
         return self._taken_since(before)
 
     def missing(self, changes: Iterable[Change]) -> str:
-        """Return what changes are to take away or rename and is not there; not while others wait.
+        """Return what the changes remove or rename although it is not there.
 
-        ARMOR says nothing. A value that was to be replaced, and is another, leaves two of them.
+        Empty while earlier changes wait for APPLY: they may add it. ARMOR says nothing here. A
+        client that replaces a value but names a wrong old one is left with two values.
         """
         if self.waiting:
             return ''

@@ -44,10 +44,10 @@ CHUNK = 100
 COMPACT_FROM = 1 << 20
 """Bytes of journal from which on a snapshot is written, if the last one is not larger."""
 MOST_UNTESTED = 100
-"""Directives that were not reasoned over yet, up to which a snapshot waits: it does not tell which
-of them to leave out should reasoning over them end the process."""
+"""A snapshot waits while at most so many directives are not reasoned over yet. If reasoning over
+them ends the process, the journal tells which one to leave out; a snapshot could not."""
 CLOSING = 1.0
-"""Seconds for which a store that is closed waits for the snapshot that is being written."""
+"""Seconds that closing a store waits for a snapshot in writing."""
 RETRY_SECONDS = 1.0
 """Seconds between two attempts to write what waits."""
 MOST_WAITING = 200_000

@@ -420,7 +420,10 @@ class ConcurrentFrame(Frame):
             raise LeftBehindError
 
     def _stop_others(self, running: Iterable[str]) -> SmachError | None:
-        """Stop the states that are to stop now that one has ended; the error of deciding that."""
+        """Ask the container which states stop now that one has ended, and stop them.
+
+        Where the container's answer is an error, all stop; the error is returned.
+        """
         error = None
         try:
             stop: Iterable[str] = self.container.fsm_states_to_stop(self.outcomes)

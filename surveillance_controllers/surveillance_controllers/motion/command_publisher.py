@@ -76,7 +76,7 @@ class SensorAge:
 
     @property
     def top_speed(self) -> float:
-        """The speed that messages allow which come on time, or `LATE` after that, m/s."""
+        """The highest speed, m/s, while every message comes at most `LATE` seconds too late."""
         return max(0.0, self._deceleration * (self._standstill - REACTION - LATE))
 
     def seconds_to_brake(self, speed: float, now: float) -> float:

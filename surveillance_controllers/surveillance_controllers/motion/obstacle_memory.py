@@ -1,10 +1,10 @@
 """What the lidar sees and the map does not have, remembered until it is seen to be gone.
 
 A point counts when it lies well away from everything the map has occupied. It is forgotten when a
-ray goes through where it was, or when it has not been seen for a long time. It stays once it was
-seen to stand for longer than people rest; until then it may go away. Points beside each other are
-one thing: seen from another side, it has stood for as long. Where a ray went through in the
-meantime, somebody came who stands beside it.
+ray goes through where it was, or when it has not been seen for a long time. After `settle` seconds
+in one place it is taken to be furniture, and stays; before that it may be a person who walks on.
+Points beside each other are one thing, which has stood for as long as its oldest point. An
+exception is a point through which a ray went meanwhile: there somebody new has come.
 """
 
 from __future__ import annotations

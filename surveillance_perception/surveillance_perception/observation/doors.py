@@ -24,7 +24,7 @@ Segment = tuple[float, float, float, float]
 DEVIATION = 0.05
 """Of a measured end from where it is expected, metres: noise, the pose's error, a leaf's depth."""
 FLOOR = 0.05
-"""Likelihood of a beam that fits nothing, as a part of that of one that fits."""
+"""Likelihood of a beam that fits no state of the door; 1 is that of a beam that fits."""
 CLOSE_BEHIND = 0.2
 """Likelihood that something stands within a leaf's reach behind the opening."""
 LEAST_BEAMS = 6

@@ -38,7 +38,7 @@ _SHORTEST_WALL = 0.12
 _LINE_CELLS = 5
 """A room's point keeps this far from the lines of doors: their thickness, working cells."""
 _BESIDE_DOOR = 0.3
-"""An opening whose middle is as near to that of a known door is that door, metres."""
+"""An opening is a known door if their middles are at most so far apart, metres."""
 
 
 @dataclass(frozen=True)

@@ -97,7 +97,13 @@ class Blocking:
         return is_known or self._core_blocker(x, self.blocked, self.chosen) is not None
 
     def _core_blocker(self, x: int, blocked: dict[int, int], cores: Iterable[int]) -> int | None:
-        """Return an earlier individual, of these, that is all that x is, and that x may be."""
+        """Return an earlier individual with all concepts of x, in whose place x may stand.
+
+        Args:
+            x: An unnamed individual.
+            blocked: Who is blocked already, and so blocks nobody.
+            cores: Who may block.
+        """
         model, put_off, nominals = self._model, self.put_off, self._rules.nominals.keys()
         own, known = model.labels[x].keys(), self.blocked.get(x)
         parent = model.parent[x]

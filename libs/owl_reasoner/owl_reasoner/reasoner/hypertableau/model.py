@@ -1,4 +1,4 @@
-"""A model in the making: who is there, what is known of them, and on which choices that rests.
+"""A model in the making: its individuals, the facts about them, and the choices each rests on.
 
 Individuals and values are nodes of one numbering. Every fact carries the choices it depends on, a
 bit for each; facts without choices are entailed. Every change can be taken back. No rule is applied
