@@ -18,7 +18,9 @@ charge to the full level, and a state has the charge that was used. On every map
 any moment the place that waits longest was visited before all others, so its wait encloses a closed
 tour. And a part draw / (draw + rate) of all time is spent charging; a moment of it lies in the wait
 of all moments until every place was visited since. Averaged over time, such a wait therefore holds
-a closed tour and that part of the shortest way from a station through all places.
+a closed tour and that part of the shortest way from a station through all places. Lastly, in any
+time as long as the longest wait every place is visited, so that it holds the shortest way through
+all places, wherever that begins; and on average only the other part of time is spent on ways.
 """
 
 from __future__ import annotations
@@ -301,7 +303,11 @@ def charge_bound(rules: RuleMap, precision: float = 0.01, states: int = STATES) 
     cover = _shortest_covers(np.maximum(np.floor(TICKS * away) - 1, 0).astype(np.int32))
     through = min(int(cover[station, -1]) for station in energy.stations) / TICKS
     charging = energy.draw / (energy.draw + energy.fastest)
-    low = max(rules.least_period, shortest_tour(away).length + through * charging)
+    low = max(
+        rules.least_period,
+        shortest_tour(away).length + through * charging,
+        float(cover[:, -1].min()) / TICKS / (1.0 - charging),
+    )
     high, step = math.inf, 0.9 * precision
     search = _ChargeSearch(rules, cover, states)
     while high > low * (1.0 + precision):
@@ -411,7 +417,8 @@ class _ChargeSearch:
             level = self._energy.full - self._energy.draw * (used + drive) / TICKS
             charge = math.floor(TICKS * self._energy.charge_seconds(number, max(level, 0.0)))
             ticks = drive + charge
-            if ages[station] + ticks <= longest:
+            # It is visited when the charge begins.
+            if ages[station] + drive <= longest:
                 charges.append((*_after((place, met, ages), station, ticks), 0))
         return [*charges, *found]
 

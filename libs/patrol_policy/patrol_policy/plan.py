@@ -310,12 +310,13 @@ class Plan:
         seen: dict[int, float] = {}
         for stop in (*outcome.walk[begin:], *outcome.walk[begin:]):
             # From the end to the beginning there need be no door.
+            arrived = state.now
             for step in rules.path(state.place, stop):
-                rules.go(state, step)
+                arrived = rules.go(state, step)
             place = rules.places[stop]
             if place in seen and place not in rules.windows:
                 known = 0.0 if math.isinf(waits[place]) else waits[place]
-                waits[place] = max(known, state.now - seen[place])
+                waits[place] = max(known, arrived - seen[place])
             seen[place] = state.now
         return waits
 

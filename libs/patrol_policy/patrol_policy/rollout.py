@@ -395,8 +395,12 @@ class RuleMap:
             return state.place
         return charge
 
-    def go(self, state: State, stop: int) -> None:
-        """Move a state to a stop: time passes and the level falls; at a station it is charged."""
+    def go(self, state: State, stop: int) -> float:
+        """Move a state to a stop: time passes and the level falls; at a station it is charged.
+
+        Returns:
+            Until when the place waited: a station's is visited when the charge begins.
+        """
         seconds = self.leg_seconds[state.place].get(stop, math.inf)
         energy = self.energy
         if stop >= self.count:
@@ -404,12 +408,16 @@ class RuleMap:
             number = stop - self.count
             seconds = energy.drive[number][state.place]
             state.level -= energy.draw * seconds
+            arrived = state.now + seconds
             seconds += energy.charge_seconds(number, state.level) + energy.approach[number]
             state.level = max(state.level, energy.full)
-        elif energy:
-            state.level -= energy.draw * seconds
+        else:
+            arrived = state.now + seconds
+            if energy:
+                state.level -= energy.draw * seconds
         state.now += seconds
         state.place = self.places[stop]
+        return arrived
 
 
 class _FoundWays(dict[int, float]):
@@ -519,10 +527,10 @@ def roll_out(
         if choice == at.place:  # It stays there for good.
             at.now = end
             break
-        rules.go(at, choice)
+        arrived = rules.go(at, choice)
         walk.append(choice)
         place = places[choice]
-        wait = rules.waited(place, seen[place], at.now) if windows else at.now - seen[place]
+        wait = rules.waited(place, seen[place], arrived) if windows else arrived - seen[place]
         seen[place] = at.now
         waits[place] = max(waits[place], wait)
         if met[place]:
