@@ -38,6 +38,7 @@ from surveillance_runtime.run_parameters import (
     place_file,
     write_parameters,
 )
+from surveillance_runtime.rviz_layout import fleet_layout
 
 NOTHING_RECORDED = 'Mission: nothing was recorded.'
 EXIT_NOTHING_DONE = 1
@@ -94,6 +95,11 @@ def run_mission(run: Run, config: Path, runs: Path, resume: Path | None = None) 
     if run.network:
         log.say('nodes of other machines are heard: see docs/security.md')
     log.say(f'watch it in a second terminal: {watch_command(run)}')
+    if robots := [part.robot for part in team if part.robot]:
+        layout = folder / 'fleet.rviz'
+        usual = (config / 'mission.rviz').read_text(encoding='utf-8')
+        layout.write_text(fleet_layout(usual, robots, run.namespace), encoding='utf-8')
+        log.say(f'or in RViz: rviz2 -d {_short(layout)}')
     outbox, tell = None, None
     if run.notify is not None:
         from surveillance_ontology.patrol_ontology import ROBOT
@@ -108,9 +114,8 @@ def run_mission(run: Run, config: Path, runs: Path, resume: Path | None = None) 
     alarm.close()
     if outbox is not None:
         outbox.close()
-    for part in team:
-        for line in what_to_look_at(part.folder(folder)):
-            log.plain(line)
+    for line in what_to_look_at(folder):
+        log.plain(line)
     log.close()
     # A service is stopped with its machine, and goes on with it.
     state.end(ended=supervisor.time_is_over or not is_service())
@@ -186,15 +191,17 @@ def _supervised(
 
 def what_to_look_at(folder: Path) -> list[str]:
     """Write the report of a run; return where it is, and how to replay the run."""
+    from surveillance_operator.recording.runs import robots_of
     from surveillance_operator.report import write_report
 
     lines = []
-    if summary(folder / RECORD) != NOTHING_RECORDED:
+    robots = robots_of(folder).values()
+    if any(summary(own / RECORD) != NOTHING_RECORDED for own in robots):
         try:
             lines.append(f'report: {_short(write_report(folder))}')
         except FileError as error:
             lines.append(f'report: {error}')
-    if (folder / TIMELINE).exists():
+    if any((own / TIMELINE).exists() for own in robots):
         lines.append(f'replay: {" ".join(COMMAND)} replay {shlex.quote(_short(folder))}')
     return lines
 

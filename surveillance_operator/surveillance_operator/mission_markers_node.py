@@ -88,7 +88,8 @@ def silent_of(snapshot: Snapshot) -> list[DiagnosticStatus]:
 def markers_of(snapshot: Snapshot, stamp: Any) -> MarkerArray:
     """Return places and doors as markers in the map frame.
 
-    A place's colour goes from `FRESH` to `LATE` as its wait comes near the threshold.
+    A place's colour goes from `FRESH` to `LATE` as its wait comes near the threshold. A robot that
+    has a namespace has its name above it.
     """
     found = [Marker(action=Marker.DELETEALL)]
     threshold = snapshot.threshold or 120.0
@@ -110,6 +111,11 @@ def markers_of(snapshot: Snapshot, stamp: Any) -> MarkerArray:
         door.text = name
         door.points = [Point(x=line[0], y=line[1]), Point(x=line[2], y=line[3])]
         found.append(door)
+    if snapshot.namespace and snapshot.pose is not None:
+        x, y, _ = snapshot.pose
+        own = _marker('robots', 0, Marker.TEXT_VIEW_FACING, (x, y, 0.8), (0, 0, 0.5), (1, 0.9, 0.4))
+        own.text = snapshot.namespace.rpartition('/')[2]
+        found.append(own)
     for each in found:
         each.header.frame_id, each.header.stamp = 'map', stamp
     return MarkerArray(markers=found)

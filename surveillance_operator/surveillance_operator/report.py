@@ -9,7 +9,8 @@ import json
 import math
 import sys
 import time
-from collections.abc import Iterable, Iterator, Sequence
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from html import escape
 from itertools import groupby, pairwise
@@ -19,7 +20,7 @@ from surveillance_behaviour.mission import mission_log
 from surveillance_behaviour.mission.mission_log import Event
 from surveillance_operator.map_command import facts, graph_over_doors, in_words, run_of
 from surveillance_operator.recording import bag
-from surveillance_operator.recording.runs import find_run, run_parser
+from surveillance_operator.recording.runs import find_run, robots_of, run_parser
 from surveillance_runtime.command_line import EXIT_BAD_INPUT
 from surveillance_runtime.files import INCIDENTS, PLACE, RECORD, RECORDING, FileError, replace_text
 from surveillance_runtime.place import read_place_file
@@ -48,10 +49,15 @@ svg{width:100%;height:2rem;display:block}
 def write_report(folder: Path) -> Path:
     """Write the report of a run into its folder; return its path.
 
+    That of a fleet leads to one for each robot, which are written, too.
+
     Raises:
         FileError: The run has no record, or it cannot be read.
     """
+    robots = robots_of(folder)
     with _one_line(folder):
+        if robots and '' not in robots:
+            return _write_fleet(folder, robots)
         events, plan, run = _material(folder)
         if not any(mission_log.summarize(events).visits.values()):
             raise FileError(f'no visit was recorded in {folder / RECORD}')
@@ -70,7 +76,13 @@ def draw_picture(folder: Path) -> Path | None:
         FileError: As for `write_report`.
     """
     with _one_line(folder):
-        _, plan, run = _material(folder)
+        robots = robots_of(folder)
+        if robots and '' not in robots:
+            plan, runs = _ways(folder, _records(robots)[0])
+            run = _together(runs)
+        else:
+            _, plan, alone = _material(folder)
+            run = alone or Run()
         if plan is None:
             return None
         path = folder / PICTURE
@@ -95,6 +107,167 @@ def _material(folder: Path) -> tuple[Sequence[Event], FloorPlan | None, Run | No
         return events, None, None
     plan = read_place_file(file).plan
     return events, plan, run_of(events, plan.place, str(folder / RECORD))
+
+
+def _write_fleet(folder: Path, robots: Mapping[str, Path]) -> Path:
+    """Write the report of several robots, and each one's own."""
+    records, problems = _records(robots)
+    if not any(event.name == 'visit' for events in records.values() for event in events):
+        raise FileError(f'no visit was recorded in {folder}')
+    plan, runs = _ways(folder, records)
+    links = {}
+    for robot, own in robots.items():
+        with contextlib.suppress(FileError):  # as of one that has visited nothing
+            links[robot] = f'{robot}/{write_report(own).name}'
+    drawn = _map(plan, _together(runs)) if plan is not None else ''
+    path = folder / NAME
+    replace_text(path, _fleet_page(folder, records, problems, drawn, links))
+    return path
+
+
+def _records(robots: Mapping[str, Path]) -> tuple[dict[str, Sequence[Event]], list[str]]:
+    """Return what happened to each robot, and what cannot be read."""
+    records: dict[str, Sequence[Event]] = {}
+    problems = []
+    for robot, own in robots.items():
+        try:
+            records[robot] = mission_log.read(own / RECORD)
+        except FileError as error:
+            records[robot] = ()
+            problems.append(f'{robot}: {error}')
+    return records, problems
+
+
+def _ways(
+    folder: Path, records: Mapping[str, Sequence[Event]]
+) -> tuple[FloorPlan | None, list[Run]]:
+    """Return the place of a fleet, and what each robot did there."""
+    if not (folder / PLACE).exists():
+        return None, []
+    plan = read_place_file(folder / PLACE).plan
+    runs = []
+    for robot, events in records.items():
+        try:
+            runs.append(run_of(events, plan.place, robot))
+        except FileError:  # nothing was recorded of it
+            runs.append(Run())
+    return plan, runs
+
+
+def _together(runs: Sequence[Run]) -> Run:
+    """Return what several robots did, for one picture."""
+    visits: Counter[str] = Counter()
+    recharges: Counter[str] = Counter()
+    for run in runs:
+        visits.update(run.visits)
+        recharges.update(run.recharges)
+    return Run(
+        driven=[way for run in runs for way in run.driven],
+        planned=[way for run in runs for way in run.planned],
+        failures=[point for run in runs for point in run.failures],
+        recharges=recharges,
+        visits=visits,
+        threshold=next((run.threshold for run in runs if run.threshold), None),
+        summary=f'{len(runs)} robots, {sum(visits.values())} visits',
+    )
+
+
+def _fleet_page(
+    folder: Path,
+    records: Mapping[str, Sequence[Event]],
+    problems: Sequence[str],
+    drawn: str,
+    links: Mapping[str, str],
+) -> str:
+    events = [event for own in records.values() for event in own]
+    begin, end = min(e.time for e in events), max(e.time for e in events)
+    summaries = {robot: mission_log.summarize(own) for robot, own in records.items()}
+    threshold = next((each.threshold for each in summaries.values() if each.threshold), None)
+    rows = []
+    for robot, summary in summaries.items():
+        name = escape(robot)
+        linked = f'<a href="{escape(links[robot])}">{name}</a>' if robot in links else name
+        told = in_words(summary) if records[robot] else 'nothing was recorded'
+        rows.append(f'<tr><td>{linked}</td><td>{escape(told)}</td></tr>')
+    lines = _one_time_line(records, begin)
+    table = _table(['at', 'robot', 'what', 'in words'], lines[-MOST_LINES:])
+    left_out = len(lines) - MOST_LINES
+    more = f'<p>The last {MOST_LINES}; {left_out} earlier ones: see {RECORD}.</p>'
+    body = [
+        f'<h1>Mission {escape(folder.name)}, {len(records)} robots</h1>',
+        *(f'<p class="late">{escape(each)}</p>' for each in problems),
+        f'<table><tbody>{"".join(rows)}</tbody></table>',
+        drawn,
+        '<h2>Idleness</h2>',
+        _idleness_of_all(records, summaries, threshold, begin, end),
+        f'<details open><summary>What happened ({len(lines)})</summary>{table}'
+        f'{more if left_out > 0 else ""}</details>',
+        _incidents(folder),
+    ]
+    return _document(folder, body)
+
+
+def _idleness_of_all(
+    records: Mapping[str, Sequence[Event]],
+    summaries: Mapping[str, mission_log.Summary],
+    threshold: float | None,
+    begin: float,
+    end: float,
+) -> str:
+    """Return how long each place waited for any robot, and how often each one visited it."""
+    times: dict[str, list[float]] = {}
+    for summary in summaries.values():
+        times |= {place: [] for place in summary.visits if place not in times}
+    for events in records.values():
+        for event in events:
+            if event.name == 'visit':
+                times.setdefault(event.text('place'), []).append(event.time)
+    rows = []
+    for place in sorted(times):
+        visits = sorted(times[place])
+        longest = max(after - before for before, after in pairwise([begin, *visits, end]))
+        late = threshold is not None and longest > threshold
+        by = ', '.join(
+            f'{robot} {summary.visits[place]}'
+            for robot, summary in summaries.items()
+            if summary.visits[place]
+        )
+        rows.append(
+            f'<tr><td>{escape(place)}</td><td class="n">{len(visits)}</td><td>{escape(by)}</td>'
+            f'<td class="n{" late" if late else ""}">{longest:.0f} s{" !" if late else ""}</td>'
+            f'<td class="w">{_strip(visits, threshold, begin, end)}</td></tr>'
+        )
+    return (
+        '<table><thead><tr><th>place</th><th class="n">visits</th><th>by</th>'
+        '<th class="n">longest unvisited</th>'
+        f'<th class="w">over the mission</th></tr></thead><tbody>{"".join(rows)}</tbody></table>'
+    )
+
+
+def _one_time_line(records: Mapping[str, Sequence[Event]], begin: float) -> list[list[str]]:
+    """Return what happened to all robots in one order; equal lines of a robot stand once."""
+    told: list[tuple[float, str, list[str]]] = []
+    for robot, events in records.items():
+        before: list[str] = []
+        for event in events:
+            if event.name not in _TOLD:
+                continue
+            head, words = _TOLD[event.name]
+            cells = [_cell(event.fields[head]), ', '.join(_cell(event.fields[k]) for k in words)]
+            line = [robot, f'{event.name} {cells[0]}', cells[1]]
+            if line != before:
+                told.append((event.time, robot, line))
+            before = line
+    return [[_clock(at - begin), *line] for at, _, line in sorted(told)]
+
+
+_TOLD = {
+    'visit': ('place', ()),
+    'decision': ('place', ('rule', 'reason')),
+    'recharge': ('place', ('seconds',)),
+    'failure': ('what', ('reason',)),
+}
+"""What stands in a fleet's time line: events, what each is of, and its words."""
 
 
 def _map(plan: FloorPlan, run: Run) -> str:
@@ -159,6 +332,11 @@ def _page(folder: Path, events: Sequence[Event], drawn: str, bound: float | None
         head = f'<summary>{title} ({number})</summary>'
         body.append(f'<details{opened}>{head}{table}</details>')
     body.append(_incidents(folder))
+    return _document(folder, body)
+
+
+def _document(folder: Path, body: Sequence[str]) -> str:
+    """Return the whole page."""
     made = time.strftime('%Y-%m-%d %H:%M')
     return (
         '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">'
@@ -316,13 +494,15 @@ def main(argv: Sequence[str] | None = None) -> int:
         if options.day is not None:
             from surveillance_operator.day_report import write_day  # its pictures take time
 
-            print(write_day(folder, options.day, blur=not options.sharp))
+            for own in robots_of(folder).values():
+                print(write_day(own, options.day, blur=not options.sharp))
             return 0
-        try:
-            for line in bag.repair(folder / RECORDING):
-                print(line)
-        except OSError as error:  # the report can do without
-            print(f'report: {folder / RECORDING}: cannot be repaired: {error.strerror}')
+        for own in robots_of(folder).values():
+            try:
+                for line in bag.repair(own / RECORDING):
+                    print(line)
+            except OSError as error:  # the report can do without
+                print(f'report: {own / RECORDING}: cannot be repaired: {error.strerror}')
         print(write_report(folder))
         if (picture := draw_picture(folder)) is not None:
             print(picture)

@@ -6,14 +6,18 @@ The page of a robot that is alone is that of a fleet of one; `test_page_states.p
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import io
 import json
 from collections.abc import Iterator
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+import yaml
+from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import PoseWithCovarianceStamped
 from rclpy.qos import QoSProfile
@@ -23,6 +27,7 @@ from std_srvs.srv import SetBool, Trigger
 
 from patrol_policy.world import Decision
 from state_machines.exceptions import CallError
+from surveillance_behaviour.mission.mission_log import MissionRecord
 from surveillance_interfaces.msg import DoorStates, FleetRobot, MissionStatus
 from surveillance_operator import fleet_feed, mission_feed
 from surveillance_operator.console_commands import answer, completions
@@ -30,8 +35,13 @@ from surveillance_operator.fleet_actions import WORDS, FleetActions
 from surveillance_operator.fleet_feed import FleetFeed
 from surveillance_operator.fleet_table import fleet_lines
 from surveillance_operator.frames import merged_events
+from surveillance_operator.mission_markers_node import markers_of
 from surveillance_operator.page.hub import Hub
 from surveillance_operator.page.server import Page
+from surveillance_operator.recording.runs import find_recordings
+from surveillance_operator.recording.timeline import TimelineWriter
+from surveillance_operator.replay import open_player
+from surveillance_operator.report import draw_picture, write_report
 from surveillance_operator.snapshot import (
     Event,
     Health,
@@ -46,6 +56,8 @@ from surveillance_operator.watch.view import MissionView
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.place.occupancy_grid import Grid
 from surveillance_runtime.qos import STATE_QOS
+from surveillance_runtime.rviz_layout import fleet_layout
+from tests.launcher.conftest import ROOT
 from tests.operator.browser import CHROMIUM, DESK, DRIVER, MISSING, PHONE, Viewer
 
 
@@ -301,6 +313,81 @@ def test_the_terminal_shows_the_robots_and_the_one_that_was_chosen() -> None:
         view = MissionView(FLEET['bert'], fleet=FLEET, robot='bert')
         Console(file=file, width=width, height=20).print(view)
         assert max(map(len, file.getvalue().splitlines())) <= width
+
+
+@pytest.fixture
+def fleet_run(tmp_path: Path) -> Path:
+    """Return what a run of two robots left, of which one began later."""
+    folder = tmp_path / '20260101-000000'
+    folder.mkdir()
+    (folder / 'place.yaml').write_text((ROOT / 'config' / 'seven_rooms.yaml').read_text())
+    for name, begin, place in (('anna', 0.0, 'R1'), ('bert', 50.0, 'R2')):
+        own = folder / name
+        own.mkdir()
+        writer = TimelineWriter(own / 'timeline.jsonl')
+        for second in range(30):
+            at = 1000.0 + begin + second
+            snapshot = replace(FLEET[name], now=at, pose=(float(second), 1.0, 0.0), number=second)
+            writer.add(snapshot, at)
+        writer.close()
+        with MissionRecord(own / 'mission.jsonl') as record:
+            places = ['C1', 'R1', 'R2']
+            record.write('start', begin, machine='surveillance', places=places, place='C1')
+            for n in range(3):
+                reason = f'{place} is for {name}'
+                at = begin + 20.0 * n
+                record.write('decision', at, place=place, rule='URGENT', reason=reason)
+                record.write('visit', begin + 20.0 * n + 5.0, place=place, distance=3.0)
+    return folder
+
+
+def test_the_report_of_a_fleet_has_all_robots_and_leads_to_each(fleet_run: Path) -> None:
+    text = write_report(fleet_run).read_text()
+    assert 'href="anna/report.html"' in text
+    assert (fleet_run / 'bert' / 'report.html').is_file()
+    assert 'bert 3' in text
+    assert text.count('<img class="map"') == 1
+    assert draw_picture(fleet_run) == fleet_run / 'report.png'
+    lines = text[text.index('What happened') :]
+    assert lines.index('R2 is for bert') > lines.index('R1 is for anna')
+    found = find_recordings(str(fleet_run), fleet_run.parent)
+    assert list(found) == ['anna', 'bert']
+    assert list(find_recordings('last', fleet_run.parent)) == ['anna', 'bert']
+
+
+def test_a_fleet_is_replayed_in_one_time(fleet_run: Path) -> None:
+    hub = Hub()
+    with contextlib.ExitStack() as stack:
+        player = open_player(find_recordings(str(fleet_run), fleet_run.parent), hub, stack)
+        assert player.length == 79.0, 'from the first one that begins to the last one that ends'
+        player.seek(60.0)
+
+        async def look() -> Any:
+            stream = hub.stream('bert')
+            await anext(stream)
+            return json.loads((await anext(stream)).removeprefix('data: '))
+
+        seen = asyncio.run(look())
+        assert seen['p']['pose'] == [10.0, 1.0, 0.0]
+        assert seen['r']['anna']['pose'] == [29.0, 1.0, 0.0]
+        assert seen['p']['replay']['at'] == 60.0
+        assert ['anna', 'anna begins'] in [each[1:] for each in seen['p']['events']]
+
+
+def test_rviz_shows_each_robot_in_a_group_of_its_own() -> None:
+    text = (ROOT / 'config' / 'mission.rviz').read_text()
+    layout = yaml.safe_load(fleet_layout(text, ['bert', 'anna'], 'house'))
+    displays = layout['Visualization Manager']['Displays']
+    assert displays[0]['Topic']['Value'] == '/house/map'
+    assert [each['Name'] for each in displays[1:]] == ['anna', 'bert']
+    planned = {
+        group['Name']: next(each for each in group['Displays'] if each['Name'] == 'Planned')
+        for group in displays[1:]
+    }
+    assert planned['anna']['Topic']['Value'] == '/house/anna/plan'
+    assert planned['anna']['Color'] != planned['bert']['Color']
+    (name,) = [each for each in markers_of(FLEET['anna'], Time()).markers if each.ns == 'robots']
+    assert name.text == 'anna'
 
 
 class Prompt:
