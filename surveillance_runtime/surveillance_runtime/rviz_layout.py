@@ -60,7 +60,7 @@ def _topic(display: dict[str, Any]) -> dict[str, Any]:
 
 
 def _is_shared(display: dict[str, Any]) -> bool:
-    name = _topic(display)['Value'].strip('/')
+    name = str(_topic(display)['Value']).strip('/')
     return name_for('robot', name) == name
 
 
