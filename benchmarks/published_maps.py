@@ -13,6 +13,7 @@ reach.
 from __future__ import annotations
 
 import argparse
+import contextlib
 import json
 import sys
 import tempfile
@@ -116,7 +117,8 @@ def main() -> int:
             seconds = time.perf_counter() - begun
             rows_, columns = read_map(path).cells.shape
             rooms = read_place_file(place).plan.place.rooms
-            run = patrolled(place, 60.0 * (2.0 if options.quick else options.minutes))
+            with contextlib.chdir(folder):  # a map's file is named as seen from the place's
+                run = patrolled(place, 60.0 * (2.0 if options.quick else options.minutes))
         rows.append(
             (
                 name,

@@ -14,7 +14,7 @@ import contextlib
 import math
 import random
 import threading
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 from patrol_policy.battery import Battery, ChargeCurve
@@ -47,6 +47,7 @@ from surveillance_behaviour.fleet import FleetKnowledge, share_of
 from surveillance_behaviour.ports import Ontology, Places, Point, UnknownPlaceError
 from surveillance_ontology.patrol_ontology import Snapshot
 from surveillance_runtime.place.patrol_rules import PatrolRules
+from surveillance_runtime.place.stations import Station
 from surveillance_runtime.suggestions import nearest
 
 LOOK_AGAIN = 1.0
@@ -73,9 +74,8 @@ class WorldModel:
         rules: What holds for single places.
         tell: Told what can be kept of the places, at the start and when that changes.
         promise: Given the same for each place, whenever what it rests on changes.
-        stations: Where the stations are, by their places: x, y, metres.
-        rates: How fast stations charge, by their places, percent per second: what is taken for
-            true until it was seen.
+        stations: The stations by their places; how fast one charges is taken for true until it was
+            seen.
         fleet: The robots that share the patrol; None: this one is alone.
         settle: Waits until what was published is heard, so that two robots that want the same at
             the same moment know it of each other.
@@ -103,11 +103,10 @@ class WorldModel:
         elapsed: Callable[[], float] | None = None,
         rules: PatrolRules | None = None,
         tell: Callable[[str], None] = lambda sentence: None,
-        rates: Mapping[str, float] | None = None,
+        stations: Mapping[str, Station] | None = None,
         fleet: FleetKnowledge | None = None,
         settle: Callable[[Interrupt], None] = lambda interrupt: None,
         promise: Callable[[tuple[Promise, ...]], None] = lambda found: None,
-        stations: Mapping[str, Sequence[float]] | None = None,
     ) -> None:
         self.settings = settings
         self.fleet = fleet
@@ -141,9 +140,8 @@ class WorldModel:
         self._rules = rules or PatrolRules()
         self._tell = tell
         self._promise = promise
-        self._stations = stations or {}
+        self.take_stations(stations or {})
         self.promised: tuple[Promise, ...] = ()
-        self._curves = {place: ChargeCurve.even(rate) for place, rate in (rates or {}).items()}
         self._told: dict[str, str] = {}
         self._told_about: object = None
         self._announce = announce
@@ -151,6 +149,15 @@ class WorldModel:
         self._checked_threshold: object = None
         self._checked_seconds = 0.0
         self._checked_rules: tuple[str, ...] = ()
+
+    def take_stations(self, stations: Mapping[str, Station]) -> None:
+        """Take where the stations are, and how fast they charge."""
+        self._stations = dict(stations)
+        self._curves = {
+            place: ChargeCurve.even(station.rate / 60.0)
+            for place, station in stations.items()
+            if station.rate
+        }
 
     def take_rules(self, rules: PatrolRules) -> None:
         """Take what holds for single places, and ask for the places' points anew."""
@@ -177,8 +184,8 @@ class WorldModel:
     def _approaches(self) -> dict[str, float]:
         """Return the seconds from the points of recharge rooms to their stations."""
         return {
-            place: math.dist(self._positions[place][:2], pose[:2]) / self.settings.speed
-            for place, pose in self._stations.items()
+            place: math.dist(self._positions[place][:2], station.pose[:2]) / self.settings.speed
+            for place, station in self._stations.items()
             if place in self._positions
         }
 

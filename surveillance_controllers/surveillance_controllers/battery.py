@@ -225,6 +225,10 @@ class BatteryInUse:
         # When the arm moves: since when that was not counted yet, and until when.
         self._arm_moves = 0.0, 0.0
 
+    def take_stations(self, stations: Mapping[str, Station]) -> None:
+        """Take where the stations are from now on."""
+        self._stations = stations
+
     @property
     def docked(self) -> bool:
         """Whether the robot stands at a station."""

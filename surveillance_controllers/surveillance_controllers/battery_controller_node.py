@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Any, TextIO
 
@@ -42,6 +42,8 @@ from surveillance_runtime.conversions import (
 )
 from surveillance_runtime.incidents import Severity
 from surveillance_runtime.node import PatrolNode
+from surveillance_runtime.place.stations import stations_in
+from surveillance_runtime.place_changes import follow_place
 from surveillance_runtime.process import run_node
 from surveillance_runtime.qos import SENSOR_QOS
 from surveillance_runtime.state_file import StateFile
@@ -209,6 +211,7 @@ class RobotBattery:
         self._low_below = settings.require_recharge
         self._stations = settings.stations
         self._use = BatteryInUse(battery, settings.stations, settings.dock_reach, since)
+        follow_place(node, self._take_place)
         self._driver: DrivenBattery | None = None
         self._states: OwnedTopic[BatteryState] | None = None
         self._begun = self._wait.elapsed()
@@ -248,6 +251,11 @@ class RobotBattery:
             owner='simulator',
         )
         node.create_timer(settings.update_period, self._update)
+
+    def _take_place(self, described: Mapping[str, Any]) -> None:
+        """Take the stations of a place that was changed."""
+        self._stations = stations_in(described)
+        self._use.take_stations(self._stations)
 
     def why_not_charging(self, asked_at: float) -> str | None:
         """Say why the battery cannot charge now, as was asked at a time, s; None when it can."""

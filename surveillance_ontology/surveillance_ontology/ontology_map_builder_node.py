@@ -47,7 +47,7 @@ from surveillance_runtime.parameters import ParameterError
 from surveillance_runtime.place import Place, PlaceError, described_place, description_of
 from surveillance_runtime.place.patrol_rules import patrol_rules
 from surveillance_runtime.place.rooms import place_from
-from surveillance_runtime.place.stations import AT_STATION, described_stations, stations_of
+from surveillance_runtime.place.stations import AT_STATION, described_stations, stations_in
 from surveillance_runtime.place.zones import zones_from
 from surveillance_runtime.place_changes import TOPIC, described_in_text
 from surveillance_runtime.process import run_node
@@ -261,10 +261,12 @@ class OntologyMapBuilder(PatrolNode):
             wanted = checked_names(place_from(described))
             patrol_rules(described, wanted.rooms)
             zones_from(described)
-            if stations_of(described, wanted.positions, wanted.start) != self._stations:
+            stations = stations_in(described)
+            if self._fleet and stations != self._stations:
                 raise PlaceError(
                     ('stations',),
-                    'are read at the start: expected them as they were; start the mission again',
+                    'of a fleet are read at the start: expected them as they were; start the '
+                    'mission again',
                 )
         except ValueError as error:
             response.answer = str(error)
@@ -276,6 +278,7 @@ class OntologyMapBuilder(PatrolNode):
         response.answer = await self._work.run(lambda: self._keeper.edit(change))
         response.accepted = not response.answer
         if response.accepted:
+            self._stations = stations
             rooms, doors = len(wanted.rooms), len(wanted.doors)
             response.answer = f'the mission has the place now: {rooms} rooms, {doors} doors'
             self._tell_place(request.line)
@@ -302,7 +305,7 @@ class OntologyMapBuilder(PatrolNode):
         try:
             kept = json.loads(self._place_file.read_text('utf-8'))
             if kept['described'] == self._given:
-                described_in_text(kept['text'])
+                self._stations = stations_in(described_in_text(kept['text']))
                 self._tell_place(kept['text'])
         except (OSError, ValueError, KeyError, TypeError) as error:
             self.get_logger().warn(f'the changed place that was kept is not used: {error!r:.120}')

@@ -221,6 +221,17 @@ PARTS: Mapping[str, tuple[tuple[str, ...], Callable[[Snapshot], Any]]] = {
             for name in sorted({*(s.doors or {}), *s.door_lines})
         },
     ),
+    'zones': (
+        ('zones',),
+        lambda s: {
+            name: {'corners': [list(corner) for corner in zone.corners], 'speed': zone.speed}
+            for name, zone in s.zones.items()
+        },
+    ),
+    'stations': (
+        ('stations',),
+        lambda s: {room: [round(v, 3) for v in pose] for room, pose in s.stations.items()},
+    ),
     'pose': (('pose',), lambda s: None if s.pose is None else [round(v, 3) for v in s.pose]),
     'others': (
         ('others',),

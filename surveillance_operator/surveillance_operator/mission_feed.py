@@ -16,6 +16,7 @@ from typing import Any
 
 from geometry_msgs.msg import PoseWithCovarianceStamped
 from rcl_interfaces.srv import GetParameters, ListParameters
+from rclpy.parameter import parameter_value_to_python
 from rclpy.qos import QoSCompatibility, qos_check_compatible
 from rosgraph_msgs.msg import Clock as ClockMessage
 
@@ -43,6 +44,9 @@ from surveillance_runtime.diagnostics import STALE_AFTER
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.node_table import name_for
 from surveillance_runtime.place.floor_plan import Door
+from surveillance_runtime.place.rooms import ZONE_TABLES, PlaceError, nested
+from surveillance_runtime.place.stations import stations_in
+from surveillance_runtime.place.zones import Zone, zones_from
 from surveillance_runtime.place_changes import follow_place
 from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
 
@@ -325,27 +329,35 @@ class _Facts:
         planner, behaviour = name_for(robot, PLANNER), name_for(robot, BEHAVIOUR)
         self._list = ServiceCaller(node, ListParameters, f'{planner}/list_parameters')
         self._get = ServiceCaller(node, GetParameters, f'{planner}/get_parameters')
+        self._list_stations = ServiceCaller(node, ListParameters, f'{BUILDER}/list_parameters')
+        self._get_stations = ServiceCaller(node, GetParameters, f'{BUILDER}/get_parameters')
         self._get_behaviour = ServiceCaller(node, GetParameters, f'{behaviour}/get_parameters')
         follow_place(node, self._take_place)
         self._armor: ArmorClient | None = None
         self._places: set[str] = set()
         self._without_position: set[str] = set()
         of_robot = (self._ask_doors, self._ask_behaviour)
-        self._questions = of_robot if robot else (*of_robot, self._ask_reference)
+        shared = (self._ask_reference, self._ask_stations)
+        self._questions = of_robot if robot else (*of_robot, *shared)
         self._asks_places = not robot
+        self._changed = False
         self._unanswered = set(self._questions)
         self._asking = False
 
     def _take_place(self, described: Mapping[str, Any]) -> None:
-        """Take doors and points of a place that was changed."""
+        """Take doors, zones, stations and points of a place that was changed."""
         lines = {
             name: Door(name, *row).segment for name, row in (described.get('doors') or {}).items()
         }
+        zones, stations = _zones_of(described), _poses_of(described)
         self._without_position |= self._places
-        self._update(lambda old: replace(old, door_lines=lines))
+        # From now on the nodes' parameters are those of the place as it was.
+        self._changed = True
+        self._update(lambda old: replace(old, door_lines=lines, zones=zones, stations=stations))
 
     def forget(self) -> None:
         """Ask anew: another mission may have another map."""
+        self._changed = False
         self._unanswered = set(self._questions)
         self._without_position = set(self._places)
 
@@ -398,18 +410,40 @@ class _Facts:
                 self._update(_with_position(place, point_from(answer.position)))
 
     async def _ask_doors(self) -> None:
-        listed = await self._list.call_async(ListParameters.Request(prefixes=['doors']), TIMEOUT)
+        request = ListParameters.Request(prefixes=['doors', *ZONE_TABLES])
+        listed = await self._list.call_async(request, TIMEOUT)
         names = ['execution_mode', *listed.result.names]
         values = (await self._get.call_async(GetParameters.Request(names=names), TIMEOUT)).values
         if len(values) != len(names):
             raise CallError(f'{PLANNER} gave {len(values)} of {len(names)} parameters')
+        found = nested(
+            dict(zip(names[1:], map(parameter_value_to_python, values[1:]), strict=True))
+        )
         lines = {
-            name.removeprefix('doors.'): Door(name, *value.double_array_value).segment
-            for name, value in zip(names[1:], values[1:], strict=True)
-            if len(value.double_array_value) == 4
+            name: Door(name, *row).segment
+            for name, row in (found.get('doors') or {}).items()
+            if row is not None and len(row) == 4
         }
-        mode = values[0].string_value
-        self._update(lambda old: replace(old, mode=mode, door_lines=lines))
+        mode, zones = values[0].string_value, _zones_of(found)
+        if self._changed:
+            self._update(lambda old: replace(old, mode=mode))
+        else:
+            self._update(lambda old: replace(old, mode=mode, door_lines=lines, zones=zones))
+
+    async def _ask_stations(self) -> None:
+        """Ask who answers for the places' points where the stations are."""
+        request = ListParameters.Request(prefixes=['stations'])
+        listed = await self._list_stations.call_async(request, TIMEOUT)
+        names = ['recharge_rooms', 'station', *listed.result.names]
+        answer = await self._get_stations.call_async(GetParameters.Request(names=names), TIMEOUT)
+        if len(answer.values) != len(names):
+            raise CallError(f'{BUILDER} gave {len(answer.values)} of {len(names)} parameters')
+        given = dict(zip(names, map(parameter_value_to_python, answer.values), strict=True))
+        single = {name: given.pop(name) for name in names[:2]}
+        table = nested(nested(given).get('stations', {}))
+        stations = _poses_of({**single, 'stations': table})
+        if not self._changed:
+            self._update(lambda old: replace(old, stations=stations))
 
     async def _ask_behaviour(self) -> None:
         names = ['urgency_threshold', 'policy']
@@ -469,6 +503,31 @@ class _OtherRobots:
                 with contextlib.suppress(ValueError):
                     came[robot] = pose_from(newest[0].pose.pose)
         return came
+
+
+def _zones_of(described: Mapping[str, Any]) -> dict[str, Zone]:
+    """Return the zones of a place, by name; none where they are not sound."""
+    tables = {
+        table: {name: list(row or ()) for name, row in (described.get(table) or {}).items()}
+        for table in ZONE_TABLES
+    }
+    try:
+        zones = zones_from(tables)
+    except PlaceError:
+        return {}
+    return {**zones.keep_out, **zones.slow}
+
+
+def _poses_of(described: Mapping[str, Any]) -> dict[str, Pose]:
+    """Return the poses of a place's stations; none where they are not sound."""
+    try:
+        return {
+            room: station.pose
+            for room, station in stations_in(described).items()
+            if room and (described.get('station') or described.get('stations'))
+        }
+    except PlaceError:
+        return {}
 
 
 def _mismatch(reason: str) -> str:

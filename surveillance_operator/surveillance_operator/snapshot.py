@@ -19,6 +19,7 @@ from patrol_policy.promises import Promise
 from patrol_policy.world import Decision
 from surveillance_runtime.place.floor_plan import Segment
 from surveillance_runtime.place.occupancy_grid import Grid
+from surveillance_runtime.place.zones import Zone
 
 NO_POINTS: NDArray[np.float64] = np.empty((0, 2))
 TRAIL_STEP = 0.1
@@ -204,6 +205,8 @@ class Snapshot:
         links: Pairs of places that are joined by an open door.
         doors: Whether each door is open.
         door_lines: The doors' openings: x1, y1, x2, y2, metres.
+        zones: Where the robot never drives, and where it drives slowly, by name.
+        stations: The charging stations' poses by their rooms.
         visited_at: When each place was visited last, seconds of the mission's time; 0: never yet.
         urgent: The places that the ontology has as URGENT.
         pose: Where the robot is.
@@ -257,6 +260,8 @@ class Snapshot:
     links: frozenset[tuple[str, str]] = frozenset()
     doors: Mapping[str, bool] | None = None
     door_lines: Mapping[str, Segment] = field(default_factory=dict)
+    zones: Mapping[str, Zone] = field(default_factory=dict)
+    stations: Mapping[str, Pose] = field(default_factory=dict)
     visited_at: Mapping[str, float] = field(default_factory=dict)
     urgent: frozenset[str] = frozenset()
     pose: Pose | None = None

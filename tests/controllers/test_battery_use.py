@@ -109,3 +109,14 @@ def test_a_clock_that_goes_back_takes_nothing() -> None:
     before = battery.energy
     use.advance(2.0)
     assert battery.energy == before
+
+
+def test_a_station_that_was_moved_charges_where_it_is_now() -> None:
+    use = in_use()[1]
+    use.see_pose((1.0, 0.0, 0.0), 0.0)
+    assert use.docked
+    use.take_stations({'C': Station((7.0, 0.0, 0.0))})
+    assert not use.docked
+    assert '(7.00, 0.00)' in (use.why_not_charging() or '')
+    use.see_pose((7.0, 0.0, 0.0), 1.0)
+    assert use.docked

@@ -380,12 +380,16 @@ def test_a_place_that_was_changed_is_taken_told_and_kept(
         ({'map': {}}, 'map: expected rooms'),
         ({'hours': {'R2': 'noon'}}, 'hours.R2: '),
         ({'keep_out_zones': {'Z': [1]}}, 'keep_out_zones.Z: '),
-        ({'station': [3.0, 3.0, 0.0]}, 'stations: are read at the start'),
+        ({'station': [3.0]}, 'station: '),
     ):
         refused = call('set_place', line=description_text({**described, **change}))
         assert not refused.accepted
         assert words in refused.answer
     assert 'expected a JSON object' in call('set_place', line='[1]').answer
+    # The station has moved.
+    described['station'] = [3.0, 3.0, 0.0]
+    assert call('set_place', line=description_text(described)).accepted
+    assert call('room_position', room_name='E/station').position.x == 3.0
     # A builder that is started again tells it again.
     graph.remove(builder)
     told.clear()

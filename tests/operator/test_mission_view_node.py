@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from functools import partial
 from typing import Any
 
@@ -18,6 +19,7 @@ from std_msgs.msg import Bool, UInt8
 
 from surveillance_interfaces.action import FollowPath
 from surveillance_interfaces.msg import Decision, DoorStates, MissionStatus
+from surveillance_interfaces.srv import ConsoleCommand
 from surveillance_ontology.armor_server_node import ArmorServer
 from surveillance_ontology.ontology_map_builder_node import OntologyMapBuilder
 from surveillance_operator import mission_feed, mission_view_node
@@ -42,7 +44,8 @@ class Planner(PatrolNode):
     def __init__(self, **options: Any) -> None:
         super().__init__('planner_controller', **options)
         self.parameter('execution_mode', 'SIMULATED', 'Mode.')
-        self.parameters_under('doors')
+        for table in ('doors', 'keep_out_zones', 'slow_zones'):
+            self.parameters_under(table)
 
 
 @pytest.fixture(autouse=True)
@@ -67,6 +70,32 @@ def test_what_a_peer_says_commands_no_terminal(graph: Any, monkeypatch: pytest.M
     told = r'in \x1b[2J, heading for E\nlaunch | forged'
     graph.until(lambda: any(told in line for line in printed))
     assert publisher is not None
+
+
+def test_zones_and_stations_follow_a_changed_place(graph: Any) -> None:
+    graph.add(ArmorServer)
+    graph.add(OntologyMapBuilder, parameters={**PLACE, 'station': [1.0, 2.0, 0.5]})
+    zone = [0.0, 0.0, 1.0, 0.0, 1.0, 1.0]
+    graph.add(Planner, parameters={'keep_out_zones.K': zone, 'slow_zones.S': [0.3, *zone]})
+    view = graph.add(MissionViewNode)
+    graph.until(lambda: view.snapshot.stations == {'A': (1.0, 2.0, 0.5)})
+    graph.until(lambda: {'K', 'S'} == set(view.snapshot.zones))
+    assert view.snapshot.zones['S'].speed == 0.3
+    described = {
+        'map': {'A': ['D'], 'B': ['D']},
+        'room_positions': {'A': [1.0, 1.0], 'B': [5.0, 1.0]},
+        'robot_room': 'A',
+        'recharge_rooms': ['B'],
+        'station': [5.0, 2.0, 0.0],
+        'slow_zones': {'S': [0.2, *zone]},
+    }
+    command = graph.node.create_client(ConsoleCommand, 'ontology_map/set_place')
+    graph.until(command.service_is_ready)
+    asked = command.call_async(ConsoleCommand.Request(line=json.dumps(described)))
+    graph.until(asked.done)
+    assert asked.result().accepted, asked.result().answer
+    graph.until(lambda: view.snapshot.stations == {'B': (5.0, 2.0, 0.0)})
+    assert {name: zone.speed for name, zone in view.snapshot.zones.items()} == {'S': 0.2}
 
 
 def test_it_gathers_what_topics_ontology_and_parameters_tell(graph: Any) -> None:

@@ -22,6 +22,7 @@ from surveillance_operator.snapshot import (
     Transition,
 )
 from surveillance_runtime.place.occupancy_grid import Grid
+from surveillance_runtime.place.zones import Zone
 from tests.operator.browser import CHROMIUM, DESK, DRIVER, MISSING, PHONE, Viewer
 
 pytestmark = [
@@ -155,6 +156,23 @@ def test_every_state_is_readable_everywhere(name: str, hub: Hub, viewer: Viewer)
         if name != 'large':  # whose hundreds of equal rooms the checker takes a minute for
             assert viewer.axe() == []
     assert viewer.driver.get_log('browser') == []
+
+
+def test_zones_and_stations_are_drawn_and_drawn_anew(hub: Hub, viewer: Viewer) -> None:
+    zones = {
+        'K1': Zone('K1', ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0))),
+        'S1': Zone('S1', ((2.0, 0.0), (3.0, 0.0), (3.0, 1.0)), 0.3),
+    }
+    shown = replace(STATES['large'], zones=zones, stations={'R1': (1.0, 1.5, 0.0)})
+    hub.show(shown)
+    viewer.until(lambda: viewer.count('#map [data-zone]') == 2)
+    assert viewer.text('#map [data-zone=S1] title') == 'S1: at most 0.3 m/s'
+    assert viewer.js(
+        'return document.querySelector("#map [data-zone=K1]").getAttribute("d")'
+    ).startswith('M0 0L1 0L1 -1')
+    hub.show(replace(shown, zones={}, stations={'R2': (3.0, 1.5, 0.0)}))
+    viewer.until(lambda: not viewer.count('#map [data-zone]'))
+    viewer.until(lambda: viewer.count('#map [data-station=R2]') == 1)
 
 
 def test_what_is_empty_says_so(hub: Hub, viewer: Viewer) -> None:

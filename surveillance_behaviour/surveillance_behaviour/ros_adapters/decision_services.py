@@ -31,7 +31,7 @@ from surveillance_interfaces.srv import GoTo, WhyNot
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.parameters import parameter
 from surveillance_runtime.place.patrol_rules import described_patrol_rules, patrol_rules
-from surveillance_runtime.place.stations import Station, described_stations
+from surveillance_runtime.place.stations import Station, described_stations, stations_in
 from surveillance_runtime.place_changes import follow_place
 from surveillance_runtime.state_topics import OwnedTopic
 from surveillance_runtime.waiting import AwaitedWork
@@ -126,14 +126,26 @@ def world_model_of(
         elapsed,
         rules,
         lambda sentence: log.info(sentence),
-        {place: station.rate / 60.0 for place, station in stations.items() if station.rate},
+        stations,
         fleet,
         settle,
         promise,
-        {place: station.pose for place, station in stations.items()},
     )
     world_model.learn_draw(elapsed)
-    follow_place(node, lambda described: world_model.take_rules(patrol_rules(described)))
+
+    def take_place(described: Mapping[str, Any]) -> None:
+        """Take the rules and the stations of a place that was changed."""
+        world_model.take_rules(patrol_rules(described))
+        found = stations_in(described)
+        stations.clear()
+        stations.update(found)
+        world_model.take_stations(found)
+        rooms = [str(each) for each in described.get('recharge_rooms') or ()]
+        if rooms != list(settings.recharge_rooms):
+            kind = Parameter.Type.STRING_ARRAY
+            node.set_parameters([Parameter('recharge_rooms', kind, rooms)])
+
+    follow_place(node, take_place)
     return world_model
 
 

@@ -14,6 +14,7 @@ from __future__ import annotations
 import math
 import threading
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from itertools import pairwise
 from typing import Any
 
@@ -45,7 +46,8 @@ from surveillance_controllers.motion.place_recording import PlaceRecorder
 from surveillance_runtime.conversions import pose_from, pose_message, seconds_of
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.parameters import ParameterError
-from surveillance_runtime.place.stations import station_at
+from surveillance_runtime.place.stations import station_at, stations_in
+from surveillance_runtime.place_changes import follow_place
 from surveillance_runtime.state_topics import StateSubscription
 
 SPACING = 1.5
@@ -252,6 +254,11 @@ class DockingMotion:
         self._docker = GoalCaller(node, self._dock, 'dock_robot')
         self._undocker = GoalCaller(node, self._undock, 'undock_robot')
         self._docked = False
+        follow_place(node, self._take_place)
+
+    def _take_place(self, described: Mapping[str, Any]) -> None:
+        """Take the stations of a place that was changed."""
+        self._settings = replace(self._settings, stations=stations_in(described))
 
     def follow(self, path: Points, run: GoalRun, report: Callable[[Points], None]) -> Points:
         """Undocks where that is needed, drives, and docks where the way ends at a station.

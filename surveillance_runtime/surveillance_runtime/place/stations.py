@@ -105,6 +105,17 @@ def stations_of(
     return {home: Station((x, y, 0.0))}
 
 
+def stations_in(described: Mapping[str, Any]) -> dict[str, Station]:
+    """Return the stations of all of a place's parameters.
+
+    Raises:
+        PlaceError: As `stations_of`.
+    """
+    positions = described.get('room_positions') or {}
+    start = str(described.get('robot_room') or next(iter(positions), ''))
+    return stations_of(described, positions, start)
+
+
 def _station(room: str, entry: Any, positions: Mapping[str, Any]) -> Station:
     where = ('stations', room)
     if positions and room not in positions:

@@ -86,7 +86,7 @@ function present() {
 }
 
 const MOST_TRAIL = 600;
-const MAP_PARTS = ['status', 'grid', 'places', 'regions', 'links', 'doors', 'plan', 'scan', 'obstacles', 'pose', 'trail', 'mission', 'markers', 'others', 'promises', 'robots'];
+const MAP_PARTS = ['status', 'grid', 'places', 'regions', 'links', 'doors', 'plan', 'scan', 'obstacles', 'pose', 'trail', 'mission', 'markers', 'others', 'promises', 'robots', 'zones', 'stations'];
 const SHOW = {
   present: [['grid', 'places', 'machine', 'mission', 'health'], present],
   fleet: [['robots', 'doing', 'shares', 'out', 'troubles', 'battery', 'decision', 'stopped', 'active', 'mission'], () => fleet.show()],

@@ -1,7 +1,9 @@
 // The map: what the robot knows of the place, and what it does there. Metres; y points up.
 import {s, colour, names, short, shown, wait} from './dom.js';
 
-const LAYERS = ['regions', 'grid', 'links', 'driven', 'plans', 'plan', 'doors', 'lidar', 'obstacles', 'markers', 'places', 'others', 'fleet', 'robot'];
+const LAYERS = ['regions', 'grid', 'zones', 'links', 'driven', 'plans', 'plan', 'doors', 'lidar', 'obstacles', 'markers', 'stations', 'places', 'others', 'fleet', 'robot'];
+// A dock, open to the side that the robot comes from.
+const STATION = 'M.25 -.3H-.3V.3H.25';
 const ROBOT = 'M.55 0L-.35 .38L-.15 0L-.35 -.38Z';
 
 const line = (points) => points.map(([x, y], i) => `${i ? 'L' : 'M'}${x} ${-y}`).join('');
@@ -42,6 +44,8 @@ export class MapView {
     if (came('scan')) this.lidar.setAttribute('d', (state.scan ?? []).map(([x, y]) => `M${x} ${-y}h0`).join(''));
     if (came('obstacles')) this.drawObstacles(state.obstacles);
     if (came('markers', 'grid')) this.drawMarkers(state.markers?.at);
+    if (came('zones')) this.drawZones(state.zones);
+    if (came('stations')) this.drawStations(state.stations);
     if (came('others')) this.drawOthers(state.others);
     if (came('pose', 'robots') || (came('status') && !state.pose)) this.drawRobot(state);
     if (came('robots', 'pose', 'status')) this.drawFleet(robots, state.places);
@@ -130,6 +134,20 @@ export class MapView {
     this.layers.markers.replaceChildren(...Object.entries(at ?? {}).flatMap(([id, [x, y]]) => [
       s('rect', {class: 'tag', x: x - .17, y: -y - .17, width: .34, height: .34, 'data-marker': id}, s('title', {}, `marker ${id}`)),
       s('text', {class: 'tag', x, y: y > this.top - .7 ? -y + .65 : -y - .3}, id)]));
+  }
+
+  drawZones(zones) {
+    this.layers.zones.replaceChildren(...Object.entries(zones ?? {}).map(([name, {corners, speed}]) => s('path', {
+      class: speed === null ? 'zone keep_out' : 'zone slow', d: `${line(corners)}Z`, 'data-zone': name},
+    s('title', {}, speed === null ? `${name}: kept out of` : `${name}: at most ${speed} m/s`))));
+  }
+
+  drawStations(stations) {
+    this.layers.stations.replaceChildren(...Object.entries(stations ?? {}).map(([room, pose]) => {
+      const station = s('path', {class: 'station', d: STATION, 'data-station': room}, s('title', {}, `charging station of ${room}`));
+      placeAt(station, pose);
+      return station;
+    }));
   }
 
   drawOthers(others) {
