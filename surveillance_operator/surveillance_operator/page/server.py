@@ -75,6 +75,7 @@ class Page:
         token: What gives access; one is made unless given.
         replay: Whether a recording is shown: then anybody who may look may move in time.
         front: The document at the address itself, a file of `static`.
+        longest: Bytes of the longest request of an action that may have more than others.
         report: Told one line about a request that failed, and about what was no request of HTTP;
             keep the number of lines small, anybody can send them.
 
@@ -97,6 +98,7 @@ class Page:
         token: str = '',
         replay: bool = False,
         front: str = 'index.html',
+        longest: Mapping[str, int] | None = None,
         report: Callable[[str], Any] = lambda _: None,
     ) -> None:
         self._hub = hub
@@ -105,6 +107,7 @@ class Page:
         self._evidence_of = evidence
         self._replay = replay
         self._front = front
+        self._longest = longest or {}
         self.token = token or secrets.token_urlsafe(24)
         self._socket = _bound(host, port)
         self.port: int = self._socket.getsockname()[1]
@@ -211,6 +214,7 @@ class Page:
             'kind': kind,
             'control': int(may_act),
             'edit': int(may_edit),
+            'imports': int(may_edit and 'import_map' in self._actions),
             'watch': int('sightings' in self._questions),
         }
         attributes = ' '.join(f'data-{name}="{value}"' for name, value in shown.items())
@@ -256,13 +260,14 @@ class Page:
         if not self._replay and not self._has_token(request):
             text = 'refused: open the address with the token that the mission printed'
             return JSONResponse({'ok': False, 'text': text}, 403)
-        body = b''
+        body = bytearray()
+        longest = self._longest.get(request.path_params['name'], LONGEST_BODY)
         async for chunk in request.stream():
             body += chunk
-            if len(body) > LONGEST_BODY:
+            if len(body) > longest:
                 return JSONResponse({'ok': False, 'text': 'the request is too long'}, 413)
         try:
-            given = parse_json(body or b'{}')
+            given = parse_json(bytes(body) or b'{}')
         except ValueError:
             given = None
         if not isinstance(given, dict):

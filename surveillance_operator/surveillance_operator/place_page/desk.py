@@ -33,15 +33,21 @@ class PlaceDesk:
     """Lets any number of browsers edit one place, one change after the other.
 
     Args:
-        editor: The place.
+        editor: The place; None: none is open yet.
         on_saved: Told when the file was written; returns what else there is to say.
+        import_map: Makes a place of files that were dropped, and opens it; returns what was found;
+            None: the place that is open stays.
     """
 
     def __init__(
-        self, editor: PlaceEditor, on_saved: Callable[[PlaceEditor], str] = lambda _: ''
+        self,
+        editor: PlaceEditor | None,
+        on_saved: Callable[[PlaceEditor], str] = lambda _: '',
+        import_map: Callable[..., tuple[PlaceEditor, str]] | None = None,
     ) -> None:
-        self._editor = editor
+        self._open = editor
         self._on_saved = on_saved
+        self._import_map = import_map
         self._lock = threading.Lock()
 
     @property
@@ -52,19 +58,44 @@ class PlaceDesk:
     @property
     def actions(self) -> dict[str, Action]:
         """What whoever may act can do, by name."""
-        editor = self._editor
-        return {
-            'edit': lambda operation, fields: self._done(lambda: editor.apply(operation, fields)),
+        actions: dict[str, Action] = {
+            'edit': lambda operation, fields: self._done(
+                lambda: self._editor.apply(operation, fields)
+            ),
             'check_edit': self._check,
-            'undo_edit': lambda: self._done(editor.undo),
-            'redo_edit': lambda: self._done(editor.redo),
-            'reload_place': lambda: self._done(editor.reload),
+            'undo_edit': lambda: self._done(lambda: self._editor.undo()),
+            'redo_edit': lambda: self._done(lambda: self._editor.redo()),
+            'reload_place': lambda: self._done(lambda: self._editor.reload()),
             'save_place': lambda: self._done(self._save),
         }
+        if self._import_map is not None:
+            actions['import_map'] = self._import
+        return actions
+
+    @property
+    def _editor(self) -> PlaceEditor:
+        if self._open is None:
+            raise ValueError('no place is open yet: drop a map on the page')
+        return self._open
 
     def _place(self) -> dict[str, Any]:
         with self._lock:
-            return {'ok': True, 'place': shown(self._editor)}
+            return {'ok': True, 'place': None if self._open is None else shown(self._open)}
+
+    def _import(
+        self, files: Mapping[str, Any], resolution: str = '', level: str = ''
+    ) -> dict[str, Any]:
+        make = self._import_map
+        if make is None or not isinstance(files, Mapping):
+            raise ValueError('files: expected their contents by name')
+
+        def change() -> str:
+            if self._open is not None and self._open.is_changed:
+                raise ValueError('the open place is not saved: save it, or undo its changes')
+            self._open, said = make(files, str(resolution), str(level))
+            return said
+
+        return self._done(change)
 
     def _room_at(self, x: str, y: str) -> dict[str, Any]:
         at = float(x), float(y)

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 from surveillance_ontology.patrol_ontology import checked_names
 from surveillance_operator.page.hub import Hub
 from surveillance_operator.page.server import Page
 from surveillance_operator.place_page.desk import PlaceDesk
+from surveillance_operator.place_page.dropped_map import MOST_BYTES, import_dropped
 from surveillance_runtime.command_line import EXIT_BAD_INPUT, CommandParser
 from surveillance_runtime.place_editor import PlaceEditor
 from surveillance_runtime.robot_base import ROBOT_RADIUS
@@ -22,7 +24,13 @@ def _parse(argv: Sequence[str] | None) -> argparse.Namespace:
         description='Shows a place in a browser: rooms, doors, zones, stations and rules can be '
         'changed there and saved.',
     )
-    parser.add_argument('place', type=Path, metavar='PLACE', help="the place's file")
+    parser.add_argument(
+        'place',
+        type=Path,
+        nargs='?',
+        metavar='PLACE',
+        help="the place's file; without one, a map is dropped on the page, and a place made of it",
+    )
     parser.add_argument(
         '--web-address',
         default='127.0.0.1:0',
@@ -46,14 +54,31 @@ def _parse(argv: Sequence[str] | None) -> argparse.Namespace:
     return options
 
 
-def editor_page(place: Path, host: str, port: int, radius: float, token: str = '') -> Page:
+def editor_page(place: Path | None, host: str, port: int, radius: float, token: str = '') -> Page:
     """Return the page on which a place is edited, not started yet.
+
+    Args:
+        place: The place's file; None: it is made of a map that is dropped on the page.
+        host, port: Where to serve it; port 0 takes any.
+        radius: Of the robot, metres.
+        token: What gives access; one is made unless given.
 
     Raises:
         FileError: The file cannot be read or is no sound place.
         OSError: The address cannot be used.
     """
-    desk = PlaceDesk(PlaceEditor(place, radius=radius, more_checks=checked_names))
+    folder = Path.cwd() if place is None else place.parent
+
+    def opened(path: Path) -> PlaceEditor:
+        return PlaceEditor(path, radius=radius, more_checks=checked_names)
+
+    def import_map(
+        files: Mapping[str, Any], resolution: str, level: str
+    ) -> tuple[PlaceEditor, str]:
+        path, said = import_dropped(files, folder, radius, resolution, level)
+        return opened(path), said
+
+    desk = PlaceDesk(None if place is None else opened(place), import_map=import_map)
     return Page(
         Hub(),
         questions=desk.questions,
@@ -62,6 +87,7 @@ def editor_page(place: Path, host: str, port: int, radius: float, token: str = '
         port=port,
         token=token,
         front='edit.html',
+        longest={'import_map': 2 * MOST_BYTES},
         report=lambda line: print(f'edit: {line}', file=sys.stderr),
     )
 
@@ -74,6 +100,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     except (ValueError, OSError) as error:
         print(f'edit: {error}', file=sys.stderr)
         return EXIT_BAD_INPUT
-    print(f'{options.place} is shown at {page.address} (Ctrl-C ends)', flush=True)
+    shown = options.place or 'a map can be dropped on the page; it'
+    print(f'{shown} is shown at {page.address} (Ctrl-C ends)', flush=True)
     page.run()
     return 0

@@ -33,6 +33,7 @@ function take(found) {
     if (!view) whole();
     draw();
   }
+  for (const id of ['floor-section', 'chosen-section']) $(id).hidden = !place;
   if (found.text) {
     $('said').textContent = (found.ok ? '✓ ' : '✗ ') + found.text;
     $('said').className = found.ok ? 'ok' : 'warn';
@@ -477,7 +478,7 @@ addEventListener('keydown', (event) => {
   if (key === 'y') { event.preventDefault(); send('redo_edit'); }
 });
 addEventListener('beforeunload', (event) => { if (may && place?.changed) event.preventDefault(); });
-addEventListener('resize', draw);
+addEventListener('resize', () => { if (place) draw(); });
 
 // --- the rest of the page ---
 
@@ -497,6 +498,50 @@ $('list').addEventListener('change', () => {
   const [kind, name] = $('list').value.split(' ');
   choose(kind ? {kind, name} : null);
 });
+// --- a map that is dropped, or chosen ---
+
+const dropped = new Map();
+const inText = (file) => new Promise((done, fail) => {
+  const reader = new FileReader();
+  reader.onload = () => done(reader.result.slice(reader.result.indexOf(',') + 1));
+  reader.onerror = () => fail(reader.error);
+  reader.readAsDataURL(file);
+});
+
+async function importMap(files) {
+  for (const file of files) dropped.set(file.name, file);
+  if (!dropped.size) return;
+  const said = $('import-said');
+  said.textContent = `${[...dropped.keys()].join(', ')}: looking for rooms and doors …`;
+  said.className = 'note';
+  $('import-now').disabled = true;
+  try {
+    const texts = await Promise.all([...dropped].map(async ([name, file]) => [name, await inText(file)]));
+    view = chosen = null;
+    const found = await send('import_map', {files: Object.fromEntries(texts), resolution: $('scale').value, level: $('level').value});
+    said.textContent = found.text ?? '';
+    said.className = found.ok ? 'ok' : 'warn';
+    // Files that belong together may come one by one.
+    if (found.ok || !/expected it with/.test(found.text)) dropped.clear();
+    if (!found.ok && /scale|level/.test(found.text)) for (const file of files) dropped.set(file.name, file);
+    if (place && !view) { whole(); draw(); }
+  } catch (error) {
+    said.textContent = `a file cannot be read: ${error.message}`;
+    said.className = 'warn';
+    dropped.clear();
+  } finally {
+    $('import-now').disabled = false;
+    $('files').value = '';
+  }
+}
+
+if (document.documentElement.dataset.imports === '1') {
+  $('import-section').hidden = false;
+  $('import').addEventListener('submit', (event) => { event.preventDefault(); importMap($('files').files); });
+  $('files').addEventListener('change', () => importMap([...$('files').files]));
+  addEventListener('dragover', (event) => event.preventDefault());
+  addEventListener('drop', (event) => { event.preventDefault(); importMap([...event.dataTransfer.files]); });
+}
 $('read-only').hidden = may;
 take_up('select');
 take(await ask('place', {}));

@@ -1,0 +1,127 @@
+"""Files that a person drops on the page: kept beside each other, and made a place of.
+
+They are looked at in a folder of their own first; only what became a place is put where the command
+was started, and nothing there is written over.
+"""
+
+from __future__ import annotations
+
+import base64
+import binascii
+import re
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from surveillance_operator.graph_import import SUFFIXES
+from surveillance_operator.place_import import ImportRequest, import_place
+from surveillance_runtime.files import FileError, in_one_line
+from surveillance_runtime.place.occupancy_map import PICTURES
+
+MOST_BYTES = 48_000_000
+"""Of all files together; as text they are a third longer."""
+_YAML = ('.yaml', '.yml')
+_NAME = re.compile(r'[^\W_][\w .()-]{0,99}')
+_IMAGE = re.compile(rb'^(image[ \t]*:[ \t]*)(.*?)[ \t]*\r?$', re.MULTILINE)
+
+
+def import_dropped(
+    files: Mapping[str, Any], folder: Path, radius: float, resolution: str = '', level: str = ''
+) -> tuple[Path, str]:
+    """Make a place of files; return it, and what was found in one line.
+
+    Args:
+        files: Their contents in base64, by name: a map.yaml with its picture, a picture, a building
+            or a graph.
+        folder: Where they are put, and the place beside them.
+        radius: Of the robot, metres.
+        resolution: Side of a picture's pixel, metres; empty: not given.
+        level: The level of a building that has several; empty: not given.
+
+    Raises:
+        ValueError: They are none of these, or something of that name is there; one line.
+    """
+    contents = {_checked_name(name): _decoded(name, text) for name, text in files.items()}
+    if sum(map(len, contents.values())) > MOST_BYTES:
+        raise ValueError(f'more than {MOST_BYTES // 1_000_000} MB: expected smaller files')
+    source = _source(contents)
+    if source.endswith(_YAML):
+        contents[source] = _with_its_picture(source, contents)
+    with tempfile.TemporaryDirectory(prefix='dropped-') as staged:
+        stage = Path(staged)
+        for name, data in contents.items():
+            (stage / name).write_bytes(data)
+        out = stage / f'{Path(source).stem.removesuffix(".building")}_place.yaml'
+        request = ImportRequest(
+            stage / source, out, radius, resolution=_side(resolution), level=level.strip()
+        )
+        try:
+            said = import_place(request)
+        except ValueError as error:
+            raise ValueError(str(error).replace(f'{stage}/', '')) from None
+        made = sorted(stage.iterdir())
+        for path in made:
+            there = folder / path.name
+            if there.exists() and not (
+                path.name in contents and there.read_bytes() == contents[path.name]
+            ):
+                raise FileError(f'{there}: is there already; expected another name')
+        try:
+            for path in made:
+                data = path.read_bytes()
+                if path == out:
+                    data = data.replace(f'{stage}/'.encode(), b'')
+                (folder / path.name).write_bytes(data)
+        except OSError as error:
+            raise FileError(in_one_line(error)) from None
+    found = said[0].replace(f'{stage}/', '')
+    return folder / out.name, f'{found}; written to {folder / out.name}'
+
+
+def _checked_name(name: str) -> str:
+    known = (*_YAML, *PICTURES, *SUFFIXES)
+    if not _NAME.fullmatch(name) or not name.lower().endswith(known):
+        raise ValueError(f'{name[:80]!r}: expected a file of a map, such as map.yaml or map.pgm')
+    return name
+
+
+def _decoded(name: str, text: Any) -> bytes:
+    try:
+        return base64.b64decode(text, validate=True)
+    except (binascii.Error, TypeError, ValueError):
+        raise ValueError(f'{name}: did not arrive whole; drop it again') from None
+
+
+def _source(contents: Mapping[str, bytes]) -> str:
+    """Return which of the files says what the others are."""
+    for kinds in (_YAML, SUFFIXES, PICTURES):
+        found = sorted(name for name in contents if name.lower().endswith(kinds))
+        if len(found) > 1:
+            raise ValueError(f'{" and ".join(found)}: expected one map at a time')
+        if found:
+            return found[0]
+    raise ValueError('no file came: expected map.yaml with its picture')
+
+
+def _with_its_picture(source: str, contents: Mapping[str, bytes]) -> bytes:
+    """Return a map's description with the picture's name alone: here it lies beside it."""
+    found = _IMAGE.search(contents[source])
+    if found is None:
+        return contents[source]
+    named = found[2].decode('utf-8', 'replace').strip('\'"').replace('\\', '/').rpartition('/')[2]
+    if named not in contents:
+        others = ', '.join(sorted(contents.keys() - {source}))
+        came = f' (not {others})' if others else ''
+        raise ValueError(f'{source} names {named}{came}: expected it with {source}')
+    start, end = found.span(2)
+    return contents[source][:start] + named.encode() + contents[source][end:]
+
+
+def _side(given: str) -> float | None:
+    if not str(given).strip():
+        return None
+    try:
+        return float(given)
+    except ValueError:
+        raise ValueError(f'{given!r}: expected the metres of a pixel, such as 0.05') from None
