@@ -65,7 +65,7 @@ PLANNER = 'planner_controller'
 POSE_TYPE = 'geometry_msgs/msg/PoseWithCovarianceStamped'
 OF_THE_PLACE = ('map', 'door_states')
 """The topics that the robots of a fleet share."""
-SHARED = ('grid', 'positions', 'links', 'doors', 'visited_at', 'urgent', 'others')
+SHARED = ('grid', 'positions', 'links', 'doors', 'visited_at', 'urgent', 'others', 'stations')
 """The fields of a snapshot that are the same for all robots of a fleet."""
 OBSERVERS = ('mission_', 'console', 'fleet_')
 """How the names of nodes begin that only look on: after a mission they may go."""
