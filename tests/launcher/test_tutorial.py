@@ -12,7 +12,11 @@ from pathlib import Path
 
 import pytest
 
+from surveillance_runtime.place import read_place_file
+from surveillance_runtime.place.occupancy_map import write_map
+from surveillance_runtime.place.plan_grid import draw
 from tests.launcher.conftest import ROOT, USER_ENVIRON, Started
+from tests.operator.test_rmf_building import building, level
 
 PROCESS = ROOT / 'tests' / 'launcher' / 'mission_process.py'
 ELSEWHERE = ('git clone', 'python3 launch.py\n', 'benchmarks/')
@@ -81,3 +85,40 @@ def test_the_page_does_what_it_says(
         assert "beside a laboratory: ['Hall', 'Lab']" in said
     else:
         assert re.search(r'shortest tour 48 s, longest idleness 4\d s', said)
+
+
+def test_the_page_about_your_building_does_what_it_says(
+    tmp_path: Path,
+    start: Callable[..., Started],
+    ros_domain: int,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    grid = draw(read_place_file(ROOT / 'config' / 'seven_rooms.yaml').plan)
+    write_map(tmp_path / 'building.yaml', grid.cells[::-1], 0.05, (*grid.origin, 0.0))
+    (tmp_path / 'plan.png').write_bytes((tmp_path / 'building.png').read_bytes())
+    building(tmp_path, level('L1', 0.0), level('L2', 4.0))
+    said, shown, driven = '', 0, 0
+    for language, text in blocks('your_building.md'):
+        if language == 'yaml':  # zones, which a person adds to the place
+            with open('place.yaml', 'a', encoding='utf-8') as place:
+                place.write(text)
+        for line in text.splitlines() if language == 'sh' else ():
+            if ' edit' in line:
+                editor = start(*words_of(line, tmp_path))
+                editor.until(r'is shown at (\S+)')
+                editor.end(signal.SIGINT)
+                shown += 1
+            elif '--for' in line:
+                mission = start(*words_of(line, tmp_path), '--domain', str(ros_domain))
+                mission.until('arrived in R')
+                assert mission.end(signal.SIGINT)[0] == 0
+                driven += 1
+            else:
+                said += carried_out(line, tmp_path)
+    assert (shown, driven) == (2, 1)
+    assert '7 doors' in said
+    assert {path.name for path in tmp_path.glob('*_place.yaml')} == {
+        *('plan_place.yaml', 'clinic_place.yaml'),
+    }
+    assert (tmp_path / 'masks' / 'costmap_filters.yaml').exists()

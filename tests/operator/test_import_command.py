@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 from typing import Any
 
@@ -10,8 +9,6 @@ import cv2
 import numpy as np
 import pytest
 
-from launcher.run import make_parser
-from surveillance_operator import map_command
 from surveillance_operator.import_command import main
 from surveillance_runtime.place import read_place_file
 from surveillance_runtime.place.occupancy_map import write_map
@@ -170,19 +167,3 @@ def test_a_damaged_graph_costs_one_line(
         (tmp_path / name).write_text(text)
         assert main([name, '--out', 'place.yaml']) == 2
         assert capsys.readouterr().err.count('\n') == 1
-
-
-def test_the_commands_of_the_page_about_your_building(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    text = (CONFIG.parent / 'docs' / 'your_building.md').read_text('utf-8')
-    commands = re.findall(r'^ +python3 launch\.py (.*)$', text, re.MULTILINE)
-    assert [words.split()[0] for words in commands] == ['import', 'edit', 'map', '--mode']
-    commands.pop(1)  # The editor has tests of its own, in a browser.
-    monkeypatch.chdir(tmp_path)
-    mapped(tmp_path, 'seven_rooms').rename(tmp_path / 'building.yaml')
-    assert main(commands[0].split()[1:]) == 0
-    assert map_command.main(commands[1].split()[1:]) == 0
-    assert (tmp_path / 'place.png').exists()
-    options = make_parser().parse_args(commands[2].split())
-    assert (options.place, options.seconds) == (Path('place.yaml'), 60.0)
