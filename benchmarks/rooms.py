@@ -89,6 +89,25 @@ def door_scores(image: Image, drawn: Image, truth: Labels) -> tuple[int, int, in
     return len(lines), int(near.any(axis=0).sum()), len(own), int((~near.any(axis=1)).sum())
 
 
+def corrections(found: Labels, truth: Labels) -> int:
+    """Return the clicks in the editor that make the found rooms the true ones.
+
+    Found rooms that lie in one true room are joined (two taps each), true rooms in one found room
+    are cut apart (two taps each); each of the two tools is chosen once.
+    """
+    inside = (truth > 0) & (found > 0)
+    pairs, areas = np.unique(np.stack([truth[inside], found[inside]]), axis=1, return_counts=True)
+    shares = sorted(zip(areas.tolist(), *pairs.tolist(), strict=True), reverse=True)
+    home: dict[int, int] = {}
+    held: dict[int, int] = {}
+    for _, room, segment_ in shares:  # the largest share first
+        home.setdefault(segment_, room)
+        held.setdefault(room, segment_)
+    joins = len(home) - len(set(home.values()))
+    cuts = sum(home[segment_] != room for room, segment_ in held.items())
+    return 2 * (joins + cuts) + (joins > 0) + (cuts > 0)
+
+
 def peer(image: Image, resolution: float) -> Labels:
     """Return the basins of the plain watershed."""
     free = image > FREE
@@ -168,12 +187,14 @@ def main() -> int:
     parser.add_argument('--turned', action='store_true', help='other resolutions and directions')
     parser.add_argument('--quick', action='store_true', help='the first three maps')
     parser.add_argument('--doors', action='store_true', help='the doors, too')
+    parser.add_argument('--clicks', action='store_true', help='corrections in the editor, too')
     parser.add_argument('--each', action='store_true', help='a line for each map')
     options = parser.parse_args()
     names = sorted(path.name.removesuffix(TRUTH) for path in options.folder.glob('*' + TRUTH))
     methods: dict[str, Callable[[Image, float], Labels]] = {'watershed': peer, 'ours': ours}
     results: dict[tuple[str, str, str], list[tuple[float, ...]]] = {}
     doors: dict[str, list[tuple[int, ...]]] = {}
+    clicks: dict[str, list[tuple[int, int]]] = {}
     for name in names[:3] if options.quick else names:
         drawn: Any = cv2.imread(str(options.folder / (name + TRUTH)), cv2.IMREAD_GRAYSCALE)
         truth = true_rooms(drawn)
@@ -194,6 +215,9 @@ def main() -> int:
                             labels.astype(np.float32), size, interpolation=cv2.INTER_NEAREST
                         ).astype(np.int32)
                     row = (*scores(labels, true), seconds)
+                    if options.clicks and (method, variant) == ('ours', 'as drawn'):
+                        rooms = len(np.unique(true[true > 0]))
+                        clicks.setdefault(kind, []).append((rooms, corrections(labels, true)))
                     results.setdefault((kind, variant, method), []).append(row)
                     if options.each and method == 'ours':
                         print(name, kind, variant, *(f'{value:.3f}' for value in row))
@@ -203,6 +227,12 @@ def main() -> int:
         print(
             f'{kind:10} {variant:14} {method:10} {recall:6.3f} {precision:9.3f} {matched:7.3f} '
             f'{seconds:8.2f}'
+        )
+    for kind, counted in clicks.items():
+        each = sorted(30 * taken / rooms for rooms, taken in counted)
+        print(
+            f'{kind:10} corrections for 30 rooms: median {np.median(each):.0f} clicks, '
+            f'least {each[0]:.0f}, most {each[-1]:.0f}'
         )
     for kind, counts in doors.items():
         true_, found, proposed, false = np.sum(counts, axis=0)
