@@ -74,9 +74,8 @@ def explore(
     )
     lidar = replace(LidarModel(), noise=noise)
     robot = Robot(world, base, lidar, rng=np.random.default_rng(seed))
-    exploration = Exploration(
-        MapBuilder(start=robot.base.pose), frontiers=frontiers or FrontierParameters()
-    )
+    builder = MapBuilder(start=robot.base.pose)
+    exploration = Exploration(builder, frontiers=frontiers or FrontierParameters())
     angles, worst = robot.lidar.angles, 0.0
     think_ms = []
     while exploration.phase is not Phase.DONE and robot.time < most:
@@ -98,7 +97,7 @@ def explore(
         wall_error,
         worst,
         math.dist(robot.base.odometry[:2], robot.base.pose[:2]),
-        exploration.builder.loops,
+        builder.loops,
         robot.base.collisions,
         math.dist(robot.base.pose[:2], world.plan.start[:2]) < 0.5,
         [f'{each.reason} {np.round(each.point, 1).tolist()}' for each in exploration.unreached],
@@ -180,6 +179,7 @@ def main() -> int:
                         f'{cpu:.0f}',
                     )
                 )
+                print(' '.join(rows[-1]), file=sys.stderr, flush=True)
                 for each in did.given_up:
                     print(f'{file.stem}: left: {each}')
                 if options.keep is not None:

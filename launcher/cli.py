@@ -100,6 +100,7 @@ def _make_streams_safe() -> None:
 def _dispatch(argv: list[str]) -> int:
     commands: dict[str, Callable[[list[str]], int]] = {
         'run': _run,
+        'explore': _explore,
         'node': _node,
         'list': _list,
         'params': _params,
@@ -134,6 +135,15 @@ def _run(argv: list[str]) -> int:
         run, folder = resumed(run, usual, RUNS, options.resume)
     interrupt.raise_if_lost()
     return run_mission(run, CONFIG, RUNS, folder)
+
+
+def _explore(argv: list[str]) -> int:
+    from launcher import explore
+
+    options = explore.options_of(argv)
+    _enter(['explore', *argv])
+    interrupt.raise_if_lost()
+    return explore.run_exploration(options, CONFIG, RUNS)
 
 
 def _node(argv: list[str]) -> int:

@@ -41,6 +41,7 @@ Runs a patrol until Ctrl-C, each node in its own process, or runs COMMAND. The f
 _COMMANDS = """\
 commands (each has its own --help):
   run                       run a patrol: the same as without a command
+  explore                   map a building by driving through it, and make a place of it
   node NAME [ROS args]      run one node in this terminal
   list                      list the nodes
   params [NODE]             print the value of each parameter and where it comes from

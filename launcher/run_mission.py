@@ -5,7 +5,8 @@ from __future__ import annotations
 import os
 import shlex
 import subprocess
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from launcher import run_folder
@@ -28,6 +29,7 @@ from launcher.supervisor import Supervisor
 from launcher.team import Part, parts
 from surveillance_behaviour.mission import mission_log
 from surveillance_runtime import node_table
+from surveillance_runtime.configuration import Entry
 from surveillance_runtime.files import LAUNCH_LOG, PLACE, RECORD, TIMELINE, FileError
 from surveillance_runtime.launch_protocol import EXIT_THERE, NotNowError
 from surveillance_runtime.place.writing import copy_place
@@ -45,7 +47,31 @@ EXIT_NOTHING_DONE = 1
 """The exit code of a run that had all its time and in which the mission did not begin."""
 
 
-def run_mission(run: Run, config: Path, runs: Path, resume: Path | None = None) -> int:
+@dataclass(frozen=True)
+class Errand:
+    """What a run is for that ends by itself.
+
+    Attributes:
+        title: How the log calls it.
+        node: When it has finished the run is over.
+        entries: Return the parameters that the nodes are given, by the folder of the run.
+        close: Do what is left to do with that folder when all nodes have ended; return the exit
+            code.
+    """
+
+    title: str
+    node: str
+    entries: Callable[[Path], Sequence[Entry]]
+    close: Callable[[Path], int]
+
+
+def run_mission(
+    run: Run,
+    config: Path,
+    runs: Path,
+    resume: Path | None = None,
+    errand: Errand | None = None,
+) -> int:
     """Start the nodes, supervise them to the end, print the summary; return the exit code."""
     merged = configuration(config, run)  # before anything is written
     run, profile = with_profile(with_mode_of(run, merged), config)
@@ -71,19 +97,25 @@ def run_mission(run: Run, config: Path, runs: Path, resume: Path | None = None) 
     for part in team:
         own = part.folder(folder)
         own.mkdir(exist_ok=True)
-        merged = configuration(config, part.run, own, fleet=part.entries)
+        given = (*part.entries, *(errand.entries(own) if errand is not None else ()))
+        merged = configuration(config, part.run, own, fleet=given)
         files = write_parameters(own / 'parameters', part.run.namespace, merged, part.everyone)
         names = [node.name for node in part.nodes]
         of_robot = profile_of(config, part.run).profile
         renamed = (*part.renamed, *remappings(of_robot, names, mode))
         programs += programs_of(part, files, environ, renamed)
         copy_place(place, own / PLACE)
+    if errand is not None:
+        programs = [
+            replace(each, leads=True, ends_run=True) if each.name == errand.node else each
+            for each in programs
+        ]
     names = [part.name(node.name) for part in team for node in part.everyone]
     names += [part.name(COMPOSED) for part in team if run.composed]
     log = MergedLog(None, names, path=folder / LAUNCH_LOG)
     log.say(
-        f'{run.behaviour} in mode {mode}, {_robots(team, profile.name)}, '
-        f'place {place.name}, '
+        f'{errand.title if errand is not None else run.behaviour} in mode {mode}, '
+        f'{_robots(team, profile.name)}, place {place.name}, '
         f'ROS domain {ros_domain(run)}, files in {_short(folder)}'
     )
     if moved := team[0].moved_points:
@@ -121,7 +153,7 @@ def run_mission(run: Run, config: Path, runs: Path, resume: Path | None = None) 
     state.end(ended=supervisor.time_is_over or not is_service())
     for descriptor in claims:
         os.close(descriptor)
-    return code
+    return code if errand is None else code or errand.close(folder)
 
 
 def _look_for_others(run: Run, team: Sequence[Part]) -> None:

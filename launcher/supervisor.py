@@ -66,6 +66,7 @@ class Program:
         command, environ: as for `subprocess`.
         takes_input: whether it reads lines, see `Supervisor.send`.
         leads: whether it uses the others, and so is stopped before them.
+        ends_run: whether all others are stopped when it has finished.
         memory: bytes of resident memory beyond which it is ended and started again; 0: any.
     """
 
@@ -74,6 +75,7 @@ class Program:
     environ: Mapping[str, str]
     takes_input: bool = False
     leads: bool = False
+    ends_run: bool = False
     memory: int = 0
 
 
@@ -331,6 +333,8 @@ class Supervisor:
             return
         if child.finished:
             self._log.say(f'{name} has ended by itself')
+            if child.program.ends_run:
+                self.stop()
             return
         if code in (EXIT_CANNOT_START, EXIT_NOT_NOW) and child.starts == 1:
             self._log.error(f'{name} cannot start with this configuration: stopping')

@@ -179,6 +179,18 @@ def planar_covariance(deviation: float, turn_deviation: float) -> NDArray[np.flo
     return covariance
 
 
+def map_message(grid: Grid, frame: str, stamp: Time) -> OccupancyGrid:
+    """Return the message of a map; see `map_from`."""
+    message = OccupancyGrid()
+    message.header.frame_id, message.header.stamp = frame, stamp
+    message.info.map_load_time = stamp
+    message.info.resolution = float(grid.resolution)
+    message.info.height, message.info.width = grid.cells.shape
+    message.info.origin = pose_message((*grid.origin, 0.0))
+    message.data.frombytes(grid.cells.tobytes())
+    return message
+
+
 def map_from(message: OccupancyGrid, most_cells: int) -> Grid:
     """Return a map.
 

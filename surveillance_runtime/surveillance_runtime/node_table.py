@@ -62,6 +62,7 @@ _PURPOSES = {
         'planner_controller': 'paths between points and to places',
         'motion_controller': 'follows a path with the base',
         'collision_monitor': 'lets no command through to the base that the lidar does not allow',
+        'explorer': 'drives through an unknown building and maps it',
         'observer': 'notices doors, things, markers and views that are not as they are to be',
     },
     'surveillance_operator': {
@@ -119,7 +120,8 @@ _OF_PATROL = (
 )
 _OF_BASE = ('simulator', 'collision_monitor')
 _MONITOR = 'collision_monitor'
-RUN_NODES = frozenset((*_ALWAYS, *_OF_PATROL, *_OF_BASE))
+EXPLORER = 'explorer'
+RUN_NODES = frozenset((*_ALWAYS, *_OF_PATROL, *_OF_BASE, EXPLORER))
 """The nodes of which a robot has one each."""
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 from builtin_interfaces.msg import Time
 from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped, TransformStamped
-from nav_msgs.msg import OccupancyGrid, Odometry
+from nav_msgs.msg import Odometry
 from scipy.spatial.transform import Rotation
 from sensor_msgs.msg import CameraInfo, Image, JointState, LaserScan
 from std_msgs.msg import Header
@@ -22,7 +22,6 @@ from surveillance_runtime.conversions import (
     pose_message,
 )
 from surveillance_runtime.place.floor_plan import Marker
-from surveillance_runtime.place.occupancy_grid import Grid
 from surveillance_runtime.place.rooms import Pose as PlanePose
 from surveillance_runtime.profile.description import FixedFrame
 from surveillance_simulation.camera.model import Camera, Picture
@@ -123,17 +122,6 @@ def scan_to_ros(
         scan_time=duration,
     )
     message.ranges.frombytes(ranges.astype(np.float32).tobytes())
-    return message
-
-
-def grid_to_ros(grid: Grid, frame: str, stamp: Time) -> OccupancyGrid:
-    """Convert a map to a message."""
-    message = OccupancyGrid(header=Header(frame_id=frame, stamp=stamp))
-    message.info.map_load_time = stamp
-    message.info.resolution = float(grid.resolution)
-    message.info.height, message.info.width = grid.cells.shape
-    message.info.origin = pose_message((*grid.origin, 0.0))
-    message.data.frombytes(grid.cells.tobytes())
     return message
 
 

@@ -23,12 +23,11 @@ from surveillance_controllers.motion import nav2 as nav2_motion
 from surveillance_controllers.motion.arrival import MotionFailedError
 from surveillance_controllers.motion_controller_node import MotionController
 from surveillance_interfaces.action import FollowPath
-from surveillance_runtime.conversions import point_messages
+from surveillance_runtime.conversions import map_message, point_messages
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.parameters import ParameterError
 from surveillance_runtime.place.stations import Station
 from surveillance_runtime.qos import STATE_QOS
-from surveillance_simulation.conversions import grid_to_ros
 from tests.nav2_definitions import ACTIONS, stand_in
 
 PATH = np.array([[0.0, 0, 0], [3, 0, 0], [3, 4, 0]])
@@ -179,7 +178,7 @@ def test_the_place_follows_the_pose_by_the_rooms_of_the_map(
 
     # The map may come after the pose. Both points are nearer to A's than to B's.
     come_to(3.6)
-    maps.publish(grid_to_ros(flat.grid, 'map', Time()))
+    maps.publish(map_message(flat.grid, 'map', Time()))
     graph.until(lambda: recorder.places[-1:] == ['A'])
     come_to(4.3)
     graph.until(lambda: recorder.places[-1] == 'B')

@@ -12,11 +12,10 @@ from nav_msgs.msg import OccupancyGrid
 
 from state_machines.ros import GoalAbortedError, GoalRun, GoalServer
 from surveillance_controllers.geometry import equally_spaced
-from surveillance_runtime.conversions import pose_estimate, pose_from, pose_message
+from surveillance_runtime.conversions import map_message, pose_estimate, pose_from, pose_message
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.place import plan_grid, read_place_file
 from surveillance_runtime.qos import STATE_QOS
-from surveillance_simulation.conversions import grid_to_ros
 
 SPEED = 0.5
 """Of the robot, m/s."""
@@ -34,7 +33,7 @@ class MapServer(PatrolNode):
         assert plan is not None
         grid = plan_grid.draw(plan)
         topic = self.create_publisher(OccupancyGrid, 'map', STATE_QOS)
-        topic.publish(grid_to_ros(grid, 'map', self.get_clock().now().to_msg()))
+        topic.publish(map_message(grid, 'map', self.get_clock().now().to_msg()))
 
 
 class Navigator(PatrolNode):

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from surveillance_controllers import conversions as received
 from surveillance_interfaces.srv import SetMarker
-from surveillance_runtime.conversions import pose_from, pose_message, seconds_of
+from surveillance_runtime.conversions import map_message, pose_from, pose_message, seconds_of
 from surveillance_runtime.place import plan_grid
 from surveillance_simulation import conversions
 from surveillance_simulation.camera.model import Camera
@@ -53,7 +53,7 @@ def test_a_scan_comes_back_with_its_infinities() -> None:
 
 def test_a_map_comes_back() -> None:
     grid = plan_grid.draw(two_rooms().plan)
-    back = received.grid_from(conversions.grid_to_ros(grid, 'map', STAMP))
+    back = received.grid_from(map_message(grid, 'map', STAMP))
     assert (back.cells == grid.cells).all()
     assert back.resolution == pytest.approx(grid.resolution)
     assert back.origin == pytest.approx(grid.origin)

@@ -13,6 +13,7 @@ import math
 import threading
 from dataclasses import dataclass, field
 from enum import Enum
+from typing import Protocol
 
 import numpy as np
 
@@ -21,7 +22,6 @@ from surveillance_controllers.exploration.frontiers import (
     FrontierParameters,
     find_frontiers,
 )
-from surveillance_controllers.exploration.map_building import MapBuilder
 from surveillance_controllers.geometry import Points, Pose, Scan, composed, in_map, relative
 from surveillance_controllers.motion.driving import Drive, Spin, State
 from surveillance_controllers.motion.path_following import DriveParameters, Velocity
@@ -38,6 +38,8 @@ _BETTER = 1.5
 """or when another one is worth so much more, metres."""
 _FOUND_AT_HOME = 0.3
 """The robot is back within this distance of its start, metres."""
+_MAP_WITHIN = 8.0
+"""What the robot sees goes into the map within this time, seconds; slam_toolbox takes 5."""
 _NEAR_WALL = 0.15
 """A point this near to what the map has is no obstacle of its own, metres."""
 _BLIND_SPOT = 'what lies behind cannot be seen from beside it'
@@ -54,6 +56,24 @@ class Phase(Enum):
     EXPLORING = 'exploring'
     RETURNING = 'driving back'
     DONE = 'done'
+
+
+class Mapping(Protocol):
+    """What builds the map, or follows it: `MapBuilder` or `ForeignMap`."""
+
+    start: Pose
+
+    def pose(self, odometry: Pose) -> Pose:
+        """Return where the robot is on the map while its odometry says this."""
+
+    def is_due(self, odometry: Pose) -> bool:
+        """Tell whether a scan that is made here changes the map."""
+
+    def see(self, scan: Scan, odometry: Pose, *, keep: bool = False) -> bool:
+        """Take a scan; tell whether the map changed."""
+
+    def grid(self) -> Grid:
+        """Return the map as it is now."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,7 +107,7 @@ class Exploration:
         reason: Why the robot is not back at its start, if it is not.
     """
 
-    builder: MapBuilder
+    builder: Mapping
     drive: DriveParameters = field(default_factory=DriveParameters)
     planning: PlanningParameters = field(default_factory=PlanningParameters)
     frontiers: FrontierParameters = field(default_factory=FrontierParameters)
@@ -97,7 +117,6 @@ class Exploration:
 
     def __post_init__(self) -> None:
         self._lock = threading.Lock()
-        self._start = self.builder.start
         self._grid: Grid | None = None
         self._planner: GridPlanner | None = None
         self._task: Drive | Spin | None = None
@@ -107,6 +126,7 @@ class Exploration:
         self._left: list[Frontier] = []
         self._spent: list[tuple[Points, str]] = []
         self._looked = False
+        self._now = self._arrived_at = 0.0
 
     @property
     def grid(self) -> Grid | None:
@@ -138,7 +158,7 @@ class Exploration:
     def pose(self, odometry: Pose) -> Pose:
         """Return where the robot is on the map while its odometry says this."""
         correction = self._correction
-        return self._start if correction is None else composed(correction, odometry)
+        return self.builder.start if correction is None else composed(correction, odometry)
 
     def see(self, scan: Scan, odometry: Pose, now: float) -> Velocity:
         """Take a scan, and return with which velocity to go on.
@@ -149,6 +169,7 @@ class Exploration:
             now: The time, seconds.
         """
         with self._lock:
+            self._now = now
             self._scan = scan, odometry
             if self._pending is None and self.builder.is_due(odometry):
                 self._pending = self._scan
@@ -220,9 +241,12 @@ class Exploration:
                 changed = True
             elif task.state is State.ARRIVED:
                 if not self._looked:
+                    self._looked, self._arrived_at = True, self._now
+                    changed = False
+                if not changed and self._now - self._arrived_at < _MAP_WITHIN:
                     # What is seen from here first goes into the map.
                     with self._lock:
-                        self._looked, self._pending = True, self._scan
+                        self._pending = self._scan
                     return
                 if self._part_left(self.goal) > _SEEN_ENOUGH:
                     self._give_up(self.goal, _BLIND_SPOT)
@@ -294,7 +318,9 @@ class Exploration:
         )
         try:
             self._planner.set_obstacles(points[away > _NEAR_WALL])
-            path = self._planner.plan(pose[:2], goal if goal is not None else self._start[:2])
+            path = self._planner.plan(
+                pose[:2], goal if goal is not None else self.builder.start[:2]
+            )
         except NoPathError as error:
             self.reason = str(error)
             with self._lock:
@@ -315,7 +341,7 @@ class Exploration:
         task = self._task
         if isinstance(task, Drive) and task.state.ended:
             self.reason = task.reason if task.state is State.FAILED else ''
-            if math.dist(self._here[:2], self._start[:2]) <= _FOUND_AT_HOME:
+            if math.dist(self._here[:2], self.builder.start[:2]) <= _FOUND_AT_HOME:
                 self.reason = ''
             self.phase = Phase.DONE
             return

@@ -170,6 +170,30 @@ class MapFrame:
         self._publisher.publish(TFMessage(transforms=[transform]))
 
 
+class MapFrameReader:
+    """Reads map -> odom from `tf`, where tf2_msgs is installed and another program localises.
+
+    Args:
+        node: The node that reads.
+        frames: Their names.
+        take: Called with where the odometry's frame lies on the map.
+    """
+
+    def __init__(self, node: PatrolNode, frames: Frames, take: Callable[[Pose], None]) -> None:
+        self._node, self._frames, self._take = node, frames, take
+        if TFMessage is not None:
+            node.create_subscription(TFMessage, 'tf', self._on_transforms, 100)
+
+    def _on_transforms(self, message: Any) -> None:
+        wanted = _plain(self._frames.map), _plain(self._frames.odom)
+        for each in message.transforms:
+            if (_plain(each.header.frame_id), _plain(each.child_frame_id)) == wanted:
+                with conversions.refusing(self._node, 'tf: map -> odom'):
+                    matrix = conversions.matrix_from(each.transform)
+                    x, y = matrix[:2, 3].tolist()
+                    self._take((x, y, math.atan2(matrix[1, 0], matrix[0, 0])))
+
+
 def _plain(frame: str) -> str:
     """Return a frame's name without the slash that older drivers begin it with, as tf2 does."""
     return frame.removeprefix('/')

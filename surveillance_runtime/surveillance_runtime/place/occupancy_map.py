@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from surveillance_runtime.files import FileError, in_one_line, like_file
+from surveillance_runtime.files import FileError, in_one_line, like_file, replace_text
 from surveillance_runtime.place.occupancy_grid import FREE, OCCUPIED, UNKNOWN, Grid, Points
 from surveillance_runtime.suggestions import nearest
 from surveillance_runtime.yaml_file import YamlFile, read_yaml_file
@@ -173,15 +173,22 @@ def is_map_description(values: Mapping[str, Any]) -> bool:
 
 
 def write_map(
-    path: Path, cells: NDArray[np.int8], resolution: float, origin: tuple[float, float, float]
+    path: Path,
+    cells: NDArray[np.int8],
+    resolution: float,
+    origin: tuple[float, float, float],
+    kind: str = 'png',
 ) -> None:
-    """Write a map in map_server's format: a YAML file, and a PNG of the same name beside it.
+    """Write a map in map_server's format: a YAML file, and a picture of the same name beside it.
+
+    What is there is replaced at once: a reader finds no half of it.
 
     Args:
         path: The YAML file.
         cells: Occupancy, row 0 at the top of the picture, shape (rows, columns).
         resolution: Side of a cell, metres.
         origin: Pose of the lower left corner, metres and rad.
+        kind: Of the picture: png or pgm.
 
     Raises:
         FileError: It cannot be written.
@@ -193,12 +200,14 @@ def write_map(
     grey[cells >= 65] = 0
     x, y, yaw = (round(float(each), 7) for each in origin)
     text = (
-        f'image: {path.stem}.png\nmode: trinary\nresolution: {resolution:g}\n'
+        f'image: {path.stem}.{kind}\nmode: trinary\nresolution: {resolution:g}\n'
         f'origin: [{x}, {y}, {yaw}]\nnegate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n'
     )
     try:
-        Image.fromarray(grey).save(path.with_suffix('.png'))
-        path.write_text(text, 'utf-8')
+        fresh = path.with_name(f'.{path.stem}.new.{kind}')
+        Image.fromarray(grey).save(fresh)
+        fresh.replace(path.with_suffix(f'.{kind}'))
+        replace_text(path, text)
     except OSError as error:
         raise FileError(f'{path}: cannot be written: {error.strerror or error}') from None
 

@@ -15,7 +15,7 @@ from sensor_msgs.msg import JointState, LaserScan
 from std_msgs.msg import String, UInt32
 
 from surveillance_interfaces.msg import DoorStates
-from surveillance_runtime.conversions import nanoseconds_of
+from surveillance_runtime.conversions import map_message, nanoseconds_of
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.parameters import parameter
 from surveillance_runtime.place import plan_grid
@@ -44,6 +44,9 @@ class PublishedOptions:
     """How place and robots are published; units as declared."""
 
     map_resolution: float = parameter(0.05, 'Side of a cell of the map, metres.', 0.01, 0.5)
+    publish_map: bool = parameter(
+        True, 'Publish the map of the place; without it a robot has to build its own.'
+    )
     announce_pose: bool = parameter(
         False, 'Tell each new subscriber of initialpose, such as AMCL, where the robot is.'
     )
@@ -125,9 +128,10 @@ class PlaceFeed:
         self._world = world
         self._clock = node.create_publisher(Clock, '/clock', 1) if drives_clock else None
         self._doors = OwnedTopic(node, DoorStates, 'door_states')
-        self._map = OwnedTopic(node, OccupancyGrid, 'map', repeat=MAP_REPEAT)
-        grid = plan_grid.draw(world.plan, setup.published.map_resolution)
-        self._map.publish(conversions.grid_to_ros(grid, setup.frames.map, Time()))
+        if setup.published.publish_map:
+            self._map = OwnedTopic(node, OccupancyGrid, 'map', repeat=MAP_REPEAT)
+            grid = plan_grid.draw(world.plan, setup.published.map_resolution)
+            self._map.publish(map_message(grid, setup.frames.map, Time()))
         self.tell_doors()
 
     def tell_doors(self) -> None:

@@ -1,0 +1,308 @@
+"""The node `explorer`: drives through a building that nobody has mapped, and maps it.
+
+It reads `odom` and the lidars, commands `cmd_vel`, and publishes the growing `map`, where the robot
+is on it (`amcl_pose`) and the transform from `map` to `odom`. With `mapping: topic` another program
+maps, as slam_toolbox: then the node reads its `map`, and its transform or its `pose`. When nothing
+is left to see it drives back to where it began, writes the map into `folder` and ends.
+"""
+
+from __future__ import annotations
+
+import math
+import threading
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from builtin_interfaces.msg import Time
+from geometry_msgs.msg import PoseWithCovarianceStamped
+from nav_msgs.msg import OccupancyGrid, Odometry
+from sensor_msgs.msg import LaserScan
+
+from surveillance_controllers import conversions
+from surveillance_controllers.exploration.exploration import Exploration, Phase
+from surveillance_controllers.exploration.foreign_map import ForeignMap
+from surveillance_controllers.exploration.frontiers import FrontierParameters
+from surveillance_controllers.exploration.map_building import MapBuilder, MappingParameters
+from surveillance_controllers.geometry import Pose, composed, relative
+from surveillance_controllers.motion.command_publisher import CommandPublisher
+from surveillance_controllers.motion.holding import Hold
+from surveillance_controllers.motion.odometry import OdometryBuffer, joined
+from surveillance_controllers.motion.path_following import DriveParameters, Velocity
+from surveillance_controllers.motion.transforms import MapFrame, MapFrameReader, ScanReader
+from surveillance_controllers.planning.grid_planning import PlanningParameters
+from surveillance_runtime.conversions import (
+    map_message,
+    pose_estimate,
+    pose_from,
+    pose_of_serialized,
+    seconds_of,
+    stamp_of_serialized,
+)
+from surveillance_runtime.files import FileError
+from surveillance_runtime.node import PatrolNode
+from surveillance_runtime.parameters import parameter
+from surveillance_runtime.place.occupancy_grid import Grid
+from surveillance_runtime.place.occupancy_map import write_map
+from surveillance_runtime.process import run_node
+from surveillance_runtime.profile.parameters import declared_frames
+from surveillance_runtime.qos import SENSOR_QOS
+from surveillance_runtime.state_topics import OwnedTopic, StateSubscription
+
+MAP_FILE = 'map.yaml'
+"""In `folder`; with `map.pgm` beside it."""
+DONE_FILE = 'explored'
+"""In `folder`, once the robot has seen all that it can: what is left and why, a line each."""
+OWN, TOPIC = 'own', 'topic'
+_WAIT = 0.05
+"""Seconds between two looks whether there is something to think about."""
+_PUBLISH, _SAVE = 1.0, 10.0
+"""Seconds of real time between two maps that are published, and two that are written."""
+_SAME_GOAL = 2.0
+"""A goal that moved by less than this is told once, metres."""
+_TELL = 10.0
+"""Seconds between two lines about what is missing."""
+
+
+@dataclass(frozen=True)
+class ExplorerSettings:
+    """What the explorer is told by its parameters."""
+
+    mapping: str = parameter(
+        OWN,
+        'Who maps: own, the node itself; topic, another program, whose map it follows.',
+        choices=(OWN, TOPIC),
+        read_only=True,
+    )
+    folder: str = parameter(
+        '',
+        'Folder for the map, map.yaml and map.pgm, written while it grows; empty: none is written.',
+        read_only=True,
+    )
+
+
+class Explorer(PatrolNode):
+    """Explores with one robot; the thinking is done on one thread of its own.
+
+    Attributes:
+        exploration: What it has found, and where it is going.
+    """
+
+    def __init__(self, **node_options: Any) -> None:
+        super().__init__('explorer', **node_options)
+        self._settings = self.declare_fields(ExplorerSettings())
+        drive = self.declare_fields(DriveParameters(), prefix='drive.')
+        planning = replace(
+            self.declare_fields(
+                PlanningParameters(), prefix='planning.', without=('radius', 'footprint')
+            ),
+            radius=drive.radius,
+            footprint=drive.footprint,
+        )
+        frontiers = self.declare_fields(FrontierParameters(), prefix='frontiers.')
+        mapping = self.declare_fields(MappingParameters(), prefix='mapping.')
+        self._frames = declared_frames(self, 'map', 'odom', 'base', 'transform_tolerance')
+        self._lidar = ScanReader(self, drive.radius, self._frames.base)
+        self._foreign = ForeignMap() if self._settings.mapping == TOPIC else None
+        self.exploration = Exploration(
+            self._foreign or MapBuilder(parameters=mapping), drive, planning, frontiers
+        )
+        self._readings = OdometryBuffer()
+        self._odometry: Pose | None = None
+        self._heard_scan = False
+        self._lock = threading.Lock()
+        self._saved_at = self._published_at = 0.0
+        self._base = CommandPublisher(
+            self,
+            'cmd_vel',
+            (*self._lidar.settings.scans, 'odom'),
+            drive.deceleration,
+            lambda topic: self.get_logger().warn(f'nothing on the topic {topic}: the robot stands'),
+            frame=self._frames.base,
+        )
+        self._hold = Hold(self, self._on_hold)
+        self._poses = OwnedTopic(self, PoseWithCovarianceStamped, 'amcl_pose', repeat=None)
+        self._maps: OwnedTopic[OccupancyGrid] | None = None
+        if self._foreign is None:
+            self._maps = OwnedTopic(self, OccupancyGrid, 'map', repeat=5.0)
+            self._map_frame = MapFrame(self, self._frames)
+        else:
+            self._follow_foreign()
+        StateSubscription(
+            self,
+            Odometry,
+            'odom',
+            self._on_odometry,
+            raw=True,
+            each=True,
+            qos=SENSOR_QOS,
+            owner='simulator',
+        )
+        self._lidar.subscribe(self._on_scan)
+        self.spawn(self._explore, 'explore')
+
+    def _follow_foreign(self) -> None:
+        """Read the map of another program, and where it has the robot."""
+        assert self._foreign is not None
+        StateSubscription(self, OccupancyGrid, 'map', self._on_map)
+        self.create_subscription(PoseWithCovarianceStamped, 'pose', self._on_pose, 5)
+        MapFrameReader(self, self._frames, self._foreign.take_correction)
+
+    def _on_map(self, message: OccupancyGrid) -> None:
+        assert self._foreign is not None
+        with conversions.refusing(self, 'map'):
+            self._foreign.take_map(conversions.grid_from(message))
+
+    def _on_pose(self, message: PoseWithCovarianceStamped) -> None:
+        assert self._foreign is not None
+        with conversions.refusing(self, 'pose'):
+            pose, stamp = pose_from(message.pose.pose), seconds_of(message.header.stamp)
+            with self._lock:
+                odometry = self._odometry_at(stamp)
+            if odometry is not None:
+                back = relative(odometry, (0.0, 0.0, 0.0))
+                self._foreign.take_correction(composed(pose, back))
+
+    def _odometry_at(self, stamp: float) -> Pose | None:
+        if not self._readings.covers(stamp, stamp):
+            return self._odometry
+        x, y, yaw = self._readings.at(np.array([stamp]))[0].tolist()
+        return (x, y, yaw)
+
+    def _on_odometry(self, serialized: bytes) -> None:
+        with conversions.refusing(self, 'odom'):
+            pose, stamp = pose_of_serialized(serialized, texts=1), stamp_of_serialized(serialized)
+            with self._lock:
+                self._base.hear('odom')
+                self._readings.add(stamp if stamp > 0.0 else self._now(), pose)
+                self._odometry = pose
+
+    def _on_scan(self, topic: str, message: LaserScan) -> None:
+        with conversions.refusing(self, topic):
+            stamp = message.header.stamp
+            if stamp == Time():
+                stamp = self.get_clock().now().to_msg()
+            scan = self._lidar.read(message, topic)
+            with self._lock:
+                self._base.hear(topic)
+                if self._odometry is None:
+                    return
+                odometry = self._odometry
+                scan = joined(scan, self._readings, seconds_of(stamp))
+                self._heard_scan = True
+                velocity = self.exploration.see(scan, odometry, self._now())
+                self._base.command(Velocity() if self._hold.active else velocity)
+            self._tell_pose(odometry, stamp)
+
+    def _on_hold(self) -> None:
+        with self._lock:
+            if self._hold.active:
+                self._base.command(Velocity())
+
+    def _tell_pose(self, odometry: Pose, stamp: Time) -> None:
+        if self.exploration.correction is None:
+            return
+        pose = self.exploration.pose(odometry)
+        estimate = PoseWithCovarianceStamped(pose=pose_estimate(pose, 0.03, 0.02))
+        estimate.header.frame_id, estimate.header.stamp = self._frames.map, stamp
+        self._poses.publish(estimate)
+        if self._foreign is None:
+            self._map_frame.publish(pose, odometry, stamp)
+
+    def _explore(self) -> None:
+        """Think until all is seen; the thread's work."""
+        told, phase, goal = time.monotonic() - _TELL, self.exploration.phase, None
+        while not self.stopping.is_set():
+            changed = self.exploration.think()
+            if changed:
+                self._show(time.monotonic())
+            if self.exploration.phase is Phase.DONE:
+                self._end()
+                return
+            if self.exploration.phase is not phase:
+                phase = self.exploration.phase
+                self.get_logger().info(f'{phase.value}')
+            aim = self.exploration.goal
+            if aim is not None and aim is not goal:
+                x, y = aim.middle
+                is_another = goal is None or math.dist(goal.middle, aim.middle) > _SAME_GOAL
+                goal = aim
+                if is_another:
+                    self.get_logger().info(
+                        f'to ({x:.1f}, {y:.1f}), {aim.way:.1f} m away: {aim.length:.1f} m of the '
+                        'unknown begin there'
+                    )
+            missing = self._missing()
+            if missing and time.monotonic() - told >= _TELL:
+                told = time.monotonic()
+                self.get_logger().info(f'waiting for {missing}')
+            if not changed:
+                self.stopping.wait(_WAIT)
+
+    def _missing(self) -> str:
+        """Return what has not come yet; empty when the robot can begin."""
+        names = ['odom' if self._odometry is None else '', '' if self._heard_scan else 'scan']
+        if self._foreign is not None:
+            names.append(self._foreign.missing)
+        return ', '.join(name for name in names if name)
+
+    def _show(self, now: float) -> None:
+        """Publish and write the map, each not too often."""
+        grid = self.exploration.grid
+        assert grid is not None
+        if self._maps is not None and now - self._published_at >= _PUBLISH:
+            self._published_at = now
+            self._maps.publish(map_message(grid, self._frames.map, self.get_clock().now().to_msg()))
+        if now - self._saved_at >= _SAVE:
+            self._saved_at = now
+            self._save(grid)
+
+    def _save(self, grid: Grid) -> None:
+        if not self._settings.folder:
+            return
+        try:
+            file = Path(self._settings.folder, MAP_FILE)
+            write_map(file, grid.cells[::-1], grid.resolution, (*grid.origin, 0.0), 'pgm')
+        except FileError as error:
+            self.get_logger().error(f'the map is not kept: {error}')
+
+    def _end(self) -> None:
+        """Say what was found and what was left, and end the process."""
+        with self._lock:
+            self._base.command(Velocity())
+        exploration, logger = self.exploration, self.get_logger()
+        self._saved_at = self._published_at = 0.0
+        self._show(time.monotonic())
+        left = [
+            f'({each.point[0]:.1f}, {each.point[1]:.1f}), {each.length:.1f} m: {each.reason}'
+            for each in exploration.unreached
+        ]
+        if exploration.reason:
+            left.append(f'the robot is not back at its start: {exploration.reason}')
+        for each in left:
+            logger.warn(f'left: {each}')
+        if self._settings.folder:
+            Path(self._settings.folder, DONE_FILE).write_text(
+                ''.join(f'{each}\n' for each in left), 'utf-8'
+            )
+        logger.info('all that can be reached has been seen')
+        self.finish()
+
+    def on_stop(self) -> None:
+        """Stand, and keep the map as it is."""
+        with self._lock:
+            self._base.command(Velocity())
+        self.exploration.stop()
+        if self.exploration.grid is not None:
+            self._save(self.exploration.grid)
+
+    def _now(self) -> float:
+        return float(self.get_clock().now().nanoseconds) / 1e9
+
+
+def main(args: Sequence[str] | None = None) -> int:
+    """Run the node."""
+    return run_node(Explorer, args)
