@@ -43,8 +43,9 @@ Every parameter of every node, written by `python3 launch.py params --write` fro
 declarations; a test compares. `ros2 param describe NODE NAME` says the same of a running node.
 
 A value is looked for in this order, and the first that is found counts: `-p NAME:=VALUE` on the
-command line; a file given with `--params` (or `--params-file`), of several the last; the file of
-the place (`--map`); `config/parameters.yaml`; the default below. Within one file the section
+command line; what an option of the launcher sets; a file given with `--params` (or
+`--params-file`), of several the last; the file of the place (`--map`); the robot's profile
+(`--robot`); `config/parameters.yaml`; the default below. Within one file the section
 `/**/node` counts before `/**`. A file with a `map` replaces the place before it as a whole. An
 unknown name, a wrong type and a value out of range end the start with one line and status 2.
 `python3 launch.py params [NODE]` prints the values and where each comes from.
