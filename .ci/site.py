@@ -31,7 +31,7 @@ START = {
     'your_building.md': 'Your building',
     'your_robot.md': 'Your robot',
 }
-HOW_TO = ('running', 'watching', 'fleet', 'long_runs', 'operator', 'security')
+HOW_TO = ('running', 'explore', 'watching', 'fleet', 'long_runs', 'operator', 'security')
 FROM = ('from_armor', 'from_smach', 'from_yasmin', 'from_patrolling_sim')
 CONFIG = """\
 site_name: Surveillance robot

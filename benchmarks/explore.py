@@ -13,6 +13,7 @@ import math
 import sys
 import time
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -24,7 +25,7 @@ from whole_stack import ROOT
 from surveillance_controllers.exploration.exploration import Exploration, Phase
 from surveillance_controllers.exploration.frontiers import FrontierParameters
 from surveillance_controllers.exploration.map_building import MapBuilder
-from surveillance_controllers.geometry import Scan
+from surveillance_controllers.geometry import Pose, Scan, composed, relative
 from surveillance_operator.map_command import graph_over_doors
 from surveillance_runtime.place import plan_grid
 from surveillance_runtime.place.occupancy_grid import Grid, distance_to
@@ -131,6 +132,68 @@ def compared(grid: Grid, world: World) -> tuple[float, float]:
     return share, float(np.percentile(truth.interpolated(surface, walls), 95))
 
 
+def read_log(file: Path) -> list[tuple[Pose, Scan]]:
+    """Return poses and scans of a log in FLIRT's format: lines VERTEX2 and ROBOTLASER1, in turn.
+
+    Such logs, of public data sets, are in github.com/tipaldi/flirtlib (data/).
+    """
+    poses: list[Pose] = []
+    scans: list[Scan] = []
+    for line in file.read_text().splitlines():
+        kind, *words = line.split()
+        if kind == 'VERTEX2':
+            x, y, yaw = (float(word) for word in words[1:4])
+            poses.append((x, y, yaw))
+        elif kind == 'ROBOTLASER1':
+            numbers = [float(word) for word in words[: 8 + int(words[7])]]
+            count, reach = int(numbers[7]), min(numbers[4], 50.0)
+            angles = np.linspace(numbers[1], numbers[1] + (count - 1) * numbers[3], count)
+            ranges = np.array(numbers[8 : 8 + count])
+            # What is at the lidar's limit met nothing, or something that does not reflect.
+            ranges[ranges >= 0.98 * reach] = np.nan
+            ranges[ranges <= 0.05] = np.nan
+            scans.append(Scan(angles, ranges, reach))
+    return list(zip(poses, scans, strict=True))
+
+
+def mapped(log: list[tuple[Pose, Scan]], seed: int) -> tuple[MapBuilder, list[Pose], float]:
+    """Map a log with an odometry that is 5 % long, turns, and is noisy; return what it was off."""
+    rng = np.random.default_rng(seed)
+    builder = MapBuilder(start=log[0][0])
+    odometry = last = log[0][0]
+    for pose, scan in log:
+        dx, dy, turn = relative(last, pose)
+        way = math.hypot(dx, dy)
+        error = rng.normal(0.0, 1.0, 2)
+        step = (1.05 * dx + 0.02 * way * float(error[0]), 1.05 * dy, turn)
+        bent = step[2] + 0.01 * way + 0.02 * math.sqrt(way) * float(error[1])
+        odometry, last = composed(odometry, (step[0], step[1], bent)), pose
+        builder.see(scan, odometry, keep=True)
+    return builder, list(builder.graph.poses), math.dist(odometry[:2], last[:2])
+
+
+def logs(files: list[Path], keep: Path | None) -> None:
+    """Map foreign logs; print how far the poses are from those that were published with them."""
+    rows = []
+    for file in files:
+        log = read_log(file)
+        begun = time.process_time()
+        builder, poses, off = mapped(log, 0)
+        cpu = time.process_time() - begun
+        steps = [math.dist(a[0][:2], b[0][:2]) for a, b in pairwise(log)]
+        error = [math.dist(a[:2], b[0][:2]) for a, b in zip(poses, log, strict=True)]
+        numbers = (len(log), sum(steps), off, *np.percentile(error, [50, 95, 100]), builder.loops)
+        shown = ('.0f', '.0f', '.2f', '.2f', '.2f', '.2f', '.0f')
+        cells = [format(number, form) for number, form in zip(numbers, shown, strict=True)]
+        rows.append((file.stem, *cells, f'{cpu:.0f}'))
+        print(' '.join(rows[-1]), file=sys.stderr, flush=True)
+        if keep is not None:
+            keep.mkdir(parents=True, exist_ok=True)
+            Image.fromarray(picture(builder.grid())).save(keep / f'{file.stem}.png')
+    head = ('log', 'scans', 'm', 'odom end', 'p50', 'p95', 'max', 'loops', 'cpu s')
+    print(table([head, *rows]))
+
+
 def picture(grid: Grid) -> NDArray[np.uint8]:
     """Return a map as map_server draws it."""
     shades = np.where(grid.cells < 0, 205, np.where(grid.occupied, 0, 254))
@@ -145,7 +208,11 @@ def main() -> int:
     parser.add_argument('--seeds', type=int, default=1)
     parser.add_argument('--errors', type=float, default=None, help='of the odometry, times')
     parser.add_argument('--keep', type=Path, help='write the maps into this folder')
+    parser.add_argument('--log', action='append', type=Path, help="only this log, FLIRT's format")
     options = parser.parse_args()
+    if options.log:
+        logs(options.log, options.keep)
+        return 0
     names = options.place or [
         ROOT / 'config' / f'{name}.yaml' for name in (PLACES[:1] if options.quick else PLACES)
     ]
