@@ -58,6 +58,7 @@ class ConsoleNode(PatrolNode):
         self._robot = self.parameter(
             'robot', '', 'The robot of a fleet that is spoken to first; empty: the first one.'
         )
+        self._found_by = time.monotonic() + timeout
         self._left_out = 0
         self._met: set[str] = set()
         self._feed = FleetFeed(self, FEED_PERIOD, lambda name, _new, _told: self._meet(name))
@@ -125,6 +126,10 @@ class ConsoleNode(PatrolNode):
     def _on_line(self, line: str) -> None:
         if self.ended.is_set():
             return  # a pipe has more lines than the `exit`
+        # The robots of a fleet are found some time after the console is opened.
+        while time.monotonic() < self._found_by and self._feed.snapshot('').status is None:
+            if self.stopping.wait(0.05):
+                return
         actions = self._actions.of(self.robot)
         for each in answer(line, actions, self._why, _columns(), fleet=self):
             if each.ends:

@@ -81,11 +81,11 @@ class FleetActions:
             ValueError: There is no such robot, or it cannot be done.
             CallError: A robot did not do it; the text says what became of each.
         """
-        names = self._robots()
+        names = tuple(self._robots())
         if robot != ALL:
             return do(self.of(robot))
-        if len(names) == 1:
-            return do(self.of(names[0]))
+        if names == ('',):
+            return do(self._shared)
         outcomes = self.outcomes(names, do)
         text = '; '.join(f'{name}: {said}' for name, (_, said) in outcomes.items())
         if not all(done for done, _ in outcomes.values()):

@@ -339,7 +339,7 @@ def changes(old: Snapshot, new: Snapshot) -> Iterator[Change]:
     if new.grid is not None and new.grid is not old.grid:
         rows, columns = new.grid.cells.shape
         cells = f'{columns} x {rows} cells of {new.grid.resolution:g} m'
-        yield Change(f'a map of {cells}', routine=True)
+        yield Change(f'a map of {cells}', routine=True, shared=True)
     doors, before_doors = new.doors or {}, old.doors or {}
     for door, is_open in doors.items():
         if is_open != before_doors.get(door, True):
