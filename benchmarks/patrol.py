@@ -28,7 +28,9 @@ import sys
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from datetime import datetime
 from pathlib import Path
+from zoneinfo import ZoneInfo
 
 import yaml
 
@@ -38,12 +40,13 @@ sys.path.insert(0, str(ROOT))
 from benchmarks.literature_policies import LITERATURE
 from benchmarks.tables import table
 from patrol_policy.bounds import charge_bound, rule_bound
-from patrol_policy.decision import Rules
+from patrol_policy.decision import QUIET, RECHARGE, Rules
 from patrol_policy.graph import (
     GraphError,
     PatrolGraph,
     graph_of_places,
 )
+from patrol_policy.hours import Calendar, WeeklyHours
 from patrol_policy.patrolling_sim import read_patrolling_sim
 from patrol_policy.policies import DEFAULT_POLICY, POLICIES
 from patrol_policy.promises import LATER, NEVER, WITHIN, promises
@@ -65,7 +68,7 @@ RULED = ('tour', 'lookahead', 'oldest', 'seed')
 """Policies run within the seeds' rules; the literature's run without any."""
 SIZES = (5, 8, 12, 20, 35, 60, 100, 150)
 """Places of the random maps, in turn."""
-TABLES = ('compare', 'battery', 'rules', 'choice', 'configured')
+TABLES = ('compare', 'battery', 'rules', 'choice', 'configured', 'hours')
 FREE = tuple(LITERATURE)
 POLICIES.update(LITERATURE)
 
@@ -403,6 +406,67 @@ def with_battery(count: int, states: int) -> None:
     )
 
 
+WALL_CLOCK = ZoneInfo('Europe/Rome')
+FORBIDDEN = {
+    'R1': lambda when: not 9 <= when.hour < 12,
+    'R2': lambda when: True,
+    'R3': lambda when: when.weekday() > 4 or not 8 <= when.hour < 18,
+    'R4': lambda when: (when.hour, when.minute) >= (8, 20) or when.hour < 8,
+}
+"""When the places of `month` must not be entered, written down once more from the hours alone."""
+
+
+def month(days: int) -> None:
+    """Patrol over a month with hours, thresholds, a keep-out, quiet hours; count what they forbid.
+
+    The clock on the wall is set forward within it.
+    """
+    hours = {
+        'R1': 'may daily 09:00-12:00; not daily 00:00-09:00, 12:00-24:00',
+        'R3': 'mon-fri 08:00-18:00',
+        'R4': 'daily 08:00-08:20',
+    }
+    calendar = Calendar(
+        {place: WeeklyHours.parse(text) for place, text in hours.items()},
+        quiet=WeeklyHours.parse('daily 22:00-06:00'),
+        keep_out=frozenset({'R2'}),
+        zone=WALL_CLOCK,
+    )
+    begin = datetime(2024, 3, 15, 7, 0, tzinfo=WALL_CLOCK).timestamp()
+    place = place_map('seven rooms', ROOT / 'config' / 'seven_rooms.yaml')
+    graph = PatrolGraph(place.graph.leg_seconds, 100.0)
+    tour = graph.tour.length
+    run = Patrol(
+        graph,
+        Rules(),
+        DEFAULT_POLICY,
+        0.9 * tour,
+        place.start,
+        SimulatedBattery(100.0 / (5.0 * tour), 100.0 / tour),
+        own_thresholds={'C1': 0.5 * tour, 'R3': 3600.0},
+        calendar=calendar,
+        began=begin,
+    )
+    visits = violations = late = 0
+    opened = set()
+    for decision in run.until(begin + days * DAY):
+        when = datetime.fromtimestamp(run.now, WALL_CLOCK)
+        if decision.rule == QUIET:
+            continue
+        visits += 1
+        violations += run.place in FORBIDDEN and FORBIDDEN[run.place](when)
+        # What was begun before the quiet hours is ended; nothing is begun in them.
+        left = datetime.fromtimestamp(decision.time, WALL_CLOCK)
+        late += decision.rule != RECHARGE and not 6 <= left.hour < 22
+        if run.place == 'R4':
+            opened.add(when.date())
+    print(
+        f'\n{days} days, tour {tour:.0f} s: {visits} visits, {violations} where it is closed or '
+        f'kept out, {late} begun in quiet hours; a place that is open for 20 minutes a day was '
+        f'visited on {len(opened)} days; {run.run.strandings} strandings'
+    )
+
+
 COLOURS = {
     'tour': (40, 120, 30),
     'lookahead': (200, 140, 30),
@@ -518,6 +582,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
             within_rules(within, (0.1, 0.5, 1.0, 2.0), 15.0, 60_000)
     if 'choice' in options.table:
         first_choice(1000)
+    if 'hours' in options.table:
+        month(3 if options.quick else 31)
     if 'configured' in options.table and not options.graph:
         configured(small, min(hours, 6.0))
     if options.plot:

@@ -211,7 +211,7 @@ class Patrol:
         wanted = self.battery.limits.stop_recharge
         self.now += max(0.0, wanted - self.level) / self.battery.charge
         self.level = max(self.level, wanted)
-        self._count_gap(self.place)
+        # While it charges the robot is there.
         self.visited_at[self.place] = self.now
         self.run.recharges += 1
 
