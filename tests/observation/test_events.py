@@ -135,3 +135,23 @@ def test_what_was_called_false_is_not_told_again_while_it_is_seen():
     book.end(event.number, 300.0)
     take(book, seen(stamp=400.0), look=3)
     assert {each.state for each in book.events} == {EventState.FALSE, EventState.OPEN}
+
+
+def test_what_goes_on_is_found_among_a_month_of_what_is_over_and_after_a_restart():
+    book = EventBook(most=300)
+    for number in range(1500):
+        event = take(book, seen(position=(0.0, 2.0 * number), stamp=float(number)), 1)
+        if number != 7:
+            book.end(event.number, float(number))
+    assert len(book.events) == 300
+    assert [each.number for each in book.current] == [8]
+    again = EventBook(most=300)
+    again.restore(json.loads(json.dumps(book.to_json())))
+    for each in (book, again):
+        assert take(each, seen(position=(0.0, 14.0), stamp=2000.0), 1, 3).number == 8
+        new = take(each, seen(position=(0.0, 90.0), stamp=2001.0), 1, 3)
+        assert new.number == 1501
+        each.answer(new.number, EventState.ACKNOWLEDGED)
+        for number in range(3000):
+            take(each, seen(position=(0.0, 90.0), stamp=2002.0 + number), 1, 3)
+    assert book.current == again.current

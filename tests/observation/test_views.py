@@ -54,6 +54,7 @@ def test_another_light_is_no_change():
             found = view_changes(reference, picture)
             told += found is not None
             false += bool(found)
+            assert not [each for each in found or () if not each.may_be_light]
     assert told >= 0.8 * 6 * len(PHOTOS)
     assert false <= 0.03 * told
 
@@ -108,3 +109,47 @@ def test_darkness_and_a_covered_lens_are_told():
         assert sight_of(dark) == Sight.DARK
         cloth = cv2.GaussianBlur(picture, (0, 0), 60) * 0.3 + 60
         assert sight_of(np.clip(cloth, 0, 255).astype(np.uint8)) == Sight.BLOCKED
+
+
+def coloured(path: Path) -> np.ndarray:
+    picture = cv2.imread(str(path), cv2.IMREAD_COLOR)
+    assert picture is not None
+    return cv2.resize(picture, (480, round(480 * picture.shape[0] / picture.shape[1])))
+
+
+def under_a_shadow(picture: np.ndarray, slope: float, softness: float) -> np.ndarray:
+    """Return a picture with a shadow over one side of it, and noise."""
+    rows, columns = np.indices(picture.shape[:2])
+    away = (columns - 0.5 * picture.shape[1]) + slope * (rows - 0.5 * picture.shape[0])
+    shade = 1.0 - 0.6 / (1.0 + np.exp(-np.clip(away / softness, -50, 50)))
+    noise = np.random.default_rng(2).normal(0, 2, picture.shape)
+    return np.clip(picture * shade[..., None] + noise, 0, 255).astype(np.uint8)
+
+
+@needs_photos
+def test_the_edge_of_a_shadow_is_no_thing_and_a_thing_of_another_colour_is_one():
+    seen = 0
+    for path in PHOTOS[:4]:
+        reference = coloured(path)
+        changed = reference.copy()
+        cv2.rectangle(changed, (200, 140), (250, 190), (40, 60, 200), -1)
+        for slope, softness in ((0.4, 1.0), (-0.7, 12.0)):
+            shaded = view_changes(reference, under_a_shadow(reference, slope, softness))
+            assert not [each for each in shaded or () if not each.may_be_light]
+            found = view_changes(reference, under_a_shadow(changed, slope, softness))
+            seen += any(not each.may_be_light and each.box[0] > 150 for each in found or ())
+    assert seen >= 7
+
+
+def test_what_stands_near_is_seen_beside_its_old_spot_when_the_camera_moved():
+    generator = np.random.default_rng(4)
+    far = cv2.resize(generator.integers(60, 200, (60, 80, 3), np.uint8), (480, 360))
+    near = cv2.resize(generator.integers(60, 200, (40, 20, 3), np.uint8), (120, 240))
+    pictures = []
+    for shift in (0, 5):
+        picture = far.copy()
+        picture[60:300, 180 + shift : 300 + shift] = near
+        pictures.append(picture)
+    changes = view_changes(*pictures)
+    assert changes is not None
+    assert not [each for each in changes if not each.may_be_light]

@@ -243,14 +243,33 @@ def test_a_view_is_compared_over_a_restart_and_learned_anew_when_a_person_says_s
     again = Round(views=tmp_path / 'views')
     again.watcher.restore(kept)
     again.watcher.picture(other, view, 100.0, None)
+    again.watcher.picture(other, view, 130.0, None)
+    assert again.book.events == [], 'one look alone calls nobody'
+    assert again.told[-1].state == 'changed'
+    again.watcher.arrive('elsewhere', 140.0)
+    again.watcher.arrive('R1', 150.0)
+    again.watcher.picture(other, view, 160.0, None)
     (event,) = again.book.events
     assert (event.kind, event.seen) == (Kind.VIEW, 'changed')
     assert again.watcher.answer(event.number, EventState.NORMAL).state == EventState.NORMAL
     for number in range(3):
         again.watcher.picture(other, view, 200.0 + 20.0 * number, None)
     assert [each.state for each in again.book.events] == [EventState.NORMAL]
-    again.watcher.picture(texture(), view, 300.0, None)
+    for number in range(2):
+        again.watcher.arrive('elsewhere', 290.0 + 50.0 * number)
+        again.watcher.arrive('R1', 295.0 + 50.0 * number)
+        again.watcher.picture(texture(), view, 300.0 + 50.0 * number, None)
     assert [each.state for each in again.book.events][:1] == [EventState.OPEN]
+
+
+def test_a_view_is_compared_with_the_one_with_the_doors_as_they_are_now():
+    views = ReferenceViews()
+    at = (1.0, 1.0, 0.5)
+    shut = views.add(at, texture(), 1.0, (), {'D1': 'closed'})
+    assert views.at(at, {'D1': 'open'}) is None
+    ajar = views.add(at, texture(), 2.0, (), {'D1': 'open'})
+    assert views.at(at, {'D1': 'closed'}) is shut
+    assert views.at(at, {'D1': 'open', 'D2': 'closed'}) is ajar
 
 
 def test_a_marker_that_no_file_knows_is_unknown():

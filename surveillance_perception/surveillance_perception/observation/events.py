@@ -7,8 +7,9 @@ least severe and oldest goes first; what is open stays.
 
 from __future__ import annotations
 
+import heapq
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, replace
 from enum import StrEnum
 from typing import Any
@@ -116,7 +117,11 @@ class EventBook:
         self._most = most
         self._told = told
         self._events: dict[int, Event] = {}
-        self._normal: list[Observation] = []
+        # What may be of one thing, of what goes on or is quiet: a month of what is over is not
+        # looked through for each observation.
+        self._current: dict[_Key, set[int]] = {}
+        self._over: list[tuple[int, float, int]] = []
+        self._normal: dict[_Key, list[Observation]] = {}
         self._next = 1
         self._looks: dict[int, int] = {}
         self._quiet: set[int] = set()
@@ -143,7 +148,7 @@ class EventBook:
             The event; None where it is normal, or of no severity and of no event.
         """
         self._end_others(seen)
-        if any(_same(each, seen) for each in self._normal):
+        if any(_same(each, seen) for each in self._normal.get(_key(seen), ())):
             return None
         event = self._event_of(seen)
         if event is None:
@@ -198,6 +203,8 @@ class EventBook:
             or _from_elsewhere(event, seen),
         )
         self._events[event.number] = changed
+        if changed.state != EventState.OPEN:
+            self._index(changed)
         return changed
 
     def answer(self, number: int, state: EventState) -> Event:
@@ -211,9 +218,10 @@ class EventBook:
             raise ValueError(f'an event cannot be made {state} by hand')
         event = replace(self._events[number], state=state)
         if state == EventState.NORMAL:
-            self._normal.append(
-                Observation(event.kind, event.seen, event.place, event.subject, event.position)
+            is_normal = Observation(
+                event.kind, event.seen, event.place, event.subject, event.position
             )
+            self._normal.setdefault(_key(is_normal), []).append(is_normal)
         if state == EventState.FALSE:
             self._quiet.add(number)
         self._keep(event)
@@ -225,8 +233,10 @@ class EventBook:
         Raises:
             KeyError: There is no such event.
         """
+        event = self._events[number]
         self._quiet.discard(number)
-        if (event := self._events[number]) not in self._going_on():
+        self._index(event)
+        if event.state not in _GOING_ON:
             return None
         event = replace(event, state=EventState.OVER, last=max(event.last, stamp))
         self._keep(event)
@@ -242,7 +252,7 @@ class EventBook:
         """Return all as plain values, for `restore`."""
         return {
             'events': [each.to_json() for each in self._events.values()],
-            'normal': [each.to_json() for each in self._normal],
+            'normal': [each.to_json() for some in self._normal.values() for each in some],
             'next': self._next,
             'quiet': sorted(self._quiet),
         }
@@ -258,41 +268,80 @@ class EventBook:
         following = int(values['next'])
         quiet = {int(each) for each in values.get('quiet', ())}
         self._events = {each.number: each for each in events}
-        self._normal, self._next = normal, following
+        self._normal, self._next = {}, following
+        for each in normal:
+            self._normal.setdefault(_key(each), []).append(each)
         self._looks, self._quiet = {}, quiet
+        self._current, self._over = {}, []
+        for event in events:
+            self._index(event)
+
+    @property
+    def current(self) -> list[Event]:
+        """Those that are open, acknowledged, or called false and still seen, by number."""
+        numbers = sorted(number for some in self._current.values() for number in some)
+        return [self._events[number] for number in numbers]
 
     def _keep(self, event: Event) -> None:
         self._events[event.number] = event
+        self._index(event)
         self._told(event)
-        over = [each for each in self._events.values() if each.state != EventState.OPEN]
-        if len(self._events) > self._most and over:
-            least = min(over, key=lambda each: (each.severity, each.last)).number
-            del self._events[least]
-            self._quiet.discard(least)
+        while len(self._events) > self._most and self._over:
+            severity, last, number = heapq.heappop(self._over)
+            least = self._events.get(number)
+            # An entry of an event that went on since, or that was seen again, is stale.
+            if least is None or least.state == EventState.OPEN:
+                continue
+            if (least.severity, least.last) != (severity, last):
+                continue
+            del self._events[number]
+            self._quiet.discard(number)
+            self._looks.pop(number, None)
+            self._current.get(_key(least), set()).discard(number)
 
-    def _going_on(self) -> Iterable[Event]:
-        return (
-            each
-            for each in self._events.values()
-            if each.state in (EventState.OPEN, EventState.ACKNOWLEDGED)
-        )
+    def _index(self, event: Event) -> None:
+        """Put an event where `_near` finds it, and where the least one is found."""
+        some = self._current.setdefault(_key(event), set())
+        if event.state in _GOING_ON or event.number in self._quiet:
+            some.add(event.number)
+        else:
+            some.discard(event.number)
+        if event.state != EventState.OPEN:
+            heapq.heappush(self._over, (event.severity, event.last, event.number))
+            if len(self._over) > 4 * self._most + 100:
+                # Mostly stale entries of what was seen again and again.
+                ended = (e for e in self._events.values() if e.state != EventState.OPEN)
+                self._over = [(each.severity, each.last, each.number) for each in ended]
+                heapq.heapify(self._over)
+
+    def _near(self, seen: Observation) -> list[Event]:
+        """Return what goes on, or is quiet, of what may be the same thing."""
+        numbers = sorted(self._current.get(_key(seen), ()))
+        return [each for each in map(self._events.__getitem__, numbers) if _alike(each, seen)]
 
     def _event_of(self, seen: Observation) -> Event | None:
         # What a person called false is not told again while it is seen.
-        quiet = [self._events[number] for number in self._quiet]
-        going_on = [*self._going_on(), *quiet]
-        found = [each for each in going_on if not _contradicts(each, seen) and _alike(each, seen)]
+        found = [each for each in self._near(seen) if not _contradicts(each, seen)]
         return max(found, key=lambda each: each.last, default=None)
 
     def _end_others(self, seen: Observation) -> None:
         """End events of the same thing in another state: a door that is open is closed no more."""
-        for each in list(self._going_on()):
-            if _contradicts(each, seen) and _alike(each, seen) and seen.stamp > each.last:
+        for each in self._near(seen):
+            if not _contradicts(each, seen) or seen.stamp <= each.last:
+                continue
+            if each.state in _GOING_ON:
                 self._keep(replace(each, state=EventState.OVER, last=seen.stamp))
-        for number in list(self._quiet):
-            each = self._events[number]
-            if _contradicts(each, seen) and _alike(each, seen) and seen.stamp > each.last:
-                self._quiet.discard(number)
+            self._quiet.discard(each.number)
+            self._index(self._events[each.number])
+
+
+_GOING_ON = (EventState.OPEN, EventState.ACKNOWLEDGED)
+_Key = tuple[Kind, str]
+
+
+def _key(thing: Event | Observation) -> _Key:
+    """Return what two sightings of one thing have in common for certain."""
+    return thing.kind, thing.subject
 
 
 def _alike(event: Event, seen: Observation) -> bool:

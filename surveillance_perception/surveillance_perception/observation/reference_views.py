@@ -1,4 +1,8 @@
-"""How each viewpoint looks normally: pictures by where the camera was, that outlive a restart."""
+"""How each viewpoint looks normally: pictures by where the camera was, that outlive a restart.
+
+A door that stands otherwise changes the view, and is the door's own matter: each viewpoint has a
+picture for each state in which the doors nearby were found.
+"""
 
 from __future__ import annotations
 
@@ -11,8 +15,11 @@ from typing import Any
 import cv2
 import numpy as np
 
-from surveillance_perception.observation.views import WIDTH, Grey
+from surveillance_perception.observation.views import WIDTH, Picture
 
+Box = tuple[int, int, int, int]
+SAME_PART = 0.3
+"""Parts that overlap so far, of what they cover together, are one."""
 Viewpoint = tuple[float, ...]
 """x and y in metres, then yaw and the arm's joints in radians."""
 SAME_VIEW = (0.15, 0.1)
@@ -31,14 +38,34 @@ class ReferenceView:
         stamp: When, seconds since 1970.
         markers: The ids seen from it.
         absent: In how many pictures in a row each of them was not seen.
+        doors: The states of the doors nearby.
+        differed: The parts that differed in the last two looks in which some did: the number of
+            the look, and the boxes in the reference (left, top, width, height), pixels.
     """
 
     name: str
     viewpoint: Viewpoint
-    picture: Grey
+    picture: Picture
     stamp: float
     markers: frozenset[int] = frozenset()
     absent: dict[int, int] = field(default_factory=dict)
+    doors: Mapping[str, str] = field(default_factory=dict)
+    differed: list[tuple[int, list[Box]]] = field(default_factory=list)
+
+    def saw_before(self, box: Box, look: int) -> bool:
+        """Tell whether the same part differed in the look before this one, too."""
+        return any(
+            before < look and any(_overlap(box, other) >= SAME_PART for other in boxes)
+            for before, boxes in self.differed
+        )
+
+    def note(self, boxes: list[Box], look: int) -> None:
+        """Take which parts differ in a picture; in a new look that shows none, nothing is left."""
+        earlier = [each for each in self.differed if each[0] < look][-1:]
+        if not boxes:
+            self.differed = [] if look not in dict(self.differed) else self.differed
+            return
+        self.differed = [*earlier, (look, boxes)]
 
 
 class ReferenceViews:
@@ -53,18 +80,40 @@ class ReferenceViews:
         self._views: list[ReferenceView] = []
         self._next = 1
 
-    def at(self, viewpoint: Viewpoint) -> ReferenceView | None:
-        """Return the view from a viewpoint, if there is one."""
-        return next((each for each in self._views if _same(each.viewpoint, viewpoint)), None)
+    def at(
+        self, viewpoint: Viewpoint, doors: Mapping[str, str] | None = None
+    ) -> ReferenceView | None:
+        """Return the view from a viewpoint with the doors in these states, if there is one.
+
+        Args:
+            viewpoint: Where the camera is.
+            doors: The states of the doors nearby; one that either side does not know differs not.
+        """
+        states = doors or {}
+        return next(
+            (
+                each
+                for each in self._views
+                if _same(each.viewpoint, viewpoint)
+                and all(states.get(name, state) == state for name, state in each.doors.items())
+            ),
+            None,
+        )
 
     def add(
-        self, viewpoint: Viewpoint, picture: Grey, stamp: float, markers: Iterable[int] = ()
+        self,
+        viewpoint: Viewpoint,
+        picture: Picture,
+        stamp: float,
+        markers: Iterable[int] = (),
+        doors: Mapping[str, str] | None = None,
     ) -> ReferenceView:
         """Take a picture as how this viewpoint looks normally."""
         if picture.shape[1] > WIDTH:
             size = WIDTH, max(1, round(picture.shape[0] * WIDTH / picture.shape[1]))
             picture = np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_AREA), np.uint8)
         view = ReferenceView(f'v{self._next}', viewpoint, picture, stamp, frozenset(markers))
+        view.doors = dict(doors or {})
         self._next += 1
         for old in self._views[: len(self._views) + 1 - MOST_VIEWS]:
             self.forget(old.name)
@@ -92,6 +141,7 @@ class ReferenceViews:
                 'viewpoint': list(each.viewpoint),
                 'stamp': each.stamp,
                 'markers': sorted(each.markers),
+                'doors': dict(each.doors),
             }
             for each in self._views
         ]
@@ -112,14 +162,16 @@ class ReferenceViews:
             if picture is not None:
                 viewpoint = tuple(map(float, each['viewpoint']))
                 markers = frozenset(map(int, each['markers']))
-                found.append(ReferenceView(name, viewpoint, picture, float(each['stamp']), markers))
+                view = ReferenceView(name, viewpoint, picture, float(each['stamp']), markers)
+                view.doors = {str(door): str(is_) for door, is_ in each.get('doors', {}).items()}
+                found.append(view)
         following = int(values['next'])
         self._views, self._next = found, following
 
-    def _read(self, name: str) -> Grey | None:
+    def _read(self, name: str) -> Picture | None:
         if self._folder is None or not (path := self._path(self._folder, name)).is_file():
             return None
-        picture = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE)
+        picture = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
         return None if picture is None else np.asarray(picture, np.uint8)
 
     @staticmethod
@@ -133,3 +185,10 @@ def _same(one: Viewpoint, other: Viewpoint) -> bool:
     near = math.dist(one[:2], other[:2]) <= SAME_VIEW[0]
     turned = (abs(math.remainder(a - b, math.tau)) for a, b in zip(one[2:], other[2:], strict=True))
     return near and all(each <= SAME_VIEW[1] for each in turned)
+
+
+def _overlap(one: Box, other: Box) -> float:
+    width = min(one[0] + one[2], other[0] + other[2]) - max(one[0], other[0])
+    height = min(one[1] + one[3], other[1] + other[3]) - max(one[1], other[1])
+    common = max(0, width) * max(0, height)
+    return common / max(1, one[2] * one[3] + other[2] * other[3] - common)

@@ -66,6 +66,8 @@ SEEN_AGAIN = 10.0
 """What goes on is told again after this time, seconds."""
 AGREED_PICTURES = 3
 """A dark or covered view, and a marker that is missing, must be so in so many pictures."""
+ONE_LOOK, SEEN_TWICE = 0.5, 0.9
+"""Confidence in a changed view after one look, at most, and after two, at least."""
 WALKING = 0.8
 """Confidence that what walks is a person."""
 LOOKED = 0.6
@@ -405,10 +407,8 @@ class Watcher:
 
     def _end_gone(self, now: FloorView, found: Sequence[ObjectChange], stamp: float) -> None:
         """End the events of things whose spot was in view, and is as before."""
-        for event in self.book.events:
-            if event.kind not in (Kind.OBJECT, Kind.WAY) or event.state in _ENDED:
-                continue
-            if event.position is None:
+        for event in self.book.current:
+            if event.kind not in (Kind.OBJECT, Kind.WAY) or event.position is None:
                 continue
             if any(math.dist(each.position, event.position) < 2 * SAME_THING for each in found):
                 continue
@@ -453,8 +453,8 @@ class Watcher:
         there = [each.points for each in self._candidates if each.change != Change.REMOVED]
         there += [
             np.array([event.position])
-            for event in self.book.events
-            if event.kind == Kind.OBJECT and event.state not in _ENDED and event.position
+            for event in self.book.current
+            if event.kind == Kind.OBJECT and event.position
         ]
         if there:
             # The other sides of what is new are seen for the first time, too, and are not normal.
@@ -520,30 +520,50 @@ class Watcher:
         camera = viewpoint[0], viewpoint[1]
         if self._others is not None and self._others.may_be_seen(camera, stamp):
             return
-        known = self._views.at(viewpoint)
+        doors = self._doors_near(camera)
+        known = self._views.at(viewpoint, doors)
         if known is None:
-            self._views.add(viewpoint, grey, stamp, markers or ())
+            # Who walks about here is no part of how it looks normally.
+            if not self._persons:
+                self._views.add(viewpoint, picture, stamp, markers or (), doors)
             return
         if markers is not None:
             self._miss(known, markers, viewpoint, stamp, grey)
-        differences = view_changes(known.picture, grey)
+        if self._persons:
+            return  # it is they who change the view
+        differences = view_changes(known.picture, picture)
+        things = [each for each in differences or () if not each.may_be_light]
+        again = [each for each in things if known.saw_before(each.box, self._look)]
+        if differences is not None:
+            known.note([each.box for each in things], self._look)
         if differences == []:
-            going_on = [each for each in self.book.events if each.state not in _ENDED]
-            if any((each.kind, each.subject) == (Kind.VIEW, known.name) for each in going_on):
+            current = {(each.kind, each.subject) for each in self.book.current}
+            if (Kind.VIEW, known.name) in current:
                 self._take(Observation(Kind.VIEW, 'clear', self._place, known.name, stamp=stamp))
-        for change in (differences or [])[:1]:
+        for change in (again or differences or [])[:1]:
+            # Shadows wander and people leave: one look alone is no reason to call anybody.
+            sure = change.confidence if again else min(change.confidence, ONE_LOOK)
             observation = Observation(
                 Kind.VIEW,
                 'changed',
                 self._place,
                 known.name,
                 (viewpoint[0], viewpoint[1]),
-                confidence=change.confidence,
+                confidence=max(sure, SEEN_TWICE) if again else sure,
                 stamp=stamp,
                 compared_with=f'{known.stamp:.0f}',
             )
             if self._is_due(observation):
-                self._take(observation, grey, known.picture)
+                self._take(observation, picture, known.picture)
+
+    def _doors_near(self, point: tuple[float, float]) -> dict[str, str]:
+        """Return the states of the doors near a point, of those whose state is known."""
+        near = {}
+        for name, door in self._doors.items():
+            x1, y1, x2, y2 = door.segment
+            if door.told and math.dist(((x1 + x2) / 2, (y1 + y2) / 2), point) <= DOOR_RANGE:
+                near[name] = door.told
+        return near
 
     def _look_for_persons(self, picture: Picture, stamp: float) -> None:
         found = [] if self._find_persons is None else self._find_persons(picture)
@@ -713,9 +733,6 @@ class Watcher:
         self._markers = {**hung, **self._markers} if self._known_markers else hung
         if self._grid is not None and normal:
             self._normal = _unpacked(normal, self._grid)
-
-
-_ENDED = (EventState.OVER, EventState.NORMAL)
 
 
 def _point(values: Sequence[float]) -> tuple[float, float, float]:
