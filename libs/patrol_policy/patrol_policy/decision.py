@@ -323,8 +323,9 @@ def _shared(
             step = graph.route(here, stop)[0]
             if step in allowed:
                 common['share'] = Share(choice.share.tour, stop)
-                reason = f'{stop} is the next on the tour that the rules allow ({rule}); '
-                reason += choice.reason
+                reason = f'{stop} is the next on the tour that the rules allow ({rule})'
+                if goal != here:  # why it would stay is no reason to go
+                    reason += f'; {choice.reason}'
                 return Decision(**common, place=step, target=stop, rule=rule, reason=reason)
     scores = {
         place: -graph.move(here, place) - graph.seconds(place, goal) + world.unvisited(place) * 1e-3
