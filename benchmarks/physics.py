@@ -29,6 +29,7 @@ from localisation import Amcl, print_table
 from surveillance_controllers.geometry import Pose, Scan, composed, relative
 from surveillance_controllers.motion.driving import State
 from surveillance_controllers.motion.odometry import OdometryBuffer
+from surveillance_simulation.optional_mujoco import mujoco
 from surveillance_simulation.physics.model import PhysicsModel
 from surveillance_simulation.robot.base import BaseModel
 from surveillance_simulation.robot.lidar import LidarModel
@@ -99,6 +100,8 @@ def main() -> int:
     parser.add_argument('--seed', type=int, default=1)
     parser.add_argument('--quick', action='store_true', help='120 simulated seconds')
     options = parser.parse_args()
+    if mujoco is None:
+        parser.error('mujoco is missing: pip install mujoco')
     logging.disable()
     seconds = 120.0 if options.quick else options.seconds
     file = ROOT / 'config' / f'{options.place}.yaml'
