@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 import shlex
 import sys
 from collections.abc import Iterator, Sequence
@@ -58,8 +59,14 @@ def options_of(argv: Sequence[str]) -> argparse.Namespace:
     options = parser.parse_args(argv)
     if options.out.suffix not in ('.yaml', '.yml'):
         raise ValueError(f'--out {options.out}: expected a name that ends in .yaml')
-    if not options.out.absolute().parent.is_dir():
+    folder = options.out.absolute().parent
+    if not folder.is_dir():
         raise ValueError(f'--out {options.out}: there is no folder {options.out.parent}')
+    # Said now and not after hours of driving.
+    if not os.access(folder, os.W_OK | os.X_OK):
+        raise ValueError(f'--out {options.out}: nothing can be written into {options.out.parent}')
+    if folders := [str(file) for file in files_of(options.out) if file.is_dir()]:
+        raise ValueError(f'--out {options.out}: {", ".join(folders)}: expected no folder there')
     if options.seconds is not None and not 0.0 < options.seconds < 1e9:
         raise ValueError(f'--for {options.seconds:g}: expected a positive number of seconds')
     mode = options.mode or DEFAULT_MODE
@@ -129,7 +136,10 @@ def close(folder: Path, options: argparse.Namespace, config: Path) -> int:
         print(f'{PROGRAM}: nothing was mapped: see {folder / "launch.log"}', file=sys.stderr)
         return EXIT_NOTHING_SEEN
     seen = read_map(found)
-    write_map(options.out, seen.cells, seen.resolution, seen.origin, 'pgm')
+    try:
+        write_map(options.out, seen.cells, seen.resolution, seen.origin, 'pgm')
+    except ValueError as error:
+        raise ValueError(f'{error}; the map is kept in {found}') from None
     left = folder / DONE_FILE
     print(f'map: {options.out}' + ('' if left.exists() else ' (not all of the building)'))
     for line in left.read_text('utf-8').splitlines() if left.exists() else ():

@@ -113,7 +113,7 @@ class Explorer(PatrolNode):
         self._readings = OdometryBuffer()
         self._odometry: Pose | None = None
         self._heard_scan = False
-        self._lock = threading.Lock()
+        self._lock, self._saving = threading.Lock(), threading.Lock()
         self._saved_at = self._published_at = 0.0
         self._base = CommandPublisher(
             self,
@@ -193,8 +193,9 @@ class Explorer(PatrolNode):
                 odometry = self._odometry
                 scan = joined(scan, self._readings, seconds_of(stamp))
                 self._heard_scan = True
-                velocity = self.exploration.see(scan, odometry, self._now())
-                self._base.command(Velocity() if self._hold.active else velocity)
+                stands = self._hold.active or self.stopping.is_set()
+                velocity = self.exploration.see(scan, odometry, self._now(), stands=stands)
+                self._base.command(velocity)
             self._tell_pose(odometry, stamp)
 
     def _on_hold(self) -> None:
@@ -217,6 +218,8 @@ class Explorer(PatrolNode):
         told, phase, goal = time.monotonic() - _TELL, self.exploration.phase, None
         while not self.stopping.is_set():
             changed = self.exploration.think()
+            if self.stopping.is_set():
+                return  # it was told to end, and has not seen all
             if changed:
                 self._show(time.monotonic())
             if self.exploration.phase is Phase.DONE:
@@ -265,7 +268,8 @@ class Explorer(PatrolNode):
             return
         try:
             file = Path(self._settings.folder, MAP_FILE)
-            write_map(file, grid.cells[::-1], grid.resolution, (*grid.origin, 0.0), 'pgm')
+            with self._saving:  # a stop may come while the map is written
+                write_map(file, grid.cells[::-1], grid.resolution, (*grid.origin, 0.0), 'pgm')
         except FileError as error:
             self.get_logger().error(f'the map is not kept: {error}')
 

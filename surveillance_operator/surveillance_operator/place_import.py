@@ -30,6 +30,7 @@ from surveillance_runtime.place.occupancy_map import (
 )
 from surveillance_runtime.place.writing import format_place
 from surveillance_runtime.robot_base import ROBOT_RADIUS
+from surveillance_runtime.yaml_file import read_yaml_file
 
 MOST_BYTES = 20_000_000
 """Of a YAML file; a picture may be larger."""
@@ -97,11 +98,16 @@ def _is_free(path: Path, request: ImportRequest) -> None:
         raise ValueError(f'{path}: is there already; expected another --out, or --force')
 
 
+def is_levels(data: bytes) -> bool:
+    """Tell whether a YAML file's text is taken for Open-RMF's, which has levels, and no map's."""
+    return re.search(rb'^levels:', data, re.MULTILINE) is not None
+
+
 def _levels_in(path: Path) -> Any:
     """Return what a YAML file of Open-RMF says; None: it is none, or no YAML at all."""
     try:
         data = read_file(path, MOST_BYTES)
-        if re.search(rb'^levels:', data, re.MULTILINE) is None:
+        if not is_levels(data):
             return None
         return yaml.load(data, Loader=getattr(yaml, 'CSafeLoader', yaml.SafeLoader))
     except FileError:
@@ -137,11 +143,20 @@ def _written(
         '`python3 launch.py map FILE` checks and draws it.'
     )
     picture = out.with_suffix('.png')
-    drawn_over = (request.source.resolve(), request.source.with_suffix('.png').resolve())
-    if picture.resolve() in drawn_over:
+    kept = {request.source, request.source.with_suffix('.png'), _picture_of(request.source)}
+    if picture.resolve() in {each.resolve() for each in kept}:
         picture = out.with_name(out.stem + '_drawn.png')
     text = format_place({**reference, **parameters}, title)
     return [f'{request.source}: {found}', *more, *lines, *_draw(request, text, picture)]
+
+
+def _picture_of(source: Path) -> Path:
+    """Return the picture that a map's description names; the source itself if it names none."""
+    try:
+        image = None if is_picture(source) else read_yaml_file(source).values.get('image')
+    except FileError:
+        return source  # a building or a graph
+    return source.parent / image if isinstance(image, str) else source
 
 
 def _draw(request: ImportRequest, text: str, picture: Path) -> list[str]:

@@ -10,6 +10,7 @@ import pytest
 
 from benchmarks import regular_places
 from surveillance_controllers.exploration.exploration import Exploration, Phase
+from surveillance_controllers.exploration.foreign_map import ForeignMap
 from surveillance_controllers.exploration.frontiers import (
     FrontierParameters,
     find_frontiers,
@@ -65,6 +66,41 @@ def test_what_was_seen_before_a_stop_is_there() -> None:
     exploration, _ = explored(World.from_parameters(regular_places.grid(2, 1)), stop_at=1.0)
     assert exploration.phase is Phase.DONE
     assert exploration.grid.free.any()
+
+
+def test_a_robot_that_is_held_goes_on_afterwards() -> None:
+    robot = Robot(World.from_parameters(regular_places.grid(2, 1)), rng=np.random.default_rng(0))
+    exploration = Exploration(MapBuilder(start=robot.base.pose))
+    held = 0
+    while held < 90:
+        scan = Scan(robot.lidar.angles, robot.scan().astype(float), robot.lidar.range_max)
+        held += int(robot.time > 3.0)
+        velocity = exploration.see(scan, robot.base.odometry, robot.time, stands=held > 0)
+        assert not (held and velocity.speed)
+        robot.base.command(velocity.speed, velocity.turn)
+        robot.advance(1.0 if held > 5 else 0.1)
+        exploration.think()
+        if held == 5:
+            goal = exploration.goal
+    assert goal is not None
+    assert exploration.goal is goal
+    scan = Scan(robot.lidar.angles, robot.scan().astype(float), robot.lidar.range_max)
+    exploration.see(scan, robot.base.odometry, robot.time)
+    exploration.think()
+    assert exploration.goal is goal
+    assert exploration.unreached == []
+
+
+def test_another_programs_map_without_floor_is_waited_out() -> None:
+    foreign, cells = ForeignMap(), np.full((40, 40), -1, np.int8)
+    foreign.take_correction((0.0, 0.0, 0.0))
+    foreign.take_map(Grid(cells, 0.05))
+    assert foreign.missing == 'map'
+    assert not foreign.is_due((0.0, 0.0, 0.0))
+    cells = cells.copy()
+    cells[10:20, 10:20] = 0
+    foreign.take_map(Grid(cells, 0.05))
+    assert foreign.is_due((0.0, 0.0, 0.0))
 
 
 def hall(unknown_from: int) -> Grid:

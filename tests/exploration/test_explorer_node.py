@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import threading
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,7 @@ from nav_msgs.msg import OccupancyGrid, Odometry
 from sensor_msgs.msg import LaserScan
 
 from benchmarks import regular_places
+from surveillance_controllers.exploration.exploration import Phase
 from surveillance_controllers.explorer_node import DONE_FILE, MAP_FILE, Explorer
 from surveillance_runtime.conversions import map_message, pose_estimate, pose_message
 from surveillance_runtime.place.occupancy_grid import Grid
@@ -88,3 +90,29 @@ def test_the_map_of_another_program_is_followed(graph, tmp_path: Path) -> None:
     graph.until(drives)
     assert math.dist(node.exploration.goal.middle, (5.0, 2.0)) < 0.3
     assert not node.finished
+
+
+def test_who_is_told_to_end_does_not_say_that_all_was_seen(graph, tmp_path: Path) -> None:
+    node = graph.add(Explorer, {'folder': str(tmp_path)})
+    robot = Robot(graph, door=1.2)
+
+    def sees() -> bool:
+        robot.tell()
+        return node.exploration.grid is not None
+
+    graph.until(sees)
+    think, began = node.exploration.think, threading.Event()
+
+    def think_long() -> bool:
+        began.set()
+        node.stopping.wait(10.0)
+        while node.exploration.phase is not Phase.DONE:
+            pass
+        return bool(think())
+
+    node.exploration.think = think_long
+    graph.until(began.is_set)
+    node.stop()
+    assert not node.finished
+    assert (tmp_path / MAP_FILE).exists()
+    assert not (tmp_path / DONE_FILE).exists()

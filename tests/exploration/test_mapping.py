@@ -176,3 +176,12 @@ def test_a_round_is_mapped_in_spite_of_a_bad_odometry(world: World) -> None:
     assert math.dist(odometry[:2], true[:2]) > 0.5
     assert math.dist(builder.pose(odometry)[:2], true[:2]) < 0.03
     assert builder.loops > 0
+
+
+def test_odometry_that_begins_anew_does_not_tear_the_map(world: World) -> None:
+    builder, pose = MapBuilder(start=(4.0, 11.0, 0.3)), (4.0, 11.0, 0.3)
+    builder.see(seen(world, pose), (3e6, -7.0, 0.0))
+    before = builder.grid().cells.shape
+    assert builder.see(seen(world, pose, seed=1), (0.0, 0.0, 1.0))
+    assert math.dist(builder.pose((0.0, 0.0, 1.0))[:2], pose[:2]) < 0.02
+    assert builder.grid().cells.shape == before

@@ -42,6 +42,18 @@ def test_nothing_is_written_over_unasked(tmp_path: Path, monkeypatch: pytest.Mon
     assert options_of(['--force']).out == Path('building.yaml')
 
 
+def test_what_cannot_be_written_is_said_before_the_robot_drives(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path('building.pgm').mkdir()
+    with pytest.raises(ValueError, match=r'building\.pgm: expected no folder there'):
+        options_of(['--force'])
+    monkeypatch.setattr('os.access', lambda *_: False)  # root may write everywhere
+    with pytest.raises(ValueError, match=r'--out hut\.yaml: nothing can be written into \.'):
+        options_of(['--out', 'hut.yaml'])
+
+
 def explored(folder: Path) -> None:
     """Leave what a run leaves: two rooms with a door of 1 m."""
     cells = np.zeros((82, 162), np.int8)
@@ -74,6 +86,28 @@ def test_the_map_becomes_a_place(
     assert len(place.plan.place.rooms) == 2
     assert len(place.plan.doors) == 1
     assert place.plan.start[:2] == (0.0, 0.0)
+
+
+def test_a_map_may_have_any_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    run = tmp_path / 'run'
+    run.mkdir()
+    explored(run)
+    assert close(run, options_of(['--out', "# Anna's hut: 2.yaml"]), CONFIG) == 0
+    assert read_place_file(tmp_path / "# Anna's hut: 2_place.yaml").plan.doors
+
+
+def test_a_map_that_cannot_be_written_is_not_lost(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    run = tmp_path / 'run'
+    run.mkdir()
+    explored(run)
+    options = options_of([])
+    Path('building.pgm').mkdir()
+    with pytest.raises(ValueError, match=r'the map is kept in .*run/map\.yaml'):
+        close(run, options, CONFIG)
 
 
 def test_a_run_that_saw_nothing_says_so(

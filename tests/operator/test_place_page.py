@@ -361,3 +361,57 @@ def test_what_is_dropped_and_is_no_map_costs_one_line(
     assert '\n' not in str(caught.value)
     assert 'dropped-' not in str(caught.value)
     assert list(tmp_path.iterdir()) == []
+
+
+_REST = 'resolution: 0.05\norigin: [0, 0, 0]\nnegate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.2\n'
+
+
+def two_rooms(path: Path) -> None:
+    """Write the picture of two rooms with a door of 1 m."""
+    image = Image.new('L', (162, 82), 0)
+    for box in ((2, 2, 80, 80), (82, 2, 160, 80), (80, 30, 82, 50)):
+        image.paste(254, box)
+    image.save(path)
+
+
+def as_dropped(text: str, name: str, **pictures: Path) -> dict[str, str]:
+    contents = {name: text.encode()}
+    contents |= {f'{stem}.png': path.read_bytes() for stem, path in pictures.items()}
+    return {name: base64.b64encode(data).decode() for name, data in contents.items()}
+
+
+@pytest.mark.parametrize(
+    ('image', 'name'),
+    [
+        ('image: m.png # of the ground floor', 'm.yaml'),
+        ('image: ../../elsewhere/m.png', 'm.yaml'),
+        ('"image": "C:\\\\maps\\\\m.png"', 'm.yaml'),
+        ('image: >-\n  /elsewhere/m.png', 'm.yaml'),
+        ('image: ../m.png', 'm.YAML'),
+    ],
+)
+def test_a_picture_is_taken_from_what_was_dropped(image: str, name: str, tmp_path: Path) -> None:
+    two_rooms(tmp_path / 'm.png')
+    files = as_dropped(f'{image}\n{_REST}', name, m=tmp_path / 'm.png')
+    out, said = import_dropped(files, tmp_path, 0.22)
+    assert '2 rooms, 1 door' in said
+    assert len(read_place_file(out).plan.place.rooms) == 2
+
+
+@pytest.mark.parametrize('form', ['image: {}\n', '"image": {}\n', 'image:\n  {}\n'])
+def test_no_picture_of_another_folder_is_read(form: str, tmp_path: Path) -> None:
+    two_rooms(tmp_path / 'other.png')
+    (tmp_path / 'here').mkdir()
+    files = as_dropped(form.format(tmp_path / 'other.png') + _REST, 'm.yaml')
+    with pytest.raises(ValueError, match=r'm\.yaml names other\.png: expected it with'):
+        import_dropped(files, tmp_path / 'here', 0.22)
+    assert list((tmp_path / 'here').iterdir()) == []
+
+
+def test_the_drawing_is_not_written_over_the_picture_of_the_map(tmp_path: Path) -> None:
+    two_rooms(tmp_path / 'm_place.png')
+    before = (tmp_path / 'm_place.png').read_bytes()
+    files = as_dropped(f'image: m_place.png\n{_REST}', 'm.yaml', m_place=tmp_path / 'm_place.png')
+    import_dropped(files, tmp_path, 0.22)
+    assert (tmp_path / 'm_place.png').read_bytes() == before
+    assert (tmp_path / 'm_place_drawn.png').exists()

@@ -126,7 +126,8 @@ class Exploration:
         self._left: list[Frontier] = []
         self._spent: list[tuple[Points, str]] = []
         self._looked = False
-        self._now = self._arrived_at = 0.0
+        self._now = self._arrived_at = self._stood = 0.0
+        self._heard_at: float | None = None
 
     @property
     def grid(self) -> Grid | None:
@@ -160,20 +161,27 @@ class Exploration:
         correction = self._correction
         return self.builder.start if correction is None else composed(correction, odometry)
 
-    def see(self, scan: Scan, odometry: Pose, now: float) -> Velocity:
+    def see(self, scan: Scan, odometry: Pose, now: float, *, stands: bool = False) -> Velocity:
         """Take a scan, and return with which velocity to go on.
 
         Args:
             scan: As seen from where the robot was when the odometry said this.
             odometry: Where the odometry had the robot, in its own frame.
             now: The time, seconds.
+            stands: The robot is to stand where it is; no time passes for what is under way, which
+                then goes on.
         """
         with self._lock:
-            self._now = now
+            if stands and self._heard_at is not None:
+                self._stood += now - self._heard_at
+            self._heard_at = now
+            self._now = now = now - self._stood
             self._scan = scan, odometry
             if self._pending is None and self.builder.is_due(odometry):
                 self._pending = self._scan
             pose = self.pose(odometry)
+            if stands:
+                return Velocity()
             if isinstance(self._task, Drive):
                 if self._task.state.ended:
                     return Velocity()

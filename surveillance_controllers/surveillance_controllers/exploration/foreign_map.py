@@ -24,7 +24,9 @@ class ForeignMap:
         self._started = False
 
     def take_map(self, grid: Grid) -> None:
-        """Take the map, or a later one."""
+        """Take the map, or a later one; one without free floor, as some begin with, counts not."""
+        if not grid.free.any():
+            return
         with self._lock:
             self._grid, self._is_new = grid, True
 

@@ -29,6 +29,9 @@ from surveillance_controllers.geometry import Pose, Scan, angle_between, compose
 from surveillance_runtime.parameters import parameter
 from surveillance_runtime.place.occupancy_grid import Grid
 
+_LONGEST_STEP = 10.0
+"""No robot drives so far between two scans that are kept, metres: the odometry began anew."""
+
 
 @dataclass(frozen=True)
 class MappingParameters:
@@ -154,6 +157,8 @@ class MapBuilder:
             self.graph.poses.append(self.start)
         else:
             step = relative(self._odometry, odometry)
+            if math.hypot(*step[:2]) > _LONGEST_STEP:
+                step = (0.0, 0.0, 0.0)
             self._append(scan, surface, step)
         pose = self.graph.poses[-1]
         self._kept.append(_Kept(scan, surface, pose))

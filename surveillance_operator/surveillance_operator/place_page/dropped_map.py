@@ -14,16 +14,18 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+import yaml
+
 from surveillance_operator.graph_import import SUFFIXES
-from surveillance_operator.place_import import ImportRequest, import_place
+from surveillance_operator.place_import import ImportRequest, import_place, is_levels
 from surveillance_runtime.files import FileError, in_one_line
 from surveillance_runtime.place.occupancy_map import PICTURES
+from surveillance_runtime.yaml_file import read_yaml_file
 
 MOST_BYTES = 48_000_000
 """Of all files together; as text they are a third longer."""
 _YAML = ('.yaml', '.yml')
 _NAME = re.compile(r'[^\W_][\w .()-]{0,99}')
-_IMAGE = re.compile(rb'^(image[ \t]*:[ \t]*)(.*?)[ \t]*\r?$', re.MULTILINE)
 
 
 def import_dropped(
@@ -46,8 +48,6 @@ def import_dropped(
     if sum(map(len, contents.values())) > MOST_BYTES:
         raise ValueError(f'more than {MOST_BYTES // 1_000_000} MB: expected smaller files')
     source = _source(contents)
-    if source.endswith(_YAML):
-        contents[source] = _with_its_picture(source, contents)
     with tempfile.TemporaryDirectory(prefix='dropped-') as staged:
         stage = Path(staged)
         for name, data in contents.items():
@@ -57,6 +57,9 @@ def import_dropped(
             stage / source, out, radius, resolution=_side(resolution), level=level.strip()
         )
         try:
+            if source.lower().endswith(_YAML) and not is_levels(contents[source]):
+                contents[source] = _with_its_picture(stage / source, contents)
+                (stage / source).write_bytes(contents[source])
             said = import_place(request)
         except ValueError as error:
             raise ValueError(str(error).replace(f'{stage}/', '')) from None
@@ -104,18 +107,20 @@ def _source(contents: Mapping[str, bytes]) -> str:
     raise ValueError('no file came: expected map.yaml with its picture')
 
 
-def _with_its_picture(source: str, contents: Mapping[str, bytes]) -> bytes:
+def _with_its_picture(source: Path, contents: Mapping[str, bytes]) -> bytes:
     """Return a map's description with the picture's name alone: here it lies beside it."""
-    found = _IMAGE.search(contents[source])
-    if found is None:
-        return contents[source]
-    named = found[2].decode('utf-8', 'replace').strip('\'"').replace('\\', '/').rpartition('/')[2]
+    data, values = contents[source.name], read_yaml_file(source).values
+    image = values.get('image')
+    if not isinstance(image, str) or not image:
+        return data  # whoever reads it says what is wrong
+    named = image.replace('\\', '/').rpartition('/')[2]
     if named not in contents:
-        others = ', '.join(sorted(contents.keys() - {source}))
+        others = ', '.join(sorted(contents.keys() - {source.name}))
         came = f' (not {others})' if others else ''
-        raise ValueError(f'{source} names {named}{came}: expected it with {source}')
-    start, end = found.span(2)
-    return contents[source][:start] + named.encode() + contents[source][end:]
+        raise ValueError(f'{source.name} names {named}{came}: expected it with {source.name}')
+    if named == image:
+        return data
+    return yaml.safe_dump({**values, 'image': named}, sort_keys=False).encode()
 
 
 def _side(given: str) -> float | None:

@@ -11,7 +11,9 @@ along the axes of the world, also where the picture is turned.
 
 from __future__ import annotations
 
+import json
 import math
+import re
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -172,6 +174,11 @@ def is_map_description(values: Mapping[str, Any]) -> bool:
     return 'image' in values and '/**' not in values
 
 
+def _as_yaml(name: str) -> str:
+    """Return a file's name as YAML reads it, in quotes where it has other signs than most."""
+    return name if re.fullmatch(r'\w[\w .-]*', name) else json.dumps(name, ensure_ascii=False)
+
+
 def write_map(
     path: Path,
     cells: NDArray[np.int8],
@@ -200,7 +207,7 @@ def write_map(
     grey[cells >= 65] = 0
     x, y, yaw = (round(float(each), 7) for each in origin)
     text = (
-        f'image: {path.stem}.{kind}\nmode: trinary\nresolution: {resolution:g}\n'
+        f'image: {_as_yaml(f"{path.stem}.{kind}")}\nmode: trinary\nresolution: {resolution:g}\n'
         f'origin: [{x}, {y}, {yaw}]\nnegate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n'
     )
     try:
