@@ -153,7 +153,7 @@ def close(folder: Path, options: argparse.Namespace, config: Path) -> int:
         return EXIT_BAD_INPUT
     print('\n'.join(lines))
     patrol = [*COMMAND, '--mode', options.mode or DEFAULT_MODE]
-    if options.mode == 'ROBOT':
+    if options.mode == 'ROBOT' or options.robot != Run().robot:
         patrol += ['--robot', options.robot]
     print(f'mend it: {shlex.join([*COMMAND, "edit", str(place_of(options.out))])}')
     print(f'patrol: {shlex.join([*patrol, "--map", str(place_of(options.out))])}')

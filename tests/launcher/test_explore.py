@@ -88,12 +88,16 @@ def test_the_map_becomes_a_place(
     assert place.plan.start[:2] == (0.0, 0.0)
 
 
-def test_a_map_may_have_any_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_map_may_have_any_name(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     monkeypatch.chdir(tmp_path)
     run = tmp_path / 'run'
     run.mkdir()
     explored(run)
-    assert close(run, options_of(['--out', "# Anna's hut: 2.yaml"]), CONFIG) == 0
+    options = options_of(['--out', "# Anna's hut: 2.yaml", '--robot', 'turtlebot4'])
+    assert close(run, options, CONFIG) == 0
+    assert '--mode SIMULATED --robot turtlebot4 --map' in capsys.readouterr().out
     assert read_place_file(tmp_path / "# Anna's hut: 2_place.yaml").plan.doors
 
 
