@@ -290,6 +290,13 @@ class Fleet(Protocol):
         """Have all do one of `ALL_WORDS`; raises `ValueError` or `CallError`."""
 
 
+def is_for_robot(line: str) -> bool:
+    """Tell whether a line needs the robot that is spoken to."""
+    words = line.lower().split()
+    of_all = (_ROBOTS.name, _ROBOT.name, _ALL.name, HELP.name)
+    return bool(words) and words[0] not in of_all and words != [EXIT.name]
+
+
 def help_text(columns: int = 1000) -> str:
     """Return every command with its arguments and what it does, in lines of that many columns."""
     usages = [

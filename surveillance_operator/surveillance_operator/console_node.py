@@ -21,11 +21,13 @@ from surveillance_operator.console_commands import (
     answer,
     completions,
     help_text,
+    is_for_robot,
     wrapped,
 )
 from surveillance_operator.fleet_actions import ALL, WORDS, FleetActions
 from surveillance_operator.fleet_feed import FleetFeed
 from surveillance_operator.fleet_table import fleet_lines
+from surveillance_operator.mission_actions import MissionActions
 from surveillance_operator.snapshot import Snapshot, why
 from surveillance_runtime.logging import clean, print_lines
 from surveillance_runtime.node import PatrolNode
@@ -74,9 +76,11 @@ class ConsoleNode(PatrolNode):
 
     @property
     def robot(self) -> str:
-        """The robot that is spoken to; one that is alone has no name."""
-        known = self._feed.robots
-        return self._robot if self._robot in known else known[0]
+        """The robot that is spoken to; one that is alone has no name.
+
+        One that was chosen stays chosen while it is not heard: no other gets its commands.
+        """
+        return self._robot or self._feed.robots[0]
 
     def lines(self) -> list[str]:
         """Return what each robot of the fleet does."""
@@ -107,6 +111,8 @@ class ConsoleNode(PatrolNode):
 
     def _status(self) -> str:
         name = self.robot
+        if name not in self._feed.robots:
+            return f' {name} is not heard '
         return status_line(self._feed.snapshot(name), name)
 
     def _on_announcement(self, controller: str, message: String) -> None:
@@ -130,12 +136,30 @@ class ConsoleNode(PatrolNode):
         while time.monotonic() < self._found_by and self._feed.snapshot('').status is None:
             if self.stopping.wait(0.05):
                 return
-        actions = self._actions.of(self.robot)
+        try:
+            actions = self._actions_for(line)
+        except ValueError as error:
+            _tell(str(error))
+            return
         for each in answer(line, actions, self._why, _columns(), fleet=self):
             if each.ends:
                 self.finish()
             elif each.text:
                 _tell(each.text, each.who)
+
+    def _actions_for(self, line: str) -> MissionActions:
+        """Return the actions that a line is for: those of the robot that is spoken to.
+
+        Raises:
+            ValueError: That robot is not heard, and the line is for it.
+        """
+        if not is_for_robot(line):
+            return self._actions.shared
+        robot, known = self.robot, self._feed.robots
+        if robot in known:
+            return self._actions.of(robot)
+        others = ', '.join(filter(None, known)) or 'a run with several robots'
+        raise ValueError(f'robot {robot!r} is not heard: expected {others}')
 
     def _why(self) -> str:
         deadline = time.monotonic() + self._timeout

@@ -18,6 +18,7 @@ from surveillance_operator.fleet_feed import FleetFeed
 from surveillance_operator.fleet_table import fleet_lines
 from surveillance_operator.watch_command import mission_parser, ros_arguments
 from surveillance_runtime.node import PatrolNode
+from surveillance_runtime.place.fleet import problem_in_robot_name
 from surveillance_runtime.process import ExecutorThread
 from surveillance_runtime.suggestions import nearest
 
@@ -42,6 +43,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     options = parser.parse_args(argv)
     if options.word is not None and options.word not in WORDS:
         parser.error(f'{options.word!r}: expected {nearest(options.word, WORDS)}')
+    if options.robot != ALL and (problem := problem_in_robot_name(options.robot)):
+        parser.error(f'robot {options.robot[:80]!r}: {problem}')
     rclpy.init(args=ros_arguments(parser, options))
     node, spinner = PatrolNode('fleet_view'), ExecutorThread()
     spinner.executor.add_node(node)

@@ -256,10 +256,23 @@ def open_player(
 ) -> Player:
     """Return a player of the recordings of a run's robots; what it needs ends with the stack.
 
+    One robot's recording that cannot be read costs a line, and the others are played.
+
     Raises:
-        FileError: One cannot be read, or holds nothing of a mission.
+        FileError: None can be read, or none holds anything of a mission.
     """
-    return Player({robot: _track(each, stack) for robot, each in recordings.items()}, hub)
+    tracks: dict[str, Track] = {}
+    problems: list[FileError] = []
+    for robot, each in recordings.items():
+        try:
+            tracks[robot] = _track(each, stack)
+        except FileError as error:
+            problems.append(error)
+    if not tracks:
+        raise problems[0]
+    for problem in problems:
+        print(f'replay: {problem}: it is left out', file=sys.stderr)
+    return Player(tracks, hub)
 
 
 def _track(recording: Recording, stack: contextlib.ExitStack) -> Track:

@@ -10,7 +10,7 @@ import math
 import sys
 import time
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence, Sized
 from dataclasses import replace
 from html import escape
 from itertools import groupby, pairwise
@@ -168,8 +168,13 @@ def _together(runs: Sequence[Run]) -> Run:
         recharges=recharges,
         visits=visits,
         threshold=next((run.threshold for run in runs if run.threshold), None),
-        summary=f'{len(runs)} robots, {sum(visits.values())} visits',
+        summary=f'{_robots(runs)}, {sum(visits.values())} visits',
     )
+
+
+def _robots(each: Sized) -> str:
+    """Return how many robots there are, in words."""
+    return f'{len(each)} robot{"" if len(each) == 1 else "s"}'
 
 
 def _fleet_page(
@@ -194,7 +199,7 @@ def _fleet_page(
     left_out = len(lines) - MOST_LINES
     more = f'<p>The last {MOST_LINES}; {left_out} earlier ones: see {RECORD}.</p>'
     body = [
-        f'<h1>Mission {escape(folder.name)}, {len(records)} robots</h1>',
+        f'<h1>Mission {escape(folder.name)}, {_robots(records)}</h1>',
         *(f'<p class="late">{escape(each)}</p>' for each in problems),
         f'<table><tbody>{"".join(rows)}</tbody></table>',
         drawn,

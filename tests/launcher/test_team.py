@@ -98,6 +98,10 @@ def test_a_place_names_its_robots(tmp_path):
         ('      anna: {start: [10.0, 8.0, 0.0], dok: E}\n', "dok: unknown, expected 'dock'|dock"),
         ('      anna: {start: [10.0, 8.0, 0.0], dock: R1}\n', 'no room with a station'),
         ('      R1: {start: [10.0, 8.0, 0.0]}\n', 'is the name of a room'),
+        ('      anna: {start: [10.0, 8.0, 0.0], dock: 0}\n', 'no room with a station'),
+        (f'      {"a" * 61}: {{start: [10.0, 8.0, 0.0]}}\n', 'has 61 letters: expected at most 60'),
+        ('      simulator: {start: [10.0, 8.0, 0.0]}\n', 'expected another name than simulator'),
+        ('      an na: {start: [10.0, 8.0, 0.0]}\n', 'expected a name of letters, digits'),
     ],
 )
 def test_a_wrong_robot_costs_one_line(tmp_path, robots, problem):

@@ -9,6 +9,7 @@ import asyncio
 import contextlib
 import io
 import json
+import shutil
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -29,8 +30,9 @@ from patrol_policy.world import Decision
 from state_machines.exceptions import CallError
 from surveillance_behaviour.mission.mission_log import MissionRecord
 from surveillance_interfaces.msg import DoorStates, FleetRobot, MissionStatus
-from surveillance_operator import fleet_feed, mission_feed
+from surveillance_operator import fleet_command, fleet_feed, mission_feed
 from surveillance_operator.console_commands import answer, completions
+from surveillance_operator.console_node import ConsoleNode
 from surveillance_operator.fleet_actions import WORDS, FleetActions
 from surveillance_operator.fleet_feed import FleetFeed
 from surveillance_operator.fleet_table import fleet_lines
@@ -53,6 +55,7 @@ from surveillance_operator.snapshot import (
     troubles,
 )
 from surveillance_operator.watch.view import MissionView
+from surveillance_runtime.files import FileError
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.place.occupancy_grid import Grid
 from surveillance_runtime.qos import STATE_QOS
@@ -374,6 +377,33 @@ def test_a_fleet_is_replayed_in_one_time(fleet_run: Path) -> None:
         assert ['anna', 'anna begins'] in [each[1:] for each in seen['p']['events']]
 
 
+def test_one_damaged_recording_costs_a_line_and_the_others_are_played(
+    fleet_run: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (fleet_run / 'bert' / 'timeline.jsonl').write_text('garbage\n')
+    found = find_recordings(str(fleet_run), fleet_run.parent)
+    with contextlib.ExitStack() as stack:
+        assert open_player(found, Hub(), stack).length == 29.0
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.endswith('bert/timeline.jsonl: holds nothing to replay: it is left out')
+    (fleet_run / 'anna' / 'timeline.jsonl').write_text('')
+    with contextlib.ExitStack() as stack, pytest.raises(FileError, match='anna/timeline'):
+        open_player(found, Hub(), stack)
+
+
+def test_a_robot_that_left_nothing_is_named_in_the_report(fleet_run: Path) -> None:
+    bert = fleet_run / 'bert'
+    (bert / 'place.yaml').write_text((fleet_run / 'place.yaml').read_text())
+    for name in ('mission.jsonl', 'timeline.jsonl'):
+        (bert / name).unlink()
+    text = write_report(fleet_run).read_text()
+    assert '2 robots' in text
+    assert '<p class="late">bert: cannot read the mission record' in text
+    assert list(find_recordings(str(fleet_run), fleet_run.parent)) == ['anna']
+    shutil.rmtree(bert)
+    assert ', 1 robot</h1>' in write_report(fleet_run).read_text()
+
+
 def test_rviz_shows_each_robot_in_a_group_of_its_own() -> None:
     text = (ROOT / 'config' / 'mission.rviz').read_text()
     layout = yaml.safe_load(fleet_layout(text, ['bert', 'anna'], 'house'))
@@ -401,6 +431,30 @@ class Prompt:
 
     def tell_all(self, word: str) -> str:
         return f'all {word}'
+
+
+def test_the_console_commands_no_other_robot_than_the_one_that_was_named(
+    graph: Any, tmp_path: Path, capfd: Any
+) -> None:
+    anna = Robot(graph, 'anna')
+    lines = tmp_path / 'lines'
+    lines.write_text('robots\nstop\nrobot anna\nstop\n')
+    with lines.open() as source:
+        given = {'robot': 'ana', 'peer_timeout': 3.0}
+        console = graph.add(ConsoleNode, given, console_source=source)
+        assert console.ended.wait(60.0)
+    assert "robot 'ana' is not heard: expected anna" in capfd.readouterr().out
+    assert anna.told == [True], 'told once, by its own name'
+
+
+@pytest.mark.parametrize('name', ['rob ot', '', 'röbot', 'a' * 61, 'simulator', 'a/b'])
+def test_the_command_fleet_says_in_one_line_that_a_name_is_none(
+    name: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit) as ended:
+        fleet_command.main(['stop', name])
+    assert ended.value.code == 2
+    assert 'expected' in capsys.readouterr().err
 
 
 def test_the_console_speaks_to_one_robot_or_to_all() -> None:

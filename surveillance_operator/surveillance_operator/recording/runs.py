@@ -105,12 +105,18 @@ def is_run(folder: Path) -> bool:
 
 
 def robots_of(folder: Path) -> dict[str, Path]:
-    """Return the folder of each robot of a run; a robot that was alone has no name."""
+    """Return the folder of each robot of a run; a robot that was alone has no name.
+
+    One of a fleet that left nothing but its copy of the place is named, too.
+    """
     if _is_of_robot(folder):
         return {'': folder}
     if not any((folder / file).is_file() for file in (PLACE, LAUNCH_LOG)):
         return {}
-    return {own.name: own for own in sorted(folder.iterdir()) if _is_of_robot(own)}
+    below = sorted(folder.iterdir())
+    if not any(map(_is_of_robot, below)):
+        return {}
+    return {own.name: own for own in below if _is_of_robot(own) or (own / PLACE).is_file()}
 
 
 def _is_of_robot(folder: Path) -> bool:

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from surveillance_runtime.node_table import BY_NAME
 from surveillance_runtime.place.floor_plan import FloorPlan
 from surveillance_runtime.place.occupancy_grid import Grid, distance_to
 from surveillance_runtime.place.plan_grid import draw
@@ -23,6 +24,8 @@ from surveillance_runtime.place.rooms import PlaceError, Pose, nested
 from surveillance_runtime.suggestions import nearest
 
 MOST_ROBOTS = 100
+LONGEST_NAME = 60
+"""Letters of a robot's name: it is a folder, and a part of each of its names in ROS."""
 _NAME = re.compile(r'[A-Za-z][A-Za-z0-9_]*\Z')
 _KEYS = ('start', 'dock', 'profile')
 _WORDS = ('all', 'shared')
@@ -52,6 +55,17 @@ class FleetMember:
     profile: str = ''
 
 
+def problem_in_robot_name(name: str) -> str:
+    """Return what is wrong with the name of a robot of a fleet; nothing: ''."""
+    if not _NAME.match(name):
+        return 'expected a name of letters, digits and _, like robot1'
+    if len(name) > LONGEST_NAME:
+        return f'has {len(name)} letters: expected at most {LONGEST_NAME}'
+    if name in _WORDS or name in BY_NAME:
+        return f'stands for other things: expected another name than {name}'
+    return ''
+
+
 def members_of(described: Mapping[str, Any], plan: FloorPlan) -> tuple[FleetMember, ...]:
     """Return the robots that a place's parameters name in the table `robots`; none: ().
 
@@ -66,10 +80,8 @@ def members_of(described: Mapping[str, Any], plan: FloorPlan) -> tuple[FleetMemb
     members: list[FleetMember] = []
     for name, table in tables.items():
         where = ('robots', name)
-        if not _NAME.match(name):
-            raise PlaceError(where, 'expected a name of letters, digits and _, like robot1')
-        if name in _WORDS:
-            raise PlaceError(where, f'stands for other things: expected another name than {name}')
+        if problem := problem_in_robot_name(name):
+            raise PlaceError(where, problem)
         if name in plan.place.rooms or name in plan.doors:
             raise PlaceError(where, 'is the name of a room or a door: expected another one')
         if not isinstance(table, Mapping):
@@ -81,7 +93,7 @@ def members_of(described: Mapping[str, Any], plan: FloorPlan) -> tuple[FleetMemb
             raise PlaceError(where, 'has no start, expected start: [x, y, yaw]')
         start = _pose((*where, 'start'), table['start'], plan)
         dock = table.get('dock', '')
-        if dock and dock not in plan.place.recharge_rooms:
+        if dock != '' and dock not in plan.place.recharge_rooms:
             expected = nearest(str(dock), plan.place.recharge_rooms)
             raise PlaceError((*where, 'dock'), f'no room with a station, expected {expected}')
         profile = table.get('profile', '')
