@@ -88,7 +88,8 @@ class MissionViewNode(PatrolNode):
                 )
             elif not show_once(self.see, self.stopping, self._console, self._timeout, self._robot):
                 where = f'{self.snapshot.where} within {self._timeout:g} s'
-                print(f'watch: no mission on {where}', file=sys.stderr)
+                what = f'robot {self._robot}' if self._robot else 'mission'
+                print(f'watch: no {what} on {where}', file=sys.stderr)
                 self.fail('no mission')
         except (OSError, SystemExit):  # nobody reads it any more; rich exits on a broken pipe
             pass

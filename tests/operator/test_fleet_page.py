@@ -27,6 +27,7 @@ from std_msgs.msg import UInt8
 from std_srvs.srv import SetBool, Trigger
 
 from patrol_policy.world import Decision
+from state_machines import Interrupt
 from state_machines.exceptions import CallError
 from surveillance_behaviour.mission.mission_log import MissionRecord
 from surveillance_interfaces.msg import DoorStates, FleetRobot, MissionStatus
@@ -54,7 +55,7 @@ from surveillance_operator.snapshot import (
     follow,
     troubles,
 )
-from surveillance_operator.watch.view import MissionView
+from surveillance_operator.watch.view import MissionView, show_once
 from surveillance_runtime.files import FileError
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.place.occupancy_grid import Grid
@@ -318,6 +319,16 @@ def test_the_terminal_shows_the_robots_and_the_one_that_was_chosen() -> None:
         assert max(map(len, file.getvalue().splitlines())) <= width
 
 
+def test_a_picture_is_of_the_robot_that_was_named_or_there_is_none() -> None:
+    file, goes_on = io.StringIO(), Interrupt()
+    console = Console(file=file, width=100, height=34)
+    assert not show_once(lambda: FLEET, goes_on, console, 0.0, 'brt')
+    assert file.getvalue() == ''
+    goes_on.set()
+    assert show_once(lambda: FLEET, goes_on, console, 0.0, 'bert')
+    assert file.getvalue().startswith(' bert · surveillance')
+
+
 @pytest.fixture
 def fleet_run(tmp_path: Path) -> Path:
     """Return what a run of two robots left, of which one began later."""
@@ -558,6 +569,7 @@ def test_one_robot_or_all_are_told(hub: Hub, viewer: Viewer, told: list[tuple[st
         count = len(told)
         viewer.click(selector)
         viewer.until(lambda count=count: len(told) > count)
+    assert viewer.text('#stop-answer') == '✓ stop all', 'said where STOP ALL was pressed'
     assert told[-5:] == [
         ('out', 'carl'),
         ('pause', 'bert'),

@@ -531,6 +531,8 @@ def show_moving(
             seen = chosen.held or see()
             name = chosen.drawn(seen)
             usual = FLEET_NOTE if name else KEY_NOTE
+            if chosen.robot not in ('', *seen):
+                usual = f'{chosen.robot} is not heard: this is {name or "another robot"}'
             shown = 'HELD: p continues' if chosen.held else said() or usual
             view = MissionView(seen[name], page=chosen.page, note=shown, fleet=seen, robot=name)
             live.update(view, refresh=True)
@@ -571,9 +573,15 @@ def _keyboard() -> Iterator[Callable[[float, Interrupt], str]]:
 def show_once(
     see: See, stopping: Interrupt, console: Console, timeout: float, robot: str = ''
 ) -> bool:
-    """Draw one picture once there is a mission; return whether there was one within the time."""
+    """Draw one picture once there is a mission; return whether there was one within the time.
+
+    Where a robot is named, it must be there.
+    """
     deadline = time.monotonic() + timeout
-    while all(each.status is None for each in see().values()):
+    while True:
+        seen = see()
+        if robot in ('', *seen) and any(each.status is not None for each in seen.values()):
+            break
         if time.monotonic() > deadline or stopping.wait(PERIOD / 4):
             return False
     settled = time.monotonic() + SETTLING

@@ -17,7 +17,7 @@ export class Fleet {
     this.rows = new Map();
     $('fleet-all').hidden = !may;
     for (const button of document.querySelectorAll('[data-all]')) button.addEventListener('click', () => this.tell(button.dataset.all, 'all'));
-    $('stop-all').addEventListener('click', () => this.tell('stop', 'all'));
+    $('stop-all').addEventListener('click', () => this.tell('stop', 'all', 'stop-answer'));
   }
 
   get isOne() {
@@ -70,10 +70,12 @@ export class Fleet {
     words.forEach((button, number) => { button.hidden = !WORDS[number][2]({stopped, active, out}); });
   }
 
-  async tell(word, robot) {
-    $('fleet-answer').textContent = '…';
+  // What came of it is also said beside the button that was pressed.
+  async tell(word, robot, beside = 'fleet-answer') {
+    const say = (text) => { for (const id of ['fleet-answer', beside]) $(id).textContent = text; };
+    say('…');
     const found = await act('fleet', {word, robot});
-    $('fleet-answer').textContent = (found.ok ? '✓ ' : '✗ ') + found.text;
+    say((found.ok ? '✓ ' : '✗ ') + found.text);
     $('fleet-answer').className = found.ok ? 'ok' : 'warn';
   }
 }
