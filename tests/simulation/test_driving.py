@@ -101,7 +101,7 @@ def test_a_drive_stays_in_the_corridor_around_its_path_and_arrives(seed: int) ->
 
 @pytest.mark.parametrize('manner', ['polite', 'pushy'])
 def test_among_people_the_robot_touches_nobody_and_arrives(manner: str) -> None:
-    did = navigation.among_people(PeopleModel(5, manner=manner), 60.0, 2, 'seven_rooms.yaml')
+    did = navigation.among_people(PeopleModel(5, manner=manner), 90.0, 2, 'seven_rooms.yaml')
     assert did.contacts == 0
     assert did.drives >= 2
     assert did.arrived >= did.drives - 1
