@@ -238,7 +238,7 @@ function field([key, text, value, change, options], kind) {
     return h('label', {class: 'check'}, box, text);
   }
   if (options) {
-    const list = h('select', {disabled: !may, 'data-field': key, onchange: () => commit(list.value, change, kind)}, ...options.map(([each, shown]) => h('option', {value: each}, shown)));
+    const list = h('select', {disabled: !may, 'data-field': key, onchange: () => commit(list.value, change, kind)}, ...options.map(([each, text]) => h('option', {value: each}, text)));
     list.value = value;
     return h('label', {}, text, list);
   }

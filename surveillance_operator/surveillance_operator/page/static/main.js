@@ -178,9 +178,9 @@ function camera() {
   const box = $('camera-section').getBoundingClientRect();
   if (document.hidden || box.top > innerHeight || box.bottom < 0) return;
   const next = new Image();
-  const shown = (there) => { image.hidden = !there; $('no-camera').hidden = there; };
-  next.onload = () => { image.src = next.src; shown(true); };
-  next.onerror = () => shown(false);
+  const show = (there) => { image.hidden = !there; $('no-camera').hidden = there; };
+  next.onload = () => { image.src = next.src; show(true); };
+  next.onerror = () => show(false);
   next.src = `/camera.jpg?robot=${encodeURIComponent(shown.robot)}&at=${Date.now()}`;
 }
 

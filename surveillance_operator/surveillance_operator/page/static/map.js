@@ -165,13 +165,13 @@ export class MapView {
   }
 
   drawPlaces(state, now) {
-    const shown = Object.entries(state.places ?? {}).filter(([, place]) => place.at);
-    const key = JSON.stringify([shown.map(([name, {at}]) => [name, at]), state.regions, this.width]);
+    const placed = Object.entries(state.places ?? {}).filter(([, place]) => place.at);
+    const key = JSON.stringify([placed.map(([name, {at}]) => [name, at]), state.regions, this.width]);
     if (key !== this.key) {
       this.key = key;
       const focused = document.activeElement?.dataset?.place;
       this.rooms.clear();
-      const drawn = shown.map(([name, {at}]) => this.drawPlace(name, at, state.regions?.[name]));
+      const drawn = placed.map(([name, {at}]) => this.drawPlace(name, at, state.regions?.[name]));
       this.layers.regions.replaceChildren(...drawn.map((each) => each.floor));
       this.layers.places.replaceChildren(...drawn.map((each) => each.room));
       if (focused) this.rooms.get(focused)?.room.focus();
@@ -184,12 +184,12 @@ export class MapView {
     const floor = region ? s('path', {class: 'floor', d: filled(region.boxes)})
       : s('circle', {class: 'floor', cx: at[0], cy: -at[1], r: .5});
     const [x, y] = region?.label ?? [at[0] + .8, at[1] - .25];
-    const shown = short(name, 16);
+    const written = short(name, 16);
     const readable = (this.width ?? 16) / 24;
-    const fits = region ? 2.9 * region.room / Math.max(4, shown.length) : readable;
+    const fits = region ? 2.9 * region.room / Math.max(4, written.length) : readable;
     const size = Math.max(readable / 2, Math.min(readable, fits));
     const words = s('tspan', {class: 'age', ...(region ? {x, dy: size * .95} : {dx: size * .4}), 'font-size': size * .8}, '');
-    const label = s('text', {class: region ? null : 'beside', x, y: -y, 'font-size': size}, ...(!region || region.room > .25 * size * shown.length ? [shown, words] : []));
+    const label = s('text', {class: region ? null : 'beside', x, y: -y, 'font-size': size}, ...(!region || region.room > .25 * size * written.length ? [written, words] : []));
     const choose = () => this.onPlace(name);
     const onkeydown = (event) => {
       if (event.key !== 'Enter' && event.key !== ' ') return;
