@@ -66,6 +66,26 @@ def test_nothing_happens_in_an_office_that_stays_as_it_is(office):
         assert changes(before, visit(office, [CHAIR], seed=seed)) == []
 
 
+def test_a_far_wall_stays_a_wall_when_the_heading_is_a_degree_off() -> None:
+    cells = np.zeros((160, 240), np.int8)
+    cells[10:40, 140:142] = 100
+    grid, turn = Grid(cells, RESOLUTION), math.radians(1.4)
+    views = []
+    for error in (0.0, turn, -turn):
+        gathered = FloorVisit(grid)
+        for seed in range(12):
+            # A beam each degree: it stands a little elsewhere, so that all of the wall is met.
+            sensor = 0.5, 1.0 + 0.02 * seed
+            ends, met = sweep(grid, [], sensor, seed)
+            turned = np.array(
+                [[math.cos(error), -math.sin(error)], [math.sin(error), math.cos(error)]]
+            )
+            gathered.add(sensor, (ends - sensor) @ turned.T + sensor, met)
+        views.append(gathered.view())
+    for now in views[1:]:
+        assert changes(views[0], now) == []
+
+
 def test_what_appears_and_what_goes_is_found_where_it_is(office):
     before, after = visit(office, [CHAIR]), visit(office, [CHAIR, BOX], seed=10)
     (found,) = changes(before, after)
