@@ -470,8 +470,10 @@ class Plan:
         """Take a course if it is better from here."""
         stop = max(1.01 * self._outcome.settled, self._accepted)
         outcome = self._followed(course, stop)
-        # Of one that was stopped it is not known how long the wait would become.
-        if outcome.settled <= stop and self._grade(outcome) < self._grade(self._outcome):
+        # A better round is no excuse for a longer wait on the way into it: each new plan could
+        # then turn on the round once more.
+        most = max(self._outcome.settled, self._accepted) + 1e-6
+        if outcome.settled <= most and self._grade(outcome) < self._grade(self._outcome):
             self._course, self._outcome = course, outcome
             self._state.position = 0
 
@@ -479,16 +481,22 @@ class Plan:
         """Return what a course comes to from here."""
         return self._simulated(course.choose, stop)
 
-    def _grade(self, outcome: Outcome) -> tuple[bool, int, int, float]:
+    def _grade(self, outcome: Outcome) -> tuple[bool, int, int, int, float]:
         """Return what courses are compared by, less is better, in whole percents of the bound.
 
-        Waits from visit to visit come again and again, so they count first, as far as they are
-        longer than what is accepted. Then the first waits do, which come once. Of a course that was
-        looked at in part only nothing good is known.
+        Waits that come again and again count first, as far as they are longer than what is
+        accepted, then those on the way into the round, which come once, then the first waits. A
+        plan that takes the place of another has long waits behind it: if they counted as much, all
+        rounds would be alike, and the place would be promised what is left of them. Of a course
+        that was looked at in part only nothing good is known.
         """
         bound = self._bound
-        lasting = max(0, math.ceil(100.0 * (outcome.settled - self._accepted) / bound - 1e-6))
-        return outcome.cut, lasting, round(100.0 * outcome.first / bound), outcome.settled
+
+        def late(wait: float) -> int:
+            return max(0, math.ceil(100.0 * (wait - self._accepted) / bound - 1e-6))
+
+        first = round(100.0 * outcome.first / bound)
+        return outcome.cut, late(outcome.lasting), late(outcome.settled), first, outcome.settled
 
     def _entered(self, found: Round, phase: int) -> Course:
         """Return the course that begins a round with one of its targets."""

@@ -470,6 +470,7 @@ class Outcome:
     Attributes:
         settled: The longest wait from visit to visit, less what the place has more time, seconds.
         first: The same with the waits before a place's first visit, seconds.
+        lasting: The same of the part that repeats itself alone, so of what comes for ever, seconds.
         waits: For each place the longest wait, the last one as far as it was looked at, seconds.
         walk: The stops that were entered.
         back: From where on the walk repeats itself; None: that was not found.
@@ -478,6 +479,7 @@ class Outcome:
 
     settled: float
     first: float
+    lasting: float = math.inf
     waits: Sequence[float] = field(default=(), compare=False)
     walk: Sequence[int] = field(default=(), compare=False)
     back: int | None = field(default=None, compare=False)
@@ -515,6 +517,7 @@ def roll_out(
     settled = first = 0.0
     windows, waits = rules.windows, [0.0] * rules.count
     walk: list[int] = []
+    gaps: list[float] = []
     # Comparing all ages at each step would be slow: only visits of one place are compared.
     anchor = min(rules.wanted, key=lambda place: len(rules.leg_seconds[place]), default=at.place)
     states: dict[tuple[float, ...], int] = {}
@@ -533,6 +536,7 @@ def roll_out(
         wait = rules.waited(place, seen[place], arrived) if windows else arrived - seen[place]
         seen[place] = at.now
         waits[place] = max(waits[place], wait)
+        gaps.append(wait - slack[place])
         if met[place]:
             settled = max(settled, wait - slack[place])
         else:
@@ -550,7 +554,8 @@ def roll_out(
         wait = rules.waited(place, seen[place], max(at.now, end) if is_closed else at.now)
         waits[place] = max(waits[place], wait)
         settled = max(settled, wait - slack[place])
-    return Outcome(settled, max(first, settled), waits, walk, back, cut)
+    lasting = settled if back is None else max(gaps[back:], default=0.0)
+    return Outcome(settled, max(first, settled), lasting, waits, walk, back, cut)
 
 
 def rule_map(world: World, energy: Energy | None = None) -> RuleMap:

@@ -170,6 +170,39 @@ def test_leg_times_that_are_learned_do_not_turn_the_round(seed: int) -> None:
     assert patrol.run.longest <= 1.2 * 80.0
 
 
+DRIVEN = {
+    ('E', 'C1'): 12.1, ('E', 'C2'): 13.6, ('C1', 'E'): 12.2, ('C1', 'R1'): 7.3,
+    ('C1', 'R2'): 14.5, ('C1', 'C2'): 16.7, ('R1', 'C1'): 8.3, ('R2', 'C1'): 15.1,
+    ('C2', 'C1'): 16.1, ('C2', 'E'): 13.5, ('C2', 'R3'): 3.6, ('C2', 'R4'): 13.9,
+    ('R3', 'C2'): 5.1, ('R4', 'C2'): 13.5,
+}  # fmt: skip
+"""Legs that a simulated robot drove in the seven rooms, seconds; they differ by direction."""
+
+
+@pytest.mark.parametrize('share', [0.5, 0.6, 1.3])
+def test_a_long_wait_of_the_first_lap_is_not_promised_for_ever(share: float) -> None:
+    """The robot learns on its first lap that legs take other times than it was told."""
+    known = {leg: share * seconds for leg, seconds in DRIVEN.items()}
+    patrol = Patrol(of_legs(known), Rules(), 'tour', 240.0, station='E')
+    knowing = Patrol(of_legs(DRIVEN), Rules(), 'tour', 240.0, station='E')
+    knowing.step()
+    promised = []
+    for _ in range(30):
+        here = patrol.place
+        there = patrol.step().place
+        known[here, there] = DRIVEN[here, there]
+        patrol.graph = of_legs(known)
+        promised.append(max(patrol.plan.settled_waits()))
+    assert max(promised) <= 1.05 * max(knowing.plan.settled_waits())
+
+
+def of_legs(legs: dict[tuple[str, str], float]) -> PatrolGraph:
+    ways: dict[str, dict[str, float]] = {}
+    for (place, other), seconds in legs.items():
+        ways.setdefault(place, {})[other] = seconds
+    return PatrolGraph(ways, 2.0)
+
+
 def test_places_that_the_ontology_calls_urgent_at_the_start_are_visited_first() -> None:
     graph = seven_rooms()
     memory, visited_at = PolicyMemory(), {'E': 0.0}
