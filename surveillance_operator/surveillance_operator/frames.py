@@ -147,12 +147,16 @@ def _regions(snapshot: Snapshot) -> Any:
 
 
 def health(snapshot: Snapshot) -> Any:
-    """Return what is known of each node, with its own reports, and what else is reported."""
-    reports = dict(sorted(snapshot.health.items()))
+    """Return what is known of each node, with its own reports, and what else is reported.
+
+    A program that robots share, as the simulator, may have a node in the namespace of each: its
+    report is that node's, too.
+    """
+    reports = {_in_namespace(name, snapshot): each for name, each in snapshot.health.items()}
+    reports = dict(sorted(reports.items()))
     nodes = {}
     for name in sorted({*snapshot.nodes, *snapshot.ended}):
-        full = f'{snapshot.namespace}/{name}' if snapshot.namespace else name
-        own = [each for each in reports if each == full or each.startswith(f'{full}:')]
+        own = [each for each in reports if each == name or each.startswith(f'{name}:')]
         nodes[name] = {
             'up': name in snapshot.nodes,
             'restarts': snapshot.restarts.get(name, 0),
@@ -162,15 +166,19 @@ def health(snapshot: Snapshot) -> Any:
     return {'nodes': nodes, 'others': others, 'silent': dict(snapshot.silent)}
 
 
+def _in_namespace(name: str, snapshot: Snapshot) -> str:
+    """Return the name of who reports, without the namespace of the robot that is shown."""
+    return name.removeprefix(f'{snapshot.namespace}/') if snapshot.namespace else name
+
+
 def _report(health: Health) -> Any:
     return {'level': health.level, 'message': health.message}
 
 
 def _figures(snapshot: Snapshot) -> Any:
     """Return what viewers are shown of the figures that nodes report of themselves."""
-    start = f'{snapshot.namespace}/' if snapshot.namespace else ''
     return {
-        name.removeprefix(start): {key: value for key, value in each.values if key in FIGURES}
+        _in_namespace(name, snapshot): {key: value for key, value in each.values if key in FIGURES}
         for name, each in sorted(snapshot.health.items())
         if ':' not in name
     }

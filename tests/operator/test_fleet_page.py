@@ -37,7 +37,7 @@ from surveillance_operator.console_node import ConsoleNode
 from surveillance_operator.fleet_actions import WORDS, FleetActions
 from surveillance_operator.fleet_feed import FleetFeed
 from surveillance_operator.fleet_table import fleet_lines
-from surveillance_operator.frames import merged_events
+from surveillance_operator.frames import health, merged_events
 from surveillance_operator.mission_markers_node import markers_of
 from surveillance_operator.page.hub import Hub
 from surveillance_operator.page.server import Page
@@ -114,6 +114,20 @@ def test_one_time_line_names_each_robot_and_tells_of_the_place_once() -> None:
     ]
 
 
+def test_a_program_that_robots_share_stands_once_in_the_health_of_each() -> None:
+    good = Health(0, 'up', ())
+    names = ('anna/planner_controller', 'anna/mission_markers', 'simulator', 'armor_server')
+    anna = replace(
+        FLEET['anna'], nodes=dict.fromkeys(('simulator', 'planner_controller'), frozenset('1'))
+    )
+    found = health(replace(anna, namespace='anna', health=dict.fromkeys(names, good)))
+    assert {name: len(node['reports']) for name, node in found['nodes'].items()} == {
+        'planner_controller': 1,
+        'simulator': 1,
+    }
+    assert found['others'].keys() == {'armor_server', 'mission_markers'}
+
+
 def test_what_a_robot_does_and_what_is_wrong_with_it_is_said_in_words() -> None:
     anna = FLEET['anna']
     assert doing(anna) == 'on its way to B'
@@ -123,13 +137,13 @@ def test_what_a_robot_does_and_what_is_wrong_with_it_is_said_in_words() -> None:
     out = replace(anna, share=Share(taken_out=True))
     assert doing(out) == 'taken out of the patrol'
     assert [each.text for each in follow(anna, out, 1.0)[1]] == ['taken out of the patrol']
-    health = {
+    reports = {
         'anna/battery_controller': Health(3, 'silent', ()),
         'anna/motion_controller': Health(2, 'no odometry', ()),
         'bert/motion_controller': Health(2, 'not mine', ()),
         'armor_server': Health(2, 'of all', ()),
     }
-    bad = replace(anna, stopped=True, health=health, ended=frozenset({'robot_behavior'}))
+    bad = replace(anna, stopped=True, health=reports, ended=frozenset({'robot_behavior'}))
     assert troubles(bad) == [
         'stopped until a person releases it',
         'ended: robot_behavior',
@@ -241,12 +255,12 @@ def test_robots_are_found_and_told_apart_and_share_the_place(graph: Any) -> None
     robots = {name: Robot(graph, name) for name in ('anna', 'bertha')}
     doors = graph.node.create_publisher(DoorStates, 'door_states', STATE_QOS)
     doors.publish(DoorStates(closed=['D']))
-    health = graph.node.create_publisher(DiagnosticArray, '/diagnostics', 10)
+    reports = graph.node.create_publisher(DiagnosticArray, '/diagnostics', 10)
     graph.until(lambda: feed.robots == ('anna', 'bertha'))
 
     def known() -> bool:
         names = ('anna/motion_controller', 'bertha/motion_controller', 'armor_server')
-        health.publish(DiagnosticArray(status=[DiagnosticStatus(name=name) for name in names]))
+        reports.publish(DiagnosticArray(status=[DiagnosticStatus(name=name) for name in names]))
         seen = [feed.snapshot(name) for name in robots]
         return all(
             each.status and each.pose and each.battery and each.share and each.doors and each.health
