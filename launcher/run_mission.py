@@ -25,7 +25,7 @@ from launcher.run_configuration import (
 )
 from launcher.run_processes import COMPOSED, node_environ, programs_of, ros_domain
 from launcher.service import is_service
-from launcher.supervisor import Supervisor
+from launcher.supervisor import EXIT_CUT, Supervisor
 from launcher.team import Part, parts
 from surveillance_behaviour.mission import mission_log
 from surveillance_runtime import node_table
@@ -153,7 +153,9 @@ def run_mission(
     state.end(ended=supervisor.time_is_over or not is_service())
     for descriptor in claims:
         os.close(descriptor)
-    return code if errand is None else code or errand.close(folder)
+    if errand is None or code not in (0, EXIT_CUT):
+        return code
+    return errand.close(folder) or code
 
 
 def _look_for_others(run: Run, team: Sequence[Part]) -> None:

@@ -38,6 +38,8 @@ START_WITHIN = 1.5
 """Seconds for which the next process waits at most until this one says that it is up."""
 STOP_LEADERS_WITHIN = 1.2
 """Seconds that the processes which use the others have before those are told to stop as well."""
+EXIT_CUT = 1
+"""The exit code of a run that its program has not brought to an end, see `Program.ends_run`."""
 STOP_WITHIN, STOP_AT_MOST = 2.5, 12.0
 """Seconds until whatever is left and does nothing, or has done its work, is killed, and until all
 that is left is."""
@@ -66,7 +68,8 @@ class Program:
         command, environ: as for `subprocess`.
         takes_input: whether it reads lines, see `Supervisor.send`.
         leads: whether it uses the others, and so is stopped before them.
-        ends_run: whether all others are stopped when it has finished.
+        ends_run: whether all others are stopped when it has ended, by itself or not: what it
+            knows is the run's result, and one that were started again would begin anew.
         memory: bytes of resident memory beyond which it is ended and started again; 0: any.
     """
 
@@ -340,11 +343,15 @@ class Supervisor:
             self._log.error(f'{name} cannot start with this configuration: stopping')
             self.stop(code)
             return
+        why = child.ended_for or describe_exit(code)
+        if child.program.ends_run:
+            self._log.error(f'{name} died ({why}): the run ends with what there is')
+            self.stop(EXIT_CUT)
+            return
         now = time.monotonic()
         worked = child.heartbeats is not None and child.heartbeats.begun
         pause = child.restarts.died(now, now - child.started, worked=worked)
         child.restart_at = now + pause
-        why = child.ended_for or describe_exit(code)
         when = f' in {pause:g} s' if pause else ''
         self._log.warn(f'{name} died ({why}): starting it again{when}')
         if trouble := child.restarts.trouble(now):

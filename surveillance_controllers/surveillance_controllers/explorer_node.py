@@ -42,7 +42,7 @@ from surveillance_runtime.conversions import (
     seconds_of,
     stamp_of_serialized,
 )
-from surveillance_runtime.files import FileError
+from surveillance_runtime.files import FileError, in_one_line, replace_text
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.parameters import parameter
 from surveillance_runtime.place.occupancy_grid import Grid
@@ -289,9 +289,11 @@ class Explorer(PatrolNode):
         for each in left:
             logger.warn(f'left: {each}')
         if self._settings.folder:
-            Path(self._settings.folder, DONE_FILE).write_text(
-                ''.join(f'{each}\n' for each in left), 'utf-8'
-            )
+            try:
+                text = ''.join(f'{each}\n' for each in left)
+                replace_text(Path(self._settings.folder, DONE_FILE), text)
+            except OSError as error:
+                logger.error(f'what is left is not kept: {in_one_line(error)}')
         logger.info('all that can be reached has been seen')
         self.finish()
 

@@ -67,6 +67,21 @@ def test_a_room_without_a_way_out_is_mapped_and_the_node_ends(graph, tmp_path: P
     assert 'does not fit' in (tmp_path / DONE_FILE).read_text()
 
 
+def test_what_cannot_be_written_at_the_end_is_one_line(graph, tmp_path: Path) -> None:
+    (tmp_path / DONE_FILE).mkdir()  # as of a full disk: the map is written, what follows is not
+    said = graph.said()
+    node = graph.add(Explorer, {'folder': str(tmp_path), 'frontiers.least': 0.9})
+    robot = Robot(graph, door=0.5)
+
+    def ended() -> bool:
+        robot.tell()
+        return bool(node.finished)
+
+    graph.until(ended)
+    graph.until(lambda: any(line.startswith('what is left is not kept: ') for line in said))
+    assert read_map(tmp_path / MAP_FILE)
+
+
 def test_the_map_of_another_program_is_followed(graph, tmp_path: Path) -> None:
     node = graph.add(Explorer, {'folder': str(tmp_path), 'mapping': 'topic'})
     commands = graph.listen(Twist, 'cmd_vel', 1)

@@ -21,6 +21,7 @@ for argument in sys.argv[1:]:
             os.environ,
             takes_input=True,
             leads=name.startswith('lead'),
+            ends_run=name.startswith('errand'),
             memory=int(os.environ.get('MEMORY', '0')),
         )
     )

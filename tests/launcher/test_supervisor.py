@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from launcher.supervisor import STOP_AGAIN_AFTER, STOP_AT_MOST, STOP_WITHIN, describe_exit
+from launcher.supervisor import EXIT_CUT, STOP_AGAIN_AFTER, STOP_AT_MOST, STOP_WITHIN, describe_exit
 from tests.launcher.conftest import ROOT, USER_ENVIRON, gone
 
 DRIVER = str(Path(__file__).with_name('supervised.py'))
@@ -213,6 +213,17 @@ def test_a_child_that_says_it_has_finished_is_left_alone(start):
     assert launch.end()[0] == 0
     assert any(line.endswith('| bye') for line in launch.lines)
     assert sum('started one' in line for line in launch.lines) == 1
+
+
+def test_a_child_whose_work_is_the_run_is_not_begun_anew(start):
+    launch = start(DRIVER, f'errand={WAIT}', f'two={WAIT}')
+    first = int(launch.until(r'started errand \(process (\d+)\)')[1])
+    launch.until(r'errand +\| up')
+    os.kill(first, signal.SIGKILL)
+    assert launch.end()[0] == EXIT_CUT
+    output = '\n'.join(launch.lines)
+    assert 'errand died (killed by SIGKILL): the run ends with what there is' in output
+    assert output.count('started errand') == 1
 
 
 def test_a_line_of_input_reaches_the_named_child(start):
