@@ -680,6 +680,7 @@ class LinkCampaign:
         self._domain = claim_domain()
         self.network = Network(2, seed)
         robot, desk = self.network.hosts
+        self._link = self.network.link(robot, desk)
         self._launchers = [
             self._launch(robot, 'robot', ROBOT),
             self._launch(desk, 'desk', DESK),
@@ -694,18 +695,18 @@ class LinkCampaign:
         results = LinkResults()
         self._await_visit()
         results.undisturbed = self._rate(seconds)
-        network = self.network
-        network.loss, network.delay = LOSS, DELAY
-        network.passed = network.lost = 0
+        link = self._link
+        link.loss, link.delay = LOSS, DELAY
+        link.passed = link.lost = 0
         results.disturbed = self._rate(seconds)
-        results.lost_frames = network.lost / max(1, network.lost + network.passed)
-        network.loss = network.delay = 0.0
+        results.lost_frames = link.lost / max(1, link.lost + link.passed)
+        link.loss = link.delay = 0.0
         for _ in range(cuts):
             self._await_visit()
             time.sleep(self._chance.uniform(0.0, 10.0))
-            network.cut = True
+            link.cut = True
             time.sleep(cut_seconds)
-            network.cut = False
+            link.cut = False
             joined = time.time()
             self._await_visit()
             results.visits.append(time.time() - joined)

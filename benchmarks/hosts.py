@@ -1,9 +1,9 @@
 """Hosts of a network on one machine: network namespaces on an Ethernet segment that fails.
 
 Each host is a namespace of its own with one interface besides the loopback. A thread passes the
-frames between them, and delays, drops or stops them as a bad radio link does. That needs root and
-`/dev/net/tun`, not the kernel's netem. Nothing stays behind: a namespace lives as long as a process
-that ends with this one.
+frames between them, as a switch that has learned who is where, and delays, drops or stops those
+between two hosts as a bad radio link does. That needs root and `/dev/net/tun`, not the kernel's
+netem. Nothing stays behind: a namespace lives as long as a process that ends with this one.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ import sys
 import threading
 import time
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 TUNSETIFF = 0x400454CA  # linux/if_tun.h
@@ -84,28 +85,60 @@ class Host:
         self._holder.wait()
 
 
+@dataclass
+class Link:
+    """What lies between two hosts.
+
+    Attributes:
+        loss: Which share of the frames is lost, in either direction.
+        delay: How long a frame is under way, seconds.
+        cut: Whether nothing passes.
+        passed, lost: Frames so far.
+    """
+
+    loss: float = 0.0
+    delay: float = 0.0
+    cut: bool = False
+    passed: int = 0
+    lost: int = 0
+
+    def loses(self, chance: random.Random) -> bool:
+        """Tell whether the next frame is lost, and count it."""
+        lost = self.cut or chance.random() < self.loss
+        self.lost += lost
+        self.passed += not lost
+        return lost
+
+
 class Network:
-    """Hosts and the link between them.
+    """Hosts and the links between each two of them.
 
     Args:
         count: How many hosts.
         seed: Of the losses.
 
     Attributes:
-        loss: Which share of the frames is lost.
-        delay: How long a frame is under way, seconds.
-        cut: Whether nothing passes.
-        passed, lost: Frames so far.
+        hosts: These.
     """
 
     def __init__(self, count: int, seed: int = 1) -> None:
-        self.loss, self.delay, self.cut = 0.0, 0.0, False
-        self.passed = self.lost = 0
         self._chance = random.Random(seed)
         self.hosts = [Host(number + 1) for number in range(count)]
+        self._links = {
+            frozenset((one.frames, other.frames)): Link()
+            for one, other in itertools.combinations(self.hosts, 2)
+        }
         self._waker, self._wake = os.pipe()
         self._thread = threading.Thread(target=self._pass_frames, daemon=True)
         self._thread.start()
+
+    def link(self, one: Host, other: Host) -> Link:
+        """Return what is between two hosts."""
+        return self._links[frozenset((one.frames, other.frames))]
+
+    def links_of(self, host: Host) -> list[Link]:
+        """Return all that lead to a host."""
+        return [link for ends, link in self._links.items() if host.frames in ends]
 
     def close(self) -> None:
         """Take everything down."""
@@ -120,6 +153,7 @@ class Network:
         ports = [host.frames for host in self.hosts]
         order = itertools.count()
         under_way: list[tuple[float, int, int, bytes]] = []
+        learned: dict[bytes, int] = {}
         while True:
             pause = max(0.0, under_way[0][0] - time.monotonic()) if under_way else None
             ready = select.select([*ports, self._waker], [], [], pause)[0]
@@ -128,20 +162,17 @@ class Network:
             now = time.monotonic()
             for port in ready:
                 for frame in _frames(port):
-                    for other in ports:
-                        if other != port and not self._is_lost():
-                            entry = (now + self.delay, next(order), other, frame)
+                    learned[frame[6:12]] = port  # Ethernet: receiver, sender, six bytes each
+                    known = learned.get(frame[:6])
+                    for other in ports if known is None else (known,):
+                        link = self._links.get(frozenset((port, other)))
+                        if link is not None and not link.loses(self._chance):
+                            entry = (now + link.delay, next(order), other, frame)
                             heapq.heappush(under_way, entry)
             while under_way and under_way[0][0] <= now:
                 _, _, port, frame = heapq.heappop(under_way)
                 with contextlib.suppress(OSError):  # its queue is full
                     os.write(port, frame)
-
-    def _is_lost(self) -> bool:
-        lost = self.cut or self._chance.random() < self.loss
-        self.lost += lost
-        self.passed += not lost
-        return lost
 
 
 def _frames(port: int) -> Sequence[bytes]:

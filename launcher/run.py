@@ -312,8 +312,6 @@ class Run:
                 read_script(self.stage)
             except FileError as error:
                 raise ValueError(f'--stage {error}') from None
-            if not any(node.name == 'simulator' for node in self.nodes()):
-                raise ValueError(f'--stage {self.stage}: expected a run whose simulator is started')
         for text in self.remaps:
             if not _REMAP.match(text):
                 raise ValueError(f'--remap {text!r}: expected FROM:=TO like scan:=front/scan')

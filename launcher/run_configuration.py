@@ -201,6 +201,16 @@ def check_assignments(merged: Configuration, nodes: Sequence[node_table.Node]) -
             raise ValueError(f'{entry.origin}: no node that is started takes it: {names}')
 
 
+def check_stage(run: Run, nodes: Sequence[node_table.Node]) -> None:
+    """Make sure that what is staged has a simulator to happen in.
+
+    Raises:
+        ValueError: No simulator is started.
+    """
+    if run.stage is not None and all(node.name != 'simulator' for node in nodes):
+        raise ValueError(f'--stage {run.stage}: expected a run whose simulator is started')
+
+
 def check_clocks(merged: Configuration, run: Run, nodes: Sequence[node_table.Node]) -> None:
     """Make sure that all nodes live by the clock of a simulation that is slower or faster.
 

@@ -18,6 +18,7 @@ from launcher.run import NOT_RECORDED, Run
 from launcher.run_configuration import (
     check_assignments,
     check_clocks,
+    check_stage,
     configuration,
     profile_of,
     with_mode_of,
@@ -26,7 +27,7 @@ from launcher.run_configuration import (
 from launcher.run_processes import COMPOSED, node_environ, programs_of, ros_domain
 from launcher.service import is_service
 from launcher.supervisor import EXIT_CUT, Supervisor
-from launcher.team import Part, parts
+from launcher.team import Part, parts, without_parts
 from surveillance_behaviour.mission import mission_log
 from surveillance_runtime import node_table
 from surveillance_runtime.configuration import Entry
@@ -73,14 +74,7 @@ def run_mission(
     errand: Errand | None = None,
 ) -> int:
     """Start the nodes, supervise them to the end, print the summary; return the exit code."""
-    merged = configuration(config, run)  # before anything is written
-    run, profile = with_profile(with_mode_of(run, merged), config)
-    team = parts(run, config, profile_of(config, run))
-    everyone = [node for part in team for node in part.everyone]
-    for part in team:
-        merged = configuration(config, part.run, fleet=part.entries)
-        check_assignments(merged, everyone)
-        check_clocks(merged, part.run, part.everyone)
+    run, team = checked(run, config)  # before anything is written
     domain = ros_domain(run)
     claims = [held for part in team for held in claim(part.nodes, domain, part.run.namespace)]
     if run.network:
@@ -115,7 +109,7 @@ def run_mission(
     log = MergedLog(None, names, path=folder / LAUNCH_LOG)
     log.say(
         f'{errand.title if errand is not None else run.behaviour} in mode {mode}, '
-        f'{_robots(team, profile.name)}, place {place.name}, '
+        f'{_robots(team, profile_of(config, run).profile.name)}, place {place.name}, '
         f'ROS domain {ros_domain(run)}, files in {_short(folder)}'
     )
     if moved := team[0].moved_points:
@@ -156,6 +150,24 @@ def run_mission(
     if errand is None or code not in (0, EXIT_CUT):
         return code
     return errand.close(folder) or code
+
+
+def checked(run: Run, config: Path) -> tuple[Run, tuple[Part, ...]]:
+    """Return the run, with what follows for it from files, and its parts.
+
+    Raises:
+        ValueError: One line about the first option, place or parameter that is wrong.
+    """
+    merged = configuration(config, without_parts(run))
+    run, _ = with_profile(with_mode_of(run, merged), config)
+    team = parts(run, config, profile_of(config, run))
+    everyone = [node for part in team for node in part.everyone]
+    check_stage(run, everyone)
+    for part in team:
+        merged = configuration(config, part.run, fleet=part.entries)
+        check_assignments(merged, everyone)
+        check_clocks(merged, part.run, part.everyone)
+    return run, team
 
 
 def _look_for_others(run: Run, team: Sequence[Part]) -> None:

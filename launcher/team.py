@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from launcher.run import Run
+from surveillance_runtime import node_table
 from surveillance_runtime.profile import ProfileFile
 from surveillance_runtime.run_parameters import place_file
 from surveillance_runtime.team import Choice, TeamPart, team_parts
@@ -16,7 +18,7 @@ class Part(TeamPart):
     """A part with what is asked of it.
 
     Attributes:
-        run: What is asked of its nodes; its namespace is theirs.
+        run: What is asked of its nodes; its namespace is theirs, and it names no part of the fleet.
     """
 
     run: Run
@@ -40,7 +42,22 @@ def parts(run: Run, config: Path, robot: ProfileFile) -> tuple[Part, ...]:
     return tuple(
         Part(
             **vars(part),
-            run=replace(run, namespace=part.namespace, robot=part.profile or run.robot),
+            run=replace(
+                run,
+                namespace=part.namespace,
+                robot=part.profile or run.robot,
+                only=[node.name for node in part.nodes],
+                without=[],
+            ),
         )
         for part in found
     )
+
+
+def without_parts(run: Run) -> Run:
+    """Return the run without the words that name parts of a fleet, and their nodes."""
+
+    def kept(words: Sequence[str]) -> list[str]:
+        return [word for word in words if word in node_table.BY_NAME]
+
+    return replace(run, only=kept(run.only), without=kept(run.without))

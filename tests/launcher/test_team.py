@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import itertools
 import math
+import re
 from pathlib import Path
 
 import pytest
 
-from launcher.run import Run
+from launcher.run import Run, make_parser, wanted_run
 from launcher.run_configuration import configuration, profile_of
+from launcher.run_mission import checked
 from launcher.team import parts
 from surveillance_runtime.files import FileError
 from surveillance_runtime.place import read_place_file
@@ -121,3 +123,28 @@ def test_only_and_without_name_robots_and_their_nodes():
     assert 'armor_server' not in names(left[0])
     with pytest.raises(ValueError, match=r"'robot9'.*expected"):
         team(Run(robots=2, only=('robot9',)))
+
+
+def test_the_machines_of_the_document_start_each_node_once():
+    page = (CONFIG.parent / 'docs' / 'fleet.md').read_text()
+    commands = re.findall(r'machine \d: +python3 launch.py (.*)', page)
+    started = []
+    for words in commands:
+        _, found = checked(wanted_run(make_parser().parse_args(words.split())), CONFIG)
+        started += [(part.robot, node.name) for part in found for node in part.nodes]
+    whole = [(part.robot, node.name) for part in team(Run(robots=2)) for node in part.nodes]
+    assert sorted(started) == sorted(whole)
+
+
+def test_a_part_is_told_what_of_it_runs_elsewhere():
+    _, (part,) = checked(Run(robots=2, only=('robot1',), without=('collision_monitor',)), CONFIG)
+    merged = configuration(CONFIG, part.run, fleet=part.entries)
+    motion = merged.resolve('motion_controller', '/robot1/motion_controller')
+    assert motion['robot.command_type'].origin == 'no collision_monitor'
+
+
+def test_a_stage_needs_a_simulator_on_this_machine(tmp_path):
+    stage = tmp_path / 'stage.yaml'
+    stage.write_text('stage: {dark: {at: daily 21:30, do: lamp R2 off}}\n')
+    with pytest.raises(ValueError, match='expected a run whose simulator is started'):
+        checked(Run(robots=2, only=('robot1',), stage=stage), CONFIG)
