@@ -25,6 +25,7 @@ SEBS      gain against others' intentions (Portugal and Rocha 2013); its gain li
     python benchmarks/fleet.py --graph FOLDER     maps of patrolling_sim
     python benchmarks/fleet.py --live --hours 1   the real programs in a simulated place with people
     python benchmarks/fleet.py --faults 1000      kills and cuts of a fleet of three in this process
+    python benchmarks/fleet.py --hosts            real programs on hosts that fail; root only
     python benchmarks/fleet.py --armor 60         the ontology under ten robots, for 60 s
     python benchmarks/fleet.py --composed 60      eight whole stacks, one process each, for 60 s
 """
@@ -291,15 +292,21 @@ def main() -> None:
     parser.add_argument('--faults', type=int, metavar='N', help='kills and cuts')
     parser.add_argument('--armor', type=float, metavar='SECONDS', help='calls of ten robots')
     parser.add_argument('--composed', type=float, metavar='SECONDS', help='eight whole stacks')
+    parser.add_argument('--hosts', action='store_true', help='real programs on hosts that fail')
+    parser.add_argument('--keep', type=Path, help='folder for what --hosts writes')
     parser.add_argument('--live', action='store_true', help='the real programs in a simulation')
     parser.add_argument('--hours', type=float, default=1.0, help='simulated, of --live')
-    parser.add_argument('--robots', type=int, default=4, help='of --live')
+    parser.add_argument('--robots', type=int, help='of --live (4) and --hosts (2)')
     parser.add_argument('--people', type=int, default=2, help='who walk about, of --live')
     parser.add_argument('--map', type=Path, action='append', help='a place, of --live')
     words = parser.parse_args()
     if words.faults is not None:
         fail(words.faults)
         return
+    if words.hosts:
+        from fleet_hosts import fail_hosts
+
+        raise SystemExit(fail_hosts(words.robots or 2, quick=words.quick, keep=words.keep))
     if words.armor is not None or words.composed is not None:
         from fleet_load import CONFIG, armor_under, composed
 
@@ -313,7 +320,7 @@ def main() -> None:
         from fleet_live import CONFIG, compare_places
 
         places = words.map or [CONFIG / 'seven_rooms.yaml', CONFIG / 'office.yaml']
-        compare_places(places, words.robots, 3600.0 * words.hours, words.people)
+        compare_places(places, words.robots or 4, 3600.0 * words.hours, words.people)
         return
     if words.graph is not None:
         files = sorted(words.graph.glob('**/*.graph'))

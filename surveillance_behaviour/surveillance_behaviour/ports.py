@@ -32,6 +32,10 @@ class Ontology(Protocol):
     def wait_until_built(self, interrupt: Interrupt) -> None:
         """Return once the map is in the ontology."""
 
+    def answers(self) -> bool:
+        """Return whether an ontology that did not answer does again, without the wait of a call."""
+        return True
+
     def place_classes(self, interrupt: Interrupt) -> tuple[str, ...]:
         """Return the classes that a place can be in."""
 

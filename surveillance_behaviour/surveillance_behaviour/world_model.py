@@ -281,7 +281,11 @@ class WorldModel:
         Raises:
             CallError: It does not answer, and nothing is known yet.
         """
-        visits = self.experience.visits
+        visits, last = self.experience.visits, self._last
+        if self._cut_off and last is not None and not self._ontology.answers():
+            here = self._ontology.await_place(self.place, 0.0, interrupt) or self.place
+            if here in last.connections:
+                return self._as_known(last, here, now, threshold)
         try:
             self._last = self._ontology.snapshot(
                 now,
@@ -295,7 +299,6 @@ class WorldModel:
             raise
         except CallError as error:
             here = self._ontology.await_place(self.place, 0.0, interrupt) or self.place
-            last = self._last
             if self.fleet is None or last is None or here not in last.connections:
                 raise
             if not self._cut_off:

@@ -97,6 +97,13 @@ class RosTransport:
         """Tell whether the server is there now."""
         return self._single.is_ready() and self._serial.is_ready()
 
+    def look_for_answer(self) -> Callable[[float], bool]:
+        """Return a look whether a server that did not answer does again, see `ServiceCaller`."""
+        caller, message = self._written(
+            DirectiveRequest(self._node.get_name(), '', 'GET', 'ALL', 'REFS')
+        )
+        return caller.look_for_answer(message)
+
     def call(self, request: DirectiveRequest | Batch) -> DirectiveResponse | ListResponse:
         """Carry out a directive or a batch and block until the answer."""
         caller, message = self._written(request)

@@ -78,6 +78,7 @@ class World:
 
     Attributes:
         rooms: Doors of each room.
+        is_silent: Whether an ontology that did not answer still does not.
         faults: Called with the name of each port method before it works; may raise, or change the
             world.
         station_points: Where the stations are that are not at the points of their rooms.
@@ -95,6 +96,7 @@ class World:
     charge: float = 2.0
     low_below: float = 20.0
     faults: Callable[[str], None] = lambda call: None
+    is_silent: bool = False
 
     def __post_init__(self) -> None:
         self.clock = ScriptedClock()
@@ -159,6 +161,10 @@ class World:
 
     def wait_until_built(self, interrupt: Interrupt) -> None:
         self._call('wait_until_built', interrupt)
+
+    def answers(self) -> bool:
+        self.calls.append('answers')
+        return not self.is_silent
 
     def place_classes(self, interrupt: Interrupt) -> tuple[str, ...]:
         return ('LOCATION', 'ROOM', 'CORRIDOR', 'URGENT')

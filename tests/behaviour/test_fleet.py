@@ -52,8 +52,10 @@ class CutWorld(World):
     """A world whose ontology may be away."""
 
     away = False
+    asked = 0
 
     def snapshot(self, *args: object, **named: object):  # type: ignore[no-untyped-def, override]
+        self.asked += 1
         if self.away:
             raise UnavailableError('armor: away', lambda: not self.away)
         return super().snapshot(*args, **named)  # type: ignore[arg-type]
@@ -216,6 +218,20 @@ def test_without_the_ontology_each_patrols_on_and_nothing_is_lost() -> None:
         assert outlook.visited_at[place] >= at - 1.0
         # The ontology counts whole seconds.
         assert first.world.visited_at[place] >= math.floor(at)
+
+
+def test_an_ontology_that_does_not_answer_is_not_waited_for_again_at_each_decision() -> None:
+    _air, (first, _second) = patrol(2)
+    first.model.decide(0.0, NOBODY)
+    world, asked = first.world, first.world.asked
+    world.away = world.is_silent = True
+    for now in (1.0, 2.0, 3.0):
+        first.model.decide(now, NOBODY)
+    assert world.asked == asked + 1, 'once, and then only looked for'
+    world.away = world.is_silent = False
+    first.model.decide(4.0, NOBODY)
+    assert world.asked == asked + 2
+    assert 'the ontology answers again' in first.said[-1]
 
 
 def test_one_robot_alone_without_an_ontology_waits_as_ever() -> None:

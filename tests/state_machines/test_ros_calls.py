@@ -160,6 +160,28 @@ def test_a_missed_answer_is_noted_and_shown(graph, server):
     assert float(server.health.figures()['other_ms']) > 0.0
 
 
+def test_who_can_do_without_an_answer_looks_for_one_without_waiting(graph, server):
+    caller = ServiceCaller(graph.node, Trigger, 'ask')
+    answers = caller.look_for_answer(Trigger.Request())
+    began = time.monotonic()
+    assert not answers(60.0), 'of no server no answer comes'
+    assert time.monotonic() - began < 20.0
+    gate, asked = Interrupt(), []
+
+    def slow(_request, answer):
+        asked.append(True)
+        gate.wait(60.0)
+        return answer
+
+    server.create_service(Trigger, 'ask', slow)
+    await_servers(graph, 1)
+    assert graph.until(lambda: not answers(0.0) and bool(asked))
+    assert not answers(0.05)
+    gate.set()
+    assert answers(60.0)
+    assert len(asked) == 1
+
+
 def test_service_call_notices_that_its_server_went_away(graph, server):
     asked = never_answers(server)
     caller = ServiceCaller(graph.node, Trigger, 'ask')

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -136,6 +137,10 @@ class Mission:
         self.say(f'{len(reasoner.places)} places to patrol, starting in {self.place}')
         if self._started is not None:
             return
+        for station in self.settings.choice.recharge_rooms:
+            # Where they are is known then, also while the map does not answer.
+            with contextlib.suppress(CallError):
+                self.ports.places.position(station + AT_STATION, interrupt)
         self._started = self.now()
         self._noted_places = reasoner.places
         self._noted_threshold = self.settings.choice.urgency_threshold

@@ -23,6 +23,9 @@ from surveillance_ontology.patrol_ontology import (
     Snapshot,
 )
 
+ANSWER_PATIENCE = 0.3
+"""How long a server that did not answer is waited for when it is looked at again, seconds."""
+
 
 class Whereabouts:
     """The last that was told on `robot_place`; written in the executor's thread.
@@ -88,6 +91,8 @@ class ArmorKnowledge:
         patience: How long an ontology that is built (anew), or contradicts itself, may take until
             it knows where the robot is, seconds of steady time.
         is_back: Whether a server that was away is there again; None: nobody can tell.
+        look_for_answer: Returns a look whether a server that did not answer does again, which takes
+            how long to wait at most, seconds; None: only another call tells.
         robot: The robot's name in the ontology.
     """
 
@@ -101,8 +106,11 @@ class ArmorKnowledge:
         patience: float = 0.0,
         is_back: Callable[[], bool] | None = None,
         robot: str = ROBOT,
+        look_for_answer: Callable[[], Callable[[float], bool]] | None = None,
     ) -> None:
         self._is_back = is_back
+        self._look_for_answer = look_for_answer
+        self._answers: Callable[[float], bool] | None = None
         self._armor = ArmorClient(client_id, '', transport)
         self._ontology = PatrolOntology(self._armor, robot)
         self._wake = wake
@@ -113,6 +121,12 @@ class ArmorKnowledge:
     def wait_until_built(self, interrupt: fsm.Interrupt) -> None:
         """Ask for the name of the ontology, which is answered once the map is built."""
         self._armor.reference_name = self._ask_reference(interrupt)
+
+    def answers(self) -> bool:
+        """Return whether the server answers, without the wait of a call; from a worker thread."""
+        if self._answers is not None and self._answers(ANSWER_PATIENCE):
+            self._answers = None
+        return self._answers is None
 
     def place_classes(self, interrupt: fsm.Interrupt) -> tuple[str, ...]:
         """Return the classes that a place can be in."""
@@ -176,6 +190,8 @@ class ArmorKnowledge:
             if interrupt.is_set():
                 raise CallInterruptedError from None
             if isinstance(error, ArmorServiceCallError):
+                if self._look_for_answer is not None:
+                    self._answers = self._look_for_answer()
                 raise UnavailableError(f'armor: {error}', self._is_back) from None
             raise CallError(f'armor: {error}') from None
         finally:

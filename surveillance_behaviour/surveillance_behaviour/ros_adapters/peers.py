@@ -52,6 +52,8 @@ ASK_AGAIN = 10.0
 """How long one question to a service that takes long waits for its answer, seconds."""
 MARGIN = 1e-6
 """By how much a wait is announced longer than it is, seconds: more than stamps are rounded by."""
+KNOWN_PATIENCE = 1.0
+"""How long the map is waited for that tells again what it told before, seconds."""
 LONGEST_CHARGE = 24 * 3600.0
 """The longest time a charge may take even when it gets on, seconds."""
 
@@ -159,6 +161,7 @@ def ros_ontology(node: PatrolNode, deadlines: Deadlines) -> ArmorKnowledge:
         deadlines.answer,
         transport.is_ready,
         declared_robot_name(node),
+        transport.look_for_answer,
     )
 
 
@@ -172,19 +175,41 @@ def hear_battery(node: PatrolNode, battery: BatteryMonitor) -> None:
 
 
 class RosPlaces:
-    """Positions of places, from ``ontology_map/room_position``."""
+    """Positions of places, from ``ontology_map/room_position``.
+
+    While that does not answer, a place is where it was when it was asked for last.
+    """
 
     def __init__(self, node: PatrolNode, deadlines: Deadlines) -> None:
         self._deadlines = deadlines
         self._service = ServiceCaller(node, RoomPosition, 'ontology_map/room_position')
+        self._known: dict[str, Point] = {}
+        self._answers: Callable[[float], bool] | None = None
 
     def position(self, place: str, interrupt: Interrupt) -> Point:
         """Return a point in the place."""
         request = RoomPosition.Request(room_name=place)
-        answer = self._service.call(request, self._deadlines.answer, interrupt)
+        known = self._known.get(place)
+        if known is not None and self._answers is not None and not self._answers(0.0):
+            return known
+        patience = self._deadlines.answer
+        try:
+            answer = self._service.call(
+                request, patience if known is None else min(KNOWN_PATIENCE, patience), interrupt
+            )
+        except CallInterruptedError:
+            raise
+        except CallError:
+            if known is None:
+                raise
+            self._answers = self._service.look_for_answer(request)
+            return known
+        self._answers = None
         if not answer.valid:
+            self._known.pop(place, None)
             raise UnknownPlaceError(f'{self._service.name}: there is no place {place}')
-        return point_from(answer.position)
+        self._known[place] = point = point_from(answer.position)
+        return point
 
 
 TRACE_STEP = 0.3

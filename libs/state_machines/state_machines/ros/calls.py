@@ -65,6 +65,12 @@ LONGEST_RESULT_PERIOD = 300.0
 
 A server keeps each request until the goal ends; but what it says may be lost, too."""
 
+ASK_AGAIN = 2.0
+"""Seconds after which a server that gives no answer is asked whether it does again."""
+
+ASKED_AT_MOST = 5
+"""How many of such questions are open at most."""
+
 CANCEL_PERIOD = 0.5
 """Seconds after which a cancel that was not answered is sent again."""
 
@@ -244,6 +250,46 @@ class ServiceCaller:
             return answer
 
         return await_answer
+
+    def look_for_answer(self, request: Any) -> Callable[[float], bool]:
+        """Return a look whether a server that did not answer does again; from a worker thread only.
+
+        Who may do without the answer need not wait for a deadline with each call.
+
+        Args:
+            request: Is sent for that now, and with the looks every `ASK_AGAIN` seconds, as long as
+                the server is known; it may be answered several times.
+
+        Returns:
+            The look. It takes how long to wait for an answer at most, seconds, and is True once
+            there was one.
+        """
+        asked, pending = -math.inf, list[Future]()
+        answered = threading.Event()
+
+        def ask() -> None:
+            nonlocal asked
+            if self.is_ready() and time.monotonic() - asked >= ASK_AGAIN:
+                asked = time.monotonic()
+                future = self._client.call_async(request)
+                future.add_done_callback(lambda _future: answered.set())
+                pending.append(future)
+                for old in pending[:-ASKED_AT_MOST]:
+                    self._client.remove_pending_request(old)
+                del pending[:-ASKED_AT_MOST]
+
+        def look(patience: float) -> bool:
+            ask()
+            # Of a server that is not known no answer will come.
+            if not answered.wait(patience if self.is_ready() else 0.0):
+                return False
+            for future in pending:
+                self._client.remove_pending_request(future)
+            pending.clear()
+            return True
+
+        ask()
+        return look
 
     async def call_async(self, request: Any, timeout: float) -> Any:
         """Call from a callback with `await`, which a thread waits for; otherwise as `call`.
