@@ -30,6 +30,8 @@ TUNSETIFF = 0x400454CA  # linux/if_tun.h
 IFF_TAP, IFF_NO_PI = 0x0002, 0x1000
 CLONE_NEWNET = 0x40000000  # linux/sched.h
 LONGEST_FRAME = 65536
+MULTICAST = b'\x01\x00\x5e'
+"""How the receiver of a frame to many begins in IPv4 (RFC 1112)."""
 
 
 def may_be_made() -> bool:
@@ -104,18 +106,21 @@ class Link:
         loss: Which share of the frames is lost, in either direction.
         delay: How long a frame is under way, seconds.
         cut: Whether nothing passes.
+        multicast: Whether what goes to many receivers passes, as on many radio links it does not.
         passed, lost: Frames so far.
     """
 
     loss: float = 0.0
     delay: float = 0.0
     cut: bool = False
+    multicast: bool = True
     passed: int = 0
     lost: int = 0
 
-    def loses(self, chance: random.Random) -> bool:
+    def loses(self, frame: bytes, chance: random.Random) -> bool:
         """Tell whether the next frame is lost, and count it."""
         lost = self.cut or chance.random() < self.loss
+        lost = lost or (not self.multicast and frame.startswith(MULTICAST))
         self.lost += lost
         self.passed += not lost
         return lost
@@ -177,7 +182,7 @@ class Network:
                     known = learned.get(frame[:6])
                     for other in ports if known is None else (known,):
                         link = self._links.get(frozenset((port, other)))
-                        if link is not None and not link.loses(self._chance):
+                        if link is not None and not link.loses(frame, self._chance):
                             entry = (now + link.delay, next(order), other, frame)
                             heapq.heappush(under_way, entry)
             while under_way and under_way[0][0] <= now:
