@@ -163,7 +163,6 @@ class WorldModel:
         """Take what holds for single places, and ask for the places' points anew."""
         self._rules = rules
         self._positions = {}
-        self._graph_key = None
 
     def battery(self) -> Battery:
         """Return what a decision knows of the battery now."""
@@ -370,34 +369,41 @@ class WorldModel:
         if found.place not in positions:
             raise CallError(f'ontology: the robot is in {found.place}, which is not on the map')
         times, exploring = self.experience.leg_times, self.settings.exploration_seconds
+        own_exploring = self._rules.exploration
         times.forget_fit(self.settings.speed)
+
+        def metres(start: str, goal: str) -> float:
+            # Of the points that were asked for here: another place may be taken meanwhile.
+            return math.dist(positions[start][:2], positions[goal][:2])
+
         legs = {
             place: {
-                other: times.used(place, other, self._metres(place, other))
+                other: times.used(place, other, metres(place, other))
                 for other in others
                 if other in positions
             }
             for place, others in found.connections.items()
             if place in positions
         }
-        if (found.place in self.graph.index, legs, exploring) == self._graph_key:
+        key = (True, legs, exploring, own_exploring)
+        if (found.place in self.graph.index, *key[1:]) == self._graph_key:
             return self.graph
         try:
-            whole = PatrolGraph(legs, exploring, self._rules.exploration)
+            whole = PatrolGraph(legs, exploring, own_exploring)
             graph = whole.connected(found.place)
         except GraphError as error:
             raise CallError(f'ontology: {error}') from None
-        self._graph_key = (True, legs, exploring)
+        self._graph_key = key
         if self.fleet is not None:
             # All compute with the same times, whatever each has learned.
             alike = {
                 place: {
-                    other: max(0.1, round(self._metres(place, other) / self.settings.speed, 1))
+                    other: max(0.1, round(metres(place, other) / self.settings.speed, 1))
                     for other in ways
                 }
                 for place, ways in legs.items()
             }
-            whole = PatrolGraph(alike, exploring, self._rules.exploration)
+            whole = PatrolGraph(alike, exploring, own_exploring)
             self._fleet_graph = whole.connected(found.place)
         return graph
 
@@ -441,6 +447,7 @@ class WorldModel:
             f'{battery.draw.rate:.1g}',
             frozenset(world.openings.closed),
             self.places,
+            self._rules,
         )
         if about == self._told_about:
             return

@@ -14,7 +14,7 @@ from patrol_policy.world import Decision
 from state_machines import Interrupt
 from state_machines.exceptions import CallError, UnavailableError
 from surveillance_behaviour.fleet import FleetFacts, FleetKnowledge
-from surveillance_behaviour.ros_adapters.fleet_topic import facts_of, message_of
+from surveillance_behaviour.ros_adapters.fleet_topic import facts_of, message_of, without_future
 from surveillance_behaviour.world_model import WorldModel
 
 from .scripted_world import World
@@ -319,3 +319,10 @@ def test_who_waits_keeps_its_turn_when_it_wants_something_else() -> None:
     first.model.experience.requested = 'R2'
     assert first.model.decide(9.0, NOBODY).place == 'R2'
     assert first.fleet.own.intention.since == 1.0
+
+
+def test_visits_that_no_clock_has_reached_are_not_believed() -> None:
+    visits = {'R1': 90.0, 'R2': 86_500.0}
+    facts = FleetFacts(FleetRobot('robot2', 'C1'), Intention('robot2', 'C1'), visits)
+    assert without_future(facts, 102.0).visits == {'R1': 90.0}
+    assert without_future(facts, 86_502.0) is facts

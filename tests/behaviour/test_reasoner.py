@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+import json
 import threading
 from typing import Any
 
+from diagnostic_msgs.msg import DiagnosticArray
+from std_msgs.msg import String
+
+from patrol_policy.promises import WITHIN, Promise
 from patrol_policy.world import Decision
 from state_machines.exceptions import CallError, CallInterruptedError
+from surveillance_behaviour.conversions import promises_from
 from surveillance_behaviour.reasoner_node import Reasoner
 from surveillance_interfaces.srv import Reason
+from surveillance_runtime.qos import STATE_QOS
 
 
 def test_requests_that_come_while_a_choice_is_made_share_the_next_one(
@@ -83,3 +90,16 @@ def test_a_choice_that_ends_with_its_node_is_no_failure(graph: Any, monkeypatch:
     monkeypatch.setattr(reasoner._world_model, 'decide', interrupted)
     assert reasoner._choose() == ''
     assert not warned
+
+
+def test_the_hours_of_a_place_that_was_changed_are_told_with_the_promises(graph: Any) -> None:
+    reasoner = graph.add(Reasoner)
+    model, told = reasoner._world_model, list[DiagnosticArray]()
+    graph.node.create_subscription(DiagnosticArray, 'promises', told.append, STATE_QOS)
+    places = graph.node.create_publisher(String, 'place', STATE_QOS)
+    described = {'room_positions': {'R1': [1.0, 1.0]}, 'hours': {'R1': 'mon-fri 08:00-18:00'}}
+    places.publish(String(data=json.dumps(described)))
+    graph.until(lambda: 'R1' in model._rules.calendar.hours)
+    model._promise((Promise('R1', WITHIN, 60.0, 30.0, 'R1: visited'),))
+    graph.until(lambda: bool(told))
+    assert promises_from(told[-1])[1] == {'R1': 'mon-fri 08:00-18:00'}

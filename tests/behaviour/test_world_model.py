@@ -214,3 +214,20 @@ def test_what_was_learned_and_cannot_be_read_is_said(
     damage(tmp_path / 'mission.jsonl.experience.json')
     experience = Experience.of_record(str(record))
     assert 'what was learned before is not used' in experience.problem
+
+
+def test_a_place_that_is_taken_while_somebody_looks_falsifies_no_leg() -> None:
+    world = World()
+    told = WorldModel(DecisionSettings(), world, world, world.battery)
+    whole = told.look(1.0, NOBODY).graph.leg_seconds
+    rules = PatrolRules(exploration={'R1': 60.0})
+
+    def take(call: str) -> None:
+        if call == 'position':
+            told.take_rules(rules)
+
+    told.take_rules(PatrolRules())
+    world.faults = take
+    assert told.look(2.0, NOBODY).graph.leg_seconds == whole
+    world.faults = lambda call: None
+    assert told.look(3.0, NOBODY).graph.own_exploration == {'R1': 60.0}

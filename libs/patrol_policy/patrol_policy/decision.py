@@ -573,15 +573,16 @@ def why_not(place: str, world: World, battery: Battery, settings: DecisionSettin
         return WhyNot(str(error), _premises(place, world, ''))
     if decision.place == place and decision.rule != QUIET:
         return WhyNot(f'the robot would go to {place} now [{decision.rule}]: {decision.reason}')
-    instead = f'the robot goes to {decision.place} [{decision.rule}]'
-    if decision.rule in (RECHARGE, REQUEST, QUIET):
+    does = 'stays in' if decision.place == world.place else 'goes to'
+    instead = f'the robot {does} {decision.place} [{decision.rule}]'
+    if decision.rule in (RECHARGE, REQUEST, QUIET, WAIT):
         return WhyNot(f'{instead}: {decision.reason}')
     if why := why_closed(world, place):
         return WhyNot(f'{place} is not entered: {why}; {instead}')
     energy = energy_of(world, battery, settings)
     if energy is not None and not energy.within_range[energy.index[place]]:
         return WhyNot(f'{place} is not entered: {energy.why_never(place)}; {instead}')
-    premises = _premises(place, world, '' if decision.rule == ANY else decision.rule)
+    premises = _premises(place, world, '' if decision.rule in (ANY, SHARE) else decision.rule)
     if place not in world.reachable:
         way = ' - '.join((world.place, *world.graph.route(world.place, place)))
         return WhyNot(
@@ -592,6 +593,8 @@ def why_not(place: str, world: World, battery: Battery, settings: DecisionSettin
     if place not in decision.scores:
         if place in world.avoided:
             return WhyNot(f'{place} could not be reached lately and is avoided for now; {instead}')
+        if not decision.scores:  # A share of a fleet's places compares no candidates.
+            return WhyNot(f'{instead}: {decision.reason}', premises)
         return WhyNot(
             f'{place} is not {decision.rule} ({world.wait_in_words(place)}, threshold '
             f'{world.threshold_of(place):g} s), but {_listed(decision.scores)} '
@@ -599,7 +602,7 @@ def why_not(place: str, world: World, battery: Battery, settings: DecisionSettin
             premises,
         )
     return WhyNot(
-        f'{settings.policy} scores {place} {decision.scores[place]:.1f} and {decision.place} '
+        f'{decision.policy} scores {place} {decision.scores[place]:.1f} and {decision.place} '
         f'{decision.scores[decision.place]:.1f}; {instead}: {decision.reason}',
         premises,
     )

@@ -188,8 +188,7 @@ class Plan:
         self._deadline = time.thread_time() + MOST_SECONDS
         self._key = world.threshold, world.own_thresholds, world.rules
         # What opens or closes later than that is looked at then.
-        until = world.next_change(world.now + world.look_ahead) - world.look_ahead
-        self._serves = world.now - HALF_OPEN, until
+        self._from, self._changes = world.now, world.changes(world.now + world.look_ahead)
         self.rules = rules = rule_map(world, energy)
         self._work = 0.0
         self.cut = ''
@@ -218,7 +217,11 @@ class Plan:
         planned, graph = self.rules.graph, world.graph
         if self._key != (world.threshold, world.own_thresholds, world.rules):
             return False
-        if not self._serves[0] <= world.now < self._serves[1]:
+        if world.now < self._from - HALF_OPEN:
+            return False
+        ahead = world.now + world.look_ahead
+        due = {change for change in self._changes if world.now < change[1] <= ahead}
+        if world.changes(ahead) != due:
             return False
         mine = self.rules.energy
         if energy is not mine and (energy is None or not energy.alike(mine)):

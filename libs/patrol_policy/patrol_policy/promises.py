@@ -80,11 +80,9 @@ def promises(
         threshold = asked.threshold_of(place)
         never = _why_never(place, world, asked, battery, settings, energy)
         wait = waits.get(place, math.inf)
-        opens, closes = (
-            which.get(place) for which in (world.openings.opens_in, world.openings.closes_in)
-        )
+        opens = world.openings.opens_in.get(place)
         if opens is not None or (place in missed and wait > threshold):
-            words = f'{place}: not visited before it closes in {closes or 0.0:.0f} s'
+            words = f'{place}: not visited before {_end_of_stretch(place, world)}'
             if place in world.openings.closed:
                 words = f'{place}: not visited now, {world.openings.closed[place]}'
             found.append(Promise(place, CLOSED, threshold, math.inf, words))
@@ -103,6 +101,17 @@ def promises(
         else:
             found.append(_timely(place, wait, threshold, world))
     return tuple(found)
+
+
+def _end_of_stretch(place: str, world: World) -> str:
+    """Return what ends the time in which an open place can be visited, and when."""
+    openings = world.openings
+    closes = openings.closes_in.get(place, math.inf)
+    windows = openings.windows.get(place, ())
+    end = min((end - world.now for _, end in windows if end > world.now), default=closes)
+    if end < closes:
+        return f'the quiet hours, which begin in {end:.0f} s'
+    return f'it closes in {closes:.0f} s'
 
 
 def _timely(place: str, wait: float, threshold: float, world: World) -> Promise:

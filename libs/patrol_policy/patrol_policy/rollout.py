@@ -289,14 +289,15 @@ class RuleMap:
         now = state.now
         best, found = NEVER + 1, []
         ways: Iterable[int] = self.leg_seconds[state.place]
-        if state.avoided:
-            ways = [other for other in ways if other not in state.avoided] or ways
         if self.energy:
             within = self.energy.within_range
             ways = [other for other in ways if within[other]]
         if self.windows:
             legs = self.leg_seconds[state.place]
             ways = [o for o in ways if o not in self.windows or self.is_open(o, now, legs[o])]
+        if state.avoided:
+            # Last, as in `Rules.candidates`: they count when none of the others may be entered.
+            ways = [other for other in ways if other not in state.avoided] or ways
         for other in ways:
             rank = ranks[other]
             if rank > urgent and now - seen[other] > overdue[other]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import random
 from collections.abc import Mapping
 from copy import copy
@@ -127,12 +126,16 @@ class World:
         """For how many seconds a plan knows when places open and close: about two tours."""
         return ROUNDS_AHEAD * self.graph.cheapest_entries
 
-    def next_change(self, after: float) -> float:
-        """Return when a place opens or closes next after a moment; inf: not within a week."""
-        windows = self.openings.windows.values()
-        return min(
-            (when for stretches in windows for pair in stretches for when in pair if when > after),
-            default=math.inf,
+    def changes(self, until: float) -> frozenset[tuple[str, float]]:
+        """Return which places of the map open or close from now on, and when, up to a moment."""
+        index, now = self.graph.index, self.now
+        return frozenset(
+            (place, when)
+            for place, stretches in self.openings.windows.items()
+            if place in index
+            for pair in stretches
+            for when in pair
+            if now < when <= until
         )
 
     @cached_property

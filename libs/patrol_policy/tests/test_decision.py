@@ -17,7 +17,9 @@ from patrol_policy.decision import (
     why_charge,
     why_not,
 )
+from patrol_policy.fleet import FleetOutlook, FleetRobot
 from patrol_policy.hours import ALWAYS_OPEN, Openings
+from patrol_policy.plan import plan_of
 from patrol_policy.policies import POLICIES
 from patrol_policy.world import PolicyMemory
 
@@ -81,6 +83,22 @@ def test_avoided_places_wait_until_nothing_else_is_left() -> None:
     assert chosen(Rules(), 'oldest', avoided=frozenset({'R1', 'R2'}))[1] == 'CORRIDOR'
     everything = frozenset({'R1', 'R2', 'C2', 'E'})
     assert chosen(Rules(), 'oldest', avoided=everything) == ('R2', 'URGENT')
+
+
+def test_a_plan_takes_a_place_that_could_not_be_reached_where_the_others_are_closed() -> None:
+    asked = world(
+        avoided=frozenset({'R1'}),
+        openings=Openings(
+            closed=dict.fromkeys(('C2', 'E', 'R2'), 'closed'),
+            optional=frozenset(),
+            closes_in={},
+            opens_in=dict.fromkeys(('C2', 'E', 'R2'), 30.0),
+            windows=dict.fromkeys(('C2', 'E', 'R2'), ((130.0, 9000.0),)),
+        ),
+    )
+    assert Rules().candidates(asked) == ('URGENT', ('R1',))
+    plan = plan_of(asked)
+    assert asked.graph.places[plan.advance(asked)[0]] == 'R1'
 
 
 def test_nothing_within_reach_is_an_error_that_says_so() -> None:
@@ -165,6 +183,24 @@ def test_why_not_says_what_comes_before_the_rules() -> None:
     shut = replace(world(), classes={**world().classes, 'R9': frozenset({'URGENT'})})
     with pytest.raises(ValueError, match='R9 cannot be reached: no open door leads to it'):
         why_not('R9', shut, Battery(), DecisionSettings())
+
+
+@pytest.mark.parametrize('taken_out', [False, True])
+def test_why_not_is_answered_for_a_robot_of_a_fleet(taken_out: bool) -> None:
+    one, graph = world(), seven_rooms()
+    robots = [
+        FleetRobot('a', 'C1', heard_at=one.now, taken_out=taken_out),
+        FleetRobot('b', 'R1', heard_at=one.now),
+    ]
+    asked = replace(one, fleet=FleetOutlook('a', robots, graph))
+    decision = decide(asked, Battery(), DecisionSettings())
+    for place in sorted(set(graph.places) - {'C1', decision.place}):
+        told = why_not(place, asked, Battery(), DecisionSettings())
+        if taken_out:
+            assert told.sentence == 'the robot stays in C1 [wait]: no place is mine: a is taken out'
+        elif place in one.reachable:
+            assert f'[CORRIDOR]: {decision.reason}' in told.sentence
+        assert not any('is wait' in premise for premise in told.premises)
 
 
 def test_a_threshold_below_the_tour_is_warned_of() -> None:

@@ -137,3 +137,39 @@ def test_a_simulated_week_keeps_to_the_calendar() -> None:
         if place == 'R3':
             assert when.weekday() < 5
             assert 8 <= when.hour < 18
+
+
+@pytest.mark.parametrize(('before', 'after'), [('', '08:00-08:15'), ('08:00-08:15', '08:05-09:00')])
+def test_hours_that_are_changed_during_a_patrol_change_the_plan(before: str, after: str) -> None:
+    begin = datetime(2024, 5, 6, 7, 50, tzinfo=ROME).timestamp()
+
+    def calendar(times: str) -> Calendar:
+        hours = {'R3': WeeklyHours.parse(f'daily {times}')} if times else {}
+        return Calendar(hours, zone=ROME)
+
+    def patrol(times: str) -> Patrol:
+        return Patrol(
+            seven_rooms(200.0), Rules(), 'tour', 900.0, 'E', calendar=calendar(times), began=begin
+        )
+
+    changed = patrol(before)
+    promises(changed.world(), changed.known_battery(), changed.settings)
+    changed.calendar = calendar(after)
+    told = promises(changed.world(), changed.known_battery(), changed.settings)
+    plan, fresh = changed.world().memory.plan, patrol(after)
+    promises(fresh.world(), fresh.known_battery(), fresh.settings)
+    assert plan.rules.windows == fresh.world().memory.plan.rules.windows
+    assert {each.place for each in told if each.verdict == CLOSED} == {'R3'}
+
+
+def test_what_the_quiet_hours_come_before_is_said_to_end_with_them() -> None:
+    begin = datetime(2024, 5, 6, 21, 59, tzinfo=ROME).timestamp()
+    calendar = Calendar(
+        {'R3': WeeklyHours.parse('daily 00:00-24:00')},
+        quiet=WeeklyHours.parse('daily 22:00-06:00'),
+        zone=ROME,
+    )
+    patrol = Patrol(seven_rooms(200.0), Rules(), 'tour', 30.0, 'E', calendar=calendar, began=begin)
+    told = promises(patrol.world(), patrol.known_battery(), patrol.settings)
+    words = {each.place: each.words for each in told}
+    assert words['R3'] == 'R3: not visited before the quiet hours, which begin in 60 s'

@@ -32,7 +32,7 @@ from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.parameters import parameter
 from surveillance_runtime.place.patrol_rules import described_patrol_rules, patrol_rules
 from surveillance_runtime.place.stations import Station, described_stations, stations_in
-from surveillance_runtime.place_changes import follow_place
+from surveillance_runtime.place_changes import TOPIC, follow_place
 from surveillance_runtime.state_topics import OwnedTopic
 from surveillance_runtime.waiting import AwaitedWork
 
@@ -135,15 +135,20 @@ def world_model_of(
 
     def take_place(described: Mapping[str, Any]) -> None:
         """Take the rules and the stations of a place that was changed."""
-        world_model.take_rules(patrol_rules(described))
+        nonlocal hours
+        changed = patrol_rules(described)
         found = stations_in(described)
+        hours = changed.calendar.in_words()
+        world_model.take_rules(changed)
         stations.clear()
         stations.update(found)
         world_model.take_stations(found)
         rooms = [str(each) for each in described.get('recharge_rooms') or ()]
         if rooms != list(settings.recharge_rooms):
             kind = Parameter.Type.STRING_ARRAY
-            node.set_parameters([Parameter('recharge_rooms', kind, rooms)])
+            answer, *_ = node.set_parameters([Parameter('recharge_rooms', kind, rooms)])
+            if not answer.successful:
+                log.error(f'topic {TOPIC}: {answer.reason}')
 
     follow_place(node, take_place)
     return world_model

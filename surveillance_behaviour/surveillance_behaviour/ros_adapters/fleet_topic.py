@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
@@ -13,6 +13,7 @@ from surveillance_behaviour.fleet import FleetFacts, FleetKnowledge
 from surveillance_interfaces.msg import FleetRobot as FleetRobotMessage
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.parameters import parameter
+from surveillance_runtime.state_topics import AHEAD, AHEAD_SIMULATED
 
 FLEET_TOPIC = 'fleet_robots'
 FLEET_QOS = QoSProfile(
@@ -81,13 +82,27 @@ def fleet_of(node: PatrolNode, robot: str, docks: tuple[str, ...]) -> FleetKnowl
         time.monotonic,
     )
 
+    ahead = AHEAD_SIMULATED if node.get_parameter('use_sim_time').value else AHEAD
+    early: set[str] = set()
+
     def on_message(message: FleetRobotMessage) -> None:
         try:
             facts = facts_of(message)
         except ValueError as error:
             node.get_logger().error(f'{FLEET_TOPIC}: {error}')
             return
-        knowledge.hear(facts, now())
+        heard = now()
+        believed = without_future(facts, heard + ahead)
+        if believed is facts:
+            early.discard(facts.robot.name)
+        elif facts.robot.name not in early:
+            early.add(facts.robot.name)
+            node.get_logger().error(
+                f'{FLEET_TOPIC}: {facts.robot.name} tells visits up to '
+                f'{max(facts.visits.values()) - heard:.0f} s ahead of this clock, which are not '
+                f'counted; expected at most {ahead:g} s'
+            )
+        knowledge.hear(believed, heard)
 
     told: set[str] = set()
 
@@ -166,6 +181,19 @@ def facts_of(message: FleetRobotMessage) -> FleetFacts:
     )
     visits = dict(zip(message.visited, message.visited_at, strict=True))
     return FleetFacts(robot, intention, visits)
+
+
+def without_future(facts: FleetFacts, latest: float) -> FleetFacts:
+    """Return a robot's facts without the visits that no clock has reached; itself if none are.
+
+    A robot whose clock is ahead would have its places pass for visited until the others come there.
+
+    Args:
+        facts: What was heard.
+        latest: The latest visit that is believed, seconds on the mission's clock.
+    """
+    visits = {place: at for place, at in facts.visits.items() if at <= latest}
+    return facts if len(visits) == len(facts.visits) else replace(facts, visits=visits)
 
 
 def _number(value: float | None) -> float:
