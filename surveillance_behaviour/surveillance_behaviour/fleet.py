@@ -171,6 +171,10 @@ class FleetKnowledge:
         """What this robot says."""
         return self._own
 
+    def charges_at(self, ratio: float) -> None:
+        """Take how many seconds this robot charges for each second of patrol."""
+        self.settings = replace(self.settings, charge_ratio=round(ratio, 2))
+
     # --- what follows ---
 
     def outlook(self, graph: PatrolGraph, now: float) -> FleetOutlook:

@@ -560,8 +560,7 @@ class WorldModel:
         )
         is_new = wish != fleet.own.intention
         share = share_of(decision, fleet.own.robot.share)
-        if dock is not None:
-            share = None
+        begins = {'since': now} if dock is not None and fleet.own.robot.dock is None else {}
         fleet.tell(
             place=here,
             now=now,
@@ -570,6 +569,7 @@ class WorldModel:
             share=share,
             dock=dock,
             **self._charge_facts(world, dock),
+            **begins,
         )
         if dock is not None and dock in (here, decision.place) and (other := self._at_dock(dock)):
             reason = f"{decision.reason}; the station in {dock} is {other}'s"
@@ -655,6 +655,8 @@ class WorldModel:
         )
         # What it would take now: a full battery needs no time at a dock yet.
         facts['charge_seconds'] = energy.charge_seconds(0, battery.level)
+        assert self.fleet is not None
+        self.fleet.charges_at(energy.charge_ratio(self._fleet_graph.tour.length))
         facts['runs_until'] = world.now + max(0.0, battery.level - least) / energy.draw
         if dock is not None:
             facts['charging_until'] = world.now + energy.charge_seconds(0, battery.level)
@@ -731,7 +733,8 @@ class WorldModel:
         self.experience.sent_to_charge = ''
         self._leg = None
         if self.fleet is not None:
-            self.fleet.tell(dock=None, charging_until=None, share=None)
+            now = self.experience.now or (self.world.now if self.world is not None else 0.0)
+            self.fleet.tell(dock=None, charging_until=None, since=now)
 
     def send_to_charge(self, why: str) -> None:
         """Have the robot charge before anything else."""

@@ -271,6 +271,18 @@ class Energy:
         table, low = self._tables[station], max(0, int(level))
         return table[low] + (level - low) * (table[low + 1] - table[low])
 
+    def charge_ratio(self, seconds: float) -> float:
+        """Return the seconds at a dock for each second away, when so many seconds are made good.
+
+        The way from a place's point to the dock and back counts as time at the dock.
+        """
+        if seconds <= 0.0:
+            return 0.0
+        level = max(min(self.least), self.full - self.draw * seconds)
+        away = (self.full - level) / self.draw
+        approach = 2.0 * self.approach[0] if math.isfinite(self.approach[0]) else 0.0
+        return (self.charge_seconds(0, level) + approach) / min(seconds, max(away, 1e-9))
+
     def alike(self, other: Energy | None) -> bool:
         """Return whether a plan made with the other still serves."""
         if other is None:

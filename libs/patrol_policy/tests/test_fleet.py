@@ -188,6 +188,49 @@ def test_robots_that_would_charge_together_charge_one_after_another() -> None:
     assert all(end <= begin + 1e-6 for (_, end), (begin, _) in itertools.pairwise(times))
 
 
+@pytest.mark.parametrize('count', [2, 3, 4])
+def test_robots_that_charge_keep_their_distances(count: int) -> None:
+    graph = ring(12)
+    run = FleetPatrol(
+        graph,
+        {f'robot{n}': 'P00' for n in range(count)},
+        settings=FleetSettings(docks=('P05',)),
+        battery=FleetBattery(run_seconds=500.0, charge_seconds=100.0),
+    )
+    run.until(4000.0)
+    # Each round costs a fifth of its 120 s at the dock.
+    assert run.longest(800.0) <= 1.03 * 120.0 * 1.2 / count
+    assert run.strandings == 0
+    assert {robot for robot, *_ in run.charges} == set(run.starts)
+
+
+def test_each_tour_leads_through_a_dock_where_robots_charge() -> None:
+    graph = far_wings()
+    both = fleet_plan(graph, 4, docks=['A0', 'B3'])
+    assert [{'A0', 'B3'} & set(group.stops) for group in both.groups] == [{'A0'}, {'B3'}]
+    one = fleet_plan(graph, 2, docks=['A0'])
+    assert all('A0' in group.stops for group in one.groups)
+    assert {stop for group in one.groups for stop in group.stops} == set(graph.places)
+
+
+def test_who_charges_as_planned_keeps_its_share_and_who_takes_long_does_not() -> None:
+    graph, tour = ring(12), fleet_plan(ring(12), 1).groups[0].stops
+    settings = FleetSettings(docks=('P05',), charge_ratio=0.2)
+    robots = [
+        replace(robot, share=Share(tour, robot.place), runs_until=500.0)
+        for robot in fleet('P05', 'P11')
+    ]
+    as_planned = replace(robots[0], dock='P05', charging_until=24.0)
+    shares = assign(graph, [as_planned, robots[1]], 0.0, settings).shares
+    assert shares == {'robot1': robots[0].share, 'robot2': robots[1].share}
+    long = replace(robots[0], dock='P05', charging_until=97.0)
+    assert set(assign(graph, [long, robots[1]], 0.0, settings).shares) == {'robot2'}
+    # One whose charge makes no headway loses it, too.
+    stuck = replace(as_planned, charging_until=104.0, heard_at=80.0)
+    heard = replace(robots[1], heard_at=80.0)
+    assert set(assign(graph, [stuck, heard], 80.0, settings).shares) == {'robot2'}
+
+
 def test_what_does_not_fit_is_named() -> None:
     graph = ring(4)
     with pytest.raises(FleetError, match='robot9 is not in the fleet, expected one of robot1'):

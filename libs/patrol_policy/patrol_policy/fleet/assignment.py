@@ -1,7 +1,8 @@
 """Which places are whose, computed by each robot from the same facts: no leader, no lock, no vote.
 
 Facts are what all robots publish: where each is, when it was last heard, its charge, and the share
-it took. A robot that was not heard for a while, charges, or is taken out has no share. The others
+it took. A robot that was not heard for a while, charges for far longer than planned, or is taken
+out has no share. One that charges as planned keeps it: its charge is a stop of its tour. The others
 follow the plan for their number (`partition.fleet_plan`). Those whose share is part of the plan
 keep it; the rest get the free ones, the nearest first. The groups in force are kept as long as the
 best plan is not clearly better, so that a change of the fleet moves few robots.
@@ -14,6 +15,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime, tzinfo
@@ -27,6 +29,9 @@ from patrol_policy.graph import PatrolGraph
 
 ANCHORS = 64
 """How many places of a group are tried as the one where its first robot begins."""
+
+CATCH_UP = 1.02
+"""How much longer than planned a charge in passing may be, as a factor."""
 
 
 class FleetError(ValueError):
@@ -53,11 +58,11 @@ class FleetRobot:
     Attributes:
         name: Its name.
         place: The place it entered last.
-        since: When it entered it.
+        since: When it entered it, or when a charge there began or ended.
         heard_at: When it was last heard.
         heard_since: Since when it is heard without a gap.
-        share: The share it published last; None once it is back from a charge or an outage, so that
-            it begins in the largest gap.
+        share: The share it published last; None once it is back from an outage, so that it begins
+            in the largest gap.
         charging_until: When it has charged enough; None: it does not charge.
         dock: The dock it stands at or drives to in order to charge.
         runs_until: When its battery reaches its reserve; None: it need not charge.
@@ -125,6 +130,9 @@ class FleetSettings:
         worth_changing: By which part the best plan's wait must be shorter than that of the groups
             in force for these to be given up.
         docks: Where robots charge.
+        charge_ratio: Seconds of charging for each second of patrol. The groups do not depend on it,
+            only the distances that a robot keeps.
+        least_charge: A charge in passing that is shorter is left out, seconds.
         timezone: Of the times in reasons.
     """
 
@@ -132,6 +140,8 @@ class FleetSettings:
     back_after: float = 5.0
     worth_changing: float = 0.1
     docks: tuple[str, ...] = ()
+    charge_ratio: float = 0.0
+    least_charge: float = 5.0
     timezone: tzinfo = UTC
 
 
@@ -207,7 +217,7 @@ def assign(
             raise FleetError(
                 f'{robot.name} drives to {robot.share.stop}, expected a stop of its own tour'
             )
-        if (reason := _absence(robot, now, settings)) is not None:
+        if (reason := _absence(graph, robots, robot, now, settings)) is not None:
             absent[robot.name] = reason
     present = [robot for robot in robots if robot.name not in absent]
     if not present:
@@ -226,9 +236,8 @@ def choose(
 ) -> FleetChoice:
     """Return what one robot does next, once it has arrived and explored where it is.
 
-    It charges when its slot at a dock begins, or before that when its tour passes the free dock for
-    the last time; else it goes on along its group's tour, or stays
-    while the robot ahead is nearer than the equal distance.
+    It charges whenever its tour passes a free dock, or when its slot at a dock begins; else it goes
+    on along its group's tour, or stays while the robot ahead is nearer than the equal distance.
 
     Raises:
         FleetError: The robot is not among the robots, or their facts do not fit together.
@@ -238,32 +247,36 @@ def choose(
     if me is None:
         known = ', '.join(sorted(robot.name for robot in robots))
         raise FleetError(f'{name} is not in the fleet, expected one of {known or "no robot"}')
+    # Who decides does not charge.
+    me = replace(me, charging_until=None, dock=None)
+    robots = [me if robot.name == name else robot for robot in robots]
     assignment = assign(graph, robots, now, settings, visited_at)
     share = assignment.shares.get(name)
     if share is None:
-        until = me.charging_until if me.charging_until is not None else now + settings.back_after
-        return FleetChoice(me.place, until, None, f'no place is mine: {assignment.absent[name]}')
+        reason = f'no place is mine: {assignment.absent[name]}'
+        return FleetChoice(me.place, now + settings.back_after, None, reason)
     group = _group(assignment, share)
     reached = share.stop == me.place
     onward = _next(group, share.stop) if reached else share
     mine = _mine(group, assignment, robots, me, onward)
     slot, leave = _slot(graph, robots, me, onward.stop, now, settings, assignment)
-    # Who comes by a free dock on its tour, and would be late the next time, charges now.
-    passes = (
-        slot is not None
-        and me.place == slot.dock == share.stop
-        and slot.begin - now < group.length
-        and not any(other.dock == slot.dock for other in robots if other.name != name)
-    )
-    if slot is not None and passes:
-        slot = replace(slot, begin=now, end=now + me.charge_seconds, late=0.0)
-    if slot is not None and (passes or now >= leave):
+    if _charges_in_passing(group, robots, me, reached, settings):
+        # A stop of known length: what is missing beyond it is made up for little by little.
+        end = now + min(me.charge_seconds, CATCH_UP * group.charge_at(me.place))
+        reason = (
+            f'charging in passing at {me.place} until {_clock(end, settings)}: a stop of the tour '
+            f'of {group.length:.0f} s'
+        )
+        # It goes on to the next stop afterwards, whatever it still lacks.
+        after = onward if reached else share
+        return FleetChoice(me.place, None, after, reason, DockSlot(name, me.place, now, end))
+    if slot is not None and now >= leave:
         late = f', {slot.late:.0f} s late: the docks are too few' if slot.late > 1.0 else ''
         reason = (
             f'charging at {slot.dock} from {_clock(slot.begin, settings)} '
             f'to {_clock(slot.end, settings)}: that is my slot{late}'
         )
-        return FleetChoice(slot.dock, None, None, reason, slot)
+        return FleetChoice(slot.dock, None, onward, reason, slot)
     if reached and (hold := _hold(graph, group, assignment, robots, me, now)) is not None:
         seconds, ahead = min(hold[0], leave - now), hold[1]
         reason = (
@@ -284,17 +297,67 @@ def choose(
     return FleetChoice(onward.stop, look, onward, reason, mine=mine)
 
 
-def _absence(robot: FleetRobot, now: float, settings: FleetSettings) -> str | None:
+def _charges_in_passing(
+    group: Group,
+    robots: Sequence[FleetRobot],
+    me: FleetRobot,
+    reached: bool,
+    settings: FleetSettings,
+) -> bool:
+    """Return whether a robot is at a free dock of its tour and a charge is worth its while.
+
+    Where the dock is not the stop that it drives to it only makes up for charges that it missed.
+    """
+    planned = group.charge_at(me.place) if me.place in group.position else 0.0
+    least = max(min(settings.least_charge, planned), 0.0 if reached else 1.5 * planned)
+    has_been = not reached and me.place in group.position and me.share == _next(group, me.place)
+    return (
+        planned > 0.0
+        and not has_been
+        and me.runs_until is not None
+        and me.charge_seconds >= least
+        and not any(other.dock == me.place for other in robots if other.name != me.name)
+    )
+
+
+def _absence(
+    graph: PatrolGraph,
+    robots: Sequence[FleetRobot],
+    robot: FleetRobot,
+    now: float,
+    settings: FleetSettings,
+) -> str | None:
     """Return why a robot has no share; None: it has one."""
     if robot.taken_out:
         return f'{robot.name} is taken out'
     if now - robot.heard_at > settings.silent_after:
         return f'{robot.name} was last heard at {_clock(robot.heard_at, settings)}'
-    if robot.charging_until is not None:
+    if robot.charging_until is not None and _charges_too_long(graph, robots, robot, now, settings):
         return f'{robot.name} is charging until {_clock(robot.charging_until, settings)}'
     if now - robot.heard_since < settings.back_after:
         return f'{robot.name} is heard again only since {_clock(robot.heard_since, settings)}'
     return None
+
+
+def _charges_too_long(
+    graph: PatrolGraph,
+    robots: Sequence[FleetRobot],
+    robot: FleetRobot,
+    now: float,
+    settings: FleetSettings,
+) -> bool:
+    """Return whether a robot that charges leaves its group alone for so long that the others had
+    better share its places.
+
+    That is longer than planned by more than the time from one robot of the group to the next.
+    """
+    share, until = robot.share, robot.charging_until
+    if share is None or until is None or not set(share.tour) <= graph.index.keys():
+        return True
+    team = sum(other.share is not None and other.share.tour == share.tour for other in robots)
+    group = group_of(graph, share.tour, team).charging(settings.docks, settings.charge_ratio)
+    planned = max(group.charges, default=0.0)
+    return max(until, now) - robot.since > planned + group.wait
 
 
 def _clock(seconds: float, settings: FleetSettings) -> str:
@@ -308,14 +371,35 @@ def _plan_in_force(
     settings: FleetSettings,
 ) -> FleetPlan:
     """Return the published groups with the robots that are there, or the best plan if clearly
-    better.
+    better; with the charges where robots charge.
     """
-    best = fleet_plan(graph, len(present))
+    charge = any(
+        robot.runs_until is not None or robot.charging_until is not None for robot in present
+    )
+    docks = settings.docks if charge else ()
+    plan = _groups_in_force(graph, robots, present, docks, settings)
+    groups = (group.charging(docks, settings.charge_ratio) for group in plan.groups)
+    return FleetPlan(tuple(groups))
+
+
+def _groups_in_force(
+    graph: PatrolGraph,
+    robots: Sequence[FleetRobot],
+    present: Sequence[FleetRobot],
+    docks: Sequence[str],
+    settings: FleetSettings,
+) -> FleetPlan:
+    best = fleet_plan(graph, len(present), docks=docks)
     # The absent robots' groups belong to the groups in force until others have taken them over.
     for some in (present, robots):
         tours = sorted({robot.share.tour for robot in some if robot.share is not None})
-        covered = [stop for tour in tours for stop in tour]
-        if len(covered) != len(graph.places) or set(covered) != graph.index.keys():
+        times = Counter(stop for tour in tours for stop in tour)
+        if times.keys() != graph.index.keys():
+            continue
+        # Only a dock is a stop of several tours, and each tour has one.
+        if any(count > 1 and stop not in docks for stop, count in times.items()):
+            continue
+        if docks and any(set(tour).isdisjoint(docks) for tour in tours):
             continue
         kept = balanced([group_of(graph, tour) for tour in tours], len(present))
         if kept is None or best.wait < kept.wait * (1.0 - settings.worth_changing):
@@ -469,7 +553,7 @@ def _hold(
     """
     if group.robots < 2 or not group.length:
         return None
-    here = float(group.offsets[group.position[me.place]])
+    here = float(group.offsets[group.position[me.place]]) + group.charge_at(me.place)
     nearest, ahead = math.inf, ''
     for robot in robots:
         theirs = assignment.shares.get(robot.name)
@@ -477,11 +561,18 @@ def _hold(
             continue
         number = group.position[theirs.stop]
         at = float(group.offsets[number])
-        if robot.place != theirs.stop:
+        if robot.place == theirs.stop:
+            at += group.charge_at(theirs.stop)
+        else:
+            leg = group.leg_seconds[number - 1]
             left = float(graph.distances[graph.index[robot.place], graph.index[theirs.stop]])
             left -= max(0.0, now - robot.since)
+            if robot.charging_until is not None:
+                # The rest of its charge, and the way, of which it has gone nothing.
+                leg += group.charge_at(robot.place) if robot.place in group.position else 0.0
+                left += max(0.0, robot.charging_until - robot.since)
             # One that is farther than a leg is not on the tour yet: it will begin at its stop.
-            at -= max(0.0, left) if left <= group.leg_seconds[number - 1] else 0.0
+            at -= max(0.0, left) if left <= leg else 0.0
         gap = (at - here) % group.length
         if min(gap, group.length - gap) < 1e-6:
             if (me.since, me.name) < (robot.since, robot.name):

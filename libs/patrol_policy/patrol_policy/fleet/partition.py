@@ -8,14 +8,19 @@ into stretches, by dynamic programming; one stretch with all robots is among the
 is never above tour / k. Stretches of another tour can be better: it is no proven optimum.
 `exact_wait` finds the optimum over all partitions of a small map.
 
-A plan is a pure function of the map and the number of robots.
+Robots that charge do so in passing: each group's tour leads through a dock, where each robot stays
+as long as one round has cost (`Group.charging`). That is a stop of known length on the cycle: all
+robots of a group make rounds of the same length, so that equal distances in time stay equal, no
+robot is ever missing, and robots that come to a dock one after another do not meet there.
+
+A plan is a pure function of the map, the docks and the number of robots.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from weakref import WeakKeyDictionary
 
@@ -29,6 +34,8 @@ CUTS_WORK = 4_000_000
 """Pairs of places looked at to choose where the tour is cut open first."""
 SEARCH_STEPS = 24
 """Steps of the search for the least wait; each halves what is left open."""
+BUSY_DOCK = 0.7
+"""A dock that would be taken for a larger part of the time is relieved by another one."""
 RETOUR_UP_TO = 200
 """On maps of up to so many places each group's tour is looked for anew."""
 RETOUR_EXACT_UP_TO = 9
@@ -43,31 +50,72 @@ class Group:
         stops: The places in the order of the tour; after the last one comes the first.
         leg_seconds: From each stop to the next one, exploring there included.
         robots: How many robots follow one another on it.
+        charges: Seconds that each robot charges at each stop; empty: at none.
     """
 
     stops: tuple[str, ...]
     leg_seconds: tuple[float, ...]
     robots: int
+    charges: tuple[float, ...] = ()
 
     @cached_property
     def length(self) -> float:
-        """Seconds of one round."""
-        return sum(self.leg_seconds)
+        """Seconds of one round, charging included."""
+        return sum(self.leg_seconds) + sum(self.charges)
 
     @property
     def wait(self) -> float:
-        """Seconds from one visit of a stop to the next when all robots are equally spaced."""
-        return self.length / self.robots
+        """Seconds from one visit of a stop to the next when all robots are equally spaced.
+
+        No sooner than one has charged, so that the next finds the dock free.
+        """
+        return max(self.length / self.robots, *self.charges, 0.0)
 
     @cached_property
     def offsets(self) -> NDArray[np.float64]:
-        """Seconds from the first stop to each, shape (stops,)."""
-        return np.concatenate([[0.0], np.cumsum(self.leg_seconds[:-1])])
+        """Seconds from the arrival at the first stop to that at each, shape (stops,)."""
+        stays = np.asarray(self.leg_seconds) + (np.asarray(self.charges) if self.charges else 0.0)
+        return np.concatenate([[0.0], np.cumsum(stays[:-1])])
 
     @cached_property
     def position(self) -> dict[str, int]:
         """The number of each stop."""
         return {stop: number for number, stop in enumerate(self.stops)}
+
+    def charge_at(self, stop: str) -> float:
+        """Return the seconds that each robot charges at a stop."""
+        return self.charges[self.position[stop]] if self.charges else 0.0
+
+    def charging(self, docks: Collection[str], ratio: float) -> Group:
+        """Return the group whose robots charge in passing.
+
+        They use as few of the tour's docks as suffice for all, those farthest apart, and charge at
+        each for as long.
+
+        Args:
+            docks: Where they can.
+            ratio: Seconds of charging for each second of the legs.
+        """
+        used = [number for number, stop in enumerate(self.stops) if stop in docks]
+        if not used or ratio <= 0.0:
+            return replace(self, charges=())
+        legs = sum(self.leg_seconds)
+        whole = ratio * legs
+        enough = BUSY_DOCK * (legs + whole) / self.robots
+        while len(used) > 1 and whole / (len(used) - 1) <= enough:
+            before = [used[-1], *used[:-1]]
+            shortest = min(zip(before, used, strict=True), key=lambda ends: self._away(*ends))
+            used.remove(shortest[1])
+        charges = tuple(
+            whole / len(used) if number in used else 0.0 for number in range(len(self.stops))
+        )
+        return replace(self, charges=charges)
+
+    def _away(self, start: int, end: int) -> float:
+        """Return the seconds of the legs from one stop to another one, or once round."""
+        count = len(self.stops)
+        legs = range(start, end + (count if end <= start else 0))
+        return sum(self.leg_seconds[leg % count] for leg in legs)
 
 
 @dataclass(frozen=True)
@@ -82,13 +130,17 @@ class FleetPlan:
         return max(group.wait for group in self.groups)
 
 
-_PLANS: WeakKeyDictionary[PatrolGraph, dict[tuple[int, bool, bool], FleetPlan]] = (
-    WeakKeyDictionary()
-)
+_Key = tuple[int, bool, bool, tuple[str, ...]]
+_PLANS: WeakKeyDictionary[PatrolGraph, dict[_Key, FleetPlan]] = WeakKeyDictionary()
 
 
 def fleet_plan(
-    graph: PatrolGraph, robots: int, *, alone: bool = False, whole: bool = False
+    graph: PatrolGraph,
+    robots: int,
+    *,
+    alone: bool = False,
+    whole: bool = False,
+    docks: Collection[str] = (),
 ) -> FleetPlan:
     """Return the plan for so many robots; each is computed once for a map.
 
@@ -97,6 +149,8 @@ def fleet_plan(
         robots: How many robots patrol; more robots than places stand in their places.
         alone: One robot for each group (the literature's partition strategy).
         whole: One group with all robots (the literature's cyclic strategy).
+        docks: Places of the map where robots charge: each tour leads through one, which may be a
+            stop of several. Empty: robots do not charge.
 
     Raises:
         GraphError: The map is not connected.
@@ -107,9 +161,10 @@ def fleet_plan(
     if not graph.places:
         raise ValueError('a plan for a map without places: expected at least 1 place')
     plans = _PLANS.setdefault(graph, {})
-    key = (robots, alone, whole)
+    key = (robots, alone, whole, tuple(sorted(docks)))
     if key not in plans:
-        plans[key] = _plan(graph, robots, alone, whole)
+        rows = np.array([graph.index[dock] for dock in key[-1]], dtype=np.intp)
+        plans[key] = _plan(graph, robots, alone, whole, rows)
     return plans[key]
 
 
@@ -195,14 +250,19 @@ def _lengths_of_sets(distances: NDArray[np.float64]) -> NDArray[np.float64]:
     return lengths
 
 
-def _plan(graph: PatrolGraph, robots: int, alone: bool, whole: bool) -> FleetPlan:
+def _plan(
+    graph: PatrolGraph, robots: int, alone: bool, whole: bool, docks: NDArray[np.intp]
+) -> FleetPlan:
     order = np.asarray(graph.tour.order, dtype=np.intp)
     if whole or robots == 1 or len(order) == 1:
         return FleetPlan((group_of(graph, [graph.places[p] for p in order], robots),))
     distances = graph.distances
     if alone:
         robots = min(robots, len(order))
-    stretches = _cut(distances, order, robots, alone)
+    stretches = [
+        _through_a_dock(distances, stretch, docks)
+        for stretch in _cut(distances, order, robots, alone, docks)
+    ]
     groups = [
         group_of(graph, [graph.places[p] for p in _best_order(distances, stretch, len(order))])
         for stretch in stretches
@@ -227,8 +287,51 @@ def _best_order(
     return kept if before <= tour.length else [kept[number] for number in tour.order]
 
 
+def _through_a_dock(
+    distances: NDArray[np.float64], stretch: NDArray[np.intp], docks: NDArray[np.intp]
+) -> NDArray[np.intp]:
+    """Return a stretch with a dock put in where that costs least, if it has none."""
+    if not len(docks) or np.isin(stretch, docks).any():
+        return stretch
+    after = np.roll(stretch, -1)
+    costs = (
+        distances[np.ix_(stretch, docks)]
+        + distances[np.ix_(docks, after)].T
+        - distances[stretch, after][:, None]
+    )
+    leg, dock = divmod(int(costs.argmin()), len(docks))
+    return np.insert(stretch, leg + 1, docks[dock])
+
+
+def _detours(
+    distances: NDArray[np.float64], order: NDArray[np.intp], docks: NDArray[np.intp]
+) -> NDArray[np.float64]:
+    """Return the seconds by which a dock makes each stretch longer, shape (n, n), in the rows
+    and columns of `_closed_lengths`.
+    """
+    count = len(order)
+    # From each place of the order by a dock to each other one, less the way between them.
+    around = np.full((count, count), np.inf)
+    for dock in docks:
+        np.minimum(around, distances[order, dock][:, None] + distances[dock, order], out=around)
+    around -= distances[np.ix_(order, order)]
+    closing = around.T
+    found = np.zeros((count, count))
+    legs = around[np.arange(count - 1), np.arange(1, count)]
+    dockless = ~np.isin(order, docks)
+    for start in range(count):
+        inner = np.concatenate([[np.inf], np.minimum.accumulate(legs[start:])])
+        has_none = np.logical_and.accumulate(dockless[start:])
+        found[start, start:] = np.where(has_none, np.minimum(inner, closing[start, start:]), 0.0)
+    return found
+
+
 def _cut(
-    distances: NDArray[np.float64], order: NDArray[np.intp], robots: int, alone: bool
+    distances: NDArray[np.float64],
+    order: NDArray[np.intp],
+    robots: int,
+    alone: bool,
+    docks: NDArray[np.intp],
 ) -> list[NDArray[np.intp]]:
     """Return the stretches of the best cut.
 
@@ -244,6 +347,8 @@ def _cut(
     for opening in np.linspace(0, count, openings, endpoint=False).astype(int):
         turned = np.roll(order, -int(opening))
         closed = _closed_lengths(distances, turned)
+        if len(docks):
+            closed = closed + _detours(distances, turned, docks)
         if (found := _stretches(closed, high * (1.0 - 1e-4), robots, alone)) is None:
             continue
         low = 0.0

@@ -66,6 +66,17 @@ class FleetBattery:
         left = max(0.0, runs_until - now) / self.run_seconds
         return self.charge_seconds * max(0.0, 1.0 - left)
 
+    def runs_until(self, before: float, seconds: float, now: float) -> float:
+        """Return until when it lasts after a charge of so many seconds that ends now.
+
+        Args:
+            before: Until when it lasted.
+            seconds: Of charging.
+            now: Seconds.
+        """
+        left = max(0.0, before - (now - seconds)) + seconds * self.run_seconds / self.charge_seconds
+        return now + min(left, self.run_seconds)
+
 
 @dataclass
 class FleetPatrol:
@@ -95,6 +106,9 @@ class FleetPatrol:
 
     def __post_init__(self) -> None:
         self.now = 0.0
+        if self.battery is not None:
+            ratio = self.battery.charge_seconds / self.battery.run_seconds
+            self.settings = replace(self.settings, charge_ratio=ratio)
         self.robots = {
             name: FleetRobot(
                 name,
@@ -113,7 +127,8 @@ class FleetPatrol:
         heapq.heapify(self._due)
         self._ahead: dict[str, list[str]] = {name: [] for name in self.starts}
         self._failed: set[str] = set()
-        self._slots: dict[str, float] = {}
+        self._slots: dict[str, tuple[float, float]] = {}
+        self._charging: dict[str, float] = {}
 
     def until(self, end: float) -> None:
         """Go on until ``end``, seconds."""
@@ -191,27 +206,32 @@ class FleetPatrol:
         if self.battery is not None and robot.charging_until is not None:
             if robot.dock != robot.place:
                 raise ValueError(f'{name} is to charge at {robot.dock} and is at {robot.place}')
-            if robot.runs_until is not None:
+            assert robot.runs_until is not None
+            begin, longest = self._slots[name]
+            if name not in self._charging:
                 # It waits for its slot, and for the robot that still charges.
                 begin = max(
-                    self._slots[name],
+                    begin,
                     *(end for _, dock, _, end in self.charges if dock == robot.place),
                     self.now,
                 )
                 if begin > self.now:
                     heapq.heappush(self._due, (begin, name))
                     return
-                end = self.now + self.battery.needed(robot.runs_until, self.now)
+                seconds = min(longest, self.battery.needed(robot.runs_until, self.now))
+                end = self.now + seconds
                 self.charges.append((name, robot.place, self.now, end))
-                self.robots[name] = replace(robot, charging_until=end, runs_until=None)
+                self.robots[name] = replace(robot, since=self.now, charging_until=end)
+                self._charging[name] = seconds
                 heapq.heappush(self._due, (end, name))
                 return
+            seconds = self._charging.pop(name)
             robot = self.robots[name] = replace(
                 robot,
                 charging_until=None,
                 dock=None,
-                share=None,
-                runs_until=self.now + self.battery.run_seconds,
+                since=self.now,
+                runs_until=self.battery.runs_until(robot.runs_until, seconds, self.now),
             )
         self._visit(name, robot.place)
         self._decide(name)
@@ -223,7 +243,12 @@ class FleetPatrol:
         self.decisions.append((self.now, name, choice))
         changes = replace(self.robots[name], share=choice.share or self.robots[name].share)
         if choice.slot is not None:
-            self._slots[name] = choice.slot.begin
+            longest = (
+                choice.slot.end - choice.slot.begin
+                if choice.place == self.robots[name].place
+                else math.inf
+            )
+            self._slots[name] = choice.slot.begin, longest
             changes = replace(changes, dock=choice.slot.dock, charging_until=choice.slot.end)
         self.robots[name] = changes
         place = changes.place
