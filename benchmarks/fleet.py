@@ -27,6 +27,7 @@ SEBS      gain against others' intentions (Portugal and Rocha 2013); its gain li
     python benchmarks/fleet.py --faults 1000      kills and cuts of a fleet of three in this process
     python benchmarks/fleet.py --hosts            real programs on hosts that fail; root only
     python benchmarks/fleet.py --armor 60         the ontology under ten robots, for 60 s
+    python benchmarks/fleet.py --page 20          the page with 2, 8, 20 robots, 20 s each
     python benchmarks/fleet.py --composed 60      eight whole stacks, one process each, for 60 s
 """
 
@@ -62,6 +63,7 @@ from patrol_policy.patrolling_sim import read_patrolling_sim
 TEAMS = (2, 4, 8)
 ROUNDS, LEFT_OUT, KILLED_AFTER = 8.0, 3.0, 4.0
 PROVEN_UP_TO = 10
+PLACE = Path(__file__).resolve().parents[1] / 'config' / 'office.yaml'
 SEED = 1
 
 
@@ -292,6 +294,7 @@ def main() -> None:
     parser.add_argument('--faults', type=int, metavar='N', help='kills and cuts')
     parser.add_argument('--armor', type=float, metavar='SECONDS', help='calls of ten robots')
     parser.add_argument('--composed', type=float, metavar='SECONDS', help='eight whole stacks')
+    parser.add_argument('--page', type=float, metavar='SECONDS', help='what the page takes')
     parser.add_argument('--hosts', action='store_true', help='real programs on hosts that fail')
     parser.add_argument('--keep', type=Path, help='folder for what --hosts writes')
     parser.add_argument('--live', action='store_true', help='the real programs in a simulation')
@@ -302,6 +305,11 @@ def main() -> None:
     words = parser.parse_args()
     if words.faults is not None:
         fail(words.faults)
+        return
+    if words.page is not None:
+        from fleet_page import page_under
+
+        page_under((2, 8, 20), words.page, PLACE)
         return
     if words.hosts:
         from fleet_hosts import fail_hosts

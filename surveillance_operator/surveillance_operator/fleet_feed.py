@@ -86,8 +86,15 @@ class FleetFeed:
                 for name in known - found:
                     self._feeds.pop(name).leave()
                     self._on_leave(name)
+                self._tell_place()
             for name in sorted(found - known):
                 self._follow(name)
+
+    def _tell_place(self) -> None:
+        """Have the place's feed know whom to pass on what all robots say on one topic."""
+        self._place.robots = {
+            name.rpartition('/')[2]: feed for name, feed in self._feeds.items() if name
+        }
 
     def _find(self) -> set[str]:
         """Return the robots that say something to each other."""
@@ -113,5 +120,5 @@ class FleetFeed:
         )
         with self._lock:
             self._feeds = {**self._feeds, name: feed}
-        self._place.fleet = frozenset(each.snapshot.namespace for each in self._feeds.values())
+        self._tell_place()
         self._on_change(name, feed.snapshot, ())

@@ -10,6 +10,7 @@ from __future__ import annotations
 import contextlib
 import threading
 import time
+from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
@@ -18,6 +19,7 @@ from geometry_msgs.msg import PoseWithCovarianceStamped
 from rcl_interfaces.srv import GetParameters, ListParameters
 from rclpy.parameter import parameter_value_to_python
 from rclpy.qos import QoSCompatibility, qos_check_compatible
+from rclpy.topic_endpoint_info import TopicEndpointInfo
 from rosgraph_msgs.msg import Clock as ClockMessage
 
 from armor_service.facts import ShortFact
@@ -57,6 +59,8 @@ WHOLE_LOOK_PERIOD = 5.0
 TIMEOUT = 2.0
 """Deadline of each question, seconds of steady time; then it is asked again."""
 
+MOST_PASSED_ON = 1000
+"""Messages of a topic that all robots speak on that wait for a robot's feed."""
 WAKE_PERIOD = 0.1
 """Longest wait for a message, seconds."""
 BUILDER = 'ontology_map_builder'
@@ -86,7 +90,8 @@ class MissionFeed:
         place: With a robot: follows what the robots share, in the node's own namespace.
 
     Attributes:
-        fleet: Namespaces of robots that have a feed of their own: they are not among the others.
+        robots: With the place's feed: those of the robots, by name. It hears what they all say on
+            one topic, and passes on to each what concerns it: each would otherwise hear all.
     """
 
     def __init__(
@@ -112,11 +117,14 @@ class MissionFeed:
         self._lock = threading.Lock()
         self._over = False
         self._clock_time: float | None = None
-        self._clock = PolledSubscription(node, ClockMessage, '/clock', SENSOR_QOS)
+        self._clock = None
+        if place is None:
+            self._clock = PolledSubscription(node, ClockMessage, '/clock', SENSOR_QOS)
         self._topics = [
             (topic, PolledSubscription(node, topic.kind, name_for(robot, topic.name), topic.qos))
             for topic in TOPICS
-            if (streams or not topic.stream) and not (robot and topic.name in OF_THE_PLACE)
+            if (streams or not topic.stream)
+            and not (robot and (topic.name in OF_THE_PLACE or topic.whose is not None))
         ]
         # The lidar comes with the pose, and health now and then.
         self._prompt = [
@@ -127,7 +135,9 @@ class MissionFeed:
         self._facts = _Facts(node, self.update, robot)
         self._others = _OtherRobots(node) if streams and not robot else None
         self._left = threading.Event()
-        self.fleet: frozenset[str] = frozenset()
+        self.robots: Mapping[str, MissionFeed] = {}
+        self._passed_on: deque[tuple[Topic, Any]] = deque(maxlen=MOST_PASSED_ON)
+        self._publishers: Sequence[TopicEndpointInfo] = ()
         self._next_look = self._next_whole_look = self._changed_at = 0.0
         self._processes: Mapping[str, set[str]] = {}
         self._next_reading: dict[str, float] = {}
@@ -205,13 +215,18 @@ class MissionFeed:
         if self._left.is_set():
             for _, subscription in self._topics:
                 subscription.destroy()
-            self._clock.destroy()
+            if self._clock is not None:
+                self._clock.destroy()
 
     def _take(self) -> None:
         """Take all messages that came into one new snapshot."""
-        if (newest := self._clock.newest()) is not None:
+        if self._place is not None:
+            self._clock_time = self._place._clock_time
+        elif self._clock is not None and (newest := self._clock.newest()) is not None:
             self._clock_time = seconds_of(newest[0].clock)
         came: list[tuple[Topic, Any]] = []
+        while self._passed_on:
+            came.append(self._passed_on.popleft())
         for topic, subscription in self._topics:
             if topic.beside and not any(each.name == topic.beside for each, _ in came):
                 continue
@@ -221,6 +236,8 @@ class MissionFeed:
                 if (taken := subscription.take()) is None:
                     break
                 clean_texts(taken[0])
+                if topic.whose is not None:
+                    self._pass_on(topic, topic.whose(taken[0]), taken[0])
                 # In front: what it stands beside is read with it.
                 came.insert(0 if topic.beside else len(came), (topic, taken[0]))
         others = self._others.take() if self._others is not None else {}
@@ -235,6 +252,11 @@ class MissionFeed:
         # Observers go on reporting after a mission's end.
         self.update(changed, begins=any(topic.name[0] != '/' for topic, _ in came))
 
+    def _pass_on(self, topic: Topic, whose: frozenset[str] | None, message: Any) -> None:
+        robots = self.robots
+        for name in robots if whose is None else whose & robots.keys():
+            robots[name]._passed_on.append((topic, message))
+
     def _is_due(self, topic: Topic) -> bool:
         now = time.monotonic()
         if now < self._next_reading.get(topic.name, 0.0):
@@ -245,7 +267,9 @@ class MissionFeed:
     def _look(self) -> None:
         node, now = self._node, time.monotonic()
         processes: dict[str, set[str]] = {}
-        for log in node.get_publishers_info_by_topic('/rosout'):  # which every node has
+        if self._place is None:
+            self._publishers = node.get_publishers_info_by_topic('/rosout')  # which every node has
+        for log in self._publishers if self._place is None else self._place._publishers:
             if log.node_namespace == self._prefix:
                 processes.setdefault(log.node_name, set()).add(str(log.endpoint_gid))
         if processes != self._processes:
@@ -256,7 +280,11 @@ class MissionFeed:
             self._look_at_topics(processes)
         self._note_silent()
         self._facts.ask()
-        if self._others is not None and (gone := self._others.find(self.fleet)):
+        if self._others is not None and (
+            gone := self._others.find(
+                frozenset(each.snapshot.namespace for each in self.robots.values())
+            )
+        ):
             self.update(
                 lambda old: replace(
                     old, others={name: at for name, at in old.others.items() if name not in gone}

@@ -103,6 +103,8 @@ class Topic(NamedTuple):
         stream: Whether a view may do without it.
         beside: Taken only together with a message of this topic, and read before it.
         period: Least time between two looks at it, seconds.
+        whose: Of a topic on which all robots speak: the last names of the namespaces that a message
+            concerns; None: it may concern every robot.
     """
 
     name: str
@@ -112,6 +114,7 @@ class Topic(NamedTuple):
     stream: bool = False
     beside: str = ''
     period: float = 0.0
+    whose: Callable[[Any], frozenset[str] | None] | None = None
 
 
 def read_message(snapshot: Snapshot, topic: Topic, message: Any) -> Snapshot:
@@ -236,6 +239,16 @@ def _on_diagnostics(message: DiagnosticArray, old: Snapshot) -> Fields:
     return {'health': health}
 
 
+def _who_reports(message: DiagnosticArray) -> frozenset[str] | None:
+    found = set()
+    for status in message.status:
+        where, _, node = status.name.partition(':')[0].rpartition('/')
+        if not where or node not in BY_NAME:
+            return None
+        found.add(where.rpartition('/')[2])
+    return frozenset(found)
+
+
 def _is_of_another(status: str, namespace: str) -> bool:
     """Tell whether a node of another robot says it: one that is neither ours nor shared."""
     where, _, node = status.partition(':')[0].rpartition('/')
@@ -255,6 +268,14 @@ def _on_fleet_robot(message: FleetRobot, old: Snapshot) -> Fields:
         message.taken_out,
     )
     return {} if share == old.share else {'share': share}
+
+
+def _in_fleet(message: FleetRobot) -> frozenset[str]:
+    return frozenset((message.robot,))
+
+
+def _whose_parameters(message: ParameterEvent) -> frozenset[str]:
+    return frozenset(message.node.strip('/').split('/')[-2:-1])
 
 
 def _on_parameters(message: ParameterEvent, old: Snapshot) -> Fields:
@@ -501,8 +522,8 @@ TOPICS: tuple[Topic, ...] = (
     Topic(f'{FSM}/status', FsmStatus, _on_machine),
     Topic(f'{FSM}/transition', FsmTransition, _on_transition, _QUEUE),
     *(Topic(f'{name}/announcement', String, _on_request(name)) for name in CONTROLLERS),
-    Topic(FLEET_TOPIC, FleetRobot, _on_fleet_robot, _MANY),
-    Topic('/diagnostics', DiagnosticArray, _on_diagnostics, _MANY, period=1.0),
-    Topic('/parameter_events', ParameterEvent, _on_parameters, _MANY),
+    Topic(FLEET_TOPIC, FleetRobot, _on_fleet_robot, _MANY, whose=_in_fleet),
+    Topic('/diagnostics', DiagnosticArray, _on_diagnostics, _MANY, period=1.0, whose=_who_reports),
+    Topic('/parameter_events', ParameterEvent, _on_parameters, _MANY, whose=_whose_parameters),
 )
 """All that a snapshot takes from, with how."""

@@ -277,6 +277,9 @@ def test_robots_are_found_and_told_apart_and_share_the_place(graph: Any) -> None
     assert anna.doors == bertha.doors == {'D': False}
     assert anna.health.keys() == {'anna/motion_controller', 'armor_server'}
     assert list(feed.see()) == ['anna', 'bertha', ''], 'what they share is last'
+    topics = ('/diagnostics', watcher.resolve_topic_name('fleet_robots'), '/clock')
+    heard_by = [len(watcher.get_subscriptions_info_by_topic(topic)) for topic in topics]
+    assert heard_by == [1, 1, 1], 'who watches many robots hears each of them once'
     graph.until(lambda: 'robot_behavior' in feed.snapshot('anna').nodes)
     # A program of one that ends is not one of the other.
     graph.remove(robots['anna'].node)
