@@ -4,32 +4,47 @@
     python3 benchmarks/mutation.py [PART ...] [--mutants 300] [--seed 1]
 
 A mutant is a core module with one small fault: a comparison, a number, an operator, a condition
-changed. Cosmic Ray makes them (`pip install cosmic-ray pytest-cov`). Each is tried by the tests
-that reach its line, found by coverage; what they let pass is tried again by all tests of the files
-that reach its module. A mutant that no test notices is a survivor: a missing assertion, or a change
-that makes no difference.
+changed. Cosmic Ray makes them (`pip install cosmic-ray coverage`). Each is tried by the tests that
+reach its line, found by coverage; a mutant that none of them notices is a survivor: a missing
+assertion, or a change that makes no difference.
 
 A PART is a library, or a package of the robot: its modules without ROS, tried by the tests marked
-`unit` alone. The mutants stand in a copy; the checkout is not touched. It takes about ten seconds a
-mutant.
+`unit` alone. A process collects the tests once. A fault within a function is put into a fork of it,
+which therefore costs its tests alone; a fault in what runs at import costs the imports as well.
+Limits are in processor time, since the machine may be busy. No file is changed.
+
+`equivalent_mutants.toml` names changes that make no difference to a user, each with its reason;
+they are left out. `--report FILE` keeps the survivors, `--again FILE` tries those alone.
 """
 
 from __future__ import annotations
 
 import argparse
 import ast
+import contextlib
 import difflib
+import gc
+import json
+import os
+import pickle
 import random
 import re
 import resource
-import subprocess
+import shutil
+import signal
 import sys
 import tempfile
+import time
+import tomllib
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from importlib.machinery import SourceFileLoader
 from pathlib import Path
+from types import CodeType, FunctionType
+from typing import Any
 
+import pytest
 from tables import table
 
 CHECKOUT = Path(__file__).resolve().parents[1]
@@ -46,44 +61,110 @@ PACKAGES = (
     'surveillance_runtime',
     'surveillance_simulation',
 )
+ROBOT = 'robot'
+"""The packages of the robot share their tests, and one process that collects them."""
 ROS = re.compile(r'^\s*(?:from|import) (?:rclpy|\w+_msgs|std_srvs|surveillance_interfaces)\b', re.M)
 """What a core module does not import."""
-SKIPPED = ('ReplaceBinaryOperator_BitOr', 'NoOp')
-"""Operators whose mutants are mostly type unions, which make no difference at run time."""
+LOGGED = re.compile(r'\b(?:log|logger|get_logger\(\))\.(?:debug|info|warn|warning|error|fatal)$')
+SKIPPED = ('BinaryOperator_BitOr', 'NoOp', 'Eq_Is', 'NotEq_IsNot', 'Is_Eq', 'IsNot_NotEq')
+"""Operators whose mutants mostly make no difference: type unions, and identity for equality, which
+is the same for None, enumerations and small numbers."""
 QUICK = 12
 """Mutants a part with `--quick`."""
-GRACE = 20.0
-"""Seconds of processor time that a mutant's tests may take beyond five times what they take without
-it; ten times as many by the clock, since other programs may run."""
+GRACE = 6.0
+"""Seconds of processor time that a test may take beyond five times what it takes otherwise."""
+ENOUGH = 40.0
+"""Seconds of tests that one mutant is tried by; the tests of its module come first."""
+IDLE = 15.0
+"""Seconds without any use of a processor after which tests have noticed a fault: they wait."""
+AT_ONCE = 4
+"""Mutants that are tried at the same time."""
+NOT_IN_PLACE = 99
+"""Exit code of a process that could not put a fault in place."""
+EQUIVALENT = Path(__file__).with_name('equivalent_mutants.toml')
 
 
 @dataclass(frozen=True)
 class Mutant:
     """One small fault: which operator, applied at which of its places in which module."""
 
-    module: Path
-    """Path within the copy."""
+    part: str
+    module: str
+    """Path within the checkout."""
     line: int
     operator: str
     occurrence: int
 
+    @property
+    def path(self) -> Path:
+        """Return the module's file."""
+        return CHECKOUT / self.module
 
-@dataclass(frozen=True)
+    def sources(self) -> tuple[str, str]:
+        """Return the module without and with the fault."""
+        from cosmic_ray.mutating import mutate_code
+        from cosmic_ray.plugins import get_operator
+
+        source = self.path.read_text(encoding='utf-8')
+        return source, mutate_code(source, get_operator(self.operator)(), self.occurrence) or source
+
+    def difference(self) -> tuple[str, str]:
+        """Return the lines that change, before and after."""
+        old, new = (each.splitlines() for each in self.sources())
+        lines = list(difflib.ndiff(old, new))
+        before, after = (
+            ' '.join(line[2:].strip() for line in lines if line.startswith(sign)) for sign in '-+'
+        )
+        return before, after
+
+
+@dataclass
 class Reach:
-    """Which tests reach which line of which module."""
+    """Which tests reach which line of which module, and what each of them costs."""
 
-    lines: Mapping[Path, Mapping[int, frozenset[str]]]
-    seconds: Mapping[str, float]
+    lines: dict[str, dict[int, list[str]]] = field(default_factory=dict)
+    seconds: dict[str, float] = field(default_factory=dict)
+    failing: list[str] = field(default_factory=list)
 
-    def of_line(self, module: Path, line: int) -> frozenset[str]:
-        """Return the tests that run a line; for one that runs at import, those of the module."""
-        lines = self.lines.get(module, {})
-        return lines.get(line) or frozenset()
+    def tests(self, module: str, lines: Iterable[int] | None = None) -> set[str]:
+        """Return the tests that run one of the lines of a module, or any of them."""
+        of_module = self.lines.get(module, {})
+        chosen = of_module if lines is None else lines
+        return {test for line in chosen for test in of_module.get(line, ())}
 
-    def of_files(self, module: Path) -> frozenset[str]:
-        """Return the test files that reach a module."""
-        tests = self.lines.get(module, {}).values()
-        return frozenset(test.split('::')[0] for each in tests for test in each)
+    def ordered(self, tests: Iterable[str], module: str) -> list[str]:
+        """Return tests as they are tried: those whose file names the module, then the cheap."""
+        name = re.compile(rf'\b{Path(module).stem}\b')
+        near = {file: bool(name.search(text)) for file, text in self.texts(module)}
+
+        def rank(test: str) -> tuple[bool, float, str]:
+            return not near.get(test.split('::')[0], False), self.seconds[test], test
+
+        chosen, spent = [], 0.0
+        for test in sorted(tests, key=rank):
+            spent += self.seconds[test]
+            if chosen and spent > ENOUGH:
+                break
+            chosen.append(test)
+        return chosen
+
+    def texts(self, module: str) -> Iterator[tuple[str, str]]:
+        """Yield the test files, as tests name them, with their texts."""
+        folder = root_of(module)
+        for file in {test.split('::')[0] for test in self.seconds}:
+            yield file, (folder / file).read_text(encoding='utf-8')
+
+    def naming(self, module: str) -> set[str]:
+        """Return the tests of the files that import a module."""
+        name = re.compile(rf'\b{Path(module).stem} import\b')
+        files = {file for file, text in self.texts(module) if name.search(text)}
+        return {test for test in self.seconds if test.split('::')[0] in files}
+
+
+def root_of(module: str) -> Path:
+    """Return the folder from which the tests of a module are run."""
+    parts = Path(module).parts
+    return CHECKOUT / 'libs' / parts[1] if parts[0] == 'libs' else CHECKOUT
 
 
 def main(words: Sequence[str] | None = None) -> int:
@@ -96,6 +177,8 @@ def main(words: Sequence[str] | None = None) -> int:
     parser.add_argument('--mutants', type=int, default=300, help='in all, shared by their places')
     parser.add_argument('--seed', type=int, default=1)
     parser.add_argument('--quick', action='store_true', help=f'one library, {QUICK} mutants')
+    parser.add_argument('--report', type=Path, metavar='FILE', help='keep the survivors as JSON')
+    parser.add_argument('--again', type=Path, metavar='FILE', help='try those of a report alone')
     given = parser.parse_args(words)
     for name in given.parts:
         if name not in known:
@@ -103,47 +186,66 @@ def main(words: Sequence[str] | None = None) -> int:
             hint = f'; did you mean {near[0]}?' if near else ''
             parser.error(f'PART {name}: expected one of {", ".join(known)}{hint}')
     try:
-        import cosmic_ray.plugins  # noqa: F401
-        import pytest_cov  # noqa: F401
+        import cosmic_ray  # noqa: F401
+        import coverage  # noqa: F401
     except ImportError as error:
-        parser.error(f'{error.name} is missing: pip install cosmic-ray pytest-cov')
+        parser.error(f'{error.name} is missing: pip install cosmic-ray coverage')
     parts = given.parts or (['state_machines'] if given.quick else list(known))
-    generator = random.Random(given.seed)
-    with tempfile.TemporaryDirectory() as folder:
-        copies = {name: copy_of(name, Path(folder)) for name in parts}
-        found = {name: groups_of(copies[name], name) for name in parts}
-        total = sum(map(len, found.values()))
-        wanted = QUICK * len(parts) if given.quick else given.mutants
-        rows = [['part', 'places', 'mutants', 'killed', 'survived', 'not reached', 'killed, %']]
-        sums = [0] * 5
-        for name in parts:
-            count = min(len(found[name]), max(1, round(wanted * len(found[name]) / total)))
-            chosen = [generator.choice(each) for each in generator.sample(found[name], count)]
-            results = tried(copies[name], name, chosen)
-            figures = [len(found[name]), count, *results]
-            sums = [a + b for a, b in zip(sums, figures, strict=True)]
-            rows.append([name, *map(str, figures), f'{100 * results[0] / count:.0f}'])
+    groups = {name: groups_of(name) for name in parts}
+    places = sum(map(len, groups.values()))
+    chosen: list[Mutant] = []
+    left_out: dict[str, int] = defaultdict(int)
+    known_equal = equivalent()
+    for name in parts:
+        generator = random.Random(f'{given.seed} {name}')
+        wanted = QUICK if given.quick else round(given.mutants * len(groups[name]) / places)
+        count = min(len(groups[name]), max(1, wanted))
+        for mutant in (generator.choice(each) for each in generator.sample(groups[name], count)):
+            if (mutant.module, *mutant.difference()) in known_equal:
+                left_out[name] += 1
+            else:
+                chosen.append(mutant)
+    if given.again is not None:
+        try:
+            kept = {tuple(each) for each in json.loads(given.again.read_text(encoding='utf-8'))}
+        except (OSError, ValueError) as error:
+            parser.error(f'--again {given.again}: {error}')
+        flat = (each for name in parts for group in groups[name] for each in group)
+        modules = {each[0] for each in kept}
+        near_ones = [each for each in flat if each.module in modules]
+        kept -= known_equal
+        chosen, left_out = [], defaultdict(int)
+        for each in near_ones:
+            if (difference := (each.module, *each.difference())) in kept:
+                kept.discard(difference)
+                chosen.append(each)
+    results = run(chosen)
+    rows = [
+        ['part', 'places', 'mutants', 'killed', 'survived', 'not reached', 'equal', 'killed, %']
+    ]
+    sums = [0] * 6
+    for name in parts:
+        found = [results[each] for each in chosen if each.part == name]
+        figures = [found.count(each) for each in ('killed', 'survived', 'not reached')]
+        figures = [len(groups[name]), len(found), *figures, left_out[name]]
+        sums = [a + b for a, b in zip(sums, figures, strict=True)]
+        rows.append([name, *map(str, figures), f'{100 * figures[2] / max(1, len(found)):.0f}'])
     if len(parts) > 1:
-        rows.append(['all', *map(str, sums), f'{100 * sums[2] / sums[1]:.0f}'])
+        rows.append(['all', *map(str, sums), f'{100 * sums[2] / max(1, sums[1]):.0f}'])
     print(table(rows))
+    if given.report is not None:
+        alive = [[each.module, *each.difference()] for each in chosen if results[each] != 'killed']
+        given.report.write_text(json.dumps(alive, indent=1), encoding='utf-8')
     return 0
 
 
-def copy_of(name: str, folder: Path) -> Path:
-    """Return a copy of what a part's tests need: the library, or the whole checkout."""
-    inside = f'libs/{name}' if name in LIBRARIES else '.'
-    listing = ['git', 'ls-files', '-co', '--exclude-standard', inside]
-    done = subprocess.run(listing, cwd=CHECKOUT, capture_output=True, text=True, check=True)
-    copy = folder / name
-    for each in filter(None, done.stdout.split('\n')):
-        if (CHECKOUT / each).is_file():
-            target = copy / Path(each).relative_to(inside)
-            target.parent.mkdir(parents=True, exist_ok=True)
-            target.write_bytes((CHECKOUT / each).read_bytes())
-    return copy
+def equivalent() -> set[tuple[str, str, str]]:
+    """Return the changes that make no difference: module, lines before, lines after."""
+    data = tomllib.loads(EQUIVALENT.read_text(encoding='utf-8'))
+    return {(each['module'], each['before'], each['after']) for each in data.get('mutant', [])}
 
 
-def groups_of(copy: Path, name: str) -> list[list[Mutant]]:
+def groups_of(name: str) -> list[list[Mutant]]:
     """Return the places of a part that can be mutated, each with its mutants.
 
     One comparison has eight mutants and one condition one: chosen by place, both weigh the same.
@@ -155,14 +257,15 @@ def groups_of(copy: Path, name: str) -> list[list[Mutant]]:
     plain = [
         (each, operator())
         for each, operator in operators
-        if not operator.arguments() and not any(skipped in each for skipped in SKIPPED)
+        if not operator.arguments() and not each.endswith(SKIPPED) and 'BitOr_' not in each
     ]
-    groups: dict[tuple[Path, tuple[int, int], str], list[Mutant]] = defaultdict(list)
-    for path in sorted((copy / name).rglob('*.py')):
+    folder = CHECKOUT / ('libs' if name in LIBRARIES else '.') / name / name
+    groups: dict[tuple[str, tuple[int, int], str], list[Mutant]] = defaultdict(list)
+    for path in sorted(folder.rglob('*.py')):
         source = path.read_text(encoding='utf-8')
-        if name not in LIBRARIES and ROS.search(source):
+        if 'ros' in path.parts or ROS.search(source):
             continue
-        module = path.relative_to(copy)
+        module = str(path.relative_to(CHECKOUT))
         kept_out = without_effect(ast.parse(source))
         nodes = list(ast_nodes(get_ast_from_path(path)))
         for operator_name, operator in plain:
@@ -170,143 +273,370 @@ def groups_of(copy: Path, name: str) -> list[list[Mutant]]:
             places = (place for node in nodes for place in operator.mutation_positions(node))
             for occurrence, ((line, column), _) in enumerate(places):
                 if line not in kept_out:
-                    mutant = Mutant(module, line, operator_name, occurrence)
+                    mutant = Mutant(name, module, line, operator_name, occurrence)
                     groups[module, (line, column), kind].append(mutant)
     return list(groups.values())
 
 
 def without_effect(tree: ast.Module) -> set[int]:
-    """Return the lines in which a change is none at run time: annotations and type checks."""
+    """Return the lines whose change no user notices: annotations, type checks, texts of a log.
+
+    An exception's dotted name (`except cv2.error`) counts too: Cosmic Ray makes no Python of it.
+    """
     lines: set[int] = set()
+
+    def leave_out(node: ast.AST) -> None:
+        first = getattr(node, 'lineno', 0)
+        lines.update(range(first, (getattr(node, 'end_lineno', None) or first) + 1))
+
     for node in ast.walk(tree):
         for annotation in (getattr(node, 'annotation', None), getattr(node, 'returns', None)):
             # A default on the same line goes with it: few, and no loss to a sample.
             if isinstance(annotation, ast.expr):
-                lines.update(range(annotation.lineno, (annotation.end_lineno or 0) + 1))
+                leave_out(annotation)
         if isinstance(node, ast.If) and ast.unparse(node.test).endswith('TYPE_CHECKING'):
-            lines.update(range(node.lineno, (node.end_lineno or 0) + 1))
+            leave_out(node)
+        if isinstance(node, ast.FunctionDef) and node.name == '__repr__':
+            leave_out(node)
+        if isinstance(node, ast.Call) and LOGGED.search(ast.unparse(node.func)):
+            leave_out(node)
+        if isinstance(node, ast.ExceptHandler) and isinstance(node.type, ast.Attribute):
+            leave_out(node.type)
     return lines
 
 
-def tried(copy: Path, name: str, mutants: Iterable[Mutant]) -> tuple[int, int, int]:
-    """Try mutants and print those that live; return how many were killed, survived, not reached."""
-    from cosmic_ray.mutating import mutate_code
-    from cosmic_ray.plugins import get_operator
+def run(mutants: Sequence[Mutant]) -> dict[Mutant, str]:
+    """Try mutants and print those that live; return what became of each."""
+    results: dict[Mutant, str] = {}
+    by_root: dict[Path, list[Mutant]] = defaultdict(list)
+    for each in mutants:
+        by_root[root_of(each.module)].append(each)
+    for root, own in by_root.items():
+        begun = time.monotonic()
+        reach, tried = in_fork(lambda root=root, own=own: collected(root, own))
+        trials = Trials()
+        for mutant in own:
+            if mutant not in tried:
+                try_at_import(mutant, root, reach, trials)
+        trials.finish()
+        results |= tried | trials.results
+        print(f'{root.name}: {len(own)} mutants in {time.monotonic() - begun:.0f} s', flush=True)
+    return results
 
-    reach = reach_of(copy, name)
-    killed = survived = unreached = 0
-    for mutant in mutants:
-        path = copy / mutant.module
-        source = path.read_text(encoding='utf-8')
-        changed = mutate_code(source, get_operator(mutant.operator)(), mutant.occurrence)
-        tests = reach.of_line(mutant.module, mutant.line)
-        path.write_text(changed or source, encoding='utf-8')
+
+def in_fork(call: Any) -> Any:
+    """Return what a call returns in a process of its own."""
+    reading, writing = os.pipe()
+    child = os.fork()
+    if not child:
+        code = 1
         try:
-            if not tests:
-                unreached += 1
-            elif notices(copy, name, tests, reach) or notices(
-                copy, name, reach.of_files(mutant.module), reach
-            ):
-                killed += 1
-                continue
-            else:
-                survived += 1
+            os.close(reading)
+            with os.fdopen(writing, 'wb') as pipe:
+                pickle.dump(call(), pipe)
+            code = 0
         finally:
-            path.write_text(source, encoding='utf-8')
-        where = f'{mutant.module} ({"survived" if tests else "not reached"})'
-        print(*difference(source, changed or source, where), sep='\n')
-        print(f'{name}: {killed} killed, {survived} survived, {unreached} not reached', flush=True)
-    return killed, survived, unreached
+            sys.stdout.flush()
+            os._exit(code)
+    os.close(writing)
+    with os.fdopen(reading, 'rb') as pipe:
+        data = pipe.read()
+    os.waitpid(child, 0)
+    if not data:
+        sys.exit('the tests cannot be run: see above')
+    return pickle.loads(data)
 
 
-def difference(before: str, after: str, where: str) -> Iterator[str]:
-    """Yield the lines that a mutant changes."""
-    lines = difflib.unified_diff(before.split('\n'), after.split('\n'), where, n=0, lineterm='')
-    yield from (line for line in lines if not line.startswith('+++'))
+def options(root: Path, scratch: str) -> list[str]:
+    """Return the words for pytest that all processes share."""
+    marks = 'not java and not long' + (' and unit' if root == CHECKOUT else '')
+    plugins = ['-p', 'no:cacheprovider', '-p', 'no:xdist', '-p', 'no:anyio', '-p', 'no:cov']
+    return [*plugins, '-m', marks, f'--basetemp={scratch}/base', '-qq']
 
 
-def reach_of(copy: Path, name: str) -> Reach:
-    """Run all tests of a part once and return which lines each of them reaches."""
-    from coverage import CoverageData
+def collected(root: Path, mutants: Sequence[Mutant]) -> tuple[Reach, dict[Mutant, str]]:
+    """Collect the tests of a folder and try the mutants within functions in forks.
 
-    options = [f'--cov={name}', '--cov-context=test', '--cov-report=', '--durations=0']
-    done = pytest(copy, name, [*options, '--durations-min=0', '-n', '2'], 3600)
-    if done is None or done.returncode not in (0, 1):
-        output = '' if done is None else done.stdout[-2000:]
-        sys.exit(f'{name}: its tests cannot be run:\n{output}')
-    if done.returncode:
-        failed = re.findall(r'^FAILED (\S+)', done.stdout, re.M)
-        print(f'{name}: fail without a mutant and are left out: {", ".join(failed)}')
-    else:
-        failed = []
-    data = CoverageData(copy / '.coverage')
-    data.read()
-    lines: dict[Path, dict[int, frozenset[str]]] = {}
-    for file in data.measured_files():
-        if not Path(file).is_relative_to(copy / name):
-            continue
-        by_line = {
-            line: tests_of(contexts, failed)
-            for line, contexts in data.contexts_by_lineno(file).items()
-        }
-        everything = frozenset().union(*by_line.values())
-        # What runs at import has no test of its own: each that reaches the module may notice it.
-        lines[Path(file).relative_to(copy)] = {
-            line: tests or everything for line, tests in by_line.items()
-        }
-    seconds: dict[str, float] = defaultdict(float)
-    for spent, test in re.findall(r'^([\d.]+)s \w+ +(\S.*)$', done.stdout, re.M):
-        seconds[test] += float(spent)
-    return Reach(lines, seconds)
-
-
-def tests_of(contexts: Iterable[str], failed: Sequence[str]) -> frozenset[str]:
-    """Return the tests of coverage's contexts; a fixture counts for each test of its file.
-
-    A fixture of a module or of the session runs within the first test that asks for it.
+    Returns:
+        What the tests reach, and what became of each mutant; those that run at import are left out.
     """
-    tests = set()
-    for context in contexts:
-        test, _, phase = context.partition('|')
-        if test and test not in failed:
-            tests.add(test.split('::')[0] if phase == 'setup' else test)
-    return frozenset(tests)
+    os.chdir(root)
+    with tempfile.TemporaryDirectory() as scratch:
+        server = Server(root, mutants)
+        pytest.main(options(root, scratch), plugins=[server])
+    return server.reach, server.trials.results
 
 
-def notices(copy: Path, name: str, tests: Iterable[str], reach: Reach) -> bool:
-    """Tell whether one of the tests fails, or they take five times as long."""
-    ordered = sorted(tests, key=lambda test: (reach.seconds.get(test, 0.0), test))
-    expected = sum(
-        spent
-        for test, spent in reach.seconds.items()
-        if test in ordered or test.split('::')[0] in ordered
-    )
-    # Too many for a command line: pytest reads them from a file.
-    listing = copy / '.tests'
-    listing.write_text('\n'.join(ordered), encoding='utf-8')
-    done = pytest(copy, name, ['-x', f'@{listing}'], GRACE + 5 * expected)
-    return done is None or done.returncode != 0
+class Server:
+    """A pytest plugin that tries mutants where pytest would run the tests."""
+
+    def __init__(self, root: Path, mutants: Sequence[Mutant]) -> None:
+        self.root = root
+        self.mutants = mutants
+        self.reach = Reach()
+        self.trials = Trials()
+        self.items: dict[str, pytest.Item] = {}
+
+    @pytest.hookimpl(tryfirst=True)
+    def pytest_runtestloop(self, session: pytest.Session) -> bool:
+        """Find what the tests reach, then try each mutant in a fork."""
+        # Else each fork copies what the collector of garbage writes into all objects.
+        gc.freeze()
+        self.items = {item.nodeid: item for item in session.items}
+        self.reach = in_fork(self._reach)
+        if self.reach.failing:
+            print('fail without a fault, left out:', ', '.join(self.reach.failing), flush=True)
+        for mutant in self.mutants:
+            codes = changed_functions(mutant)
+            if codes is None:
+                continue
+            tests = self.reach.tests(mutant.module, [mutant.line])
+            for (_, first), code in () if tests else codes.items():
+                last = max(line for *_, line in code.co_lines() if line is not None)
+                tests |= self.reach.tests(mutant.module, range(first + 1, last + 1))
+            if tests:
+                self.trials.start(mutant, lambda m=mutant, c=codes, t=tests: self._try(m, c, t))
+            else:
+                self.trials.settle(mutant, 'not reached')
+        self.trials.finish()
+        return True
+
+    def _reach(self) -> Reach:
+        """Run each test once and return which lines it reaches."""
+        from coverage import Coverage
+
+        reach = Reach()
+        # Only the modules that have a mutant: the rest runs at its own speed.
+        modules = sorted({str(each.path) for each in self.mutants})
+        measured = Coverage(data_file=None, include=modules, config_file=False, messages=False)
+        measured.start()
+        for name, item in self.items.items():
+            measured.switch_context(name)
+            begun = cpu_seconds()
+            passed = run_item(item, None)
+            if passed:
+                reach.seconds[name] = cpu_seconds() - begun
+            else:
+                reach.failing.append(name)
+        measured.stop()
+        data = measured.get_data()
+        for file in data.measured_files():
+            module = str(Path(file).resolve().relative_to(CHECKOUT))
+            reach.lines[module] = {
+                line: [test for test in tests if test in reach.seconds]
+                for line, tests in data.contexts_by_lineno(file).items()
+            }
+        return reach
+
+    def _try(
+        self, mutant: Mutant, codes: Mapping[tuple[str, int], CodeType], tests: set[str]
+    ) -> bool:
+        """Put a fault into this process and tell whether no test notices it."""
+        gc.unfreeze()
+        replaced = 0
+        for each in gc.get_objects():
+            if isinstance(each, FunctionType):
+                code = each.__code__
+                new = codes.get((code.co_qualname, code.co_firstlineno))
+                if new is not None and Path(code.co_filename).resolve() == mutant.path:
+                    each.__code__ = new
+                    replaced += 1
+        if not replaced:
+            raise LookupError(mutant)
+        # Each fork has its own folder for what its tests write.
+        own_folder = Path(tempfile.mkdtemp())
+        config = next(iter(self.items.values())).config
+        config._tmp_path_factory._given_basetemp = own_folder / 'base'  # type: ignore[attr-defined]
+        config._tmp_path_factory._basetemp = None  # type: ignore[attr-defined]
+        try:
+            return self._all_pass(mutant, tests)
+        finally:
+            shutil.rmtree(own_folder, ignore_errors=True)
+
+    def _all_pass(self, mutant: Mutant, tests: set[str]) -> bool:
+        """Tell whether the tests pass, up to the first that does not."""
+        ordered = self.reach.ordered(tests, mutant.module)
+        for name, following in zip(ordered, [*ordered[1:], None], strict=True):
+            limit(self.reach.seconds[name])
+            if not run_item(self.items[name], self.items[following] if following else None):
+                return False
+        return True
 
 
-def pytest(
-    copy: Path, name: str, words: Sequence[str], seconds: float
-) -> subprocess.CompletedProcess[str] | None:
-    """Run pytest in a copy; return None if it hung: took `seconds` of a processor, or waited."""
-    marks = 'not java and not long' if name in LIBRARIES else 'unit and not java and not long'
-    command = [sys.executable, '-B', '-m', 'pytest', '-p', 'no:cacheprovider', '-m', marks, *words]
-    limit = round(seconds)
+def run_item(item: pytest.Item, following: pytest.Item | None) -> bool:
+    """Run one test and tell whether it passes."""
+    from _pytest.runner import runtestprotocol
+
+    # As pytest does for a test that is run again.
+    if hasattr(item, '_request') and not item._request:
+        item._initrequest()  # type: ignore[attr-defined]
+    hook = item.ihook
+    hook.pytest_runtest_logstart(nodeid=item.nodeid, location=item.location)
+    return not any(each.failed for each in runtestprotocol(item, log=False, nextitem=following))
+
+
+def cpu_seconds() -> float:
+    """Return the processor time of this process and of the children that have ended."""
+    return time.process_time() + sum(resource.getrusage(resource.RUSAGE_CHILDREN)[:2])
+
+
+def limit(seconds: float) -> None:
+    """End this process when it takes much more of the processor than a test does."""
+    end = round(time.process_time() + GRACE + 5 * seconds)
+    resource.setrlimit(resource.RLIMIT_CPU, (end, resource.RLIM_INFINITY))
+
+
+class Trials:
+    """Mutants that are tried at the same time, each in a fork, since some tests only wait.
+
+    Attributes:
+        results: What became of each mutant.
+    """
+
+    def __init__(self) -> None:
+        self.results: dict[Mutant, str] = {}
+        self._running: dict[int, tuple[Mutant, float, float]] = {}
+
+    def settle(self, mutant: Mutant, result: str) -> None:
+        """Keep a result, and print a mutant that lives."""
+        self.results[mutant] = result
+        if result != 'killed':
+            before, after = mutant.difference()
+            print(f'{mutant.module}:{mutant.line} {result}\n  - {before}\n  + {after}', flush=True)
+
+    def start(self, mutant: Mutant, call: Any) -> None:
+        """Try a mutant by a call in a fork: True if no test notices it."""
+        while len(self._running) >= AT_ONCE:
+            self._look()
+        child = os.fork()
+        if not child:
+            code = 1
+            try:
+                os.setpgid(0, 0)
+                with open(os.devnull, 'w') as nowhere:
+                    os.dup2(nowhere.fileno(), 1)
+                    os.dup2(nowhere.fileno(), 2)
+                resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+                code = 0 if call() is True else 1
+            except LookupError:
+                code = NOT_IN_PLACE
+            finally:
+                os._exit(code)
+        self._running[child] = (mutant, 0.0, time.monotonic())
+
+    def finish(self) -> None:
+        """Wait until all have ended."""
+        while self._running:
+            self._look()
+
+    def _look(self) -> None:
+        """Take those that have ended, and end those that wait for ever."""
+        time.sleep(0.01)
+        for child, (mutant, used, since) in list(self._running.items()):
+            now_used, now = used_by(child), time.monotonic()
+            if now_used != used:
+                self._running[child] = (mutant, now_used, now)
+            ended, status = os.waitpid(child, os.WNOHANG)
+            idle = not ended and now_used == used and now > since + IDLE
+            if not ended and not idle:
+                continue
+            with contextlib.suppress(ProcessLookupError):
+                os.killpg(child, signal.SIGKILL)
+            if idle:
+                os.waitpid(child, 0)
+            elif os.WIFEXITED(status) and os.WEXITSTATUS(status) == NOT_IN_PLACE:
+                raise LookupError(f'{mutant}: the tests that reach it have not imported it')
+            del self._running[child]
+            self.settle(mutant, 'killed' if idle or status else 'survived')
+
+
+def used_by(process: int) -> float:
+    """Return the processor time of a process and of its children that have ended, in ticks."""
     try:
-        return subprocess.run(
-            command,
-            cwd=copy,
-            capture_output=True,
-            text=True,
-            timeout=10 * seconds,
-            check=False,
-            preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_CPU, (limit, limit)),
+        text = Path(f'/proc/{process}/stat').read_text(encoding='utf-8')
+    except OSError:
+        return 0.0
+    return sum(map(float, text.rpartition(')')[2].split()[11:15]))
+
+
+def changed_functions(mutant: Mutant) -> dict[tuple[str, int], CodeType] | None:
+    """Return the functions that a fault changes, by name and line; None if it runs at import."""
+    source, changed = mutant.sources()
+    codes: dict[tuple[str, int], CodeType] = {}
+
+    def compare(old: CodeType, new: CodeType, at_import: bool) -> bool:
+        function = not at_import or bool(old.co_flags & 2)  # CO_NEWLOCALS
+        if not function and own(old) != own(new):
+            return False
+        inner_old, inner_new = (
+            [each for each in code.co_consts if isinstance(each, CodeType)] for code in (old, new)
         )
-    except subprocess.TimeoutExpired:
-        return None
+        if function:
+            if own(old) != own(new) or inner_old != inner_new:
+                codes[old.co_qualname, old.co_firstlineno] = new
+            if old.co_freevars != new.co_freevars or len(inner_old) != len(inner_new):
+                return False
+        return len(inner_old) == len(inner_new) and all(
+            compare(a, b, not function) for a, b in zip(inner_old, inner_new, strict=True)
+        )
+
+    top, top_changed = (compile(each, str(mutant.path), 'exec') for each in (source, changed))
+    return codes if compare(top, top_changed, True) else None
+
+
+def own(code: CodeType) -> tuple[object, ...]:
+    """Return what a code object is without the functions in it."""
+    constants = [repr(each) for each in code.co_consts if not isinstance(each, CodeType)]
+    names = (code.co_names, code.co_varnames, code.co_freevars, code.co_cellvars)
+    return code.co_code, constants, names, code.co_qualname
+
+
+def try_at_import(mutant: Mutant, root: Path, reach: Reach, trials: Trials) -> None:
+    """Try a fault in what runs at import, in a process that imports the package anew."""
+    tests = reach.tests(mutant.module) | reach.naming(mutant.module)
+    if not tests:
+        trials.settle(mutant, 'not reached')
+        return
+    ordered = reach.ordered(tests, mutant.module)
+    _, changed = mutant.sources()
+
+    def attempt() -> bool:
+        plain = SourceFileLoader.get_code
+
+        def get_code(loader: SourceFileLoader, fullname: str) -> CodeType | None:
+            if Path(loader.path).resolve() == mutant.path:
+                return compile(changed, loader.path, 'exec', dont_inherit=True)
+            return plain(loader, fullname)
+
+        SourceFileLoader.get_code = get_code  # type: ignore[assignment,method-assign]
+        os.chdir(root)
+        limit(ENOUGH)
+        files = sorted({test.split('::')[0] for test in ordered})
+        with tempfile.TemporaryDirectory() as scratch:
+            words = [*options(root, scratch), '-x', *files]
+            done = pytest.main(words, plugins=[Chosen(ordered, reach)])
+        return done == 0
+
+    trials.start(mutant, attempt)
+
+
+class Chosen:
+    """A pytest plugin that runs certain tests in a certain order, each within its limit."""
+
+    def __init__(self, ordered: Sequence[str], reach: Reach) -> None:
+        self.place = {name: number for number, name in enumerate(ordered)}
+        self.reach = reach
+
+    @pytest.hookimpl(trylast=True)
+    def pytest_collection_modifyitems(self, items: list[pytest.Item]) -> None:
+        """Leave the chosen tests, in their order."""
+        kept = [each for each in items if each.nodeid in self.place]
+        items[:] = sorted(kept, key=lambda each: self.place[each.nodeid])
+
+    @pytest.hookimpl(tryfirst=True)
+    def pytest_runtest_setup(self, item: pytest.Item) -> None:
+        """Limit a test's processor time."""
+        limit(self.reach.seconds[item.nodeid])
 
 
 if __name__ == '__main__':
