@@ -2,7 +2,9 @@
 
 A watcher listens in one namespace. Either a robot's mission is there, or what the robots of a fleet
 share; then each robot has a namespace of its own below. Which these are, the publishers of
-`fleet_robots` tell. The snapshot of the watcher's own namespace has no name.
+`fleet_robots` tell, and the readers of the shared `place`, which any program of a robot may be: a
+robot whose behaviour is down is stopped with the others. The snapshot of the watcher's own
+namespace has no name.
 """
 
 from __future__ import annotations
@@ -14,6 +16,8 @@ from surveillance_behaviour.ros_adapters.fleet_topic import FLEET_TOPIC
 from surveillance_operator.mission_feed import LOOK_PERIOD, MissionFeed
 from surveillance_operator.snapshot import Change, Snapshot
 from surveillance_runtime.node import PatrolNode
+from surveillance_runtime.place.fleet import problem_in_robot_name
+from surveillance_runtime.place_changes import TOPIC as PLACE_TOPIC
 
 OnChange = Callable[[str, Snapshot, Sequence[Change]], None]
 """Takes a robot's name, its snapshot, and what changed."""
@@ -97,14 +101,17 @@ class FleetFeed:
         }
 
     def _find(self) -> set[str]:
-        """Return the robots that say something to each other."""
-        own = self._node.get_namespace().rstrip('/') + '/'
-        topic = self._node.resolve_topic_name(FLEET_TOPIC)
-        return {
+        """Return the robots of which a program says or reads what all of them share."""
+        node = self._node
+        own = node.get_namespace().rstrip('/') + '/'
+        ends = node.get_publishers_info_by_topic(node.resolve_topic_name(FLEET_TOPIC))
+        ends += node.get_subscriptions_info_by_topic(node.resolve_topic_name(PLACE_TOPIC))
+        below = {
             each.node_namespace.removeprefix(own)
-            for each in self._node.get_publishers_info_by_topic(topic)
+            for each in ends
             if each.node_namespace.startswith(own) and each.node_namespace != own
         }
+        return {name for name in below if not problem_in_robot_name(name)}
 
     def _follow(self, name: str) -> None:
         def on_change(new: Snapshot, told: Sequence[Change]) -> None:

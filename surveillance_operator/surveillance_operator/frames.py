@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from patrol_policy.policies import POLICIES
+from patrol_policy.promises import lines as promise_lines
 from surveillance_operator.room_outlines import room_outlines
 from surveillance_operator.snapshot import (
     NO_POINTS,
@@ -214,6 +215,8 @@ PARTS: Mapping[str, tuple[tuple[str, ...], Callable[[Snapshot], Any]]] = {
     'status': (('status',), _status),
     'decision': (('decision', 'number'), _decision),
     'promises': (('promises', 'hours'), _promises),
+    # As the log says it: a place that is late by little is no trouble.
+    'kept': (('promises',), lambda s: promise_lines(s.promises)[0] if s.promises else None),
     'battery': (
         ('battery', 'battery_low'),
         lambda s: None if s.battery is None else {'level': s.battery, 'low': s.battery_low},

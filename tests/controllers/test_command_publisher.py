@@ -77,6 +77,21 @@ def test_new_commands_do_not_speed_a_robot_up_that_brakes(
     assert told == ['scan']
 
 
+def test_a_sensor_that_stammers_is_told_of_once_in_a_while(
+    graph: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    told: list[str] = []
+    base = CommandPublisher(graph.node, 'cmd_vel', ['scan'], DECELERATION, told.append)
+    now = 0.0
+    monkeypatch.setattr(base, '_now', lambda: now)
+    for count in range(1300):
+        now = 0.01 * count
+        if count % 50 == 0:  # a scan each half second, while commands come
+            base.hear('scan')
+        base.command(Velocity(0.6))
+    assert told == ['scan', 'scan'], 'once in ten seconds'
+
+
 @pytest.mark.parametrize('wanted', [0.7, -1.5])
 def test_a_speed_too_high_to_brake_from_is_one_that_can_be_kept(
     graph: Any, monkeypatch: pytest.MonkeyPatch, wanted: float

@@ -23,7 +23,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import PoseWithCovarianceStamped
 from rclpy.qos import QoSProfile
 from rich.console import Console
-from std_msgs.msg import UInt8
+from std_msgs.msg import String, UInt8
 from std_srvs.srv import SetBool, Trigger
 
 from patrol_policy.world import Decision
@@ -287,6 +287,26 @@ def test_robots_are_found_and_told_apart_and_share_the_place(graph: Any) -> None
     assert 'robot_behavior' in feed.snapshot('bertha').nodes
     assert ('anna', 'every node has ended: waiting for the next mission') in heard
     assert 'anna' in feed.robots, 'a robot that is gone is missed'
+
+
+def test_a_robot_whose_behaviour_is_down_is_found_and_stopped_with_the_others(graph: Any) -> None:
+    feed = FleetFeed(graph.add(PatrolNode, name='hands'), 0.02)
+    Robot(graph, 'anna')
+    monitor = graph.add(PatrolNode, name='collision_monitor', namespace='/bert')
+    monitor.create_subscription(String, '/place', lambda _: None, STATE_QOS)
+    stopped: list[bool] = []
+
+    def stop(request: Any, response: Any) -> Any:
+        stopped.append(request.data)
+        response.success = True
+        return response
+
+    monitor.create_service(SetBool, 'stop', stop)
+    graph.until(lambda: feed.robots == ('anna', 'bert'))
+    FleetActions(graph.add(PatrolNode, name='keys'), lambda: feed.robots, 60.0).told(
+        'all', WORDS['stop'][1]
+    )
+    assert stopped == [True]
 
 
 def test_a_word_is_for_one_robot_or_for_all_whatever_becomes_of_one(graph: Any) -> None:

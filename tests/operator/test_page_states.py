@@ -216,6 +216,8 @@ def test_what_cannot_be_kept_of_each_place_is_shown_with_its_hours(
     hub.show_parts({'promises': told}, 0.0, whole=False)
     line = '1 of 2 places can be visited within their thresholds'
     viewer.until(lambda: viewer.text('#promises-line') == line)
+    hub.show_parts({'kept': 'all 2 places, or little later'}, 0.0, whole=False)
+    viewer.until(lambda: viewer.text('#promises-line') == 'all 2 places, or little later')
     viewer.js('document.getElementById("promises").open = true')
     assert viewer.text('#promises-list') == 'B: never visited (daily 08:00-18:00)A: in time'
 

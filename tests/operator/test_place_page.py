@@ -135,8 +135,17 @@ def test_a_place_is_changed_by_mouse_and_saved(browser: Viewer, page: Page, file
     browser.until(lambda: "there is a 'R2' already" in hand.problem, 20.0)
     hand.fill('name', 'kitchen')
     browser.until(lambda: not hand.problem, 20.0)
-    hand.keys(Keys.ENTER)
+    browser.js(
+        'const send = window.fetch; window.sent = [];'
+        'window.fetch = (at, all) => { window.sent.push(at); return send(at, all); };'
+        # As browsers do it that send a form by the Enter key: both events come at once.
+        'const input = document.querySelector("[data-field=name]"); input.focus();'
+        'input.dispatchEvent(new Event("change")); input.form.requestSubmit()'
+    )
     hand.said('R1 is kitchen')
+    browser.until(lambda: browser.text('#chosen-h') == 'room kitchen', 20.0)
+    assert browser.js('return window.sent').count('/act/edit') == 1
+    assert not hand.problem
     hand.fill('hours', 'mon-fri 8')
     browser.until(lambda: hand.problem.startswith('hours.kitchen: '), 20.0)
     hand.fill('hours', 'mon-fri 08:00-18:00')
@@ -415,3 +424,15 @@ def test_the_drawing_is_not_written_over_the_picture_of_the_map(tmp_path: Path) 
     import_dropped(files, tmp_path, 0.22)
     assert (tmp_path / 'm_place.png').read_bytes() == before
     assert (tmp_path / 'm_place_drawn.png').exists()
+
+
+def test_a_place_that_cannot_be_written_whole_leaves_nothing(tmp_path: Path) -> None:
+    two_rooms(tmp_path / 'm.png')
+    here = tmp_path / 'here'
+    here.mkdir()
+    (here / 'm_place.yaml').symlink_to(tmp_path / 'gone' / 'm_place.yaml')
+    files = as_dropped(f'image: m.png\n{_REST}', 'm.yaml', m=tmp_path / 'm.png')
+    with pytest.raises(ValueError, match='No such file'):
+        import_dropped(files, here, 0.22)
+    assert list(here.iterdir()) == []
+    import_dropped(files, here, 0.22)

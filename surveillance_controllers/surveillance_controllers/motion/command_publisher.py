@@ -35,6 +35,8 @@ LATE = 0.01
 """Messages that are late by this slow no robot down, seconds."""
 LONGEST_PERIOD = 0.25
 """A sensor that is slower than this lets the robot drive slowly, or not at all; seconds."""
+TELL_AGAIN = 10.0
+"""A topic that falls silent again and again is told of once in this time, seconds."""
 _COUNT = 10
 """Intervals of which the period is the mean."""
 
@@ -101,7 +103,8 @@ class CommandPublisher:
         frame: That the commands are in, the robot's own, where they are stamped.
         heard: Topics without which the robot stands; `hear` is to be told of their messages.
         deceleration: With which the base brakes when it must, m/s^2.
-        on_silence: Told the topic for whose silence the robot stands, once until it drives again.
+        on_silence: Told the topic for whose silence the robot stands, once until it drives again,
+            and not more often than each `TELL_AGAIN`.
         standstill: The robot stands this long after the first message that did not come, seconds.
 
     Attributes:
@@ -133,6 +136,7 @@ class CommandPublisher:
         self.topic = str(node.resolve_topic_name(topic))
         self._timer = node.create_timer(WATCH_PERIOD, self._limit_again, autostart=False)
         self._silent = ''
+        self._told: dict[str, float] = {}
         self.wanted = Velocity()
 
     def hear(self, topic: str) -> None:
@@ -182,7 +186,10 @@ class CommandPublisher:
             self._publisher.publish(twist)
         silent = self._age.left(now)[1] if share == 0.0 and self.wanted != Velocity() else ''
         if silent and not self._silent:
-            self._on_silence(silent)
+            told = self._told.get(silent, -math.inf)
+            if not told <= now < told + TELL_AGAIN:
+                self._told[silent] = now
+                self._on_silence(silent)
         self._silent = silent
 
     def _watch(self, now: float) -> None:

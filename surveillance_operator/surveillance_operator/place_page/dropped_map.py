@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import base64
 import binascii
+import contextlib
 import re
 import tempfile
 from collections.abc import Mapping
@@ -70,13 +71,18 @@ def import_dropped(
                 path.name in contents and there.read_bytes() == contents[path.name]
             ):
                 raise FileError(f'{there}: is there already; expected another name')
+        new = [path for path in made if not (folder / path.name).exists()]
         try:
-            for path in made:
+            for path in new:
                 data = path.read_bytes()
                 if path == out:
                     data = data.replace(f'{stage}/'.encode(), b'')
                 (folder / path.name).write_bytes(data)
         except OSError as error:
+            # Half of it would stand in the way of the next try.
+            for path in new:
+                with contextlib.suppress(OSError):
+                    (folder / path.name).unlink(missing_ok=True)
             raise FileError(in_one_line(error)) from None
     found = said[0].replace(f'{stage}/', '')
     return folder / out.name, f'{found}; written to {folder / out.name}'

@@ -223,11 +223,12 @@ async function commit(value, change, kind) {
   const [operation, fields] = change(value);
   const found = await edit(operation, fields);
   $('problem').textContent = found.ok ? '' : found.text;
-  if (!found.ok) return;
+  if (!found.ok) return false;
   if (operation === 'rename') choose({kind, name: fields.new});
   else if (operation === 'move_station') choose({kind, name: Object.keys(place.stations).find((room) => Math.hypot(place.stations[room][0] - fields.x, place.stations[room][1] - fields.y) < 0.01) ?? chosen.name});
   else if (operation.startsWith('remove')) choose(null);
   else { panelShows = ''; panel(); }
+  return true;
 }
 
 function field([key, text, value, change, options], kind) {
@@ -243,7 +244,13 @@ function field([key, text, value, change, options], kind) {
     return h('label', {}, text, list);
   }
   const input = h('input', {disabled: !may, 'data-field': key, autocomplete: 'off', value: value ?? '', oninput: () => check(input, change)});
-  input.addEventListener('change', () => { if (input.value !== String(value ?? '')) commit(input.value, change, kind); });
+  // The Enter key tells of a change twice, by itself and as the form is sent: the first one counts.
+  let sent = input.value;
+  input.addEventListener('change', async () => {
+    if (input.value === sent) return;
+    sent = input.value;
+    if (!await commit(input.value, change, kind)) sent = String(value ?? '');
+  });
   return h('label', {}, text, input);
 }
 

@@ -107,7 +107,7 @@ const SHOW = {
     $('release').hidden = !state.stopped;
   }],
   control: [['places', 'doors', 'mission', 'requests', 'health'], () => control.show()],
-  promises: [['promises'], () => showPromises(state)],
+  promises: [['promises', 'kept'], () => showPromises(state)],
   strips: [['history', 'places', 'mission', 'promises'], () => drawStrips($('strips'), state, now())],
   map: [MAP_PARTS, (parts) => map.show(state, parts, now(), robots)],
 };

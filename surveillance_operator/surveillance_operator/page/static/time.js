@@ -72,12 +72,13 @@ export function drawStrips(root, state, now) {
 }
 
 // What can be kept of each place, those that cannot first.
-export function showPromises({promises}) {
+export function showPromises({promises, kept: words}) {
   const order = ['never', 'later', 'unknown', 'closed', 'within'];
   const found = names(promises).sort((a, b) => order.indexOf(promises[a].verdict) - order.indexOf(promises[b].verdict));
   const kept = found.filter((name) => promises[name].verdict === 'within').length;
   $('promises').hidden = !found.length;
-  $('promises-line').textContent = `${kept} of ${found.length} places can be visited within their thresholds`;
+  // Recordings of before have no words for all of them.
+  $('promises-line').textContent = words ?? `${kept} of ${found.length} places can be visited within their thresholds`;
   $('promises-line').classList.toggle('warn', found.some((name) => promises[name].verdict === 'never'));
   $('promises-list').replaceChildren(...found.map((name) => {
     const {verdict, words, hours} = promises[name];
