@@ -103,3 +103,20 @@ def test_the_hours_of_a_place_that_was_changed_are_told_with_the_promises(graph:
     model._promise((Promise('R1', WITHIN, 60.0, 30.0, 'R1: visited'),))
     graph.until(lambda: bool(told))
     assert promises_from(told[-1])[1] == {'R1': 'mon-fri 08:00-18:00'}
+
+
+def test_a_robot_of_a_fleet_keeps_its_dock_when_the_place_is_changed(graph: Any) -> None:
+    docks = {'stations.E.pose': [5.0, 10.0, 0.0], 'stations.R4.pose': [15.0, 15.0, 0.0]}
+    own = {'fleet': True, 'recharge_rooms': ['E'], **docks}
+    reasoner = graph.add(Reasoner, parameters=own)
+    places = graph.node.create_publisher(String, 'place', STATE_QOS)
+    described = {
+        'room_positions': {'E': [5.0, 10.0], 'R4': [15.0, 15.0]},
+        'recharge_rooms': ['E', 'R4'],
+        'stations': {'E': {'pose': [5.0, 10.0, 0.0]}, 'R4': {'pose': [15.0, 15.0, 0.0]}},
+        'hours': {'R4': 'mon-fri 08:00-18:00'},
+    }
+    places.publish(String(data=json.dumps(described)))
+    graph.until(lambda: 'R4' in reasoner._world_model._rules.calendar.hours)
+    graph.until(lambda: set(reasoner._world_model._stations) == {'E', 'R4'})
+    assert reasoner.get_parameter('recharge_rooms').value == ['E']

@@ -428,3 +428,20 @@ def test_evidence_keeps_the_most_severe_and_newest_within_its_bound(tmp_path: Pa
     assert names[0] not in left
     assert sum(each.stat().st_size for each in tmp_path.iterdir()) <= 40_000
     assert EvidenceStore(tmp_path).total == store.total
+
+
+@pytest.mark.parametrize('spot', [(1000.0, 2.0), (-1000.0, -1000.0)])
+def test_an_event_of_another_map_costs_no_look(spot: tuple[float, float]):
+    watch = Round()
+    watch.visit('R1', HERE)
+    watch.visit('R1', HERE, boxes=[(1.5, 1.5, 0.15)])
+    state = json.loads(json.dumps(watch.watcher.state()))
+    (event,) = state['book']['events']
+    event['position'] = list(spot)
+    again = Round()
+    again.watcher.restore(state)
+    again.time = watch.time + 1000.0
+    again.visit('R1', HERE)
+    again.visit('R1', HERE)
+    assert again.looks
+    assert [each.state for each in again.book.events] == [EventState.OPEN]

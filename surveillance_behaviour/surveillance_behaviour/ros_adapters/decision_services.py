@@ -144,7 +144,8 @@ def world_model_of(
         stations.update(found)
         world_model.take_stations(found)
         rooms = [str(each) for each in described.get('recharge_rooms') or ()]
-        if rooms != list(settings.recharge_rooms):
+        # Of a fleet stations are read at the start, and a robot may have one of them alone.
+        if fleet is None and rooms != list(settings.recharge_rooms):
             kind = Parameter.Type.STRING_ARRAY
             answer, *_ = node.set_parameters([Parameter('recharge_rooms', kind, rooms)])
             if not answer.successful:

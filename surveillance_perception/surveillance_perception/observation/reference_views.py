@@ -163,7 +163,9 @@ class ReferenceViews:
                 viewpoint = tuple(map(float, each['viewpoint']))
                 markers = frozenset(map(int, each['markers']))
                 view = ReferenceView(name, viewpoint, picture, float(each['stamp']), markers)
-                view.doors = {str(door): str(is_) for door, is_ in each.get('doors', {}).items()}
+                view.doors = {
+                    str(door): str(is_) for door, is_ in dict(each.get('doors', ())).items()
+                }
                 found.append(view)
         following = int(values['next'])
         self._views, self._next = found, following

@@ -427,6 +427,8 @@ class Watcher:
         """Tell whether beams passed through nearly all of a thing's spot."""
         row, column = now.grid.cell_of(*position)
         reach = max(1, round(SPOT / now.grid.resolution))
+        if not now.grid.contains(np.array([[row, column]]))[0]:
+            return False  # of an event that was seen on another map
         spot = now.free[max(row - reach, 0) : row + reach + 1, max(column - reach, 0) :][
             :, : 2 * reach + 1
         ]
@@ -456,11 +458,14 @@ class Watcher:
             for event in self.book.current
             if event.kind == Kind.OBJECT and event.position
         ]
+        # The other sides of what is new are seen for the first time, too, and are not normal.
+        things = np.zeros_like(new)
         if there:
-            # The other sides of what is new are seen for the first time, too, and are not normal.
-            things = np.zeros_like(new)
+            # Events outlive the map that they were seen on.
             cells = now.grid.cells_of(np.concatenate(there))
+            cells = cells[now.grid.contains(cells)]
             things[cells[:, 0], cells[:, 1]] = True
+        if things.any():
             away = ndimage.distance_transform_edt(~things) * now.grid.resolution
             new &= away > OTHER_SIDES
         self._normal = replace(
