@@ -1,6 +1,9 @@
 """Persons found in pictures, and in pictures without any.
 
 .venv/bin/python benchmarks/persons.py --with FOLDER_OR_PICTURE ... --without FOLDER_OR_PICTURE ...
+
+With --crops N, N parts of each picture without persons are looked at, too: half of it to all of it,
+mirrored or not.
 """
 
 from __future__ import annotations
@@ -37,11 +40,31 @@ def measured(finder: PersonFinder, paths: list[Path]) -> tuple[list[str], float]
     return hits, 1000.0 * spent / max(1, len(paths))
 
 
+def false_in_crops(finder: PersonFinder, paths: list[Path], crops: int) -> tuple[int, list[str]]:
+    """Return how many parts of pictures were looked at, and the pictures of those with a find."""
+    rng = np.random.default_rng(8)
+    looked, false = 0, []
+    for path in paths:
+        read = cv2.imread(str(path))
+        for _ in range(0 if read is None else crops):
+            rows, columns = read.shape[:2]
+            high, wide = (max(1, round(each * rng.uniform(0.5, 1.0))) for each in (rows, columns))
+            top, left = rng.integers(rows - high + 1), rng.integers(columns - wide + 1)
+            part = read[top : top + high, left : left + wide]
+            if rng.random() < 0.5:
+                part = part[:, ::-1]
+            looked += 1
+            if finder.find(np.ascontiguousarray(part, np.uint8)):
+                false.append(path.name)
+    return looked, false
+
+
 def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else '')
     parser.add_argument('--with', dest='persons', type=Path, nargs='*', default=[])
     parser.add_argument('--without', type=Path, nargs='*', default=[])
+    parser.add_argument('--crops', type=int, default=0, help='of each picture without persons')
     given = parser.parse_args()
     persons, without = pictures(given.persons), pictures(given.without)
     finder = load_finder()
@@ -51,6 +74,12 @@ def main() -> None:
     spent = (first * len(persons) + second * len(without)) / max(1, len(persons + without))
     found, wrong = f'{len(hits)}/{len(persons)}', f'{len(false)}/{len(without)}'
     print(f'{"BlazePose":12} {found:>10} {wrong:>10} {spent:8.0f}   {", ".join(false)}')
+    missed = [each.name for each in persons if each.name not in hits]
+    print(f'missed: {", ".join(missed) or "none"}')
+    if given.crops:
+        looked, wrong_parts = false_in_crops(finder, without, given.crops)
+        names = ', '.join(f'{each} {wrong_parts.count(each)}' for each in sorted(set(wrong_parts)))
+        print(f'parts: {len(wrong_parts)} of {looked} false   {names}')
 
 
 if __name__ == '__main__':

@@ -26,10 +26,16 @@ def add_thing(body: Any, thing: Thing, kind: Callable[[Part], Mapping[str, Any]]
     for part in thing.parts:
         x, y = thing.at(part)
         half = (part.top - part.bottom) / 2
-        is_box = part.shape == Shape.BOX
+        length, width = part.length / 2, part.width / 2
+        shape, size = {
+            Shape.BOX: (mujoco.mjtGeom.mjGEOM_BOX, [length, width, half]),
+            Shape.CYLINDER: (mujoco.mjtGeom.mjGEOM_CYLINDER, [length, half, 0.0]),
+            # Thicker than the slice, so that slices run into each other: 6 % of ripple.
+            Shape.ELLIPSE: (mujoco.mjtGeom.mjGEOM_ELLIPSOID, [length, width, 3 * half]),
+        }[part.shape]
         body.add_geom(
-            type=mujoco.mjtGeom.mjGEOM_BOX if is_box else mujoco.mjtGeom.mjGEOM_CYLINDER,
-            size=[part.length / 2, part.width / 2, half] if is_box else [part.length / 2, half, 0],
+            type=shape,
+            size=size,
             pos=[x, y, part.bottom + half],
             quat=about_z(thing.yaw),
             **kind(part),

@@ -35,8 +35,9 @@ from surveillance_runtime.place.floor_plan import Marker
 from surveillance_runtime.suggestions import nearest
 from surveillance_runtime.yaml_file import EntryError, read_table
 from surveillance_simulation.robot.robot import Robot
+from surveillance_simulation.world.figures import person
 from surveillance_simulation.world.textures import marker_panel
-from surveillance_simulation.world.things import Thing, barrel, box, chair, person
+from surveillance_simulation.world.things import Thing, barrel, box, chair
 
 AJAR = 30.0
 """How far a door is ajar where nothing is said, degrees."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import math
 from pathlib import Path
 
 import cv2
@@ -11,12 +12,23 @@ import pytest
 import skimage
 
 from surveillance_perception.observation.persons import PersonFinder, load_finder
+from surveillance_simulation.camera.model import Camera, Conditions, expose
+from surveillance_simulation.camera.mujoco_rendering import MujocoRenderer
+from surveillance_simulation.camera.rendering import Renderer
+from surveillance_simulation.world.figures import person
+from surveillance_simulation.world.world import read_world
 
+SEVEN_ROOMS = Path(__file__).parents[2] / 'config' / 'seven_rooms.yaml'
 DATA = Path(skimage.__file__).parent / 'data'
 
 
 def photograph(name: str) -> np.ndarray:
     return np.asarray(cv2.imread(str(DATA / f'{name}.png')), np.uint8)
+
+
+def camera_along_x(x: float, y: float, z: float) -> np.ndarray:
+    """Return the transform (4, 4) of a camera that looks along x."""
+    return np.array([[0, 0, 1, x], [-1, 0, 0, y], [0, -1, 0, z], [0, 0, 0, 1]], float)
 
 
 def finder() -> PersonFinder:
@@ -68,7 +80,28 @@ def test_a_box_follows_from_the_anchor_and_lies_within_the_picture():
     assert shown[0].shape == (1, 224, 224, 3)
     assert shown[0].min() == -1.0
     assert shown[0].max() == 1.0
-    assert len(shown) == 1, 'squares of so small a picture would be enlarged'
+    assert len(shown) == 2, 'squares of so small a picture would be enlarged'
+
+
+def test_who_reaches_out_of_the_picture_is_found_with_a_margin_around_it():
+    """Only in the second look, at 1.4 times the width, the anchor in the middle is sure of it."""
+    for score, count in ((1.2, 0), (1.6, 1)):
+        looks = 0
+
+        def network(values: np.ndarray, score: float = score) -> tuple[np.ndarray, np.ndarray]:
+            nonlocal looks
+            looks += 1
+            coordinates, scores = np.zeros((2254, 12), np.float32), np.full(2254, -200.0)
+            if looks == 2:
+                assert values[0, 30].max() == -1.0
+                assert values[0, 112, 112].min() == 1.0
+                number = 2 * (14 * 28 + 14)
+                scores[number] = score
+                coordinates[number, 6:8] = 0.0, -100.0
+            return coordinates, scores.astype(np.float32)
+
+        found = PersonFinder(network).find(np.full((200, 200, 3), 255, np.uint8))
+        assert [each.box for each in found] == [(0, 0, 200, 200)] * count
 
 
 def test_what_is_missing_or_wrong_is_one_line(tmp_path: Path, monkeypatch):
@@ -83,3 +116,23 @@ def test_what_is_missing_or_wrong_is_one_line(tmp_path: Path, monkeypatch):
         load_finder()
     with pytest.raises(ValueError, match=r'no package ai_edge_litert; pip install'):
         load_finder(str(wrong))
+
+
+@pytest.mark.parametrize('renderer', [Renderer, MujocoRenderer])
+def test_the_simulators_person_looks_like_one_to_a_network_that_knows_photographs(renderer):
+    find = finder().find
+    if renderer is MujocoRenderer:
+        pytest.importorskip('mujoco')
+    seen = []
+    for degrees in (0, 90, 225):
+        world = read_world(SEVEN_ROOMS)
+        world.put(person('p', 13.0, 8.0, math.radians(degrees)))
+        drawn = renderer(world, Camera.from_field_of_view())
+        picture = expose(
+            drawn.ideal(camera_along_x(10.0, 8.0, 0.9)),
+            Conditions(),
+            np.random.default_rng(1),
+        )
+        drawn.close()
+        seen.append(find(np.ascontiguousarray(picture[..., ::-1])))
+    assert [len(each) for each in seen] == [1, 1, 1]

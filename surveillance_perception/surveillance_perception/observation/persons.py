@@ -2,10 +2,11 @@
 
 The network (Bazarevsky and others, BlazePose, 2020; Apache-2.0) looks at 224 by 224 pixels and
 gives, for each of 2,254 anchors, a score, a box, and four points: the first is the middle of the
-hips, the second lies on the circle around them that holds the whole body. A picture is looked at
-as a whole, for persons nearby, and in three overlapping squares, for those far away. Its weights
-are a file of the package mediapipe, which is only read: nothing is fetched, and nothing of that
-package runs. `ai-edge-litert` runs the network.
+hips, the second lies on the circle around them that holds the whole body. A picture is looked at as
+a whole, for persons nearby, in three overlapping squares, for those far away, and with a black
+margin around it, for those who stand so near that they reach out of it. Its weights are a file of
+the package mediapipe, which is only read: nothing is fetched, and nothing of that package runs.
+`ai-edge-litert` runs the network.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ import importlib
 import importlib.util
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -33,6 +34,9 @@ LAYERS = ((8, 2), (16, 2), (32, 6))
 """Stride of each grid of anchors, pixels, and how many anchors stand in each of its cells."""
 SURE = 0.7
 """Score from which a person is told."""
+MARGIN, SURE_WITH_MARGIN = 0.2, 0.8
+"""Of the picture that is looked at with a margin: that, as part of its longer side, and the score
+from which a person is told there; what is no person looks more like one there."""
 SAME_PERSON = 0.3
 """Two finds that overlap by this part are one."""
 INSTALL = 'pip install ai-edge-litert, and pip install --no-deps mediapipe==0.10.21'
@@ -79,11 +83,25 @@ class PersonFinder:
             for left, top, width, height in _windows(picture.shape[1], picture.shape[0])
             for each in self._in_window(picture, left, top, width, height)
         ]
+        found += self._with_margin(picture)
         kept: list[Person] = []
         for each in sorted(found, key=lambda each: -each.confidence):
             if not any(_one_person(each, other) for other in kept):
                 kept.append(each)
         return kept
+
+    def _with_margin(self, picture: Picture) -> list[Person]:
+        margin = round(MARGIN * max(picture.shape[:2]))
+        sides = (margin, margin, margin, margin)
+        wide = np.asarray(cv2.copyMakeBorder(picture, *sides, cv2.BORDER_CONSTANT), np.uint8)
+        found = []
+        for each in self._in_window(wide, 0, 0, wide.shape[1], wide.shape[0]):
+            left, top, width, height = each.box
+            low = np.array([left, top]) - margin
+            box = _box(low, low + np.array([width, height]), picture)
+            if each.confidence >= SURE_WITH_MARGIN and min(box[2:]) > 0:
+                found.append(replace(each, box=box))
+        return found
 
     def _in_window(
         self, picture: Picture, left: int, top: int, width: int, height: int

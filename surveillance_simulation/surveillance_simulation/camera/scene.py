@@ -161,7 +161,16 @@ def thing_faces(thing: Thing) -> Iterator[Face]:
         texture = textures.barrel() if thing.kind == 'barrel' else textures.plain(part.colour)
         outline = _outline(part, x, y, thing.yaw)
         for first, second in pairwise([*outline, outline[0]]):
-            yield from _upright(first, second, part.bottom, part.top, texture)
+            face = next(_upright(first, second, part.bottom, part.top, texture))
+            if part.shape == Shape.ELLIPSE:
+                # Round things are told from flat ones by how light falls off along them.
+                length = math.dist(first, second)
+                normal = (second[1] - first[1]) / length, (first[0] - second[0]) / length
+                shade = 0.76 + 0.24 * (0.8 * normal[0] + 0.6 * normal[1])
+                face = replace(face, shade=shade)
+            yield face
+        if part.shape == Shape.ELLIPSE:
+            continue  # slices lie on each other
         # Of a cylinder the lid is the square inside it: the rim's height hides the rest.
         shrink = math.sqrt(0.5) if part.shape == Shape.CYLINDER else 1.0
         turn = thing.yaw + (math.pi / 4 if part.shape == Shape.CYLINDER else 0.0)
@@ -185,8 +194,9 @@ def _outline(part: Part, x: float, y: float, yaw: float) -> list[tuple[float, fl
         ]
     else:
         ring = np.arange(12) * (2 * math.pi / 12)
-        radius = part.length / 2
-        points = [(radius * math.cos(a), radius * math.sin(a)) for a in ring.tolist()]
+        points = [
+            (part.length / 2 * math.cos(a), part.width / 2 * math.sin(a)) for a in ring.tolist()
+        ]
     cosine, sine = math.cos(yaw), math.sin(yaw)
     return [(x + cosine * a - sine * b, y + sine * a + cosine * b) for a, b in points]
 

@@ -26,6 +26,7 @@ class Shape(StrEnum):
 
     BOX = 'box'
     CYLINDER = 'cylinder'
+    ELLIPSE = 'ellipse'
 
 
 @dataclass(frozen=True)
@@ -33,7 +34,7 @@ class Part:
     """One upright body of a thing, in the thing's frame: x ahead, y to the left.
 
     Attributes:
-        shape: Box or cylinder.
+        shape: Box, cylinder, or a slice of something round: an upright elliptic cylinder.
         x, y: Its middle, metres.
         length, width: Its sides along x and y, metres; of a cylinder both are its diameter.
         bottom, top: Its heights, metres.
@@ -89,7 +90,6 @@ class Thing:
 BARREL_HEIGHT = 0.8
 _ORANGE, _BROWN, _WOOD = (224, 104, 28), (150, 108, 62), (96, 62, 36)
 _CASE, _ARM = (62, 66, 72), (148, 152, 158)
-_TROUSERS, _SHIRT, _SKIN, _HAIR = (40, 48, 84), (176, 36, 44), (214, 168, 138), (52, 36, 26)
 
 
 def barrel(name: str, x: float, y: float, radius: float) -> Thing:
@@ -102,7 +102,7 @@ def barrel(name: str, x: float, y: float, radius: float) -> Thing:
         raise PlaceError((), f"obstacle '{name}': radius {radius:g} m: expected 0.01 to 5 m")
     side = 2.0 * radius
     part = Part(Shape.CYLINDER, 0.0, 0.0, side, side, 0.0, BARREL_HEIGHT, _ORANGE)
-    return _checked(Thing(name, 'barrel', x, y, 0.0, (part,)))
+    return checked(Thing(name, 'barrel', x, y, 0.0, (part,)))
 
 
 def box(
@@ -117,7 +117,7 @@ def box(
         if not 0.02 <= side <= 5.0:
             raise PlaceError((), f"box '{name}': {word} {side:g} m: expected 0.02 to 5 m")
     part = Part(Shape.BOX, 0.0, 0.0, length, width, 0.0, height, _BROWN)
-    return _checked(Thing(name, 'box', x, y, yaw, (part,)))
+    return checked(Thing(name, 'box', x, y, yaw, (part,)))
 
 
 def chair(name: str, x: float, y: float, yaw: float) -> Thing:
@@ -129,27 +129,7 @@ def chair(name: str, x: float, y: float, yaw: float) -> Thing:
     )
     seat = Part(Shape.BOX, 0.0, 0.0, 0.44, 0.44, 0.45, 0.5, _WOOD)
     back = Part(Shape.BOX, -0.2, 0.0, 0.04, 0.44, 0.5, 0.95, _WOOD)
-    return _checked(Thing(name, 'chair', x, y, yaw, (*legs, seat, back)))
-
-
-def person(name: str, x: float, y: float, yaw: float) -> Thing:
-    """Return a person of 1.75 m who stands on both legs; the lidar meets the shanks."""
-
-    def limb(y: float, wide: float, bottom: float, top: float, colour: Colour) -> Part:
-        return Part(Shape.CYLINDER, 0.0, y, wide, wide, bottom, top, colour)
-
-    parts = (
-        *(limb(side * 0.1, 0.12, 0.0, 0.5, _TROUSERS) for side in (-1, 1)),
-        *(limb(side * 0.1, 0.17, 0.5, 0.88, _TROUSERS) for side in (-1, 1)),
-        Part(Shape.BOX, 0.0, 0.0, 0.2, 0.34, 0.84, 1.16, _SHIRT),
-        Part(Shape.BOX, 0.0, 0.0, 0.22, 0.42, 1.16, 1.42, _SHIRT),
-        *(limb(side * 0.26, 0.1, 1.1, 1.42, _SHIRT) for side in (-1, 1)),
-        *(limb(side * 0.27, 0.08, 0.76, 1.1, _SKIN) for side in (-1, 1)),
-        limb(0.0, 0.12, 1.42, 1.5, _SKIN),
-        limb(0.0, 0.18, 1.5, 1.69, _SKIN),
-        limb(0.0, 0.2, 1.69, 1.75, _HAIR),
-    )
-    return _checked(Thing(name, 'person', x, y, yaw, parts))
+    return checked(Thing(name, 'chair', x, y, yaw, (*legs, seat, back)))
 
 
 def robot(name: str, x: float, y: float, radius: float) -> Thing:
@@ -158,16 +138,16 @@ def robot(name: str, x: float, y: float, radius: float) -> Thing:
         Part(Shape.CYLINDER, 0.0, 0.0, 2.0 * radius, 2.0 * radius, 0.02, 0.32, _CASE),
         Part(Shape.CYLINDER, 0.0, 0.0, 0.1, 0.1, 0.32, 0.75, _ARM),
     )
-    return _checked(Thing(name, 'robot', x, y, 0.0, parts))
+    return checked(Thing(name, 'robot', x, y, 0.0, parts))
 
 
 def discs_of(things: Iterable[Thing]) -> boxes.Array:
-    """Return the cylinders that the lidar's plane cuts, (n, 3): centre x, y and radius, metres."""
+    """Return what is round in the lidar's plane, (n, 3): centre x, y and (mean) radius, metres."""
     rows = [
-        (*thing.at(part), part.length / 2)
+        (*thing.at(part), (part.length + part.width) / 4)
         for thing in things
         for part in thing.parts
-        if part.is_cut and part.shape == Shape.CYLINDER
+        if part.is_cut and part.shape != Shape.BOX
     ]
     return np.array(rows, dtype=float).reshape(-1, 3)
 
@@ -189,7 +169,12 @@ def boxes_of(things: Iterable[Thing]) -> boxes.Array:
     return np.array(rows, dtype=float).reshape(-1, 6)
 
 
-def _checked(thing: Thing) -> Thing:
+def checked(thing: Thing) -> Thing:
+    """Return a thing that has a name and a place.
+
+    Raises:
+        PlaceError: It has none.
+    """
     word = 'obstacle' if thing.kind == 'barrel' else thing.kind
     if not thing.name:
         raise PlaceError((), f"{word} '': expected a name")

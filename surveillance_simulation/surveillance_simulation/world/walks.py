@@ -9,7 +9,7 @@ from itertools import pairwise
 
 from surveillance_runtime.place import PlaceError
 from surveillance_runtime.place.floor_plan import Point
-from surveillance_simulation.world.things import person
+from surveillance_simulation.world.figures import person
 from surveillance_simulation.world.world import World
 
 SPEED = 1.0

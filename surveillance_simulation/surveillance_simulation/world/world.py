@@ -23,8 +23,9 @@ from surveillance_runtime.place.floor_plan import (
 )
 from surveillance_runtime.place.regions import Regions
 from surveillance_runtime.suggestions import nearest
+from surveillance_simulation.world.figures import person
 from surveillance_simulation.world.map_surface import MapSurface
-from surveillance_simulation.world.things import Thing, barrel, boxes_of, discs_of, person
+from surveillance_simulation.world.things import Thing, barrel, boxes_of, discs_of
 from surveillance_simulation.world.things import robot as robot_thing
 
 MARKER_STATES = ('whole', 'broken', 'covered', 'gone')
