@@ -46,7 +46,9 @@ def false_in_crops(finder: PersonFinder, paths: list[Path], crops: int) -> tuple
     looked, false = 0, []
     for path in paths:
         read = cv2.imread(str(path))
-        for _ in range(0 if read is None else crops):
+        if read is None:
+            continue
+        for _ in range(crops):
             rows, columns = read.shape[:2]
             high, wide = (max(1, round(each * rng.uniform(0.5, 1.0))) for each in (rows, columns))
             top, left = rng.integers(rows - high + 1), rng.integers(columns - wide + 1)
