@@ -299,7 +299,7 @@ def main() -> None:
     parser.add_argument('--keep', type=Path, help='folder for what --hosts writes')
     parser.add_argument('--live', action='store_true', help='the real programs in a simulation')
     parser.add_argument('--hours', type=float, default=1.0, help='simulated, of --live')
-    parser.add_argument('--robots', type=int, help='of --live (4) and --hosts (2)')
+    parser.add_argument('--robots', type=int, help='of --live (4), --hosts (2), --composed (8)')
     parser.add_argument('--people', type=int, default=2, help='who walk about, of --live')
     parser.add_argument('--map', type=Path, action='append', help='a place, of --live')
     words = parser.parse_args()
@@ -322,7 +322,7 @@ def main() -> None:
         if words.armor is not None:
             armor_under(10, words.armor, place)
         if words.composed is not None:
-            composed(8, words.composed, place)
+            composed(words.robots or 8, words.composed, place)
         return
     if words.live:
         from fleet_live import CONFIG, compare_places

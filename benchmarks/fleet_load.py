@@ -203,11 +203,29 @@ def armor_under(robots: int, seconds: float, place: Path) -> None:
     )
 
 
+def spread(place: Path, robots: int, folder: Path) -> Path:
+    """Return a copy of a place in which so many robots start in places far from each other.
+
+    Beside one another at the station they would leave one after the other, by one door.
+    """
+    points = read_place_file(place).plan.place.positions
+    names = sorted(points)
+    chosen = [names[number * len(names) // robots] for number in range(robots)]
+    lines = [
+        f'      robot{number + 1}: {{start: [{points[name][0]}, {points[name][1]}, 0.0]}}'
+        for number, name in enumerate(chosen)
+    ]
+    copy = folder / place.name
+    copy.write_text('\n'.join((place.read_text().rstrip(), '    robots:', *lines, '')))
+    return copy
+
+
 def composed(robots: int, seconds: float, place: Path) -> None:
     """Print how fast time goes with the stacks of so many robots, each composed in a process."""
     with tempfile.TemporaryDirectory(prefix='fleet-') as name:
         fast = ['-p', 'use_sim_time:=true', '-p', 'simulator:speed:=0.0']
-        words = ['--map', str(place), '--robots', str(robots), '--composed', *fast]
+        began_start = time.monotonic()
+        words = ['--map', str(spread(place, robots, Path(name))), '--composed', *fast]
         launched = Launched(words, Path(name))
         context = rclpy.Context()
         rclpy.init(args=[], context=context, domain_id=launched.domain)
@@ -228,10 +246,11 @@ def composed(robots: int, seconds: float, place: Path) -> None:
             while len(record) < robots and time.monotonic() < deadline:
                 time.sleep(1.0)
                 found = Path(name).glob('runs/*/*/mission.jsonl')
-                record = [each for each in found if b'"visit"' in each.read_bytes()]
+                record = [each for each in found if b'"decision"' in each.read_bytes()]
             if len(record) < robots:
                 print(launched.text)
-                print(f'only {len(record)} of {robots} robots have come to a place')
+                print(f'only {len(record)} of {robots} robots have decided')
+            started = time.monotonic() - began_start
             before = {name: cpu_seconds(each) for name, each in launched.processes.items()}
             first, began = times[-1], time.monotonic()
             time.sleep(seconds)
@@ -249,6 +268,11 @@ def composed(robots: int, seconds: float, place: Path) -> None:
     cores = os.cpu_count() or 1
     own = [share for part, share in used.items() if part.startswith('robot')]
     total = sum(used.values())
+    at_start = sum(before.values())
+    print(
+        f'all {robots} robots decided after {started:.0f} s, which took {at_start:.0f} s of '
+        f'processor time in {len(before)} processes'
+    )
     print(
         f'{place.stem}, {robots} robots composed on {cores} cores (load '
         f'{os.getloadavg()[0]:.0f}): {passed / took:.2f} simulated seconds a second with '
