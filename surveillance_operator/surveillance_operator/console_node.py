@@ -78,7 +78,8 @@ class ConsoleNode(PatrolNode):
     def robot(self) -> str:
         """The robot that is spoken to; one that is alone has no name.
 
-        One that was chosen stays chosen while it is not heard: no other gets its commands.
+        One that was chosen, or was told something, stays chosen while it is not heard, and when
+        others come: no other gets its commands.
         """
         return self._robot or self._feed.robots[0]
 
@@ -157,6 +158,7 @@ class ConsoleNode(PatrolNode):
             return self._actions.shared
         robot, known = self.robot, self._feed.robots
         if robot in known:
+            self._robot = robot
             return self._actions.of(robot)
         others = ', '.join(filter(None, known)) or 'a run with several robots'
         raise ValueError(f'robot {robot!r} is not heard: expected {others}')

@@ -9,10 +9,12 @@ import asyncio
 import contextlib
 import io
 import json
+import os
 import shutil
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -493,6 +495,21 @@ def test_the_console_commands_no_other_robot_than_the_one_that_was_named(
         assert console.ended.wait(60.0)
     assert "robot 'ana' is not heard: expected anna" in capfd.readouterr().out
     assert anna.told == [True], 'told once, by its own name'
+
+
+def test_a_robot_that_joins_takes_no_commands_from_the_one_that_is_spoken_to(
+    graph: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    receiver, sender = os.pipe()
+    with os.fdopen(receiver) as source, os.fdopen(sender, 'w'):
+        console = graph.add(ConsoleNode, console_source=source)
+        known = SimpleNamespace(robots=('bert',))
+        monkeypatch.setattr(console, '_feed', known)
+        console._actions_for('stop')
+        known.robots = ('anna', 'bert')
+        assert console.robot == 'bert'
+        monkeypatch.undo()
+        graph.remove(console)
 
 
 @pytest.mark.parametrize('name', ['rob ot', '', 'röbot', 'a' * 61, 'simulator', 'a/b'])
