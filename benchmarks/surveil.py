@@ -34,10 +34,12 @@ if str(ROOT) not in sys.path:
     sys.path.insert(0, str(ROOT))
 
 from launcher.alarm import Alarm
+from marker_detection.detector import DetectorSettings, MarkerDetector
 from surveillance_operator.notify.pipeline import notifier
 from surveillance_perception.observation.day_book import DayBook
 from surveillance_perception.observation.events import Event, EventBook
 from surveillance_perception.observation.evidence import EvidenceStore
+from surveillance_perception.observation.marker_views import SeenMarker
 from surveillance_perception.observation.observations import Kind, Observation
 from surveillance_perception.observation.persons import load_finder
 from surveillance_perception.observation.views import view_changes
@@ -546,6 +548,164 @@ def measure_views(trials: int) -> list[list[str]]:
     return rows
 
 
+# --- markers ---
+
+
+class Marked:
+    """A place with markers, and the stage that it is on."""
+
+    def __init__(self) -> None:
+        self.rng = np.random.default_rng(41)
+        self.world = read_world(ROOT / 'config' / 'patrol_world.yaml')
+        self.stage = Stage(Robot(self.world))
+        self.time = datetime(2026, 3, 2, tzinfo=UTC).timestamp()
+
+
+def measure_markers(trials: int) -> list[list[str]]:
+    """Move, remove, double or hide a marker between two looks from one viewpoint.
+
+    The peer calls a marker gone that it does not read, and moved whose picture has moved by its
+    side. A trial counts where the spot, and where it hangs then, is in view.
+    """
+    rounds = Marked()
+    world, rng = rounds.world, rounds.rng
+    camera = Camera.from_field_of_view(640, 480)
+    renderer = Renderer(world, camera)
+    detector = MarkerDetector(DetectorSettings(dictionary=world.plan.marker_dictionary))
+    places = {name: world.place_at(*_before(p.marker, 0.4)) for name, p in world.panels.items()}
+    names = sorted(name for name, place in places.items() if place is not None)
+    homes = {name: world.panels[name].marker for name in names}
+    lights = (*LIGHTS[:3], LIGHTS[5])
+    kinds = (
+        ('moved by 0.3 to 1 m', 'moved', '99 %'),
+        ('gone', 'missing', '99 %'),
+        ('double', 'double', ''),
+        ('there, in another light', '', '0'),
+        ('there, somebody stands before it', '', '0'),
+    )
+    rows = [['markers', 'aim', 'right', 'nothing said', 'wrong', 'of it gone', 'peer right']]
+    for kind, wanted, aim in kinds:
+        said: list[set[str]] = []
+        peer = 0
+        while len(said) < trials:
+            name = names[int(rng.integers(len(names)))]
+            home, place = homes[name], places[name]
+            for other in names:
+                world.hang_marker(homes[other])
+            at = _stand(rounds, home, str(place))
+            if at is None:
+                continue
+            told: list[Observation] = []
+            watcher = Watcher(
+                [rule_from({'marker': 'all'})],
+                EventBook(),
+                local=lambda stamp: datetime.fromtimestamp(stamp, UTC),
+                robot='Robot1',
+                tell=told.append,
+            )
+            watcher.arrive(str(place), rounds.time)
+            yaw = math.atan2(home.y - at[1], home.x - at[0]) + float(rng.uniform(-0.2, 0.2))
+            away = math.dist(at, (home.x, home.y))
+
+            def look(
+                light: Conditions,
+                at: tuple[float, float] = at,
+                yaw: float = yaw,
+                watcher: Watcher = watcher,
+                home: Any = home,
+                away: float = away,
+            ) -> list[SeenMarker]:
+                rounds.time += 2.0
+                x, y = at + rng.normal(0.0, 0.02, 2)
+                turned = yaw + float(rng.normal(0.0, math.radians(0.7)))
+                renderer.refresh()
+                ideal = renderer.ideal(camera_pose(x, y, HEIGHT, turned, 0.0))
+                picture = np.ascontiguousarray(expose(ideal, light, rng)[..., ::-1])
+                seen = [
+                    SeenMarker(each.marker_id, np.asarray(each.corners, float), home.size, away)
+                    for each in detector.detect(picture)
+                ]
+                watcher.picture(picture, (*at, yaw), rounds.time, seen)
+                return seen
+
+            first = [each for each in look(lights[0]) if each.number == home.id]
+            if len(first) != 1 or first[0].pixels < 12:
+                continue  # it is not in view, or so small that nobody would look from here
+            watcher.arrive('elsewhere', rounds.time)
+            rounds.time += 600.0
+            watcher.arrive(str(place), rounds.time)
+            if not _stage_marker(rounds, kind, home, at, str(place)):
+                continue
+            light = lights[int(rng.integers(len(lights)))]
+            before = len(told)
+            for _ in range(4):
+                now = [each for each in look(light) if each.number == home.id]
+            if 'person' in world.things:
+                rounds.stage.do('remove person', 0.0)
+            if f'{name} copy' in world.panels:
+                world.set_marker(f'{name} copy', 'gone')
+            if kind != 'gone' and wanted and len(now) < 1 + (wanted == 'double'):
+                continue  # where it hangs now is not in view
+            states = [e.state for e in told[before:] if e.subject == str(home.id)]
+            said.append({states[-1]} if states else set())
+            pixels = [float(np.hypot(*(each.middle - first[0].middle))) for each in now]
+            guess = 'missing' if not now else 'double' if len(now) > 1 else ''
+            if not guess and pixels[0] > first[0].pixels:
+                guess = 'moved'
+            peer += guess == wanted
+        right = sum(each == ({wanted} if wanted else set()) for each in said)
+        quiet = 0 if not wanted else sum(not each for each in said)
+        gone = sum('missing' in each and wanted != 'missing' for each in said)
+        wrong = len(said) - right - quiet
+        counts = [str(quiet), str(wrong), str(gone), part(peer, trials)]
+        rows.append([kind, aim, part(right, trials), *counts])
+    return rows
+
+
+def _before(marker: Any, away: float) -> tuple[float, float]:
+    return marker.x + away * math.cos(marker.yaw), marker.y + away * math.sin(marker.yaw)
+
+
+def _stand(rounds: Marked, marker: Any, place: str) -> tuple[float, float] | None:
+    """Return a random point from which a marker may be seen."""
+    for _ in range(50):
+        away, slant = rounds.rng.uniform(1.0, 3.0), marker.yaw + rounds.rng.uniform(-0.8, 0.8)
+        x, y = marker.x + away * math.cos(slant), marker.y + away * math.sin(slant)
+        if rounds.world.place_at(x, y) == place and rounds.world.clearance(x, y) > 0.3:
+            return x, y
+    return None
+
+
+def _stage_marker(
+    rounds: Marked, kind: str, home: Any, at: tuple[float, float], place: str
+) -> bool:
+    """Do what a trial wants; tell whether that could be."""
+    if kind.startswith(('moved', 'double')):
+        away = float(rounds.rng.uniform(0.3, 1.0)) * (1 if rounds.rng.random() < 0.5 else -1)
+        if kind == 'double':
+            away = math.copysign(max(abs(away), 0.4), away)
+        x, y = home.x - away * math.sin(home.yaw), home.y + away * math.cos(home.yaw)
+        inside = x + 0.1 * math.cos(home.yaw), y + 0.1 * math.sin(home.yaw)
+        if rounds.world.place_at(*inside) != place:
+            return False
+        state = 'copy' if kind == 'double' else 'moved'
+        rounds.stage.do(
+            f'marker {home.name} {state} {x} {y} {home.z} {math.degrees(home.yaw)}', 0.0
+        )
+        return True
+    if kind == 'gone':
+        rounds.stage.do(f'marker {home.name} gone', 0.0)
+    elif 'somebody' in kind:
+        part_of_way = float(rounds.rng.uniform(0.3, 0.8))
+        x = at[0] + part_of_way * (home.x - at[0]) + float(rounds.rng.normal(0.0, 0.1))
+        y = at[1] + part_of_way * (home.y - at[1]) + float(rounds.rng.normal(0.0, 0.1))
+        try:
+            rounds.stage.do(f'person person {x} {y} {rounds.rng.uniform(0, 360):.0f}', 0.0)
+        except ValueError:
+            return False
+    return True
+
+
 # --- real data ---
 
 
@@ -853,7 +1013,18 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument('--quick', action='store_true', help='fewer trials, below 50 s')
     parser.add_argument('--days', type=float, default=7.0, help='of the week (default: 7)')
     parser.add_argument('--shared', type=Path, help='folder with photos/ and maps/')
-    names = ('doors', 'things', 'persons', 'views', 'real', 'cpu', 'telling', 'month', 'week')
+    names = (
+        'doors',
+        'things',
+        'markers',
+        'persons',
+        'views',
+        'real',
+        'cpu',
+        'telling',
+        'month',
+        'week',
+    )
     parser.add_argument('--only', choices=names, nargs='*', help='these tables alone')
     options = parser.parse_args(argv)
     quick = options.quick
@@ -861,6 +1032,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     measures: dict[str, Callable[[], list[list[str]]]] = {
         'doors': lambda: measure_doors(12 if quick else 420),
         'things': lambda: measure_things(4 if quick else 70),
+        'markers': lambda: measure_markers(4 if quick else 100),
         'persons': lambda: measure_persons(6 if quick else 60),
         'views': lambda: measure_views(8 if quick else 60),
         'real': lambda: measure_real(shared, 40 if quick else 1000),

@@ -51,6 +51,7 @@ from surveillance_perception.observation.answers import answered
 from surveillance_perception.observation.day_book import DayBook
 from surveillance_perception.observation.events import Event, EventBook, EventState
 from surveillance_perception.observation.evidence import EvidenceStore
+from surveillance_perception.observation.marker_views import SeenMarker
 from surveillance_perception.observation.observations import Kind, Observation
 from surveillance_perception.observation.other_robots import OtherRobots
 from surveillance_perception.observation.persons import Person, load_finder
@@ -214,7 +215,7 @@ class Observer(PatrolNode):
         self._odom_in_map: PlanarPose | None = None
         self._joints: tuple[float, ...] = ()
         self._moved_at = -math.inf
-        self._seen_markers: frozenset[int] | None = None
+        self._seen_markers: tuple[SeenMarker, ...] | None = None
         self._next_picture = 0.0
         self._work: queue.Queue[Callable[[], object] | None] = queue.Queue()
         self._lidar.subscribe(self._on_scan)
@@ -404,7 +405,14 @@ class Observer(PatrolNode):
         self._joints = joints
 
     def _on_detections(self, message: MarkerDetectionArray) -> None:
-        self._seen_markers = frozenset(int(each.id) for each in message.detections)
+        found = []
+        for each in message.detections:
+            corners = np.asarray(each.corners, float).reshape(4, 2)
+            if each.confirmed and np.isfinite(corners).all():
+                side, ahead = float(each.size), float(each.pose.position.z)
+                side, ahead = (e if math.isfinite(e) and e > 0 else 0.0 for e in (side, ahead))
+                found.append(SeenMarker(int(each.id), corners, side, ahead))
+        self._seen_markers = tuple(found)
 
     def _on_markers(self, message: MarkerDetectionArray) -> None:
         stamp, frame = self._now(), message.header.frame_id.removeprefix('/')
@@ -462,7 +470,7 @@ class Observer(PatrolNode):
         serialized: bytes,
         viewpoint: Viewpoint | None,
         stamp: float,
-        markers: frozenset[int] | None,
+        markers: tuple[SeenMarker, ...] | None,
     ) -> None:
         image = image_from_ros(deserialize_message(serialized, Image), MOST_PIXELS)
         self._watcher.picture(np.asarray(image, np.uint8), viewpoint, stamp, markers)

@@ -10,7 +10,7 @@ import math
 import sys
 import time
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence, Sized
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Sized
 from dataclasses import replace
 from html import escape
 from itertools import groupby, pairwise
@@ -482,6 +482,23 @@ def _clock(seconds: float) -> str:
     return f'{minutes // 60}:{minutes % 60:02d}:{rest:02d}'
 
 
+def _write_days(
+    robots: Mapping[str, Path], day: str, write: Callable[..., Path], blur: bool
+) -> int:
+    """Write the day of each robot that has one; return 2 where none has."""
+    written, problems = [], []
+    for own in robots.values():
+        try:
+            written.append(write(own, day, blur=blur))
+        except FileError as error:
+            problems.append(str(error))
+    for path in written:
+        print(path)
+    for problem in dict.fromkeys(problems):
+        print(f'report: {problem}', file=sys.stderr)
+    return 0 if written else 2
+
+
 def main(argv: Sequence[str] | None = None) -> int:
     """Write the report of a run and say where; the exit code is 2 for bad input."""
     parser = run_parser('report', 'Writes what a mission did into one HTML file.')
@@ -499,9 +516,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         if options.day is not None:
             from surveillance_operator.day_report import write_day  # its pictures take time
 
-            for own in robots_of(folder).values():
-                print(write_day(own, options.day, blur=not options.sharp))
-            return 0
+            return _write_days(robots_of(folder), options.day, write_day, not options.sharp)
         for own in robots_of(folder).values():
             try:
                 for line in bag.repair(own / RECORDING):

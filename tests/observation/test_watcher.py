@@ -23,6 +23,8 @@ from surveillance_perception.observation.watcher import Look, Watcher
 from surveillance_perception.observation.ways import Ways
 from surveillance_runtime.place.occupancy_grid import Grid
 
+from .marked_walls import hang, wall
+
 RULES = """
 - object: none
 - door: D1
@@ -283,19 +285,56 @@ def test_a_marker_that_no_file_knows_is_unknown():
 
 def test_markers_move_and_go_missing_only_where_their_spot_was_in_view():
     watch = Round()
-    grey = np.random.default_rng(3).integers(0, 255, (60, 80), np.uint8)
-    picture = cv2.resize(grey, (320, 240))
+    empty = wall()
+    picture = empty.copy()
+    hung = hang(picture, 14, 120, 100)
     view, other = (1.0, 1.0, 0.5), (1.0, 1.0, 2.5)
     watch.watcher.marker(14, (2.0, 0.0, 1.0), 1.0)
-    watch.watcher.picture(picture, view, 1.0, frozenset({14}))
+    watch.watcher.picture(picture, view, 1.0, [hung])
     for number in range(5):
-        watch.watcher.picture(picture, other, 10.0 + number, frozenset())
+        watch.watcher.picture(wall(2), other, 10.0 + number, [])
     assert not watch.book.events
     for number in range(3):
-        watch.watcher.picture(picture, view, 20.0 + number, frozenset())
-    assert [(each.subject, each.seen) for each in watch.book.events] == [('14', 'missing')]
+        watch.watcher.picture(picture, view, 15.0 + number, [])  # it was not read, and is there
+    assert not watch.book.events
+    for number in range(3):
+        watch.watcher.picture(empty, view, 20.0 + number, [])
+    markers = [each for each in watch.book.events if each.kind == Kind.MARKER]
+    assert [(each.subject, each.seen, each.position) for each in markers] == [
+        ('14', 'missing', (2.0, 0.0))
+    ]
     watch.watcher.marker(14, (2.0, 0.5, 1.0), 60.0)
-    assert {each.seen for each in watch.book.events if each.state == EventState.OPEN} == {'moved'}
+    going_on = [each for each in watch.book.events if each.state == EventState.OPEN]
+    assert {each.seen for each in going_on if each.kind == Kind.MARKER} == {'moved'}
+
+
+def test_a_second_marker_with_an_id_is_double_until_it_is_gone():
+    watch = Round(markers={14: (2.0, 0.0, 1.0)})
+    picture = wall()
+    hung = hang(picture, 14, 120, 100)
+    both = picture.copy()
+    second = hang(both, 14, 220, 60)
+    view = (1.0, 1.0, 0.5)
+    watch.watcher.picture(picture, view, 1.0, [hung])
+    for number in range(3):
+        watch.watcher.picture(both, view, 10.0 + number, [hung, second])
+    watch.watcher.marker(14, (2.0, 0.0, 1.0), 14.0)
+    open_ = [each for each in watch.book.events if each.kind == Kind.MARKER]
+    assert [(each.seen, each.state) for each in open_] == [('double', EventState.OPEN)]
+    for number in range(4):
+        watch.watcher.picture(picture, view, 60.0 + number, [hung])
+    assert {each.state for each in watch.book.events if each.kind == Kind.MARKER} == {
+        EventState.OVER
+    }
+
+
+def test_a_marker_in_pictures_that_no_file_knows_is_unknown():
+    watch = Round(markers={14: None})
+    picture = wall()
+    strange = hang(picture, 77, 120, 100)
+    for number in range(3):
+        watch.watcher.picture(picture, None, 10.0 + number, [strange])
+    assert [(each.subject, each.seen) for each in watch.book.events] == [('77', 'unknown')]
 
 
 def walk(watch: Round, start: tuple[float, float], step: tuple[float, float], steps: int) -> None:

@@ -10,6 +10,8 @@ import numpy as np
 import pytest
 
 from surveillance_operator.day_report import write_day
+from surveillance_operator.recording.runs import LAUNCH_LOG, TIMELINE
+from surveillance_operator.report import main
 from surveillance_perception.observation import day_book
 from surveillance_perception.observation.day_book import DayBook
 from surveillance_perception.observation.events import EventBook, EventState
@@ -73,6 +75,26 @@ def test_the_newest_day_is_found_and_one_without_anything_is_one_line(run: Path)
     (run / 'observer.json').unlink()
     with pytest.raises(FileError, match='nothing was watched, expected a run with --watch'):
         write_day(run, 'last')
+
+
+def test_the_day_of_a_fleet_is_that_of_each_robot_that_watched(
+    run: Path, tmp_path_factory: pytest.TempPathFactory, capsys: pytest.CaptureFixture[str]
+) -> None:
+    fleet = tmp_path_factory.mktemp('fleet')
+    (fleet / LAUNCH_LOG).touch()
+    for name in ('robot1', 'robot2', 'robot3'):
+        (fleet / name).mkdir()
+        (fleet / name / TIMELINE).touch()
+    for name in ('robot2', 'robot3'):
+        (fleet / name / 'observer.json').write_bytes((run / 'observer.json').read_bytes())
+    assert main([str(fleet), '--day', '2026-03-02']) == 0
+    told = capsys.readouterr()
+    assert told.out.split() == [
+        str(fleet / name / 'day_2026-03-02.html') for name in ('robot2', 'robot3')
+    ]
+    assert told.err.startswith(f'report: {fleet / "robot1"}: nothing was watched')
+    assert main([str(fleet), '--day', 'monday']) == 2
+    assert "--day 'monday': expected such as 2026-03-01" in capsys.readouterr().err
 
 
 def test_the_book_of_days_is_bounded_and_comes_back(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -15,6 +15,7 @@ from typing import Any
 import cv2
 import numpy as np
 
+from surveillance_perception.observation.marker_views import SeenMarker
 from surveillance_perception.observation.views import WIDTH, Picture
 
 Box = tuple[int, int, int, int]
@@ -36,8 +37,7 @@ class ReferenceView:
         viewpoint: Where the camera was.
         picture: What it showed, at most `WIDTH` wide.
         stamp: When, seconds since 1970.
-        markers: The ids seen from it.
-        absent: In how many pictures in a row each of them was not seen.
+        markers: The markers in it by id, in its pixels. Of one that hangs twice, none.
         doors: The states of the doors nearby.
         differed: The parts that differed in the last two looks in which some did: the number of
             the look, and the boxes in the reference (left, top, width, height), pixels.
@@ -47,8 +47,7 @@ class ReferenceView:
     viewpoint: Viewpoint
     picture: Picture
     stamp: float
-    markers: frozenset[int] = frozenset()
-    absent: dict[int, int] = field(default_factory=dict)
+    markers: dict[int, SeenMarker] = field(default_factory=dict)
     doors: Mapping[str, str] = field(default_factory=dict)
     differed: list[tuple[int, list[Box]]] = field(default_factory=list)
 
@@ -105,14 +104,16 @@ class ReferenceViews:
         viewpoint: Viewpoint,
         picture: Picture,
         stamp: float,
-        markers: Iterable[int] = (),
+        markers: Iterable[SeenMarker] = (),
         doors: Mapping[str, str] | None = None,
     ) -> ReferenceView:
         """Take a picture as how this viewpoint looks normally."""
-        if picture.shape[1] > WIDTH:
+        factor = min(1.0, WIDTH / picture.shape[1])
+        if factor < 1.0:
             size = WIDTH, max(1, round(picture.shape[0] * WIDTH / picture.shape[1]))
             picture = np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_AREA), np.uint8)
-        view = ReferenceView(f'v{self._next}', viewpoint, picture, stamp, frozenset(markers))
+        view = ReferenceView(f'v{self._next}', viewpoint, picture, stamp)
+        view.markers = _once(each.scaled(factor) for each in markers)
         view.doors = dict(doors or {})
         self._next += 1
         for old in self._views[: len(self._views) + 1 - MOST_VIEWS]:
@@ -140,7 +141,7 @@ class ReferenceViews:
                 'name': each.name,
                 'viewpoint': list(each.viewpoint),
                 'stamp': each.stamp,
-                'markers': sorted(each.markers),
+                'markers': [seen.to_json() for _, seen in sorted(each.markers.items())],
                 'doors': dict(each.doors),
             }
             for each in self._views
@@ -161,8 +162,8 @@ class ReferenceViews:
             picture = self._read(name)
             if picture is not None:
                 viewpoint = tuple(map(float, each['viewpoint']))
-                markers = frozenset(map(int, each['markers']))
-                view = ReferenceView(name, viewpoint, picture, float(each['stamp']), markers)
+                view = ReferenceView(name, viewpoint, picture, float(each['stamp']))
+                view.markers = _once(map(SeenMarker.from_json, each['markers']))
                 view.doors = {
                     str(door): str(is_) for door, is_ in dict(each.get('doors', ())).items()
                 }
@@ -187,6 +188,12 @@ def _same(one: Viewpoint, other: Viewpoint) -> bool:
     near = math.dist(one[:2], other[:2]) <= SAME_VIEW[0]
     turned = (abs(math.remainder(a - b, math.tau)) for a, b in zip(one[2:], other[2:], strict=True))
     return near and all(each <= SAME_VIEW[1] for each in turned)
+
+
+def _once(markers: Iterable[SeenMarker]) -> dict[int, SeenMarker]:
+    some = list(markers)
+    numbers = [each.number for each in some]
+    return {each.number: each for each in some if numbers.count(each.number) == 1}
 
 
 def _overlap(one: Box, other: Box) -> float:

@@ -130,7 +130,7 @@ def view_changes(reference: Picture, picture: Picture) -> list[ViewChange] | Non
         before, now = grey_of(before), grey_of(now)
     if sight_of(before) != Sight.CLEAR or sight_of(now) != Sight.CLEAR:
         return None
-    onto = _registration(grey_of(before), grey_of(now))
+    onto = registration(grey_of(before), grey_of(now))
     if onto is None:
         return None
     size = (before.shape[1], before.shape[0])
@@ -204,7 +204,7 @@ def _scaled(picture: Picture) -> Picture:
     return np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_AREA), np.uint8)
 
 
-def _registration(before: Grey, now: Grey) -> npt.NDArray[Any] | None:
+def registration(before: Grey, now: Grey) -> npt.NDArray[Any] | None:
     """Return the homography that lays the new picture over the old one; None without one."""
     # Evened out, so that a dim picture has features, too.
     even = cv2.createCLAHE(3.0, (8, 8))

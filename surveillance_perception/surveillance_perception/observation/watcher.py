@@ -33,6 +33,11 @@ from surveillance_perception.observation.floor import (
     is_leaf,
 )
 from surveillance_perception.observation.habits import Habits
+from surveillance_perception.observation.marker_views import (
+    MarkerMemory,
+    SeenMarker,
+    compare_markers,
+)
 from surveillance_perception.observation.motion import WalkFinder
 from surveillance_perception.observation.observations import Kind, Observation
 from surveillance_perception.observation.other_robots import OtherRobots
@@ -65,7 +70,7 @@ OTHER_SIDES = 0.6
 SEEN_AGAIN = 10.0
 """What goes on is told again after this time, seconds."""
 AGREED_PICTURES = 3
-"""A dark or covered view, and a marker that is missing, must be so in so many pictures."""
+"""A dark or covered view, and an unknown marker, must be seen in so many pictures."""
 ONE_LOOK, SEEN_TWICE = 0.5, 0.9
 """Confidence in a changed view after one look, at most, and after two, at least."""
 WALKING = 0.8
@@ -76,10 +81,12 @@ LOOKED_SECONDS = 5.0
 """And for so long."""
 BESIDE_DOOR = 0.3
 """A point so far from a door is in the place on its side, metres."""
+MARKER_MOVED = 0.3
+"""A marker whose place was measured so far from where it hung hangs elsewhere, metres."""
+STANDS = 0.06
+"""The camera stands where it stood within this, metres and, for its joints, radians."""
 BEHIND = 0.3
 """Depth of what stands in a way, metres."""
-MARKER_MOVED = 0.3
-"""A marker seen so far from where it hung hangs elsewhere, metres."""
 
 
 @dataclass
@@ -207,6 +214,8 @@ class Watcher:
         self._last: tuple[tuple[float, float], Points] = ((0.0, 0.0), np.zeros((0, 2)))
         self._at: tuple[float, float] | None = None
         self._views = views or ReferenceViews()
+        self._marker_memory = MarkerMemory()
+        self._strange: dict[int, int] = {}
         self._sights: deque[Sight] = deque(maxlen=AGREED_PICTURES)
         self._sight: Sight | None = None
 
@@ -491,7 +500,7 @@ class Watcher:
         picture: Picture,
         viewpoint: Viewpoint | None,
         stamp: float,
-        markers: frozenset[int] | None,
+        markers: Sequence[SeenMarker] | None,
     ) -> None:
         """Take a picture.
 
@@ -500,7 +509,7 @@ class Watcher:
             viewpoint: Where the camera is: x, y in metres, then angles in radians; None while it
                 moves.
             stamp: Seconds since 1970.
-            markers: The ids seen in it; None: nobody looked for markers.
+            markers: The markers in it; None: nobody looked for markers.
         """
         grey = picture
         if picture.ndim == 3:
@@ -520,6 +529,7 @@ class Watcher:
         if sight != Sight.CLEAR:
             return
         self._look_for_persons(picture, stamp)
+        self._look_for_strange(markers or (), stamp, grey)
         if viewpoint is None:
             return
         camera = viewpoint[0], viewpoint[1]
@@ -532,8 +542,8 @@ class Watcher:
             if not self._persons:
                 self._views.add(viewpoint, picture, stamp, markers or (), doors)
             return
-        if markers is not None:
-            self._miss(known, markers, viewpoint, stamp, grey)
+        if markers is not None and not self._persons:
+            self._compare_markers(known, markers, picture, viewpoint, stamp)
         if self._persons:
             return  # it is they who change the view
         differences = view_changes(known.picture, picture)
@@ -584,28 +594,59 @@ class Watcher:
                 cv2.rectangle(shown, (left, top), (left + width, top + height), (0, 200, 0), 2)
             self._take(seen, shown)
 
-    def _miss(
+    def _look_for_strange(self, seen: Sequence[SeenMarker], stamp: float, grey: Grey) -> None:
+        """Tell of markers that no file knows, once several pictures in a row show them."""
+        if not self._known_markers:
+            return
+        numbers = {each.number for each in seen} - self._known_markers
+        self._strange = {number: self._strange.get(number, 0) + 1 for number in numbers}
+        for number, count in self._strange.items():
+            if count >= AGREED_PICTURES:
+                where = self._at
+                strange = Observation(
+                    Kind.MARKER, 'unknown', self._place, str(number), where, 0.9, stamp
+                )
+                if self._is_due(strange):
+                    self._take(strange, grey)
+
+    def _compare_markers(
         self,
         view: ReferenceView,
-        seen: frozenset[int],
+        seen: Sequence[SeenMarker],
+        picture: Picture,
         viewpoint: Viewpoint,
         stamp: float,
-        grey: Grey,
     ) -> None:
-        """Tell of markers that are in a view's reference, and in several pictures now are not."""
-        view.markers |= seen
-        for marker in seen:
-            view.absent.pop(marker, None)
-        for marker in view.markers - seen:
-            view.absent[marker] = view.absent.get(marker, 0) + 1
-            if view.absent[marker] == AGREED_PICTURES:
-                where = viewpoint[0], viewpoint[1]
-                self._take(
-                    Observation(
-                        Kind.MARKER, 'missing', self._place, str(marker), where, 0.9, stamp
-                    ),
-                    grey,
-                )
+        """Tell of the markers of a view that hang no longer as in its reference."""
+        if not view.markers and not seen:
+            return
+        known = [
+            each for each in seen if not self._known_markers or each.number in self._known_markers
+        ]
+        before = view.viewpoint
+        stands = math.dist(before[:2], viewpoint[:2]) <= STANDS and all(
+            abs(a - b) <= STANDS for a, b in zip(before[3:], viewpoint[3:], strict=True)
+        )
+        turned = math.remainder(viewpoint[2] - before[2], math.tau) if stands else math.nan
+        found = compare_markers(view.picture, view.markers, picture, known, turned)
+        if found is None:
+            return
+        for each in found:
+            if each.state == 'here' and each.number not in view.markers and each.at is not None:
+                view.markers[each.number] = each.at  # it was there, and was not read then
+        current = {e.subject: e for e in self.book.current if e.kind == Kind.MARKER}
+        memory = self._marker_memory
+        for each in memory.take(view.name, found, view.markers, self._look):
+            event = current.get(str(each.number))
+            if each.state == 'new' or (each.state == 'here' and event is None):
+                continue
+            hung = self._markers.get(each.number)
+            where = hung[:2] if hung is not None else (viewpoint[0], viewpoint[1])
+            told = Observation(
+                Kind.MARKER, each.state, self._place, str(each.number), where, 0.9, stamp
+            )
+            if self._is_due(told):
+                self._take(told, picture, view.picture)
 
     def marker(self, number: int, position: tuple[float, float, float], stamp: float) -> None:
         """Take where a marker hangs, from several pictures; map frame, metres."""
@@ -618,6 +659,12 @@ class Watcher:
             state = 'unknown'
         else:
             state = 'moved' if math.dist(hung, position) > MARKER_MOVED else 'here'
+            hangs_twice = number in self._marker_memory.elsewhere and any(
+                each.kind == Kind.MARKER and each.subject == str(number) and each.seen == 'double'
+                for each in self.book.current
+            )
+            if hangs_twice:
+                return  # either panel is where it was
         place = self._place_of(where)
         seen = Observation(Kind.MARKER, state, place, str(number), where, 0.95, stamp)
         if self._is_due(seen):
