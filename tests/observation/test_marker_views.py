@@ -29,7 +29,7 @@ def states(found) -> dict[int, str]:
 
 def test_a_marker_at_its_spot_is_there_also_from_a_little_aside(reference):
     picture, hung = reference
-    shift = np.float64([[1, 0, 6], [0, 1, -4]])
+    shift = np.array([[1, 0, 6], [0, 1, -4]], float)
     aside = np.asarray(cv2.warpAffine(picture, shift, (320, 240), borderMode=cv2.BORDER_REFLECT))
     seen = SeenMarker(14, hung[14].corners + np.array([6, -4]), 0.15)
     assert states(compare_markers(picture, hung, aside, [seen])) == {14: 'here'}

@@ -10,14 +10,13 @@ import numpy as np
 import pytest
 
 from surveillance_operator.day_report import write_day
-from surveillance_operator.recording.runs import LAUNCH_LOG, TIMELINE
 from surveillance_operator.report import main
 from surveillance_perception.observation import day_book
 from surveillance_perception.observation.day_book import DayBook
 from surveillance_perception.observation.events import EventBook, EventState
 from surveillance_perception.observation.evidence import EvidenceStore
 from surveillance_perception.observation.observations import Kind, Observation
-from surveillance_runtime.files import FileError
+from surveillance_runtime.files import LAUNCH_LOG, TIMELINE, FileError
 
 
 def at(day: int, hour: int) -> float:

@@ -18,7 +18,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from surveillance_perception.observation.views import Floats, Grey, Picture, grey_of, registration
+from surveillance_perception.observation.views import Floats, Picture, grey_of, registration
 
 Array = npt.NDArray[np.float64]
 
@@ -146,8 +146,7 @@ def compare_markers(
     if factor != 1.0:
         size = reference.shape[1], reference.shape[0]
         picture = np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_AREA), np.uint8)
-    before, now_grey = grey_of(reference), grey_of(picture)
-    onto = registration(before, now_grey)
+    onto = registration(grey_of(reference), grey_of(picture))
     if onto is None:
         onto = _turned_onto(hung, turned)
     if onto is None:
