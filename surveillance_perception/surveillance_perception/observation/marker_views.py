@@ -232,12 +232,13 @@ class _Laid:
         """Tell whether a marker's spot is in view and shows something else."""
         if spot.pixels < LEAST_SIDE:
             return False
-        ring = self._between(spot, INNER, OUTER)
         whole = self._between(spot, 0.0, OUTER)
         # All of it has to be in both pictures.
         if not _is_inside(spot, OUTER, self.covered.shape) or not self.covered[whole].all():
             return False
-        return self._surrounded_as_before(ring) and not self._shows_nearby(spot)
+        # On each of its sides: somebody may stand before it who is narrower than what surrounds it.
+        sides = self._sides(spot)
+        return all(map(self._looks_as_before, sides)) and not self._shows_nearby(spot)
 
     def is_new(self, seen: SeenMarker) -> bool:
         """Tell whether the reference shows something else where a marker is read now."""
@@ -264,7 +265,18 @@ class _Laid:
                 cv2.fillConvexPoly(mask, corners, value)
         return np.asarray(mask == 1, np.bool_)
 
-    def _surrounded_as_before(self, ring: npt.NDArray[np.bool_]) -> bool:
+    def _sides(self, spot: SeenMarker) -> list[npt.NDArray[np.bool_]]:
+        """Return what lies above, below and beside a spot, (rows, columns) each."""
+        inner, outer = _grown(spot, INNER), _grown(spot, OUTER)
+        sides = []
+        for first, second in ((0, 1), (1, 2), (2, 3), (3, 0)):
+            mask = np.zeros(self.covered.shape, np.uint8)
+            around = np.array([inner[first], inner[second], outer[second], outer[first]])
+            cv2.fillConvexPoly(mask, np.round(around).astype(np.int32), 1)
+            sides.append(np.asarray(mask == 1, np.bool_))
+        return sides
+
+    def _looks_as_before(self, ring: npt.NDArray[np.bool_]) -> bool:
         rows, columns = np.nonzero(ring)
         before = self.before[rows, columns]
         best = 0.0
