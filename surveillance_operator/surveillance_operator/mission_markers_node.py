@@ -59,9 +59,10 @@ class MissionMarkers(PatrolNode):
 
     def _work(self) -> None:
         drawn, due = None, 0.0
+        made: dict[tuple[str, int], Marker] = {}
         while not self.stopping.wait(PERIOD):
             snapshot = self._feed.see()
-            self._markers.publish(markers_of(snapshot, self.get_clock().now().to_msg()))
+            self._markers.publish(markers_of(snapshot, self.get_clock().now().to_msg(), made))
             if snapshot.trail is not drawn and time.monotonic() >= due:
                 drawn, due = snapshot.trail, time.monotonic() + PATH_PERIOD
                 self._driven.publish(path_of(snapshot, self.get_clock().now().to_msg()))
@@ -85,35 +86,47 @@ def silent_of(snapshot: Snapshot) -> list[DiagnosticStatus]:
     ]
 
 
-def markers_of(snapshot: Snapshot, stamp: Any) -> MarkerArray:
+def markers_of(
+    snapshot: Snapshot, stamp: Any, made: dict[tuple[str, int], Marker] | None = None
+) -> MarkerArray:
     """Return places and doors as markers in the map frame.
 
     A place's colour goes from `FRESH` to `LATE` as its wait comes near the threshold. A robot that
     has a namespace has its name above it.
+
+    Args:
+        snapshot: What is known.
+        stamp: Of the markers.
+        made: Markers of an earlier message, to be used again: making them costs most of it.
     """
+    made = {} if made is None else made
     found = [Marker(action=Marker.DELETEALL)]
     threshold = snapshot.threshold or 120.0
     for number, (name, (x, y)) in enumerate(sorted(snapshot.positions.items())):
         visited = snapshot.visited_at.get(name) or None
         share = 1.0 if visited is None else min(1.0, max(0.0, (snapshot.now - visited) / threshold))
         mixed = [a + share * (b - a) for a, b in zip(FRESH, LATE, strict=True)]
-        disc = _marker('places', number, Marker.CYLINDER, (x, y, 0.02), (0.8, 0.8, 0.04), mixed)
+        disc = _marker(
+            made, 'places', number, Marker.CYLINDER, (x, y, 0.02), (0.8, 0.8, 0.04), mixed
+        )
         urgent = URGENT_MARK if name in snapshot.urgent else ''
         label = _marker(
-            'names', number, Marker.TEXT_VIEW_FACING, (x, y, 0.4), (0, 0, 0.5), (1, 1, 1)
+            made, 'names', number, Marker.TEXT_VIEW_FACING, (x, y, 0.4), (0, 0, 0.5), (1, 1, 1)
         )
         label.text = name + urgent
         found += [disc, label]
     for number, (name, line) in enumerate(sorted(snapshot.door_lines.items())):
         is_open = (snapshot.doors or {}).get(name, True)
         colour = (0.04, 0.5, 0.35) if is_open else (0.7, 0.07, 0.17)
-        door = _marker('doors', number, Marker.LINE_LIST, (0, 0, 0.1), (0.12, 0, 0), colour)
+        door = _marker(made, 'doors', number, Marker.LINE_LIST, (0, 0, 0.1), (0.12, 0, 0), colour)
         door.text = name
         door.points = [Point(x=line[0], y=line[1]), Point(x=line[2], y=line[3])]
         found.append(door)
     if snapshot.namespace and snapshot.pose is not None:
         x, y, _ = snapshot.pose
-        own = _marker('robots', 0, Marker.TEXT_VIEW_FACING, (x, y, 0.8), (0, 0, 0.5), (1, 0.9, 0.4))
+        own = _marker(
+            made, 'robots', 0, Marker.TEXT_VIEW_FACING, (x, y, 0.8), (0, 0, 0.5), (1, 0.9, 0.4)
+        )
         own.text = snapshot.namespace.rpartition('/')[2]
         found.append(own)
     for each in found:
@@ -133,6 +146,7 @@ def path_of(snapshot: Snapshot, stamp: Any) -> Path:
 
 
 def _marker(
+    made: dict[tuple[str, int], Marker],
     namespace: str,
     number: int,
     kind: int,
@@ -140,7 +154,10 @@ def _marker(
     size: Sequence[float],
     colour: Sequence[float],
 ) -> Marker:
-    marker = Marker(ns=namespace, id=number, type=kind, action=Marker.ADD)
+    marker = made.get((namespace, number))
+    if marker is None:
+        marker = made[namespace, number] = Marker(ns=namespace, id=number, action=Marker.ADD)
+    marker.type = kind
     position, scale = marker.pose.position, marker.scale
     position.x, position.y, position.z = map(float, at)
     scale.x, scale.y, scale.z = map(float, size)
