@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from enum import StrEnum
 from typing import Protocol
 
 from patrol_policy.promises import Promise
@@ -197,6 +198,15 @@ class Doubt:
     look_from: Point | None = None
 
 
+class Side(StrEnum):
+    """Where the arm points."""
+
+    FRONT = 'front'
+    LEFT = 'left'
+    BACK = 'back'
+    RIGHT = 'right'
+
+
 class Looking(Protocol):
     """Who knows from where a place is to be looked at, and moves the robot there."""
 
@@ -216,7 +226,10 @@ class Looking(Protocol):
         """Drive to a point in the same place."""
 
     def turn(self, interrupt: Interrupt) -> None:
-        """Turn the arm to each of its sides, or the base once around."""
+        """Turn the base once around."""
+
+    def point_arm(self, side: Side, interrupt: Interrupt) -> None:
+        """Point the arm to a side."""
 
 
 class Announcer(Protocol):

@@ -10,7 +10,7 @@ import state_machines as fsm
 from state_machines import Interrupt
 from state_machines.exceptions import CallError, CallInterruptedError
 from surveillance_behaviour.machines import MACHINES
-from surveillance_behaviour.ports import Doubt, Point
+from surveillance_behaviour.ports import Doubt, Point, Side
 
 from .machine_runs import settings
 from .scripted_world import World
@@ -26,6 +26,8 @@ class ScriptedLooking:
         self.driven: list[tuple[float, Point]] = []
         self.turns: list[float] = []
         self.fails = False
+        self.arm = False
+        self.sides: list[tuple[str, Side]] = []
 
     def viewpoints(self, place: str) -> Sequence[Point]:
         return self.points.get(place, [])
@@ -37,7 +39,12 @@ class ScriptedLooking:
         return self.world.at
 
     def has_arm(self) -> bool:
-        return False
+        return self.arm
+
+    def point_arm(self, side: Side, interrupt: Interrupt) -> None:
+        if not self.world.clock.sleep(2.0, interrupt):
+            raise CallInterruptedError
+        self.sides.append((self.world.place, side))
 
     def drive(self, point: Point, interrupt: Interrupt) -> None:
         if self.fails:
@@ -87,6 +94,43 @@ def test_a_short_stay_leaves_no_time_to_look():
     run.until(150.0)
     assert not run.looking.driven
     assert not run.looking.turns
+
+
+@pytest.mark.parametrize(
+    ('seconds', 'first'),
+    [
+        (8.0, []),
+        (12.0, [Side.LEFT, Side.FRONT]),
+        (18.0, [Side.LEFT, Side.BACK, Side.FRONT]),
+        (40.0, [Side.LEFT, Side.BACK, Side.RIGHT, Side.FRONT]),
+    ],
+)
+def test_the_arm_looks_at_as_many_sides_as_the_time_allows_in_one_sweep(seconds, first):
+    run = Watched('surveillance', exploration_seconds=seconds)
+    run.looking.arm = True
+    run.until(300.0)
+    place = run.world.arrivals[0][1]
+    assert [side for where, side in run.looking.sides if where == place][: len(first)] == first
+
+
+def test_sides_that_one_visit_left_out_are_looked_at_in_the_next():
+    run = Watched('surveillance', exploration_seconds=12.0)
+    run.looking.arm = True
+    run.until(900.0)
+    by_place: dict[str, list[Side]] = {}
+    for place, side in run.looking.sides:
+        if side != Side.FRONT:
+            by_place.setdefault(place, []).append(side)
+    often = max(by_place.values(), key=len)
+    assert often[:3] == [Side.LEFT, Side.BACK, Side.RIGHT]
+
+
+def test_where_time_is_short_the_viewpoint_that_shows_most_comes_first():
+    run = Watched('surveillance', exploration_seconds=11.5)
+    far, near = (13.0, 8.0, 0.0), (10.6, 8.0, 0.0)
+    run.looking.points = {'C1': [far, near]}
+    run.until(200.0)
+    assert run.looking.driven[0][1] == far
 
 
 def test_the_robot_stays_at_its_station():

@@ -59,6 +59,7 @@ EVENTS: Mapping[str, tuple[str, ...]] = {
     'map': ('places',),
     'exploring': ('place', 'seconds'),
     'viewpoint': ('place', 'point'),
+    'look': ('place', 'sides', 'left_out'),
     'verify': ('place', 'number', 'found'),
     'visit': ('place', 'distance'),
     'decision': ('place', 'rule', 'reason'),

@@ -16,7 +16,7 @@ from std_msgs.msg import String
 
 from state_machines import Interrupt
 from state_machines.ros import CallError, GoalCaller, ServiceCaller
-from surveillance_behaviour.ports import Doubt, Point
+from surveillance_behaviour.ports import Doubt, Point, Side
 from surveillance_behaviour.ros_adapters.peers import Deadlines, MissionClock, run
 from surveillance_interfaces.action import ComputePath, Control, FollowPath
 from surveillance_interfaces.srv import MarkerRoutine
@@ -31,14 +31,12 @@ from surveillance_runtime.state_topics import StateSubscription
 
 ARM_DEADLINE = 60.0
 """Within which the arm is at a pose, seconds of real time."""
-DWELL = 4.5
-"""Seconds at each pose of the arm: two pictures of the observer."""
-POSES = (
-    MarkerRoutine.Request.LEFT,
-    MarkerRoutine.Request.BACK,
-    MarkerRoutine.Request.RIGHT,
-    MarkerRoutine.Request.HOME,
-)
+POSES = {
+    Side.LEFT: MarkerRoutine.Request.LEFT,
+    Side.BACK: MarkerRoutine.Request.BACK,
+    Side.RIGHT: MarkerRoutine.Request.RIGHT,
+    Side.FRONT: MarkerRoutine.Request.HOME,
+}
 
 
 class RosLooking:
@@ -84,22 +82,20 @@ class RosLooking:
         run(self._follower, request, limits.answer, limits.move, interrupt)
 
     def turn(self, interrupt: Interrupt) -> None:
-        """Turn the arm to each of its sides, or the base once around."""
+        """Turn the base once around."""
+        limits, here = self._deadlines, self._position
+        goal = Control.Goal(point_set=point_messages([here] if here is not None else []))
+        run(self._turner, goal, limits.answer, limits.move, interrupt)
+
+    def point_arm(self, side: Side, interrupt: Interrupt) -> None:
+        """Point the arm to a side."""
         limits = self._deadlines
-        if not self.has_arm():
-            here = self._position
-            goal = Control.Goal(point_set=point_messages([here] if here is not None else []))
-            run(self._turner, goal, limits.answer, limits.move, interrupt)
-            return
-        for pose in POSES:
-            request = MarkerRoutine.Request(pos=pose)
-            answer = self._arm.call(
-                request, limits.move or ARM_DEADLINE, interrupt, discovery=limits.answer
-            )
-            if not answer.success:
-                raise CallError(f'{self._arm.name}: {answer.message}')
-            if pose != POSES[-1] and not self._clock.sleep(DWELL, interrupt):
-                return
+        request = MarkerRoutine.Request(pos=POSES[side])
+        answer = self._arm.call(
+            request, limits.move or ARM_DEADLINE, interrupt, discovery=limits.answer
+        )
+        if not answer.success:
+            raise CallError(f'{self._arm.name}: {answer.message}')
 
     def _on_viewpoints(self, message: String) -> None:
         told = _read(self._node, 'viewpoints', message.data, dict)
