@@ -129,6 +129,22 @@ def test_robots_of_other_namespaces_appear_and_go(
     graph.until(lambda: watcher.feed.snapshot.others.keys() == {'a/b'})
 
 
+def test_who_leaves_a_mission_hears_nothing_more(
+    graph: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A fleet's page leaves robots that go: their topics would come in for ever."""
+    monkeypatch.setattr(mission_feed, 'LOOK_PERIOD', 0.05)
+    watcher = graph.add(Watcher)
+    publisher = graph.node.create_publisher(PoseWithCovarianceStamped, 'amcl_pose', STATE_QOS)
+    publisher.publish(pose(1.0, 0.0))
+    graph.until(lambda: watcher.feed.snapshot.pose == (1.0, 0.0, 0.0))
+    watcher.feed.leave()
+    graph.until(lambda: publisher.get_subscription_count() == 0)
+    assert graph.node.count_subscribers('battery_level') == 0
+    publisher.publish(pose(2.0, 0.0))
+    assert watcher.feed.snapshot.pose == (1.0, 0.0, 0.0)
+
+
 def test_the_progress_of_a_scan_ends_with_its_goal() -> None:
     """The page said `view 4 of 7` for the rest of the mission."""
     feedback = ScanSurroundings.Impl.FeedbackMessage()

@@ -33,6 +33,11 @@ def test_axioms_come_and_go(rooms: Ask) -> None:
     assert rooms('QUERY AXIOMS', 'R1').queried_objects == []
 
 
+def test_a_name_whose_prefix_nobody_declared_is_an_iri(rooms: Ask) -> None:
+    assert rooms('ADD AXIOM', 'Individual: urn:hall Types: ROOM').error_description == ''
+    assert '<urn:hall>' in rooms('QUERY IND CLASS', 'ROOM').queried_objects
+
+
 def test_rules_come_and_go(rooms: Ask) -> None:
     rule = 'ROOM(?r), visitedAt(?r, ?t), greaterThan(?t, 5) -> Visited(?r)'
     before = rooms('QUERY RULES').queried_objects

@@ -73,6 +73,10 @@ def text(value: str) -> Literal:
     return Literal(value, XSD + 'string')
 
 
+def uri(value: str) -> Literal:
+    return Literal(value, XSD + 'anyURI')
+
+
 @pytest.mark.parametrize(
     ('name', 'arguments', 'expected'),
     [
@@ -85,6 +89,8 @@ def text(value: str) -> Literal:
         ('substringAfter', (Literal('15', XSD + 'integer'), text('5')), []),
         ('resolveURI', (text('../c'), text('http://x/a/b/d')), ['http://x/a/c']),
         ('resolveURI', (text('c'), text('no base')), []),
+        ('resolveURI', (uri('../c'), uri('http://x/a/b/d')), ['http://x/a/c']),
+        ('resolveURI', (Literal('2020-02-29', XSD + 'date'), uri('http://x/a')), []),
         ('divide', (Literal('1', XSD + 'integer'), Literal('4', XSD + 'integer')), ['0.25']),
         ('divide', (Literal('1', XSD + 'integer'), Literal('0', XSD + 'integer')), []),
     ],

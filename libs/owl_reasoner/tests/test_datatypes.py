@@ -74,6 +74,42 @@ def test_what_is_outside_the_lexical_space_is_in_no_datatype(text: str, datatype
         assert not values.contains(literal)
 
 
+@pytest.mark.parametrize(
+    ('datatype', 'least', 'most'),
+    [
+        ('byte', -128, 127),
+        ('short', -32_768, 32_767),
+        ('int', -2_147_483_648, 2_147_483_647),
+        ('long', -9_223_372_036_854_775_808, 9_223_372_036_854_775_807),
+        ('unsignedByte', 0, 255),
+        ('unsignedShort', 0, 65_535),
+        ('unsignedInt', 0, 4_294_967_295),
+        ('unsignedLong', 0, 18_446_744_073_709_551_615),
+        ('positiveInteger', 1, None),
+        ('nonNegativeInteger', 0, None),
+        ('negativeInteger', None, -1),
+        ('nonPositiveInteger', None, 0),
+    ],
+)
+def test_whole_numbers_have_the_bounds_of_xml_schema(
+    datatype: str, least: int | None, most: int | None
+) -> None:
+    """XML Schema 1.1, part 2, section 3.4."""
+    values = value_set(XSD + datatype)
+    assert values is not None
+    for bound, step in ((least, -1), (most, 1)):
+        if bound is not None:
+            assert values.contains(value(str(bound), 'integer'))
+            assert not values.contains(value(str(bound + step), 'integer'))
+
+
+def test_a_time_stamp_without_a_zone_is_no_moment_at_all() -> None:
+    moments = value_set(XSD + 'dateTime')
+    assert moments is not None
+    assert moments.contains(value('2000-01-01T00:00:00Z', 'dateTimeStamp'))
+    assert not moments.contains(value('2000-01-01T00:00:00', 'dateTimeStamp'))
+
+
 def test_binary_values_are_octets() -> None:
     assert value('0aff', 'hexBinary') == value(' 0AFF\n', 'hexBinary')
     assert value('0 A E =', 'base64Binary') == value('0AE=', 'base64Binary')
