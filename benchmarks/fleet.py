@@ -9,7 +9,9 @@ are left out. Robots drive 0.6 m/s and spend 2 s in each place they enter.
 - killed: one robot stops after four rounds; the longest wait from then on over tour / (k - 1).
   Beside it stands 2 (k - 1) / k: on one tour the places that the lost robot was about to visit were
   visited one gap before, and the next robot is one gap away
-- charging: batteries that last four rounds and charge for half a round, a dock for four
+- charging: batteries that last four rounds and charge for half a round, a dock for four; the
+  longest wait over the bound of `patrol_policy.fleet.charging_bound`, which knows the charging, and
+  over what the same fleet could keep without batteries
 
 ========= =========================================================================================
 shared    the library's `fleet.choose`
@@ -48,6 +50,7 @@ from patrol import EXPLORATION_SECONDS, SPEED, random_graph
 from tables import table
 
 from patrol_policy.fleet.assignment import FleetChoice, FleetRobot, FleetSettings, choose
+from patrol_policy.fleet.charging_bound import PROVEN_UP_TO, charging_wait
 from patrol_policy.fleet.partition import FleetPlan, exact_wait, fleet_plan
 from patrol_policy.fleet.simulation import (
     FleetBattery,
@@ -62,7 +65,7 @@ from patrol_policy.patrolling_sim import read_patrolling_sim
 
 TEAMS = (2, 4, 8)
 ROUNDS, LEFT_OUT, KILLED_AFTER = 8.0, 3.0, 4.0
-PROVEN_UP_TO = 10
+RUN, CHARGE = 4.0, 0.5
 PLACE = Path(__file__).resolve().parents[1] / 'config' / 'office.yaml'
 SEED = 1
 
@@ -146,8 +149,8 @@ def compare(maps: Iterable[tuple[str, PatrolGraph]]) -> None:
     names = ['shared', 'cyclic', 'partition', 'CR', 'SEBS']
     steady = [['longest / (tour / k)', 'places', 'k', 'plan', 'optimum', *names]]
     killed = [['killed: / (tour / (k-1))', 'k', '2(k-1)/k', *names]]
-    charged = [['charging', 'k', 'longest / (tour / k)', 'longest / bound']]
-    charged[0] += ['stranded', 'charges', 'docks']
+    charged = [['charging / (tour / k)', 'k', 'plan', 'bound', 'longest', 'longest / bound']]
+    charged[0] += ['without', 'stranded', 'charges', 'docks']
     ratios: list[float] = []
     proven: list[float] = []
     behind: list[str] = []
@@ -205,16 +208,18 @@ def charging(graph: PatrolGraph, team: int) -> list[str]:
         graph,
         starts(graph, team),
         settings=FleetSettings(docks=docks),
-        battery=FleetBattery(4.0 * tour, 0.5 * tour),
+        battery=FleetBattery(RUN * tour, CHARGE * tour),
     )
     run.until(3.0 * ROUNDS * tour)
-    wait = run.longest(LEFT_OUT * tour)
-    # While one charges, and that is so often, the others cannot do better than their own plan.
-    away = math.ceil(team * 0.5 / (4.0 + 0.5) - 1e-9)
-    bound = fleet_plan(graph, team - away).wait if team > away else math.inf
+    wait, even = run.longest(LEFT_OUT * tour), tour / team
+    bound = charging_wait(graph, team, docks, RUN * tour, CHARGE * tour)
+    planned = fleet_plan(graph, team, docks=docks).wait * (1.0 + CHARGE / RUN)
     return [
-        f'{wait / (tour / team):.3f}',
+        f'{planned / even:.3f}',
+        f'{bound / even:.3f}',
+        f'{wait / even:.3f}',
         f'{wait / bound:.3f}',
+        f'{fleet_plan(graph, team).wait / even:.3f}',
         *(f'{run.strandings}', f'{len(run.charges)}', f'{len(docks)}'),
     ]
 

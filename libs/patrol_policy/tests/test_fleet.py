@@ -22,6 +22,7 @@ from patrol_policy.fleet import (
     exact_wait,
     fleet_plan,
 )
+from patrol_policy.fleet.charging_bound import charging_wait
 from patrol_policy.fleet.simulation import FleetBattery, FleetPatrol, Outage
 from patrol_policy.graph import PatrolGraph, graph_of_places
 
@@ -202,6 +203,30 @@ def test_robots_that_charge_keep_their_distances(count: int) -> None:
     assert run.longest(800.0) <= 1.03 * 120.0 * 1.2 / count
     assert run.strandings == 0
     assert {robot for robot, *_ in run.charges} == set(run.starts)
+
+
+@pytest.mark.parametrize('count', [1, 2, 4, 7])
+def test_no_patrol_is_below_the_bound_with_charging(count: int) -> None:
+    graph = random_map(3, 7)
+    tour = graph.tour.length
+    bound = charging_wait(graph, count, ['P0'], 4.0 * tour, 0.5 * tour)
+    plan = fleet_plan(graph, count, docks=['P0']).wait
+    assert exact_wait(graph, count) <= bound <= 1.126 * plan
+    run = FleetPatrol(
+        graph,
+        {f'robot{n}': 'P0' for n in range(count)},
+        settings=FleetSettings(docks=('P0',)),
+        battery=FleetBattery(4.0 * tour, 0.5 * tour),
+    )
+    run.until(12.0 * tour)
+    assert run.longest(3.0 * tour) >= 0.999 * bound
+    assert run.strandings == 0
+
+
+def test_one_robots_bound_is_its_round_with_the_charge() -> None:
+    for places in (8, 12):
+        bound = charging_wait(ring(places), 1, ['P03'], 500.0, 100.0)
+        assert bound == pytest.approx(10.0 * places * 1.2, rel=1e-3)
 
 
 def test_each_tour_leads_through_a_dock_where_robots_charge() -> None:

@@ -207,7 +207,7 @@ def exact_wait(graph: PatrolGraph, robots: int) -> float:
     count = len(graph.places)
     if count > EXACT_UP_TO:
         raise ValueError(f'a map of {count} places: expected at most {EXACT_UP_TO}')
-    lengths = _lengths_of_sets(graph.distances)
+    lengths = lengths_of_sets(graph.distances)
     full = (1 << count) - 1
     best = np.full((robots + 1, full + 1), np.inf)
     best[:, 0] = 0.0
@@ -229,7 +229,7 @@ def exact_wait(graph: PatrolGraph, robots: int) -> float:
     return float(best[robots, full])
 
 
-def _lengths_of_sets(distances: NDArray[np.float64]) -> NDArray[np.float64]:
+def lengths_of_sets(distances: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the length of the shortest closed tour through each set of places, by bits.
 
     Ways begin at the lowest place of their set, so that each set is looked at once.
@@ -303,11 +303,11 @@ def _through_a_dock(
     return np.insert(stretch, leg + 1, docks[dock])
 
 
-def _detours(
+def detours(
     distances: NDArray[np.float64], order: NDArray[np.intp], docks: NDArray[np.intp]
 ) -> NDArray[np.float64]:
     """Return the seconds by which a dock makes each stretch longer, shape (n, n), in the rows
-    and columns of `_closed_lengths`.
+    and columns of `closed_lengths`.
     """
     count = len(order)
     # From each place of the order by a dock to each other one, less the way between them.
@@ -346,9 +346,9 @@ def _cut(
     best: list[NDArray[np.intp]] = [order]
     for opening in np.linspace(0, count, openings, endpoint=False).astype(int):
         turned = np.roll(order, -int(opening))
-        closed = _closed_lengths(distances, turned)
+        closed = closed_lengths(distances, turned)
         if len(docks):
-            closed = closed + _detours(distances, turned, docks)
+            closed = closed + detours(distances, turned, docks)
         if (found := _stretches(closed, high * (1.0 - 1e-4), robots, alone)) is None:
             continue
         low = 0.0
@@ -366,7 +366,7 @@ def _cut(
     return best
 
 
-def _closed_lengths(distances: NDArray[np.float64], order: NDArray[np.intp]) -> NDArray[np.float64]:
+def closed_lengths(distances: NDArray[np.float64], order: NDArray[np.intp]) -> NDArray[np.float64]:
     """Return the closed length of each stretch from row to column, shape (n, n); inf below."""
     along = np.concatenate([[0.0], np.cumsum(distances[order[:-1], order[1:]])])
     back = distances[np.ix_(order, order)].T
