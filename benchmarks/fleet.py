@@ -12,6 +12,9 @@ are left out. Robots drive 0.6 m/s and spend 2 s in each place they enter.
 - charging: batteries that last four rounds and charge for half a round, a dock for four; the
   longest wait over the bound of `patrol_policy.fleet.charging_bound`, which knows the charging, and
   over what the same fleet could keep without batteries
+- with rules (URGENT, CORRIDOR, ROOM; a corridor has three ways or more), a threshold of one round,
+  no batteries: no place that is entered only when it is URGENT can wait less than the threshold, so
+  the bound is the longer of that and the plan
 
 ========= =========================================================================================
 shared    the library's `fleet.choose`
@@ -49,9 +52,11 @@ from pathlib import Path
 from patrol import EXPLORATION_SECONDS, SPEED, random_graph
 from tables import table
 
+from patrol_policy.decision import DecisionSettings, Rules
 from patrol_policy.fleet.assignment import FleetChoice, FleetRobot, FleetSettings, choose
 from patrol_policy.fleet.charging_bound import PROVEN_UP_TO, charging_wait
 from patrol_policy.fleet.partition import FleetPlan, exact_wait, fleet_plan
+from patrol_policy.fleet.ruled import ruled
 from patrol_policy.fleet.simulation import (
     FleetBattery,
     FleetPatrol,
@@ -67,6 +72,7 @@ TEAMS = (2, 4, 8)
 ROUNDS, LEFT_OUT, KILLED_AFTER = 8.0, 3.0, 4.0
 RUN, CHARGE = 4.0, 0.5
 PLACE = Path(__file__).resolve().parents[1] / 'config' / 'office.yaml'
+RULED_UP_TO = 20
 SEED = 1
 
 
@@ -151,6 +157,7 @@ def compare(maps: Iterable[tuple[str, PatrolGraph]]) -> None:
     killed = [['killed: / (tour / (k-1))', 'k', '2(k-1)/k', *names]]
     charged = [['charging / (tour / k)', 'k', 'plan', 'bound', 'longest', 'longest / bound']]
     charged[0] += ['without', 'stranded', 'charges', 'docks']
+    with_rules = [['with rules', 'k', 'longest / bound', 'robots stood still']]
     ratios: list[float] = []
     proven: list[float] = []
     behind: list[str] = []
@@ -190,7 +197,9 @@ def compare(maps: Iterable[tuple[str, PatrolGraph]]) -> None:
                 + [f'{kills[policy]:.3f}' for policy in names]
             )
             charged.append([name, f'{team}', *charging(graph, team)])
-    for rows in (steady, killed, charged):
+            if len(graph.places) <= RULED_UP_TO and team < len(graph.places):
+                with_rules.append([name, f'{team}', *within_rules(graph, team)])
+    for rows in (steady, killed, charged, with_rules):
         print(table(rows), end='\n\n', flush=True)
     print(f'shared over tour / k: worst {max(ratios):.3f} of {len(ratios)}')
     if proven:
@@ -222,6 +231,22 @@ def charging(graph: PatrolGraph, team: int) -> list[str]:
         f'{fleet_plan(graph, team).wait / even:.3f}',
         *(f'{run.strandings}', f'{len(run.charges)}', f'{len(docks)}'),
     ]
+
+
+def within_rules(graph: PatrolGraph, team: int) -> list[str]:
+    """Return the row of a patrol whose robots keep the rules."""
+    tour = graph.tour.length
+    classes = {
+        place: frozenset({'ROOM', 'CORRIDOR'} if len(ways) > 2 else {'ROOM'})
+        for place, ways in graph.leg_seconds.items()
+    }
+    settings = DecisionSettings(rules=Rules(('URGENT', 'CORRIDOR', 'ROOM')))
+    policy = ruled(classes, dict.fromkeys(graph.places, tour), settings)
+    run = FleetPatrol(graph, starts(graph, team), policy)
+    run.until(ROUNDS * tour)
+    stood = sum(choice.until is not None for _, _, choice in run.decisions)
+    wait, bound = run.longest(LEFT_OUT * tour), max(tour, fleet_plan(graph, team).wait)
+    return [f'{wait / bound:.3f}', f'{stood / len(run.decisions):.0%} of decisions']
 
 
 def scale(places: int, team: int) -> None:

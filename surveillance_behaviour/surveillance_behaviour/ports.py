@@ -125,6 +125,15 @@ class Reasoner(Protocol):
         """Return whether another robot of the fleet charges where this one is."""
         return False
 
+    def charge_is_over(self, now: float) -> bool:
+        """Return whether the robot may go on though its battery is not full: a fleet's charges in
+        passing have their time.
+
+        Args:
+            now: Seconds on the mission's clock.
+        """
+        return False
+
     def send_to_charge(self, why: str) -> None:
         """Have the robot charge before anything else."""
         return

@@ -116,6 +116,7 @@ class WorldModel:
         self._cut_off = False
         self._wanted: tuple[str, float] = ('', 0.0)
         self._waits = False
+        self._charge_until: float | None = None
         self.experience = experience or Experience()
         self.place = ''
         self.places: frozenset[str] = frozenset()
@@ -448,6 +449,7 @@ class WorldModel:
             frozenset(world.openings.closed),
             self.places,
             self._rules,
+            self._fleet_waits(world),
         )
         if about == self._told_about:
             return
@@ -459,6 +461,13 @@ class WorldModel:
         if any(self._told.get(place, '') != verdict for place, verdict in told.items()):
             self._told = {**self._told, **told}
             self._tell(summary(found))
+
+    def _fleet_waits(self, world: World) -> tuple[str, ...]:
+        """Return what the fleet keeps, so roughly that only a changed plan changes it."""
+        if world.fleet is None:
+            return ()
+        found = world.fleet.waits(world.now)
+        return tuple(f'{place} {wait:.1g}' for place, wait in sorted(found.items()))
 
     def _check_rules(self, interrupt: Interrupt) -> None:
         """Say which class of the rules no place can ever be in."""
@@ -530,7 +539,13 @@ class WorldModel:
         self._target = decision.target
         if decision.rule == RECHARGE and not self.experience.sent_to_charge:
             why = why_charge(world, battery, self.settings)
-            # A charge that was planned is a charge: it goes on until it is enough.
+            # A charge that was planned is a charge: it goes on until it is enough; one in passing
+            # until its time is over.
+            in_passing = not why and decision.slot is not None and decision.place == world.place
+            self._charge_until = None
+            if in_passing and decision.slot is not None:
+                approach = battery.approaches.get(decision.place, 0.0)
+                self._charge_until = decision.slot.end + approach
             if why or not battery.charged_enough(self.settings.battery):
                 self.experience.sent_to_charge = why or decision.reason.partition(';')[0]
         if world.contradiction:
@@ -636,6 +651,14 @@ class WorldModel:
             return False
         return bool(self._at_dock(self.place))
 
+    def charge_is_over(self, now: float) -> bool:
+        """Return whether a charge in passing has had its time, and the battery asks for none."""
+        world = self.world
+        if world is None or self._charge_until is None or now < self._charge_until:
+            return False
+        battery = replace(self.battery(), sent_to_charge='')
+        return not why_charge(world, battery, self.settings)
+
     def _charge_facts(self, world: World, dock: str | None) -> dict[str, float | None]:
         """Return what the others must know of this robot's battery."""
         battery, limits = self.battery(), self.settings.battery
@@ -731,6 +754,7 @@ class WorldModel:
     def charged(self) -> None:
         """Note that the robot has been charged."""
         self.experience.sent_to_charge = ''
+        self._charge_until = None
         self._leg = None
         if self.fleet is not None:
             now = self.experience.now or (self.world.now if self.world is not None else 0.0)
@@ -738,6 +762,7 @@ class WorldModel:
 
     def send_to_charge(self, why: str) -> None:
         """Have the robot charge before anything else."""
+        self._charge_until = None
         self.experience.sent_to_charge = why
 
     def route_round(self, start: str, goal: str) -> tuple[str, ...]:

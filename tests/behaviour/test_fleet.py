@@ -326,3 +326,35 @@ def test_visits_that_no_clock_has_reached_are_not_believed() -> None:
     facts = FleetFacts(FleetRobot('robot2', 'C1'), Intention('robot2', 'C1'), visits)
     assert without_future(facts, 102.0).visits == {'R1': 90.0}
     assert without_future(facts, 86_502.0) is facts
+
+
+def test_a_charge_in_passing_keeps_the_share_and_has_its_time() -> None:
+    air, (first, second) = patrol(2)
+    for robot in (first, second):
+        robot.fleet.settings = FleetSettings(docks=('E',))
+    air.run(40.0)
+    model, now = first.model, air.now
+    share = first.fleet.own.robot.share
+    assert share is not None
+    tour = share.tour
+    for step in range(60):  # 0.1 % a second
+        model.experience.draw.observe(now - 60.0 + step, 90.0 - step // 10)
+    first.world.set_level(60.0)
+    first.world.is_in = first.going = 'E'
+    model.arrived('E', now)
+    first.fleet.tell(share=Share(tour, 'E'))
+    model.decide(now, NOBODY)  # Now all know what its battery needs.
+    first.fleet.tell(share=Share(tour, 'E'))
+    decision = model.decide(now + 1.0, NOBODY)
+    assert (decision.rule, decision.place) == ('recharge', 'E')
+    assert 'charging in passing at E' in decision.reason
+    assert decision.slot is not None
+    own = second.fleet.outlook(model.graph, now).robots[0]
+    assert own.dock == 'E'
+    assert own.share == Share(tour, tour[(tour.index('E') + 1) % len(tour)])
+    assert not model.charge_is_over(now + 2.0)
+    assert model.why_charge()
+    assert model.charge_is_over(decision.slot.end + 60.0)
+    model.charged()
+    assert model.why_charge() == ''
+    assert second.fleet.outlook(model.graph, now).robots[0].share == own.share

@@ -2,22 +2,28 @@
 
 `promises` is a pure function of what is known when a decision is made. It follows the plan of the
 policy `tour` from where the robot is until it repeats itself, so what it says is what comes, as
-long as legs, doors and battery stay as they are.
+long as legs, doors and battery stay as they are. In a fleet it counts all robots that have a share,
+their charging included: how long a place waits follows from its group's tour.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from patrol_policy.battery import Battery, Energy
 from patrol_policy.decision import (
+    URGENT,
     DecisionSettings,
+    classes_of,
     energy_of,
     stations_within_reach,
     world_with_charge,
 )
+from patrol_policy.fleet.assignment import FleetOutlook
+from patrol_policy.fleet.ruled import ruled
+from patrol_policy.fleet.simulation import FleetBattery, FleetPatrol, FleetPolicy
 from patrol_policy.plan import plan_of
 from patrol_policy.world import World
 
@@ -27,6 +33,8 @@ SLIGHTLY = 1.25
 """What waits up to so many thresholds is late by little: drives are not that exact."""
 MOST_NAMES = 8
 """So many places are named of those of which the same is said."""
+MOST_REHEARSED = 400
+"""A fleet's patrol is rehearsed for so many decisions at most, about a second's work."""
 ROUNDING = 0.05
 """Seconds by which a wait may be above the threshold and counts as within it."""
 
@@ -70,7 +78,12 @@ def promises(
     waits: dict[str, float] = {}
     missed: frozenset[str] = frozenset()
     cut, proven = '', False
-    if settings.policy == 'tour' and world.place in asked.graph.index:
+    by = ''
+    if world.fleet is not None:
+        waits = fleet_waits(world, settings, energy)
+        cut, by = 'no robot has it in its share', f' by one of {world.fleet.team(world.now)} robots'
+        proven = True
+    elif settings.policy == 'tour' and world.place in asked.graph.index:
         plan = plan_of(asked, energy)
         waits = dict(zip(plan.places, plan.settled_waits(), strict=True))
         cut = plan.cut or 'none of the ways that were looked at leads there'
@@ -88,7 +101,7 @@ def promises(
             found.append(Promise(place, CLOSED, threshold, math.inf, words))
         elif never:
             found.append(Promise(place, NEVER, threshold, math.inf, f'{place}: {never}'))
-        elif math.isinf(wait) and proven:
+        elif math.isinf(wait) and proven and (world.fleet is None or place in waits):
             words = (
                 f'{place}: never visited, as the rules always have other places before it, and it '
                 'never becomes URGENT'
@@ -99,8 +112,69 @@ def promises(
             words = f'{place}: it is not known when it is visited, {why}'
             found.append(Promise(place, UNKNOWN, threshold, wait, words))
         else:
-            found.append(_timely(place, wait, threshold, world))
+            found.append(_timely(place, wait, threshold, world, by))
     return tuple(found)
+
+
+def fleet_waits(
+    world: World, settings: DecisionSettings, energy: Energy | None = None
+) -> dict[str, float]:
+    """Return how long each place waits at the latest when a fleet has it, seconds.
+
+    Where the rules let every robot enter every place, robots pass each place of a group at equal
+    distances in time. Else what follows from the rules is rehearsed: all robots decide in simulated
+    time as they would, from where they are. Where that takes too many decisions a place waits
+    until it is URGENT, and for a whole round of the robot that has it then. inf: for ever.
+    """
+    fleet, graph = world.fleet, world.graph
+    assert fleet is not None
+    waits = fleet.waits(world.now)
+    classes = {place: classes_of(world, place) - {URGENT} for place in fleet.graph.places}
+    rules = [name for name in settings.rules.classes if name != URGENT]
+    rank = {
+        place: min((rules.index(name) for name in found if name in rules), default=len(rules))
+        for place, found in classes.items()
+    }
+    if len(set(rank.values())) < 2 or not waits:
+        return waits
+    is_urgent = URGENT in settings.rules.classes
+    thresholds = {
+        place: world.threshold_of(place) if is_urgent else math.inf for place in fleet.graph.places
+    }
+    team = fleet.team(world.now)
+    tour = fleet.graph.tour.length
+    longest = max((limit for limit in thresholds.values() if math.isfinite(limit)), default=0.0)
+    begin = longest + tour
+    if team * len(graph.places) * 3.0 * begin <= MOST_REHEARSED * tour:
+        return _rehearsed(fleet, ruled(classes, thresholds, settings), begin, world.now, energy)
+    first = min(rank.values())
+    return {
+        place: wait if rank[place] == first and not is_urgent else thresholds[place] + team * wait
+        for place, wait in waits.items()
+    }
+
+
+def _rehearsed(
+    fleet: FleetOutlook, policy: FleetPolicy, begin: float, now: float, energy: Energy | None
+) -> dict[str, float]:
+    """Return how long each place waits when the robots decide by a policy, seconds."""
+    docks = tuple(dock for dock in fleet.settings.docks if dock in fleet.graph.index)
+    battery = None
+    if energy is not None and docks and fleet.settings.charge_ratio > 0.0:
+        run = max(1.0, (energy.full - min(energy.least)) / energy.draw)
+        battery = FleetBattery(run, run * fleet.settings.charge_ratio)
+    sharing = fleet.sharing(now)
+    patrol = FleetPatrol(
+        fleet.graph,
+        {robot.name: robot.place for robot in fleet.robots if robot.name in sharing},
+        policy,
+        replace(fleet.settings, docks=docks),
+        battery=battery,
+    )
+    patrol.until(3.0 * begin)
+    waits = patrol.longest_waits(begin)
+    seen = {place for at, _, place in patrol.visits if at >= begin}
+    return {place: wait if place in seen else math.inf for place, wait in waits.items()}
 
 
 def _end_of_stretch(place: str, world: World) -> str:
@@ -114,9 +188,9 @@ def _end_of_stretch(place: str, world: World) -> str:
     return f'it closes in {closes:.0f} s'
 
 
-def _timely(place: str, wait: float, threshold: float, world: World) -> Promise:
+def _timely(place: str, wait: float, threshold: float, world: World, by: str) -> Promise:
     """Return the promise for a place that is visited again and again."""
-    hours = ' while it is open' if place in world.openings.windows else ''
+    hours = by + (' while it is open' if place in world.openings.windows else '')
     if world.openings.has_quiet:
         hours += ' outside the quiet hours'
     if wait <= threshold + ROUNDING:

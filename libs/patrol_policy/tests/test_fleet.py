@@ -10,9 +10,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from patrol_policy.battery import Battery
+from patrol_policy.decision import DecisionSettings, Rules
 from patrol_policy.fleet import (
     ChargeNeed,
     FleetError,
+    FleetOutlook,
     FleetRobot,
     FleetSettings,
     Share,
@@ -23,10 +26,13 @@ from patrol_policy.fleet import (
     fleet_plan,
 )
 from patrol_policy.fleet.charging_bound import charging_wait
+from patrol_policy.fleet.ruled import ruled
 from patrol_policy.fleet.simulation import FleetBattery, FleetPatrol, Outage
 from patrol_policy.graph import PatrolGraph, graph_of_places
+from patrol_policy.promises import promises
+from patrol_policy.world import World
 
-from .worlds import seven_rooms
+from .worlds import seven_rooms, world
 
 
 def far_wings(places: int = 4) -> PatrolGraph:
@@ -266,3 +272,62 @@ def test_what_does_not_fit_is_named() -> None:
         assign(graph, fleet('P00') * 2, 0.0)
     with pytest.raises(ValueError, match='a plan for 0 robots: expected at least 1'):
         fleet_plan(graph, 0)
+
+
+def fleet_world(robots: list[FleetRobot], **changes: object) -> World:
+    """Return the seven rooms as the first of some robots knows them."""
+    corridors = {'C1', 'C2', 'E'}
+    graph = seven_rooms()
+    return world(
+        now=0.0,
+        place=robots[0].place,
+        graph=graph,
+        threshold=40.0,
+        classes={
+            place: frozenset({'ROOM', 'CORRIDOR'} if place in corridors else {'ROOM'})
+            for place in graph.places
+        },
+        fleet=FleetOutlook(robots[0].name, robots, graph, FleetSettings(docks=('E',))),
+        **changes,
+    )
+
+
+def test_promises_count_all_robots_and_their_charging() -> None:
+    settings = DecisionSettings(rules=Rules(()))
+    places = ('E', 'R1', 'R4')
+
+    def waits(robots: list[FleetRobot], ratio: float = 0.0) -> set[float]:
+        seen = fleet_world(robots)
+        assert seen.fleet is not None
+        changed = replace(seen.fleet.settings, charge_ratio=ratio)
+        seen = replace(seen, fleet=replace(seen.fleet, settings=changed))
+        return {each.wait for each in promises(seen, Battery(), settings)}
+
+    for count in (1, 3):
+        robots = fleet(*places[:count])
+        assert max(waits(robots)) == pytest.approx(fleet_plan(seven_rooms(), count).wait)
+    robots = [replace(robot, runs_until=900.0) for robot in fleet(*places)]
+    found = fleet_plan(seven_rooms(), 3, docks=['E']).wait
+    assert max(waits(robots, 0.25)) == pytest.approx(1.25 * found)
+    robots[1] = replace(robots[1], taken_out=True)
+    seen = fleet_world(robots[:2])
+    words = [each.words for each in promises(seen, Battery(), settings)]
+    assert all('by one of 1 robots' in each for each in words)
+
+
+def test_a_fleets_promise_knows_the_rules() -> None:
+    robots = fleet('E', 'R4')
+    settings = DecisionSettings(rules=Rules(('URGENT', 'CORRIDOR', 'ROOM')))
+    seen = fleet_world(robots)
+    found = {each.place: each for each in promises(seen, Battery(), settings)}
+    # A room is entered when it is URGENT, not before.
+    assert 40.0 < found['R1'].wait < 40.0 + seven_rooms().tour.length
+    classes = {place: kinds - {'URGENT'} for place, kinds in seen.classes.items()}
+    policy = ruled(classes, dict.fromkeys(classes, 40.0), settings)
+    run = FleetPatrol(seven_rooms(), {'robot1': 'E', 'robot2': 'R4'}, policy)
+    run.until(900.0)
+    for place, wait in run.longest_waits(300.0).items():
+        assert wait <= 1.1 * found[place].wait
+    never = DecisionSettings(rules=Rules(('CORRIDOR', 'ROOM')))
+    found = {each.place: each for each in promises(seen, Battery(), never)}
+    assert (found['R1'].verdict, found['C2'].verdict) == ('never', 'within')

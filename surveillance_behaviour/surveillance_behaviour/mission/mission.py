@@ -369,7 +369,9 @@ class Mission:
     def charged_enough(self) -> bool:
         """Return whether the robot may leave the station."""
         battery = Battery(self.battery.level, self.battery.low)
-        return battery.charged_enough(self.settings.choice.battery)
+        if battery.charged_enough(self.settings.choice.battery):
+            return True
+        return self.ports.reasoner.charge_is_over(self.now())
 
     def now(self) -> float:
         """Return the seconds on the mission's clock."""

@@ -4,7 +4,8 @@
 - `assignment`: `choose(graph, robots, name, now)`, what one robot does next, and why;
 - `traffic`: `right_of_way`, who goes first through what is too narrow for two;
 - `docks`: slots at the docks that do not overlap;
-- `simulation`: a fleet in simulated time.
+- `simulation`: a fleet in simulated time; `ruled`: how it decides where rules hold;
+- `charging_bound`: what robots that charge cannot beat.
 """
 
 from __future__ import annotations

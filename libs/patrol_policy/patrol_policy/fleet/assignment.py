@@ -105,19 +105,47 @@ class FleetOutlook:
         Raises:
             FleetError: The facts do not fit together.
         """
-        near = [robot for robot in self.robots if robot.place in self.graph.index]
-        stops = self.graph.index.keys()
-        # A share of another map counts for nothing.
-        near = [
-            robot
-            if robot.share is None or set(robot.share.tour) <= stops
-            else replace(robot, share=None)
-            for robot in near
-        ]
-        docks = tuple(dock for dock in self.settings.docks if dock in stops)
-        near = [robot if robot.dock in docks else replace(robot, dock=None) for robot in near]
-        settings = replace(self.settings, docks=docks)
+        near, settings = self._of_this_map()
         return choose(self.graph, near, self.name, now, settings, visited_at)
+
+    def waits(self, now: float) -> dict[str, float]:
+        """Return the seconds from robot to robot in each place, once all are equally spaced.
+
+        Charging as planned is part of it. A place that no robot has is missing.
+
+        Raises:
+            FleetError: The facts do not fit together.
+        """
+        near, settings = self._of_this_map()
+        plan = assign(self.graph, near, now, settings).plan
+        found: dict[str, float] = {}
+        for group in plan.groups if plan is not None else ():
+            for stop in group.stops:
+                found[stop] = min(group.wait, found.get(stop, math.inf))
+        return found
+
+    def sharing(self, now: float) -> frozenset[str]:
+        """Return the names of the robots that have a share."""
+        near, settings = self._of_this_map()
+        return frozenset(assign(self.graph, near, now, settings).shares)
+
+    def team(self, now: float) -> int:
+        """Return how many robots have a share."""
+        return len(self.sharing(now))
+
+    def _of_this_map(self) -> tuple[list[FleetRobot], FleetSettings]:
+        """Return the robots that doors join with this one, and the docks that are on the map."""
+        stops = self.graph.index.keys()
+        docks = tuple(dock for dock in self.settings.docks if dock in stops)
+        near = []
+        for robot in self.robots:
+            if robot.place not in stops:
+                continue
+            # A share of another map counts for nothing.
+            if robot.share is not None and not set(robot.share.tour) <= stops:
+                robot = replace(robot, share=None)
+            near.append(robot if robot.dock in docks else replace(robot, dock=None))
+        return near, replace(self.settings, docks=docks)
 
 
 @dataclass(frozen=True)
