@@ -331,3 +331,36 @@ def test_a_fleets_promise_knows_the_rules() -> None:
     never = DecisionSettings(rules=Rules(('CORRIDOR', 'ROOM')))
     found = {each.place: each for each in promises(seen, Battery(), never)}
     assert (found['R1'].verdict, found['C2'].verdict) == ('never', 'within')
+
+
+@pytest.mark.parametrize('count', [1, 2, 4])
+def test_with_rules_no_place_waits_for_ever(count: int) -> None:
+    """A corridor of three, and rooms that only rooms lead to."""
+    points = {'C1': (0, 0), 'C2': (5, 0), 'C3': (10, 0), 'R1': (0, 5), 'R2': (0, 10), 'R3': (10, 5)}
+    doors = [('C1', 'C2'), ('C2', 'C3'), ('C1', 'R1'), ('R1', 'R2'), ('C3', 'R3')]
+    ways: dict[str, list[str]] = {name: [] for name in points}
+    for one, other in doors:
+        ways[one].append(other)
+        ways[other].append(one)
+    graph = graph_of_places(ways, points, exploration_seconds=2.0)
+    classes = {
+        place: frozenset({'ROOM', 'CORRIDOR'} if place[0] == 'C' else {'ROOM'}) for place in points
+    }
+    settings = DecisionSettings(rules=Rules(('URGENT', 'CORRIDOR', 'ROOM')))
+    policy = ruled(classes, dict.fromkeys(points, 120.0), settings)
+    run = FleetPatrol(graph, {f'robot{n}': 'C1' for n in range(count)}, policy)
+    run.until(2000.0)
+    assert run.longest(400.0) < 120.0 + 2.0 * graph.tour.length
+
+
+def test_two_at_one_stop_do_not_leave_it_to_each_other() -> None:
+    """Of one that is there and one that is about to arrive, exactly one has the stop."""
+    graph, tour = ring(12), fleet_plan(ring(12), 1).groups[0].stops
+    stop, before, earlier = tour[6], tour[5], tour[4]
+    there = FleetRobot('robot1', before, since=50.0, heard_at=60.0, share=Share(tour, stop))
+    for place, since in ((earlier, 40.0), (before, 50.0), (before, 55.0)):
+        other = FleetRobot('robot2', place, since=since, heard_at=60.0, share=Share(tour, stop))
+        own = [
+            stop in choose(graph, [there, other], name, 60.0).mine for name in ('robot1', 'robot2')
+        ]
+        assert own == [True, False]
