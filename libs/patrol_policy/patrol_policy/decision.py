@@ -306,12 +306,12 @@ def _shared(
     own = {p: limit if p in mine else math.inf for p, limit in world.own_thresholds.items()}
     rule, allowed = settings.rules.candidates(replace(within, classes=classes, own_thresholds=own))
     goal, graph = choice.place, world.graph
-    if rule != URGENT and (far := _cut_off_by_rules(world, fleet, choice.share, mine, settings)):
+    if rule != URGENT and (far := _overdue(world, fleet, choice.share, settings)):
         common['share'] = Share(choice.share.tour, far)
         step = graph.route(here, far)[0]
         reason = (
-            f'{far} is mine and URGENT ({world.wait_in_words(far)}), and the rules let nobody '
-            f'through to it otherwise'
+            f'{far} is overdue ({world.wait_in_words(far)}): by the rules no robot of its group '
+            f'came to it'
         )
         return Decision(**common, place=step, target=far, rule=SHARE, reason=reason)
     # It stays where the rules would have it go; but as others pass stops over and overtake it again
@@ -348,25 +348,20 @@ def _shared(
     return Decision(**common, place=best, target=best, rule=rule, reason=reason, scores=scores)
 
 
-def _cut_off_by_rules(
-    world: World,
-    fleet: FleetOutlook,
-    share: Share,
-    mine: frozenset[str],
-    settings: DecisionSettings,
-) -> str:
-    """Return a stop of the robot's own that has been URGENT for a whole tour; empty: none.
+def _overdue(world: World, fleet: FleetOutlook, share: Share, settings: DecisionSettings) -> str:
+    """Return a stop of the robot's group that has been URGENT for a whole tour; empty: none.
 
-    The way to it leads through places that are never URGENT, since other robots visit them, nor
-    of the class whose turn it is. A robot that is alone finds them URGENT some time.
+    The way to it may lead through places that are never URGENT, since other robots visit them, nor
+    of the class whose turn it is; a robot that is alone would find them URGENT some time. Or two
+    robots that arrive by turns left it to each other.
     """
     if URGENT not in settings.rules.classes:
         return ''
     late = fleet.graph.tour.length
     for stop in _onward(share):
-        if stop not in mine or stop == world.place or stop not in world.graph.index:
+        if stop == world.place or stop not in world.graph.index or is_closed(world, stop):
             continue
-        if world.unvisited(stop) > world.threshold_of(stop) + late and not is_closed(world, stop):
+        if world.unvisited(stop) > world.threshold_of(stop) + late:
             return stop
     return ''
 

@@ -353,14 +353,16 @@ def test_with_rules_no_place_waits_for_ever(count: int) -> None:
     assert run.longest(400.0) < 120.0 + 2.0 * graph.tour.length
 
 
-def test_two_at_one_stop_do_not_leave_it_to_each_other() -> None:
-    """Of one that is there and one that is about to arrive, exactly one has the stop."""
-    graph, tour = ring(12), fleet_plan(ring(12), 1).groups[0].stops
-    stop, before, earlier = tour[6], tour[5], tour[4]
-    there = FleetRobot('robot1', before, since=50.0, heard_at=60.0, share=Share(tour, stop))
-    for place, since in ((earlier, 40.0), (before, 50.0), (before, 55.0)):
-        other = FleetRobot('robot2', place, since=since, heard_at=60.0, share=Share(tour, stop))
-        own = [
-            stop in choose(graph, [there, other], name, 60.0).mine for name in ('robot1', 'robot2')
-        ]
-        assert own == [True, False]
+def test_what_two_leave_to_each_other_is_visited_when_it_is_overdue() -> None:
+    graph = random_map(1, 10)
+    classes = {
+        place: frozenset({'ROOM', 'CORRIDOR'} if len(ways) > 2 else {'ROOM'})
+        for place, ways in graph.leg_seconds.items()
+    }
+    tour = graph.tour.length
+    settings = DecisionSettings(rules=Rules(('URGENT', 'CORRIDOR', 'ROOM')))
+    for count in (3, 6):
+        policy = ruled(classes, dict.fromkeys(classes, tour), settings)
+        run = FleetPatrol(graph, {f'robot{n}': 'P0' for n in range(count)}, policy)
+        run.until(8.0 * tour)
+        assert run.longest(2.0 * tour) < 3.0 * tour

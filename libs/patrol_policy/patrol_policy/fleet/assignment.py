@@ -286,7 +286,7 @@ def choose(
     group = _group(assignment, share)
     reached = share.stop == me.place
     onward = _next(group, share.stop) if reached else share
-    mine = _mine(graph, group, assignment, robots, me, onward)
+    mine = _mine(group, assignment, robots, me, onward)
     slot, leave = _slot(graph, robots, me, onward.stop, now, settings, assignment)
     if _charges_in_passing(group, robots, me, reached, settings):
         # A stop of known length: what is missing beyond it is made up for little by little.
@@ -544,7 +544,6 @@ def _next(group: Group, stop: str) -> Share:
 
 
 def _mine(
-    graph: PatrolGraph,
     group: Group,
     assignment: Assignment,
     robots: Sequence[FleetRobot],
@@ -553,21 +552,17 @@ def _mine(
 ) -> frozenset[str]:
     """Return the stops that no other robot of the group comes to before this one.
 
-    Of robots with the same stop it is the nearest one's, then that of the first by name. (Who came
-    to its place first would change with each that arrives, and both would leave it to the other.)
+    Of robots with the same stop it is that of the one that is in its place the longest. That
+    changes with each that arrives: what both leave to the other `decision` finds overdue.
     """
-    at = graph.index[onward.stop]
-    away = {
-        robot.name: (float(graph.distances[graph.index[robot.place], at]), robot.name)
-        for robot in robots
-    }
+    since = {robot.name: (robot.since, robot.name) for robot in robots}
     here, length = group.position[onward.stop], len(group.stops)
     gap = length
     for name, share in assignment.shares.items():
         if name == me.name or share.tour != group.stops:
             continue
         ahead = (group.position[share.stop] - here) % length
-        if ahead == 0 and away[me.name] < away[name]:
+        if ahead == 0 and since[me.name] < since[name]:
             continue
         gap = min(gap, ahead)
     return frozenset(group.stops[(here + step) % length] for step in range(gap))
