@@ -81,10 +81,18 @@ class SeenMarker:
         return replace(self, corners=self.corners * factor)
 
     def away_from(self, other: SeenMarker) -> float:
-        """Return how far it is from another one of the same size, metres; 0 within its spot."""
+        """Return how far it is from another one on the same wall, metres; 0 within its spot.
+
+        The other one's square tells how metres of the wall look, also from aside.
+        """
         pixels = float(np.hypot(*(self.middle - other.middle)))
         side = other.side or self.side
-        return 0.0 if pixels < NEAR * other.pixels else pixels / other.pixels * side
+        if pixels < NEAR * other.pixels or not side:
+            return 0.0
+        square = np.array([[0, 0], [side, 0], [side, side], [0, side]], np.float32)
+        onto_wall = cv2.getPerspectiveTransform(other.corners.astype(np.float32), square)
+        (where,) = cv2.perspectiveTransform(self.middle[None, None], onto_wall)[0]
+        return float(np.hypot(*(where - side / 2)))
 
     def to_json(self) -> list[Any]:
         """Return it as plain values."""
