@@ -48,8 +48,8 @@ def speak(robots: int) -> None:
     from sensor_msgs.msg import LaserScan
     from std_msgs.msg import Bool, UInt8
 
-    from surveillance_behaviour.ros_adapters.fleet_topic import FLEET_QOS
     from surveillance_interfaces.msg import Decision, FleetRobot, MissionStatus
+    from surveillance_runtime.fleet_messages import FLEET_QOS
     from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
 
     rclpy.init(args=[])

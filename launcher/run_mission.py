@@ -121,7 +121,8 @@ def run_mission(
     if run.network:
         log.say('nodes of other machines are heard: see docs/security.md')
     log.say(f'watch it in a second terminal: {watch_command(run)}')
-    if robots := [part.robot for part in team if part.robot]:
+    robots = [part.robot for part in team if part.robot]
+    if robots:
         layout = folder / 'fleet.rviz'
         usual = (config / 'mission.rviz').read_text(encoding='utf-8')
         layout.write_text(fleet_layout(usual, robots, run.namespace), encoding='utf-8')
@@ -131,7 +132,7 @@ def run_mission(
         from surveillance_ontology.patrol_ontology import ROBOT
         from surveillance_operator.notify.pipeline import notifier
 
-        robot = (run.namespace or '').strip('/') or ROBOT
+        robot = (run.namespace or '').strip('/') or ('fleet' if robots else ROBOT)
         outbox, tell = notifier(run.notify, folder, robot, log.warn)
     alarm = Alarm(caller(run.alarm, log, tell or (lambda _: None)), folder)
     log.listen(alarm.hear)

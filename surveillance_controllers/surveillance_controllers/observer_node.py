@@ -68,6 +68,7 @@ from surveillance_runtime.conversions import (
     stamp_of_serialized,
 )
 from surveillance_runtime.files import FileError, KeptFile
+from surveillance_runtime.fleet_messages import hear_fleet
 from surveillance_runtime.incidents import Severity
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.parameters import ParameterError, parameter
@@ -237,9 +238,7 @@ class Observer(PatrolNode):
                 Image, 'camera/rgb/image_raw', self._on_image, SENSOR_QOS, raw=True
             )
         # The names of the fleet's other robots; a robot that is alone hears nothing there.
-        self.create_subscription(
-            FleetRobot, 'fleet_robots', self._on_fleet, QoSProfile(depth=MOST_WAITING)
-        )
+        hear_fleet(self, self._on_fleet, MOST_WAITING)
         self.create_service(ConsoleCommand, 'observer/command', self._on_command)
         self.create_timer(ASSESS_PERIOD, lambda: self._later(self._assess))
         self.create_timer(KEEP_PERIOD, lambda: self._later(self._keep))

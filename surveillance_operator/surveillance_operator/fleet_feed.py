@@ -12,9 +12,9 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable, Sequence
 
-from surveillance_behaviour.ros_adapters.fleet_topic import FLEET_TOPIC
 from surveillance_operator.mission_feed import LOOK_PERIOD, MissionFeed
 from surveillance_operator.snapshot import Change, Snapshot
+from surveillance_runtime.fleet_messages import FLEET_TOPIC
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.place.fleet import problem_in_robot_name
 from surveillance_runtime.place_changes import TOPIC as PLACE_TOPIC

@@ -24,7 +24,6 @@ from rosgraph_msgs.msg import Clock as ClockMessage
 
 from armor_service.facts import ShortFact
 from state_machines.ros import CallError, ServiceCaller
-from surveillance_behaviour.ros_adapters.fleet_topic import FLEET_TOPIC
 from surveillance_interfaces.srv import ReferenceName, RoomPosition
 from surveillance_ontology.armor_client import ArmorClient, FactSubscription
 from surveillance_ontology.patrol_ontology import CONNECTIONS, PLACES, URGENT_PLACES, VISITS
@@ -43,6 +42,7 @@ from surveillance_operator.topics import (
 )
 from surveillance_runtime.conversions import clean_texts, pose_from, seconds_of
 from surveillance_runtime.diagnostics import STALE_AFTER
+from surveillance_runtime.fleet_messages import FLEET_TOPIC
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.node_table import name_for
 from surveillance_runtime.place.floor_plan import Door

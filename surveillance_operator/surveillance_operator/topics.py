@@ -26,7 +26,6 @@ from std_msgs.msg import Bool, String, UInt8
 
 from armor_service.facts import ShortFact, parse_fact
 from surveillance_behaviour.conversions import decision_from, promises_from
-from surveillance_behaviour.ros_adapters.fleet_topic import FLEET_TOPIC
 from surveillance_interfaces.action import Control, FollowPath, ScanSurroundings
 from surveillance_interfaces.msg import (
     Decision,
@@ -52,6 +51,7 @@ from surveillance_operator.snapshot import (
     Transition,
 )
 from surveillance_runtime.conversions import map_from, points_from_cloud, pose_from, seconds_of
+from surveillance_runtime.fleet_messages import FLEET_TOPIC
 from surveillance_runtime.node_table import BY_NAME
 from surveillance_runtime.qos import STATE_QOS
 from surveillance_runtime.robot_arm import ARM

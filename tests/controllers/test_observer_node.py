@@ -18,6 +18,7 @@ from surveillance_controllers.observer_node import Observer
 from surveillance_interfaces.msg import FleetRobot, RobotPlace
 from surveillance_interfaces.srv import ConsoleCommand
 from surveillance_runtime.incidents import Cause
+from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
 
 WATCH = 'rules:\n  nothing new:\n    object: none\n    places: [R1]\n'
@@ -107,7 +108,8 @@ def test_a_box_is_told_with_a_picture_and_a_person_calls_it_normal(graph, tmp_pa
 
 def test_it_hears_of_the_other_robots_of_its_fleet_and_where_they_are(graph):
     node = graph.add(Observer, {'camera': False})
-    fleet = graph.node.create_publisher(FleetRobot, 'fleet_robots', 10)
+    bert = graph.add(PatrolNode, name='robot_behavior', namespace='b')
+    fleet = bert.create_publisher(FleetRobot, '/fleet_robots', 10)
     poses = graph.node.create_publisher(PoseWithCovarianceStamped, 'b/amcl_pose', STATE_QOS)
     pose = PoseWithCovarianceStamped()
     pose.pose.pose.position.x, pose.pose.pose.position.y = 4.0, 1.0

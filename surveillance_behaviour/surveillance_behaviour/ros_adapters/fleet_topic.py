@@ -1,4 +1,4 @@
-"""The topic `fleet_robots`, on which the robots of a fleet tell each other their facts."""
+"""What the robots of a fleet tell each other on `fleet_robots`, and what is believed of it."""
 
 from __future__ import annotations
 
@@ -6,22 +6,14 @@ import math
 import time
 from dataclasses import dataclass, replace
 
-from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
-
 from patrol_policy.fleet import FleetRobot, FleetSettings, Intention, Layout, Share
 from surveillance_behaviour.fleet import FleetFacts, FleetKnowledge
 from surveillance_interfaces.msg import FleetRobot as FleetRobotMessage
+from surveillance_runtime.fleet_messages import FLEET_QOS, FLEET_TOPIC, hear_fleet
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.parameters import parameter
 from surveillance_runtime.state_topics import AHEAD, AHEAD_SIMULATED
 
-FLEET_TOPIC = 'fleet_robots'
-FLEET_QOS = QoSProfile(
-    depth=200,
-    reliability=ReliabilityPolicy.RELIABLE,
-    durability=DurabilityPolicy.VOLATILE,
-)
-"""Not latched: what a robot said last is repeated each second, and a late joiner soon hears it."""
 REPEAT = 1.0
 """Seconds of the mission's time between two signs of life."""
 MOST_STOPS = 10_000
@@ -116,7 +108,7 @@ def fleet_of(node: PatrolNode, robot: str, docks: tuple[str, ...]) -> FleetKnowl
         told.clear()
         told.update(standing)
 
-    node.create_subscription(FleetRobotMessage, FLEET_TOPIC, on_message, FLEET_QOS)
+    hear_fleet(node, on_message)
     node.create_timer(REPEAT, on_period)
     return knowledge
 
