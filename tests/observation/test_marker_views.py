@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import cv2
 import numpy as np
 import pytest
@@ -64,6 +66,15 @@ def test_a_marker_is_moved_from_0_3_m_on_and_double_where_both_are_read(referenc
     both = picture.copy()
     second = hang(both, 14, 220, 60)
     assert states(compare_markers(picture, hung, both, [hung[14], second])) == {14: 'double'}
+
+
+def test_a_marker_on_a_bare_wall_is_not_laid_over_its_old_spot():
+    picture = np.full((240, 320, 3), 150, np.uint8)
+    bare = picture.copy()
+    hung = {14: replace(hang(picture, 14, 120, 100), distance=2.0)}
+    seen = hang(bare, 14, 172, 100)
+    assert states(compare_markers(picture, hung, bare, [seen], 0.0)) == {14: 'moved'}
+    assert compare_markers(picture, hung, bare, [seen]) is None
 
 
 def told(memory: MarkerMemory, view: str, found, hung, look: int) -> list[str]:

@@ -18,7 +18,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from surveillance_perception.observation.views import Floats, Picture, grey_of, registration
+from surveillance_perception.observation.views import Floats, Grey, Picture, grey_of, registration
 
 Array = npt.NDArray[np.float64]
 
@@ -154,7 +154,12 @@ def compare_markers(
     if factor != 1.0:
         size = reference.shape[1], reference.shape[0]
         picture = np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_AREA), np.uint8)
-    onto = registration(grey_of(reference), grey_of(picture))
+    # Not by the markers: on a bare wall one that was moved would be laid over its old spot.
+    apart = (
+        _apart_from(hung.values(), reference.shape),
+        _apart_from((each.scaled(factor) for each in seen), picture.shape),
+    )
+    onto = registration(grey_of(reference), grey_of(picture), apart)
     if onto is None:
         onto = _turned_onto(hung, turned)
     if onto is None:
@@ -174,6 +179,14 @@ def compare_markers(
             fresh = laid.is_new(some[0])
             found.append(MarkerFinding(number, 'new' if fresh else 'here', some[0]))
     return found
+
+
+def _apart_from(markers: Iterable[SeenMarker], shape: tuple[int, ...]) -> Grey:
+    """Return where a picture shows none of some markers, with their sheets."""
+    mask = np.full(shape[:2], 255, np.uint8)
+    for each in markers:
+        cv2.fillConvexPoly(mask, np.round(_grown(each, INNER)).astype(np.int32), 0)
+    return mask
 
 
 def _turned_onto(hung: Mapping[int, SeenMarker], turned: float) -> npt.NDArray[Any] | None:

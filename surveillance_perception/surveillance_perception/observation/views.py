@@ -204,13 +204,21 @@ def _scaled(picture: Picture) -> Picture:
     return np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_AREA), np.uint8)
 
 
-def registration(before: Grey, now: Grey) -> npt.NDArray[Any] | None:
-    """Return the homography that lays the new picture over the old one; None without one."""
+def registration(
+    before: Grey, now: Grey, judged: tuple[Grey | None, Grey | None] = (None, None)
+) -> npt.NDArray[Any] | None:
+    """Return the homography that lays the new picture over the old one; None without one.
+
+    Args:
+        before: The old picture.
+        now: The new one.
+        judged: Of each, where features count, as bytes that are not 0; None: everywhere.
+    """
     # Evened out, so that a dim picture has features, too.
     even = cv2.createCLAHE(3.0, (8, 8))
     finder = cv2.ORB.create(1500, fastThreshold=7)
-    points, seen = finder.detectAndCompute(even.apply(before), None)
-    others, found = finder.detectAndCompute(even.apply(now), None)
+    points, seen = finder.detectAndCompute(even.apply(before), judged[0])
+    others, found = finder.detectAndCompute(even.apply(now), judged[1])
     if seen is None or found is None:
         return None
     matches = cv2.BFMatcher(cv2.NORM_HAMMING, crossCheck=True).match(found, seen)
