@@ -7,6 +7,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+import skimage
 
 from surveillance_perception.observation.views import Sight, sight_of, view_changes
 
@@ -57,6 +58,31 @@ def test_another_light_is_no_change():
             assert not [each for each in found or () if not each.may_be_light]
     assert told >= 0.8 * 6 * len(PHOTOS)
     assert false <= 0.03 * told
+
+
+@needs_photos
+def test_a_dim_picture_is_compared_and_a_dark_one_is_not():
+    """At a fifth of the light, with the camera's noise: the thing is seen, and nothing else."""
+    face = cv2.imread(str(Path(skimage.__file__).parent / 'data' / 'astronaut.png'), 0)
+    thing = cv2.resize(np.asarray(face, np.uint8), (120, 120))
+    seen = 0
+    for number, path in enumerate(PHOTOS[1:7]):
+        reference = grey(path)
+        changed = reference.copy()
+        changed[150:270, 250:370] = thing
+        generator = np.random.default_rng(number)
+
+        def dim(picture: np.ndarray, light: float, noise: np.random.Generator) -> np.ndarray:
+            taken = picture * light + noise.normal(0, 2, picture.shape)
+            return np.clip(taken, 0, 255).astype(np.uint8)
+
+        found = view_changes(reference, dim(reference, 0.2, generator))
+        assert not [each for each in found or () if not each.may_be_light], path.name
+        changes = view_changes(reference, dim(changed, 0.2, generator))
+        seen += any(not each.may_be_light for each in changes or ())
+        # Too dim is "not seen", which is not "nothing changed".
+        assert view_changes(reference, dim(changed, 0.1, generator)) is None
+    assert seen >= 4, 'as many as in full light'
 
 
 @needs_photos

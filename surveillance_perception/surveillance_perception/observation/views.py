@@ -7,13 +7,14 @@ than that plane is seen beside its old spot once the camera stands a few centime
 dense flow (DIS, Kroeger and others 2016) takes that out. Flow follows the edge of a shadow, too:
 so both layings are compared, and a change is what differs in both.
 
-Light multiplies a picture. The logarithm of the ratio of both pictures, smoothed by a median, which
-keeps steps, is the change of light with the edges of its shadows; the new picture is divided by it.
-Then two things tell of a change. Texture: windows whose normalised cross correlation is low.
-Windows that are plain in both have none to speak of, and are left alone. Colour: the ratios of the
-channels, which no shadow changes, less what is common to all pixels of the same colour: that is the
-camera or its lamp. So a plain thing before a plain wall is seen by its colour alone, and in a grey
-picture not at all.
+Light multiplies a picture. One that is dim as a whole is freed of noise, as is the reference, and
+brightened; one that is too dim for that is not compared. The logarithm of the ratio of both
+pictures, smoothed by a median, which keeps steps, is the change of light with the edges of its
+shadows; the new picture is divided by it. Then two things tell of a change. Texture: windows whose
+normalised cross correlation is low. Windows that are plain in both have none to speak of, and are
+left alone. Colour: the ratios of the channels, which no shadow changes, less what is common to all
+pixels of the same colour: that is the camera or its lamp. So a plain thing before a plain wall is
+seen by its colour alone, and in a grey picture not at all.
 
 What differs before the light is taken out, and not afterwards, is a thing of little texture or the
 edge of a shadow; nothing in two pictures tells which. It is told as such.
@@ -58,7 +59,12 @@ COLOURED = 0.22
 COLOUR_DARK = 25.0
 """Grey below which a pixel has no colour."""
 DIMMED = 0.25
-"""Light below this part of the reference's leaves nothing to compare."""
+"""A shadow darker than this, as part of the light around it, leaves nothing to compare."""
+DIM, DIMMEST = 0.33, 0.12
+"""Median brightness, as part of the reference's, below which the picture is freed of noise and
+brightened first; and below which its noise hides too much for that."""
+DENOISED = 1.2
+"""Standard deviation of the blur that frees a dim picture of noise, pixels: a quarter is left."""
 FARTHEST = 30.0
 """Flow beyond this is no parallax, pixels."""
 RIM = 22
@@ -130,6 +136,12 @@ def view_changes(reference: Picture, picture: Picture) -> list[ViewChange] | Non
         before, now = grey_of(before), grey_of(now)
     if sight_of(before) != Sight.CLEAR or sight_of(now) != Sight.CLEAR:
         return None
+    gain = _gain(before, now)
+    if gain is None:
+        return None
+    if gain > 1.0:
+        before, now = (cv2.GaussianBlur(each, (0, 0), DENOISED) for each in (before, now))
+        now = np.asarray(cv2.convertScaleAbs(now, alpha=gain), np.uint8)
     onto = registration(grey_of(before), grey_of(now))
     if onto is None:
         return None
@@ -165,6 +177,14 @@ def view_changes(reference: Picture, picture: Picture) -> list[ViewChange] | Non
     doubtful = _regions(either, 1.0 - wide.best, scale)
     doubtful = [each for each in doubtful if not any(_touch(each.box, e.box) for e in found)]
     return found + [replace(each, may_be_light=True) for each in doubtful]
+
+
+def _gain(before: Picture, now: Picture) -> float | None:
+    """Return by what a dim picture is brightened, 1 where it is not dim; None: it is too dim."""
+    share = (float(np.median(grey_of(now))) + 1.0) / (float(np.median(grey_of(before))) + 1.0)
+    if share < DIMMEST:
+        return None
+    return 1.0 if share >= DIM else 1.0 / share
 
 
 def _touch(one: tuple[int, int, int, int], other: tuple[int, int, int, int]) -> bool:
