@@ -140,8 +140,9 @@ def view_changes(reference: Picture, picture: Picture) -> list[ViewChange] | Non
     if gain is None:
         return None
     if gain > 1.0:
-        before, now = (cv2.GaussianBlur(each, (0, 0), DENOISED) for each in (before, now))
-        now = np.asarray(cv2.convertScaleAbs(now, alpha=gain), np.uint8)
+        before = np.asarray(cv2.GaussianBlur(before, (0, 0), DENOISED), np.uint8)
+        quiet = cv2.GaussianBlur(now, (0, 0), DENOISED)
+        now = np.asarray(cv2.convertScaleAbs(quiet, alpha=gain), np.uint8)
     onto = registration(grey_of(before), grey_of(now))
     if onto is None:
         return None
