@@ -539,8 +539,8 @@ def measure_views(trials: int) -> list[list[str]]:
         full = [found for is_there, found in answers if is_there]
         empty = [found for is_there, found in answers if not is_there]
         silent = full.count(None) + empty.count(None)
-        told, false_told = part(full.count(True), len(full)), part(empty.count(True), len(empty))
-        rows.append([name, aim, told, false_told, part(silent, len(answers))])
+        shares = [part(each.count(True), len(each)) for each in (full, empty)]
+        rows.append([name, aim, *shares, part(silent, len(answers))])
     full = [found for is_there, found in ours if is_there]
     empty = [found for is_there, found in ours if not is_there]
     doubts = [part(doubtful[True], len(full)), part(doubtful[False], len(empty))]
