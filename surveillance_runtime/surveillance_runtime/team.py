@@ -136,10 +136,12 @@ def team_parts(
     place = read_place_file(path, radius=reach)
     moved = points_to_pass(place.plan, reach)
     plan = with_points(place.plan, moved)
-    wide = (
+    shared_by_all: list[tuple[str, object]] = [
         ('traffic.wide_ways', list(wide_ways(plan, reach))),
         ('traffic.wide_places', list(wide_places(plan, reach))),
-    )
+    ]
+    if any(member.dock for member in fleet):
+        shared_by_all.append(('fleet_docks', list(plan.place.recharge_rooms)))
     points = [
         Entry('/**', f'{POINTS}.{name}', list(point), '--robots') for name, point in moved.items()
     ]
@@ -155,7 +157,7 @@ def team_parts(
         if part.everyone:
             own = '/'.join(filter(None, (above, member.name)))
             others = [full_name(above, other.name) for other in fleet if other.name != member.name]
-            entries = (*table, *_of_member(member, own, wide, others))
+            entries = (*table, *_of_member(member, own, shared_by_all, others))
             part = replace(part, namespace=own, profile=member.profile)
             found.append(replace(part, entries=entries, renamed=renamed))
     if not found:
@@ -214,7 +216,7 @@ def _table(fleet: Sequence[FleetMember]) -> Iterator[Entry]:
 def _of_member(
     member: FleetMember,
     namespace: str,
-    wide: Sequence[tuple[str, object]],
+    shared_by_all: Sequence[tuple[str, object]],
     others: Sequence[str],
 ) -> Iterator[Entry]:
     """Yield what the nodes of one robot are told."""
@@ -228,7 +230,7 @@ def _of_member(
     for node in ('robot_behavior', 'reasoner'):
         name = full_name(namespace, node)
         yield Entry(name, 'fleet', True, origin)
-        for key, value in wide:
+        for key, value in shared_by_all:
             yield Entry(name, key, value, origin)
     if others:
         yield Entry(full_name(namespace, RECORDER), 'other_robots', list(others), origin)

@@ -86,7 +86,12 @@ def test_a_place_names_its_robots(tmp_path):
     _shared, anna, bert = team(Run(place=path))
     assert (anna.robot, bert.robot) == ('anna', 'bert')
     merged = configuration(CONFIG, anna.run, fleet=anna.entries)
-    assert merged.resolve('robot_behavior', '/anna/robot_behavior')['recharge_rooms'].value == ['E']
+    resolved = merged.resolve('robot_behavior', '/anna/robot_behavior')
+    assert resolved['recharge_rooms'].value == ['E']
+    for name, robot in (('anna', anna), ('bert', bert)):
+        merged = configuration(CONFIG, robot.run, fleet=robot.entries)
+        resolved = merged.resolve('robot_behavior', f'/{name}/robot_behavior')
+        assert resolved['fleet_docks'].value == ['E'], 'all plan with all docks'
     with pytest.raises(ValueError, match=r'--robots 3: place.yaml has 2: anna, bert'):
         team(Run(place=path, robots=3))
 

@@ -244,6 +244,32 @@ def test_each_tour_leads_through_a_dock_where_robots_charge() -> None:
     assert {stop for group in one.groups for stop in group.stops} == set(graph.places)
 
 
+def test_robots_with_docks_of_their_own_agree_on_the_groups() -> None:
+    graph, every = far_wings(), ('A0', 'B3')
+    robots = [replace(robot, runs_until=500.0) for robot in fleet('A0', 'A1', 'B2', 'B3')]
+    plans = {
+        assign(graph, robots, 0.0, FleetSettings(docks=every, own_docks=own)).plan
+        for own in (None, ('A0',), ('B3',))
+    }
+    assert len(plans) == 1
+
+
+def test_a_robot_charges_at_its_own_dock_alone() -> None:
+    graph = ring(12)
+    tour = fleet_plan(graph, 1).groups[0].stops
+    settings = FleetSettings(docks=('P05', 'P09'), own_docks=('P05',), charge_ratio=0.5)
+    for place, charges in (('P05', True), ('P09', False)):
+        (here,) = fleet(place)
+        low = replace(here, share=Share(tour, place), runs_until=900.0, charge_seconds=60.0)
+        choice = choose(graph, [low], low.name, 0.0, settings)
+        assert (choice.slot is not None and choice.place == place) == charges
+    # What does not wait for its tour leads to its own dock, too.
+    (here,) = fleet('P09')
+    empty = replace(here, share=Share(tour, 'P09'), runs_until=1.0, charge_seconds=60.0)
+    choice = choose(graph, [empty], empty.name, 0.0, settings)
+    assert choice.place == 'P05'
+
+
 def test_who_charges_as_planned_keeps_its_share_and_who_takes_long_does_not() -> None:
     graph, tour = ring(12), fleet_plan(ring(12), 1).groups[0].stops
     settings = FleetSettings(docks=('P05',), charge_ratio=0.2)

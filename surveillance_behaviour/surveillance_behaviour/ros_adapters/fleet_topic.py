@@ -33,6 +33,13 @@ class FleetParameters:
         3600.0,
         name='fleet_silent_after',
     )
+    docks: tuple[str, ...] = parameter(
+        (),
+        'Rooms with a station for any robot of the fleet, which all its robots are to know alike; '
+        'empty: recharge_rooms. A robot itself charges in its recharge_rooms.',
+        of=str,
+        name='fleet_docks',
+    )
     wide_places: tuple[str, ...] = parameter(
         (), 'Places in which two robots can pass.', of=str, name='traffic.wide_places'
     )
@@ -50,7 +57,7 @@ def fleet_of(node: PatrolNode, robot: str, docks: tuple[str, ...]) -> FleetKnowl
     Args:
         node: The node that decides.
         robot: Its robot's name.
-        docks: The places with a charging station.
+        docks: The places with a charging station for this robot.
     """
     settings = node.declare_fields(FleetParameters())
     if not settings.fleet:
@@ -68,7 +75,9 @@ def fleet_of(node: PatrolNode, robot: str, docks: tuple[str, ...]) -> FleetKnowl
 
     knowledge = FleetKnowledge(
         robot,
-        FleetSettings(silent_after=settings.silent_after, docks=docks),
+        FleetSettings(
+            silent_after=settings.silent_after, docks=settings.docks or docks, own_docks=docks
+        ),
         Layout.of(settings.wide_places, settings.wide_ways),
         publish,
         time.monotonic,

@@ -157,7 +157,8 @@ class FleetSettings:
         back_after: Seconds that a robot must be heard without a gap to get a share again.
         worth_changing: By which part the best plan's wait must be shorter than that of the groups
             in force for these to be given up.
-        docks: Where robots charge.
+        docks: Where robots of the fleet charge: all know the same.
+        own_docks: Where this robot may charge; None: at each of them.
         charge_ratio: Seconds of charging for each second of patrol. The groups do not depend on it,
             only the distances that a robot keeps.
         least_charge: A charge in passing that is shorter is left out, seconds.
@@ -168,9 +169,16 @@ class FleetSettings:
     back_after: float = 5.0
     worth_changing: float = 0.1
     docks: tuple[str, ...] = ()
+    own_docks: tuple[str, ...] | None = None
     charge_ratio: float = 0.0
     least_charge: float = 5.0
     timezone: tzinfo = UTC
+
+    @property
+    def usable_docks(self) -> tuple[str, ...]:
+        """Where this robot may charge."""
+        own = self.own_docks
+        return self.docks if own is None else tuple(dock for dock in self.docks if dock in own)
 
 
 @dataclass(frozen=True)
@@ -290,7 +298,7 @@ def choose(
     slot, leave = _slot(graph, robots, me, onward.stop, now, settings, assignment)
     if _charges_in_passing(group, robots, me, reached, settings):
         # A stop of known length: what is missing beyond it is made up for little by little.
-        end = now + min(me.charge_seconds, CATCH_UP * group.charge_at(me.place))
+        end = now + min(me.charge_seconds, CATCH_UP * _planned_charge(group, me.place, settings))
         reason = (
             f'charging in passing at {me.place} until {_clock(end, settings)}: a stop of the tour '
             f'of {group.length:.0f} s'
@@ -336,7 +344,7 @@ def _charges_in_passing(
 
     Where the dock is not the stop that it drives to it only makes up for charges that it missed.
     """
-    planned = group.charge_at(me.place) if me.place in group.position else 0.0
+    planned = _planned_charge(group, me.place, settings)
     least = max(min(settings.least_charge, planned), 0.0 if reached else 1.5 * planned)
     has_been = not reached and me.place in group.position and me.share == _next(group, me.place)
     return (
@@ -346,6 +354,20 @@ def _charges_in_passing(
         and me.charge_seconds >= least
         and not any(other.dock == me.place for other in robots if other.name != me.name)
     )
+
+
+def _planned_charge(group: Group, place: str, settings: FleetSettings) -> float:
+    """Return the seconds that this robot charges in passing at a place.
+
+    Where its group charges at docks that are not its own, it takes the charge of a whole round at
+    the first of its own on the tour.
+    """
+    own = [stop for stop in group.stops if stop in settings.usable_docks]
+    if place not in own:
+        return 0.0
+    if any(group.charge_at(stop) for stop in own):
+        return group.charge_at(place)
+    return sum(group.charges) if place == own[0] else 0.0
 
 
 def _absence(
@@ -627,16 +649,19 @@ def _slot(
 
     None and never: it need not charge.
     """
-    if me.runs_until is None or not settings.docks:
+    docks = settings.usable_docks
+    if me.runs_until is None or not docks:
         return None, math.inf
     needs = []
     for robot in sorted(robots, key=lambda robot: robot.name):
         if robot.dock is not None and robot.charging_until is not None:
+            if robot.dock not in docks:
+                continue
             left = max(0.0, robot.charging_until - now)
             needs.append(ChargeNeed(robot.name, now, left, robot.dock))
         elif robot.runs_until is not None and robot.name in assignment.shares:
             needs.append(ChargeNeed(robot.name, robot.runs_until, robot.charge_seconds))
-    slot = dock_slots(needs, settings.docks, now)[me.name]
+    slot = dock_slots(needs, docks, now)[me.name]
     here, there, dock = (graph.index[place] for place in (me.place, stop, slot.dock))
     # One whose slot comes late waits at the dock.
     begin = min(slot.begin, me.runs_until)
