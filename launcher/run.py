@@ -298,13 +298,6 @@ class Run:
                 read_place_file(self.place)
             except FileError as error:
                 raise ValueError(f'--map {error}') from None
-        if self.watch is not None:
-            from surveillance_perception.observation.watch_rules import read_watch_file
-
-            try:
-                read_watch_file(self.watch)
-            except FileError as error:
-                raise ValueError(f'--watch {error}') from None
         if self.stage is not None:
             from surveillance_simulation.staging import read_script
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from launcher.run import RECORDER, Run
+from launcher.run import OBSERVER, RECORDER, Run
 from surveillance_runtime import node_table
 from surveillance_runtime.configuration import (
     Configuration,
@@ -209,6 +209,27 @@ def check_stage(run: Run, nodes: Sequence[node_table.Node]) -> None:
     """
     if run.stage is not None and all(node.name != 'simulator' for node in nodes):
         raise ValueError(f'--stage {run.stage}: expected a run whose simulator is started')
+
+
+def check_watch(merged: Configuration, run: Run, nodes: Sequence[node_table.Node]) -> None:
+    """Make sure that the rules of `--watch` name places and doors of the observer's place.
+
+    Raises:
+        ValueError: One names another, or the file is wrong.
+    """
+    if run.watch is None or all(node.name != OBSERVER for node in nodes):
+        return
+    from surveillance_perception.observation.watch_rules import read_watch_file
+
+    settings = merged.resolve(OBSERVER, full_name(run.namespace, OBSERVER))
+    places, doors = (
+        tuple(name.removeprefix(table) for name in settings if name.startswith(table))
+        for table in ('room_positions.', 'doors.')
+    )
+    try:
+        read_watch_file(run.watch, places, doors)
+    except FileError as error:
+        raise ValueError(f'--watch {error}') from None
 
 
 def check_clocks(merged: Configuration, run: Run, nodes: Sequence[node_table.Node]) -> None:

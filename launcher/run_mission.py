@@ -19,6 +19,7 @@ from launcher.run_configuration import (
     check_assignments,
     check_clocks,
     check_stage,
+    check_watch,
     configuration,
     profile_of,
     with_mode_of,
@@ -167,6 +168,7 @@ def checked(run: Run, config: Path) -> tuple[Run, tuple[Part, ...]]:
     for part in team:
         merged = configuration(config, part.run, fleet=part.entries)
         check_assignments(merged, everyone)
+        check_watch(merged, part.run, part.everyone)
         check_clocks(merged, part.run, part.everyone)
     return run, team
 

@@ -228,6 +228,9 @@ class Looking(Protocol):
     def position(self) -> Point | None:
         """Return where the robot is; None: nobody has said."""
 
+    def sees_around(self) -> bool:
+        """Tell whether a turn shows nothing more: lidars all around, and no camera."""
+
     def has_arm(self) -> bool:
         """Tell whether an arm turns the camera."""
 

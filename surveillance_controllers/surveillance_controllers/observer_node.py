@@ -26,7 +26,7 @@ from nav_msgs.msg import OccupancyGrid, Odometry
 from rclpy.qos import QoSProfile
 from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import Image, JointState, LaserScan
-from std_msgs.msg import String
+from std_msgs.msg import Bool, String
 
 from state_machines import Interrupt
 from state_machines.ros import CallError, ServiceCaller
@@ -87,6 +87,8 @@ MOST_WAITING = 20
 """What comes while so much waits for the worker is left out."""
 MOST_CELLS = 25_000_000
 MOST_PIXELS = 20_000_000
+SECTORS = 36
+"""Of the horizon: lidars see all around when each sector has a beam."""
 STILL = 0.02
 """The camera stands where neither metres nor radians change by more between two messages."""
 FACTS_PERIOD = 10.0
@@ -168,6 +170,9 @@ class Observer(PatrolNode):
         self._observations = self.create_publisher(String, 'observations', QoSProfile(depth=100))
         self._events = OwnedTopic(self, String, 'events')
         self._told_viewpoints = OwnedTopic(self, String, 'viewpoints')
+        self._sees_around = OwnedTopic(self, Bool, 'sees_around')
+        self._told_around: bool | None = None
+        self._directions = np.zeros(SECTORS, np.bool_)
         self._viewpoints: Viewpoints | None = None
         self._grid: Grid | None = None
         self._points = places
@@ -334,6 +339,7 @@ class Observer(PatrolNode):
         with conversions.refusing(self, topic):
             scan = self._lidar.read(message, topic)
             self._scans.append((seconds_of(message.header.stamp), scan))
+            self._directions |= sectors_of(scan)
             self._pair()
 
     def _on_pose(self, serialized: bytes) -> None:
@@ -506,7 +512,18 @@ class Observer(PatrolNode):
             return None
         return chosen.aside(floor, thing, origin)
 
+    def _tell_sees_around(self) -> None:
+        """Tell whether a turn of the base or the arm would show nothing more."""
+        camera = self._settings.camera and self.count_publishers(
+            self.resolve_topic_name('camera/rgb/image_raw')
+        )
+        around = not camera and bool(self._directions.all())
+        if around != self._told_around:
+            self._told_around = around
+            self._sees_around.publish(Bool(data=around))
+
     def _assess(self) -> None:
+        self._tell_sees_around()
         now = self._now()
         self._watcher.assess(now)
         doubts = [
@@ -632,6 +649,14 @@ def _is_near(one: Sequence[float], other: Sequence[float]) -> bool:
     return len(one) == len(other) and all(
         abs(a - b) <= STILL for a, b in zip(one, other, strict=True)
     )
+
+
+def sectors_of(scan: Scan) -> np.ndarray:
+    """Return in which sectors of the horizon a lidar measures, robot's frame, shape (SECTORS,)."""
+    angles = (scan.angles + scan.mount[2])[~np.isnan(scan.ranges)]
+    found = np.zeros(SECTORS, np.bool_)
+    found[np.floor(angles / math.tau * SECTORS).astype(int) % SECTORS] = True
+    return found
 
 
 def _on_the_map(pose: PlanarPose, scan: Scan) -> tuple[tuple[float, float], np.ndarray, np.ndarray]:

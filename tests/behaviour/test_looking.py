@@ -27,6 +27,7 @@ class ScriptedLooking:
         self.turns: list[float] = []
         self.fails = False
         self.arm = False
+        self.around = False
         self.sides: list[tuple[str, Side]] = []
 
     def viewpoints(self, place: str) -> Sequence[Point]:
@@ -37,6 +38,9 @@ class ScriptedLooking:
 
     def position(self) -> Point | None:
         return self.world.at
+
+    def sees_around(self) -> bool:
+        return self.around
 
     def has_arm(self) -> bool:
         return self.arm
@@ -111,6 +115,28 @@ def test_the_arm_looks_at_as_many_sides_as_the_time_allows_in_one_sweep(seconds,
     run.until(300.0)
     place = run.world.arrivals[0][1]
     assert [side for where, side in run.looking.sides if where == place][: len(first)] == first
+
+
+@pytest.mark.parametrize('arm', [False, True])
+def test_who_sees_all_around_stands_at_each_viewpoint_and_turns_nothing(arm: bool):
+    run = Watched('surveillance', exploration_seconds=25.0)
+    run.looking.arm, run.looking.around = arm, True
+    run.looking.points = {'C1': [(9.0, 8.0, 0.0), (11.0, 8.5, 0.0)]}
+    run.until(150.0)
+    assert not run.looking.turns
+    assert not run.looking.sides
+    (arrived, first), (_, second) = run.looking.driven[0], run.looking.driven[1]
+    assert {first, second} == {(9.0, 8.0, 0.0), (11.0, 8.5, 0.0)}
+    came = next(time for time, place in run.world.arrivals if place == 'C1')
+    assert arrived - came > 4.0, 'it stood first, so that sweeps are compared'
+
+
+def test_a_look_that_is_interrupted_is_not_called_a_problem():
+    run = Watched('surveillance', exploration_seconds=40.0)
+    run.looking.arm = True
+    run.until(3.0)  # while the arm moves
+    assert len(run.looking.sides) < 2
+    assert not [line for line in run.world.said if line.startswith('looking at')]
 
 
 def test_sides_that_one_visit_left_out_are_looked_at_in_the_next():

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 from geometry_msgs.msg import PoseWithCovarianceStamped
 from nav_msgs.msg import OccupancyGrid
-from sensor_msgs.msg import LaserScan
-from std_msgs.msg import String
+from sensor_msgs.msg import Image, LaserScan
+from std_msgs.msg import Bool, String
 
 from state_machines import Interrupt
 from state_machines.ros import ServiceCaller
@@ -124,3 +124,23 @@ def test_it_hears_of_the_other_robots_of_its_fleet_and_where_they_are(graph):
         return list(node.others.at(now)) == [(4.0, 1.0)]
 
     graph.until(heard)
+
+
+def test_it_says_when_a_turn_would_show_nothing_more(graph):
+    graph.add(Observer)
+    scans = graph.node.create_publisher(LaserScan, 'scan', SENSOR_QOS)
+    told = graph.listen(Bool, 'sees_around', STATE_QOS)
+
+    def measured(beams: int, first: float) -> bool:
+        scan = LaserScan(angle_min=first, angle_increment=math.tau / 360, range_max=8.0)
+        scan.header.frame_id = 'base_link'
+        scan.header.stamp = graph.node.get_clock().now().to_msg()
+        scan.ranges = [2.0] * beams
+        scans.publish(scan)
+        return bool(told)
+
+    graph.until(lambda: measured(180, -math.pi / 2))
+    assert not told[-1].data, 'nothing is measured behind it'
+    graph.until(lambda: measured(360, -math.pi) and told[-1].data)
+    graph.node.create_publisher(Image, 'camera/rgb/image_raw', SENSOR_QOS)
+    graph.until(lambda: not told[-1].data)

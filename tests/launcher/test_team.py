@@ -97,6 +97,21 @@ def test_a_place_names_its_robots(tmp_path):
 
 
 @pytest.mark.parametrize(
+    ('rule', 'problem'),
+    [
+        ('object: none, places: [R11]', "rules.odd: there is no place 'R11', expected 'R1'"),
+        ('door: D17, is: closed', "rules.odd: there is no door 'D17', expected 'D1'"),
+        ('door: D1, is: close', "rules.odd: door D1: got 'close', expected 'closed'"),
+    ],
+)
+def test_a_rule_about_a_place_that_is_not_there_is_refused_before_a_start(tmp_path, rule, problem):
+    watch = tmp_path / 'watch.yaml'
+    watch.write_text(f'rules:\n  odd: {{{rule}}}\n')
+    with pytest.raises(ValueError, match=f'--watch .*watch.yaml:2: {problem}'):
+        checked(Run(watch=watch), CONFIG)
+
+
+@pytest.mark.parametrize(
     ('robots', 'problem'),
     [
         ('      anna: {start: [10.0, 8.0]}\n', r'robots.anna.start: expected \[x, y, yaw\]'),

@@ -88,6 +88,11 @@ def test_a_rule_waits_until_it_lasts():
         ('person: nobody\npersistence: 0 looks', 'expected 1 look or more'),
         ('person: nobody\nconfidence: sure', 'expected a number from 0 to 1'),
         ('person: nobody\nis: nobody', "person takes no 'is'"),
+        ('door:\nis: open', "door: got None, expected the name of a door, or 'all'"),
+        ('door: [D1, D2]\nis: open', "door: got ['D1', 'D2'], expected the name of a door"),
+        ('door: D1\nis: open\nplaces: [R1]', "expected none beside 'door: D1'"),
+        ('marker: m11', "marker: got 'm11', expected the number that a marker shows, or 'all'"),
+        ('object: none\nplaces: []', 'places: got none, expected names'),
         ('person: everybody', "got 'everybody', expected one of nobody, usual"),
     ],
 )

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 
 from state_machines import Interrupt
 from state_machines.clock import elapsed_of
-from state_machines.exceptions import CallError
+from state_machines.exceptions import CallError, CallInterruptedError
 from surveillance_behaviour.mission.mission import Mission
 from surveillance_behaviour.ports import Looking, Point, Side
 
@@ -64,6 +64,8 @@ class RoomLook:
         drives = mission.place not in mission.settings.choice.recharge_rooms
         try:
             sides = self._turn(looking, end - elapsed(), drives, interrupt)
+            if looking.sees_around():
+                self._stand(end - elapsed(), interrupt)
             points = list(looking.viewpoints(mission.place)) if drives else []
             left_out = len(points)
             while points and (here := looking.position()) is not None:
@@ -75,8 +77,10 @@ class RoomLook:
                 left_out -= 1
                 mission.note('viewpoint', place=mission.place, point=list(point[:2]))
                 if not self._turn(looking, end - elapsed(), drives, interrupt):
-                    mission.clock.sleep(min(SETTLE, max(0.0, end - elapsed())), interrupt)
+                    self._stand(end - elapsed(), interrupt)
             mission.note('look', place=mission.place, sides=sides, left_out=left_out)
+        except CallInterruptedError:
+            raise
         except CallError as error:
             mission.say(f'looking at {mission.place}: {error}', warning=True)
 
@@ -101,6 +105,8 @@ class RoomLook:
                     mission.say(f'looking again at event {doubt.number} in {mission.place}')
                     looking.drive(point, interrupt)
                 mission.clock.sleep(SETTLE, interrupt)
+            except CallInterruptedError:
+                raise
             except CallError as error:
                 mission.say(f'event {doubt.number} is not looked at again: {error}', warning=True)
                 continue
@@ -108,6 +114,10 @@ class RoomLook:
             found = 'is still in doubt' if still else 'is settled'
             mission.note('verify', place=mission.place, number=doubt.number, found=found)
             mission.say(f'looked again: event {doubt.number} {found}')
+
+    def _stand(self, seconds: float, interrupt: Interrupt) -> None:
+        """Stand for a look, at most so many seconds."""
+        self._mission.clock.sleep(min(SETTLE, max(0.0, seconds)), interrupt)
 
     def _way(self, here: Point, point: Point) -> float:
         """Return the seconds to a point in the same room."""
@@ -135,6 +145,8 @@ class RoomLook:
         self, looking: Looking, seconds: float, drives: bool, interrupt: Interrupt
     ) -> list[str]:
         """Turn the camera as far as there is time; return the sides that it looked at."""
+        if looking.sees_around():
+            return []
         if looking.has_arm():
             return self._turn_arm(looking, seconds, interrupt)
         if not drives or seconds < self._turn_seconds:

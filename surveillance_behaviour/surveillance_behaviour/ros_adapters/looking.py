@@ -1,7 +1,8 @@
 """Viewpoints and doubts as the node `observer` tells them, and the driving and turning for a look.
 
 `viewpoints` is JSON of the form `{"R1": [[x, y], ...]}`, `doubts` a list of alerts that wait for a
-second look. Without an observer there are none, and the robot looks nowhere.
+second look, `sees_around` whether it sees all around without a turn. Without an observer there are
+none, and the robot looks nowhere.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from geometry_msgs.msg import PoseWithCovarianceStamped
-from std_msgs.msg import String
+from std_msgs.msg import Bool, String
 
 from state_machines import Interrupt
 from state_machines.ros import CallError, GoalCaller, ServiceCaller
@@ -52,6 +53,8 @@ class RosLooking:
         self._viewpoints: dict[str, list[Point]] = {}
         self._doubts: list[Doubt] = []
         self._position: Point | None = None
+        self._sees_around = False
+        StateSubscription(node, Bool, 'sees_around', self._on_sees_around)
         StateSubscription(node, String, 'viewpoints', self._on_viewpoints)
         StateSubscription(node, String, 'doubts', self._on_doubts)
         StateSubscription(node, PoseWithCovarianceStamped, 'amcl_pose', self._on_pose, raw=True)
@@ -67,6 +70,10 @@ class RosLooking:
     def position(self) -> Point | None:
         """Return where the robot is."""
         return self._position
+
+    def sees_around(self) -> bool:
+        """Tell whether a turn shows nothing more, as the observer says."""
+        return self._sees_around
 
     def has_arm(self) -> bool:
         """Tell whether an arm turns the camera."""
@@ -96,6 +103,9 @@ class RosLooking:
         )
         if not answer.success:
             raise CallError(f'{self._arm.name}: {answer.message}')
+
+    def _on_sees_around(self, message: Bool) -> None:
+        self._sees_around = bool(message.data)
 
     def _on_viewpoints(self, message: String) -> None:
         told = _read(self._node, 'viewpoints', message.data, dict)

@@ -62,8 +62,14 @@ NORMAL: Mapping[Kind, tuple[str, ...]] = {
     Kind.WAY: ('free',),
 }
 """What a rule may ask for, by kind."""
-NAMED = (Kind.DOOR, Kind.MARKER)
-"""Kinds of things with names; of the others the rule's first line says how it is to be."""
+NAMED: Mapping[Kind, str] = {
+    Kind.DOOR: "the name of a door, or 'all'",
+    Kind.MARKER: "the number that a marker shows, or 'all'",
+}
+"""Kinds of things with names, and what names one; of the others the rule's first line says how it
+is to be.
+"""
+ALL = ('all', 'any', 'every')
 KEYS = ('is', 'places', 'hours', 'persistence', 'severity', 'confidence')
 ALWAYS = WeeklyHours.parse('daily 00:00-24:00')
 
@@ -185,12 +191,15 @@ def rule_from(
     subject, wanted = _wanted(kind, entry)
     if kind == Kind.DOOR and doors and subject and subject not in doors:
         raise ValueError(f'there is no door {subject!r}, expected {nearest(subject, doors)}')
+    if kind == Kind.DOOR and subject and 'places' in entry:
+        # A door is told in one of the two places it joins: in the other the rule would be silent.
+        raise EntryError('places', f"expected none beside 'door: {subject}', which says where")
     looks, seconds = _persistence(entry.get('persistence', '1 look'))
     return WatchRule(
         kind,
         subject,
         wanted,
-        _places(entry.get('places', []), places),
+        _places(entry['places'], places) if 'places' in entry else (),
         _hours(entry.get('hours')),
         looks,
         seconds,
@@ -202,7 +211,11 @@ def rule_from(
 def _wanted(kind: Kind, entry: Mapping[str, Any]) -> tuple[str, str]:
     value, wanted = str(entry[kind]), entry.get('is')
     if kind in NAMED:
-        subject = '' if value in ('all', 'any', 'every') else value
+        subject = '' if value in ALL else value
+        if entry[kind] is None or isinstance(entry[kind], list | Mapping):
+            raise ValueError(f'{kind}: got {entry[kind]!r}, expected {NAMED[kind]}')
+        if kind == Kind.MARKER and subject and not re.fullmatch(r'\d{1,9}', subject, re.ASCII):
+            raise ValueError(f'{kind}: got {value!r}, expected {NAMED[kind]}')
         wanted = (
             str(wanted) if wanted is not None else NORMAL[kind][0] if len(NORMAL[kind]) == 1 else ''
         )
@@ -221,6 +234,8 @@ def _places(value: Any, known: Sequence[str]) -> tuple[str, ...]:
     names = [value] if isinstance(value, str) else value
     if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
         raise ValueError('places: expected a list of names')
+    if not names:
+        raise ValueError("places: got none, expected names, or no 'places' for everywhere")
     for name in names:
         if known and name not in known:
             raise ValueError(f'there is no place {name!r}, expected {nearest(name, known)}')
