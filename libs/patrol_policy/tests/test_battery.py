@@ -61,6 +61,17 @@ def test_a_charge_takes_what_was_learned_of_each_part_of_it() -> None:
     assert curve.seconds(90.0, 70.0) == 0.0
 
 
+def test_the_fastest_part_of_a_charge_ends_where_the_charge_does() -> None:
+    graph = seven_rooms()
+    # In parts of 5 %: what is faster above the full level is not used.
+    curve = ChargeCurve((1.0,) * 17 + (4.0,) + (9.0,) * 2)
+    energy = Energy(graph, [Station('E', curve)], Draw(0.1), 0.0, BatteryLimits(0, 90, 5))
+    assert energy.fastest == pytest.approx(4.0)
+    slow = ChargeCurve((1.0,) * 18 + (9.0,) * 2)
+    energy = Energy(graph, [Station('E', slow)], Draw(0.1), 0.0, BatteryLimits(0, 90, 5))
+    assert energy.fastest == pytest.approx(1.0)
+
+
 def test_battery_limits_out_of_order_are_named() -> None:
     with pytest.raises(ValueError, match=r'expected 0 <= battery_require_recharge < .* got 95 and'):
         BatteryLimits(95.0, 90.0)

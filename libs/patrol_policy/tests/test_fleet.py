@@ -7,7 +7,7 @@ import random
 from dataclasses import replace
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from patrol_policy.battery import Battery
@@ -286,6 +286,75 @@ def test_who_charges_as_planned_keeps_its_share_and_who_takes_long_does_not() ->
     stuck = replace(as_planned, charging_until=104.0, heard_at=80.0)
     heard = replace(robots[1], heard_at=80.0)
     assert set(assign(graph, [stuck, heard], 80.0, settings).shares) == {'robot2'}
+
+
+def test_who_is_at_its_stop_goes_to_the_next_and_who_is_not_goes_there_first() -> None:
+    graph = ring(12)
+    tour = fleet_plan(graph, 1).groups[0].stops
+    there = [FleetRobot('robot1', tour[3], share=Share(tour, tour[3]))]
+    assert choose(graph, there, 'robot1', 0.0).share == Share(tour, tour[4])
+    away = [FleetRobot('robot1', tour[3], share=Share(tour, tour[5]))]
+    choice = choose(graph, away, 'robot1', 0.0)
+    assert (choice.place, choice.share) == (tour[5], Share(tour, tour[5]))
+
+
+def test_only_who_is_at_its_stop_lets_the_robot_ahead_go_on() -> None:
+    graph = ring(12)
+    tour = fleet_plan(graph, 2, whole=True).groups[0].stops
+    ahead = FleetRobot('robot2', tour[5], share=Share(tour, tour[5]))
+    there = FleetRobot('robot1', tour[4], share=Share(tour, tour[4]))
+    choice = choose(graph, [there, ahead], 'robot1', 0.0)
+    assert (choice.place, choice.until) == (tour[4], pytest.approx(50.0))
+    # Far enough behind it goes on.
+    behind = replace(there, place=tour[11], share=Share(tour, tour[11]))
+    choice = choose(graph, [behind, ahead], 'robot1', 0.0)
+    assert (choice.place, choice.until) == (tour[0], None)
+    # On the way to its stop it has no place on the tour yet.
+    away = replace(there, place=tour[4], share=Share(tour, tour[3]))
+    choice = choose(graph, [away, ahead], 'robot1', 0.0)
+    assert (choice.place, choice.until) == (tour[3], None)
+
+
+@settings(max_examples=25)
+@given(st.integers(0, 10_000))
+def test_one_robot_has_no_long_way_where_two_short_ones_would_do(seed: int) -> None:
+    graph, draw = random_map(seed, 9), random.Random(seed)
+    robots = fleet(*draw.choices(graph.places, k=3))
+    stops = [share.stop for share in assign(graph, robots, 0.0).shares.values()]
+    ways = [
+        sum(
+            graph.seconds(robot.place, stop) ** 2 for robot, stop in zip(robots, order, strict=True)
+        )
+        for order in itertools.permutations(stops)
+    ]
+    assert ways[0] == pytest.approx(min(ways))
+
+
+@pytest.mark.parametrize(
+    ('robots', 'shared'),
+    [
+        (1, ' s, each'),
+        (2, ' s, shared with robot2, each'),
+        (4, ' s, shared with robot2 and robot3 and robot4, each'),
+        (5, ' s, shared with 4 others, each'),
+    ],
+)
+def test_a_reason_says_with_whom_a_tour_is_shared(robots: int, shared: str) -> None:
+    graph = ring(20)
+    tour = fleet_plan(graph, robots, whole=True).groups[0].stops
+    spaced = [tour[20 * number // robots] for number in range(robots)]
+    fleet_of = [replace(robot, share=Share(tour, robot.place)) for robot in fleet(*spaced)]
+    assert shared in choose(graph, fleet_of, 'robot1', 0.0).reason
+
+
+def test_a_plan_of_one_tour_or_of_one_robot_is_one_group() -> None:
+    assert [group.robots for group in fleet_plan(far_wings(), 2, whole=True).groups] == [2]
+    assert len(fleet_plan(far_wings(), 2, alone=True).groups) == 2
+    assert len(fleet_plan(far_wings(), 1).groups) == 1
+    only = PatrolGraph({'A': {}})
+    for alone in (False, True):
+        (group,) = fleet_plan(only, 3, alone=alone).groups
+        assert (group.stops, group.robots) == (('A',), 3)
 
 
 def test_what_does_not_fit_is_named() -> None:

@@ -240,6 +240,15 @@ def test_a_map_that_is_too_large_has_no_exhaustive_bound() -> None:
     assert rule_bound(graph, 100.0) == RuleBound(simple_bound(graph, 100.0))
 
 
+def test_the_simple_bound_knows_the_rules_that_it_is_given() -> None:
+    graph = chain(4)
+    # Corridors all: the shortest tour.
+    assert simple_bound(graph, 100.0, [1, 1, 1, 1]) == graph.tour.length == 42.0
+    # The ends are rooms, which are entered when they are urgent only.
+    assert simple_bound(graph, 100.0) == pytest.approx(107.0, abs=0.1)
+    assert simple_bound(graph, 100.0, [2, 1, 1, 2]) == simple_bound(graph, 100.0)
+
+
 def test_costs_may_differ_by_direction() -> None:
     legs = {
         'A': {'B': 1.0, 'C': 9.0},

@@ -84,6 +84,24 @@ def test_the_tour_of_a_small_map_is_the_shortest(graph: PatrolGraph) -> None:
     assert set(graph.walk) == set(graph.places)
 
 
+@settings(max_examples=25)
+@given(st.integers(0, 10_000))
+def test_a_tour_through_parts_that_share_one_place_has_each_place_once(seed: int) -> None:
+    draw = random.Random(seed)
+    legs: dict[str, dict[str, float]] = {'P0': {}}
+    for _ in range(5):
+        # A ring more, from a place that is there already.
+        places = list(legs)
+        new = [f'P{len(legs) + number}' for number in range(draw.randint(1, 5))]
+        around = [draw.choice(places), *new]
+        for one, other in zip(around, [*new, around[0]], strict=True):
+            seconds = float(draw.randint(1, 30))
+            legs.setdefault(one, {})[other] = legs.setdefault(other, {})[one] = seconds
+    graph = PatrolGraph(legs)
+    assert sorted(graph.tour.order) == list(range(len(legs)))
+    assert graph.tour.length == pytest.approx(tour_length(graph.distances, graph.tour.order))
+
+
 @settings(max_examples=30)
 @given(graphs())
 def test_the_shortest_ways_are_the_same_with_and_without_scipy(graph: PatrolGraph) -> None:

@@ -102,3 +102,49 @@ def test_nobody_goes_below_the_bound_that_knows_the_rules(
     for _ in patrol.until(12.0 * max(graph.tour.length, threshold)):
         pass
     assert patrol.run.settled >= rule_bound(graph, threshold, states=3_000).low - 0.01
+
+
+def test_a_large_map_has_the_same_ways_as_a_small_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    # From A to B the leg is longer than the way round by C.
+    legs = {'A': {'B': 30.0, 'C': 5.0}, 'B': {'A': 30.0, 'C': 5.0}, 'C': {'A': 5.0, 'B': 5.0}}
+    legs |= {'D': {'C': 7.0}}
+    legs['C']['D'] = 7.0
+    small = rules_of(PatrolGraph(legs, 2.0), 100.0)
+    expected = [[small.away[a][b] for b in range(4)] for a in range(4)]
+    monkeypatch.setattr('patrol_policy.graph.ALL_PAIRS_UP_TO', 0)
+    large = rules_of(PatrolGraph(legs, 2.0), 100.0)
+    assert [[large.away[a][b] for b in range(4)] for a in range(4)] == expected
+    assert expected[0][:2] == [0.0, 32.0]
+
+
+def test_the_laps_of_a_walk_each_visit_every_place() -> None:
+    rules = rules_of(chain(9), 100.0)
+    there_and_back = [*range(9), *range(7, 0, -1)]
+    found = list(rules.laps(there_and_back * 3))
+    assert found
+    assert all(set(lap) == set(range(9)) for lap in found)
+    three = rules_of(chain(3), 100.0)
+    assert list(three.laps([0, 1, 2, 1, 0])) == [(0, 1, 2), (2, 1, 0)]
+
+
+def test_a_walk_ahead_ends_at_its_horizon_and_with_a_wait_that_is_too_long() -> None:
+    graph = PatrolGraph(
+        {f'P{n}': {f'P{(n + 1) % 6}': 10.0, f'P{n - 1 if n else 5}': 10.0} for n in range(6)}
+    )
+    rules, start = rules_of(graph, 100.0), at_start(graph)
+    round_ = roll_out(rules, oldest, start, 1000.0)
+    assert round_.back is not None
+    assert [len(roll_out(rules, oldest, start, ahead).walk) for ahead in (30.0, 35.0)] == [3, 4]
+    # A wait as long as allowed is not too long, a longer one ends the walk.
+    assert roll_out(rules, oldest, start, 1000.0, stop=round_.settled).back == round_.back
+    assert len(roll_out(rules, oldest, start, 1000.0, stop=0.0).walk) < len(round_.walk)
+
+
+def test_the_wait_of_a_place_with_more_time_counts_less() -> None:
+    graph = chain(3)
+    for own in ({0: 20.0}, {2: 20.0}):
+        # All others have 80 s more.
+        rules = RuleMap(graph, 100.0, default_ranks(graph), 0, own)
+        search = RoundSearch(rules, [[(0, 1, 2, 1)]], graph.tour.length)
+        found = search.judged((0, 1, 2, 1))
+        assert found.length == pytest.approx(4 * 7.0) == found.wait

@@ -688,9 +688,8 @@ def _why(
         other for other, share in assignment.shares.items() if share.tour == group.stops
     )
     others.remove(name)
-    shared = f', shared with {" and ".join(others)}' if 0 < len(others) < 4 else ''
-    if len(others) > 3:
-        shared = f', shared with {len(others)} others'
+    with_whom = ' and '.join(others) if len(others) < 4 else f'{len(others)} others'
+    shared = f', shared with {with_whom}' if others else ''
     return (
         f'{stop} is mine: it is the next of {len(group.stops)} places on a tour of '
         f'{group.length:.0f} s{shared}, each every {group.wait:.0f} s'
