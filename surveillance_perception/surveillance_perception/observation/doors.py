@@ -14,6 +14,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from enum import StrEnum
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,6 +34,7 @@ CLOSED_BELOW, OPEN_FROM = math.radians(7.0), math.radians(60.0)
 """Angles of the leaf, radians; between them it is ajar."""
 STEP = math.radians(3.0)
 WIDEST = math.radians(120.0)
+_ANGLES = np.arange(0.0, WIDEST + STEP / 2, STEP)
 
 
 class DoorState(StrEnum):
@@ -85,17 +87,15 @@ def read_door(door: Segment, sensor: tuple[float, float], ends: Points) -> DoorR
         return None
     # Also beams beside the opening may meet an open leaf: all that come as near as it reaches.
     near = seen | (_passes(origin, rays, ranges, first, width) & (ranges > 0.3))
-    measured = Beams(ranges[near], to_line[near], seen[near], width)
+    measured = Beams(rays[near], ranges[near], to_line[near], seen[near], width)
     fits: dict[DoorState, list[tuple[float, float]]] = {state: [] for state in DoorState}
     for hinge, other in ((first, second), (second, first)):
         for side in (1.0, -1.0):
-            for angle in np.arange(0.0, WIDEST + STEP / 2, STEP):
-                leaf = hinge + _turned(other - hinge, side * angle)
-                expected, part = _crossings(origin, rays[near], hinge, leaf)
-                expected = np.where((part >= 0.0) & (part <= 1.0), expected, np.inf)
-                fits[_state(angle)].append((measured.fit(expected), float(angle)))
+            worths = measured.fits(hinge - origin, _turned(other - hinge, side * _ANGLES))
+            for angle, worth in zip(_ANGLES.tolist(), worths.tolist(), strict=True):
+                fits[_state(angle)].append((worth, angle))
     # A door without a leaf, or one that is folded away: as likely as all open leaves together.
-    none = measured.fit(np.full(int(near.sum()), np.inf)), math.inf
+    none = float(measured.without_leaf.sum()), math.inf
     fits[DoorState.OPEN] += [none] * len(fits[DoorState.OPEN])
     # Each state is worth the mean over its angles, not the best of them: nearly every sweep fits
     # some leaf that is seen along its edge. Neighbouring beams share errors: two of three count.
@@ -114,9 +114,12 @@ def _state(angle: float) -> DoorState:
     return DoorState.OPEN if angle >= OPEN_FROM else DoorState.AJAR
 
 
-def _turned(vector: Points, angle: float) -> Points:
-    cosine, sine = math.cos(angle), math.sin(angle)
-    return np.array([cosine * vector[0] - sine * vector[1], sine * vector[0] + cosine * vector[1]])
+def _turned(vector: Points, angles: Points) -> Points:
+    """Return a vector turned by each of some angles, (angles, 2)."""
+    cosine, sine = np.cos(angles), np.sin(angles)
+    return np.stack(
+        [cosine * vector[0] - sine * vector[1], sine * vector[0] + cosine * vector[1]], axis=1
+    )
 
 
 def _crossings(origin: Points, rays: Points, start: Points, end: Points) -> tuple[Points, Points]:
@@ -144,31 +147,48 @@ class Beams:
     """What was measured near a door.
 
     Attributes:
-        ranges: What was measured, metres.
-        to_line: How far the opening's line is along each beam, metres.
-        through: Whether a beam goes through the opening.
+        rays: The beams' directions, (n, 2), of length 1.
+        ranges: What was measured, (n,), metres.
+        to_line: How far the opening's line is along each beam, (n,), metres.
+        through: Whether a beam goes through the opening, (n,).
         width: Of the leaf, metres.
     """
 
+    rays: Points
     ranges: Points
     to_line: Points
     through: NDArray[np.bool_]
     width: float
 
-    def fit(self, expected: Points) -> float:
-        """Return the logarithm of the likelihood of the beams.
-
-        Args:
-            expected: Where each meets the leaf, metres; inf where it does not.
-        """
-        meets = np.isfinite(expected)
-        error = np.where(meets, np.abs(self.ranges - np.where(meets, expected, 0.0)), 0.0)
-        hit = np.exp(-0.5 * np.square(error / DEVIATION))
-        # Something nearer may hide the leaf: no more likely and no less than without it.
-        hidden = meets & (self.ranges < expected - 4 * DEVIATION)
+    @cached_property
+    def without_leaf(self) -> Points:
+        """The logarithm of the likelihood of each beam if it meets no leaf, (n,)."""
         beyond = self.ranges - np.where(np.isfinite(self.to_line), self.to_line, 0.0)
         # What stands just behind the opening may be a leaf, or a shelf: a leaf that fits wins.
         passed = np.where(beyond > self.width, 1.0, CLOSE_BEHIND)
         free = np.where(self.through, np.where(beyond > 2 * DEVIATION, passed, 0.0), 1.0)
-        likelihood = np.where(meets, np.where(hidden, 0.0, hit), free)
-        return float(np.log(FLOOR + (1.0 - FLOOR) * likelihood).sum())
+        return np.asarray(np.log(FLOOR + (1.0 - FLOOR) * free))
+
+    def fits(self, hinge: Points, leaves: Points) -> Points:
+        """Return the logarithm of the likelihood of all beams for each leaf, (leaves,).
+
+        Args:
+            hinge: Where the leaves turn, from the lidar, metres.
+            leaves: From the hinge to their other ends, (leaves, 2), metres.
+        """
+        # Where beams cross the leaves' lines: row per leaf, column per beam.
+        cross = np.outer(leaves[:, 1], self.rays[:, 0]) - np.outer(leaves[:, 0], self.rays[:, 1])
+        beside = hinge[0] * self.rays[:, 1] - hinge[1] * self.rays[:, 0]
+        with np.errstate(divide='ignore', invalid='ignore'):
+            expected = (hinge[0] * leaves[:, 1] - hinge[1] * leaves[:, 0])[:, None] / cross
+            part = beside / cross
+        meets = np.isfinite(expected) & (expected > 0.0) & (part >= 0.0) & (part <= 1.0)
+        # The exponential is worth its time only for the few beams that meet a leaf.
+        leaf, beam = np.nonzero(meets)
+        error = self.ranges[beam] - expected[meets]
+        hit = np.exp(-0.5 * np.square(error / DEVIATION))
+        # Something nearer may hide the leaf: no more likely and no less than without it.
+        likelihood = np.where(error < -4 * DEVIATION, 0.0, hit)
+        gain = np.log(FLOOR + (1.0 - FLOOR) * likelihood) - self.without_leaf[beam]
+        gains = np.bincount(leaf, gain, minlength=len(leaves))
+        return np.asarray(self.without_leaf.sum() + gains)
