@@ -872,8 +872,9 @@ def measure_week(days: float, round_every: float) -> list[list[str]]:
             visits += 1
     rows = [['a week in which nothing happens', 'aim', 'reached']]
     kinds: dict[str, int] = {}
-    for number in {each.number for each in rounds.alerts}:
-        event = next(e for e in rounds.book.events if e.number == number)
+    # An event is told again when it goes on, and counts once.
+    alarms = list({each.number: each for each in reversed(rounds.alerts)}.values())[::-1]
+    for event in alarms:
         key = f'{event.kind} {event.seen}'
         kinds[key] = kinds.get(key, 0) + 1
     count = sum(kinds.values())
@@ -886,7 +887,15 @@ def measure_week(days: float, round_every: float) -> list[list[str]]:
         ['CPU a view, ms, median', '150', f'{1000 * float(np.median(rounds.cpu_view)):.0f}']
     )
     rows.append(['CPU in all, s', '', f'{time.process_time() - cpu:.0f}'])
-    return rows
+    return rows + [[f'alarm {each.number}', '', told_of(each)] for each in alarms]
+
+
+def told_of(event: Event) -> str:
+    """Return when and where an event began, in one line."""
+    when = datetime.fromtimestamp(event.began, UTC).strftime('%a %H:%M:%S')
+    where = '' if event.position is None else ' at ({:.2f}, {:.2f})'.format(*event.position)
+    what = f'{event.kind} {event.subject} {event.seen}'.replace('  ', ' ')
+    return f'{when} {what}, {event.place}{where}, confidence {event.confidence:.2f}'
 
 
 # --- telling, and a month ---

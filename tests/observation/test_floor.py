@@ -86,6 +86,27 @@ def test_a_far_wall_stays_a_wall_when_the_heading_is_a_degree_off() -> None:
         assert changes(views[0], now) == []
 
 
+def test_a_slanting_far_wall_stays_a_wall_when_place_and_heading_are_off() -> None:
+    cells = np.zeros((160, 240), np.int8)
+    cells[10:12] = 100
+    grid, error = Grid(cells, RESOLUTION), math.radians(1.2)
+    turn = np.array([[math.cos(error), -math.sin(error)], [math.sin(error), math.cos(error)]])
+    views = []
+    for off in (0, 1):
+        gathered = FloorVisit(grid)
+        for seed in range(8):
+            # The wall is 4 m away; where it is met under 45 degrees both errors lift its ends.
+            sensor = 2.0 + 0.03 * seed, 4.6
+            ends, met = sweep(grid, [], sensor, seed)
+            if off:
+                told = sensor[0], sensor[1] + 0.04
+                gathered.add(told, (ends - sensor) @ turn.T + told, met)
+            else:
+                gathered.add(sensor, ends, met)
+        views.append(gathered.view())
+    assert changes(*views) == []
+
+
 def test_what_appears_and_what_goes_is_found_where_it_is(office):
     before, after = visit(office, [CHAIR]), visit(office, [CHAIR, BOX], seed=10)
     (found,) = changes(before, after)

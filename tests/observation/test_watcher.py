@@ -264,6 +264,23 @@ def test_a_view_is_compared_over_a_restart_and_learned_anew_when_a_person_says_s
     assert [each.state for each in again.book.events][:1] == [EventState.OPEN]
 
 
+def test_who_walks_through_a_view_in_two_looks_changes_nothing_in_it():
+    watch = Round()
+    view = (1.0, 1.0, 0.5)
+    # Somebody in one part of the picture, and two seconds later in another one.
+    left, right = texture(), texture()
+    left[150:330, 60:200] = texture(9)[150:330, 60:200]
+    right[150:330, 400:540] = texture(9)[150:330, 400:540]
+    watch.watcher.picture(texture(), view, 1.0, None)
+    for hour, passing in enumerate(((left, right), (left, right), (right, texture(), right)), 1):
+        watch.watcher.arrive('elsewhere', 3600.0 * hour - 50.0)
+        watch.watcher.arrive('R1', 3600.0 * hour - 5.0)
+        for number, picture in enumerate(passing):
+            watch.watcher.picture(picture, view, 3600.0 * hour + 2.0 * number, None)
+    assert any(each.state == 'changed' for each in watch.told), 'the pictures are compared'
+    assert [each for each in watch.book.events if each.seen == 'changed'] == []
+
+
 def test_a_view_is_compared_with_the_one_with_the_doors_as_they_are_now():
     views = ReferenceViews()
     at = (1.0, 1.0, 0.5)

@@ -32,8 +32,9 @@ LEAST_PASSES = 2
 NEAR_WALL = 0.12
 """Ends so near to a wall of the map are the wall's, metres: noise and the error of the pose."""
 YAW_SLACK = 0.025
-"""Of ends far off, within this angle of a wall, rad: an error of the heading moves them by it times
-their distance. 2.5 times the 0.6 degrees that a localised robot is off."""
+"""An error of the heading moves an end by this times its distance, rad: 2.5 times the 0.6 degrees
+that a localised robot is off. It has nothing to do with what `NEAR_WALL` allows for: as errors that
+do not depend on each other do, their squares add up."""
 NEAR_THING = 0.15
 """A thing so near to where one stood before is the same one, metres."""
 LEAST_EXTENT = 0.08
@@ -159,7 +160,8 @@ class FloorVisit:
         cells = self._grid.cells_of(hits)
         height, width = self._grid.cells.shape
         rows, columns = np.clip(cells[:, 0], 0, height - 1), np.clip(cells[:, 1], 0, width - 1)
-        return np.asarray(self._walls[rows, columns] <= YAW_SLACK * lengths, np.bool_)
+        slack = np.hypot(NEAR_WALL, YAW_SLACK * lengths)
+        return np.asarray(self._walls[rows, columns] <= slack, np.bool_)
 
     def fresh(self, points: Points) -> Mask:
         """Tell of each point whether all was free there until now, as far as this visit knows.

@@ -39,8 +39,8 @@ class ReferenceView:
         stamp: When, seconds since 1970.
         markers: The markers in it by id, in its pixels. Of one that hangs twice, none.
         doors: The states of the doors nearby.
-        differed: The parts that differed in the last two looks in which some did: the number of
-            the look, and the boxes in the reference (left, top, width, height), pixels.
+        differed: The parts that differed in all pictures of a look, for the last two looks: the
+            number of the look, and the boxes in the reference (left, top, width, height), pixels.
     """
 
     name: str
@@ -51,19 +51,33 @@ class ReferenceView:
     doors: Mapping[str, str] = field(default_factory=dict)
     differed: list[tuple[int, list[Box]]] = field(default_factory=list)
 
-    def saw_before(self, box: Box, look: int) -> bool:
-        """Tell whether the same part differed in the look before this one, too."""
-        return any(
-            before < look and any(_overlap(box, other) >= SAME_PART for other in boxes)
-            for before, boxes in self.differed
+    def lasts(self, box: Box, look: int) -> bool:
+        """Tell whether a part differed throughout this look so far, and the look before it."""
+        looks = dict(self.differed)
+        earlier = [each for each in looks if each < look]
+        return all(
+            any(_overlap(box, other) >= SAME_PART for other in looks.get(each, ()))
+            for each in (look, max(earlier, default=look - 1))
         )
 
-    def note(self, boxes: list[Box], look: int) -> None:
-        """Take which parts differ in a picture; in a new look that shows none, nothing is left."""
+    def note(self, boxes: list[Box], doubtful: list[Box], look: int) -> None:
+        """Take which parts differ in a picture that could be compared.
+
+        What some pictures of one look show and others do not, is somebody who walks by: of each
+        look the parts are kept that differ in all its pictures.
+
+        Args:
+            boxes: The parts that show something else.
+            doubtful: The parts that may differ by their light alone: a thing may be hidden there.
+            look: The number of the look.
+        """
         earlier = [each for each in self.differed if each[0] < look][-1:]
-        if not boxes:
-            self.differed = [] if look not in dict(self.differed) else self.differed
-            return
+        standing = dict(self.differed).get(look)
+        if standing is not None:
+            now = [*boxes, *doubtful]
+            boxes = [
+                box for box in standing if any(_overlap(box, other) >= SAME_PART for other in now)
+            ]
         self.differed = [*earlier, (look, boxes)]
 
 

@@ -548,9 +548,10 @@ class Watcher:
             return  # it is they who change the view
         differences = view_changes(known.picture, picture)
         things = [each for each in differences or () if not each.may_be_light]
-        again = [each for each in things if known.saw_before(each.box, self._look)]
         if differences is not None:
-            known.note([each.box for each in things], self._look)
+            doubtful = [each.box for each in differences if each.may_be_light]
+            known.note([each.box for each in things], doubtful, self._look)
+        again = [each for each in things if known.lasts(each.box, self._look)]
         if differences == []:
             current = {(each.kind, each.subject) for each in self.book.current}
             if (Kind.VIEW, known.name) in current:
