@@ -14,9 +14,9 @@ import os
 import shutil
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, get_type_hints
 
 from launcher.run import NOT_RECORDED, Run
 from state_machines.files import parse_json
@@ -166,11 +166,12 @@ def run_from(options: Mapping[str, Any]) -> Run:
     Raises:
         ValueError: They are not of a run.
     """
-    known = {field.name for field in fields(Run)}
+    known = get_type_hints(Run)
     try:
         values = {name: options[name] for name in options if name in known}
-        for name in ('place', 'parameters'):
-            values[name] = Path(values[name]) if values.get(name) else None
+        for name in values:
+            if known[name] == Path | None:
+                values[name] = Path(values[name]) if values[name] else None
         return Run(**values)
     except TypeError as error:
         raise ValueError(f'--resume: {error}') from None

@@ -164,13 +164,18 @@ def _page(
     return '\n'.join(lines) + '\n'
 
 
+def _times(count: int, what: str) -> str:
+    return f'{count} {what}{"" if count == 1 else "s"}'
+
+
 def _event(event: Event, pictures: _Pictures) -> str:
     level = ('', '', 'warning', 'alert')[min(event.severity, ALERT)]
     rule = f'<p class="quiet">{escape(event.rule)}</p>' if event.rule else ''
+    seen = f'{_times(event.sightings, "sighting")} in {_times(event.looks, "look")}'
     return (
         f'<div class="event {level}"><p><b>{escape(event.words())}</b> ({escape(event.state)})</p>'
-        f'<p>{_clock(event.began)} to {_clock(event.last)}, {event.sightings} sightings in '
-        f'{event.looks} looks, confidence {event.confidence:.0%}</p>'
+        f'<p>{_clock(event.began)} to {_clock(event.last)}, {seen}, '
+        f'confidence {event.confidence:.0%}</p>'
         f'{rule}{pictures.shown(event)}</div>'
     )
 

@@ -241,7 +241,8 @@ def test_discovery_is_the_machines_own_unless_asked_for(monkeypatch):
 
 
 def test_options_of_a_run_survive_its_launcher(tmp_path):
-    run = Run(mode='RANDOM', place=tmp_path / 'p.yaml', assignments=['a:=1'], only=['reasoner'])
+    files = {name: tmp_path / name for name in ('place', 'parameters', 'notify', 'watch', 'stage')}
+    run = replace(Run(mode='RANDOM', assignments=['a:=1'], only=['reasoner']), **files)
     stored = json.loads(json.dumps(options_of(run)))
     assert run_from(stored) == replace(run, without=[], remaps=[])
     with pytest.raises(ValueError, match='--resume'):

@@ -84,3 +84,15 @@ def test_events_are_described_beside_their_pictures_in_bounded_number(
     for number in range(1, 5):
         store.describe(number, '{}')
     assert sorted(each.name for each in tmp_path.iterdir()) == ['event_3.json', 'event_4.json']
+
+
+def test_two_things_that_are_noticed_at_once_have_a_picture_each(tmp_path):
+    store = EvidenceStore(tmp_path)
+    names = [
+        store.keep(np.full((8, 8), shade, np.uint8), 'sweep-object-C1-appeared', 3, 64.0)
+        for shade in (0, 128, 255)
+    ]
+    assert len(set(names)) == 3
+    assert all(is_sweep(name) for name in names)
+    shades = [float(np.mean(np.asarray(cv2.imread(str(tmp_path / name))))) for name in names]
+    assert np.allclose(shades, [0, 128, 255], atol=4)

@@ -6,6 +6,7 @@ The least severe goes first, and of like severity the oldest: a file's name says
 from __future__ import annotations
 
 import re
+from itertools import chain, count
 from pathlib import Path
 
 import cv2
@@ -66,7 +67,10 @@ class EvidenceStore:
             stamp: Seconds since 1970.
         """
         what = re.sub(r'[^A-Za-z0-9-]', '-', what)[:40]
-        name = f'{min(max(severity, 0), 9)}_{max(0, round(1000 * stamp)):013d}_{what}.jpg'
+        stem = f'{min(max(severity, 0), 9)}_{max(0, round(1000 * stamp)):013d}_{what}'
+        # Two things are noticed in one comparison: each keeps its picture.
+        names = chain([f'{stem}.jpg'], (f'{stem}-{number}.jpg' for number in count(2)))
+        name = next(each for each in names if each not in self._sizes)
         good, data = cv2.imencode('.jpg', picture, [cv2.IMWRITE_JPEG_QUALITY, 85])
         if not good:
             return ''
