@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from armor_service.client import ArmorClient, InProcessTransport
+from armor_service.directives import TABLE
 from armor_service.service import ArmorService
 
 from .seven_rooms import IRI, Ask, asker, build_seven_rooms, names
@@ -102,3 +103,9 @@ def test_the_client_has_methods_for_them(service: ArmorService) -> None:
     assert ask.taken_back() == []
     client.utils.cancel()
     assert client.utils.reason_within(60.0)
+
+
+def test_what_armor_does_not_know_is_said_to_be_an_addition() -> None:
+    written = [d for d in TABLE.values() if d.run.__module__.endswith('.manchester')]
+    assert {'REMOVE RULE', 'QUERY AXIOMS'} <= {directive.words for directive in written}
+    assert not [directive.words for directive in written if directive.native]

@@ -134,6 +134,7 @@ def test_what_may_take_long_is_not_done_at_once(service: ArmorService, ask: Ask)
         ask('ADD IND', f'X{number}')
     ask('APPLY')
     assert service.execute_at_once(request('QUERY FACT', 'p(?, a)')) is None, 'many facts'
+    assert service.execute_at_once(request('QUERY AXIOMS', 'X1')) is None, 'many facts'
 
 
 def test_a_reference_whose_reasoning_takes_long_is_reasoned_over_by_a_worker(

@@ -300,6 +300,32 @@ def test_a_journal_that_somebody_cut_costs_nothing_that_is_known(tmp_path: Path,
     journal.close()
 
 
+def test_a_failed_write_after_a_cut_takes_no_record_with_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def broken(*_: object) -> None:
+        raise OSError(5, 'Input/output error')
+
+    whole, cut = Journal(tmp_path / 'whole'), Journal(tmp_path / 'cut')
+    for journal in (whole, cut):
+        journal.append([['a', 1]])
+    os.truncate(tmp_path / 'cut' / 'journal-0.log', 5)
+    for journal in (whole, cut):
+        journal.append([['b', 2]])
+        with monkeypatch.context() as patch:
+            patch.setattr(os, 'fdatasync', broken)
+            with pytest.raises(StoreError, match='Input/output error'):
+                journal.append([['x', 0]])
+        journal.append([['c', 3]])
+        journal.close()
+    # Each record is where it would be had nobody cut the file.
+    sizes = {(tmp_path / name / 'journal-0.log').stat().st_size for name in ('whole', 'cut')}
+    assert len(sizes) == 1
+    journal = Journal(tmp_path / 'cut')
+    assert journal.records() == [['b', 2], ['c', 3]]
+    journal.close()
+
+
 def test_what_was_cut_from_the_journal_is_in_a_snapshot(server: Server) -> None:
     server.ask('ADD IND CLASS', 'A', 'DOOR')
     store = server.service.workspace.store

@@ -36,6 +36,12 @@ def test_small_far_marker_is_ambiguous_and_a_near_oblique_one_is_not():
     assert 0.0 <= far.ambiguity <= 1.0
 
 
+def test_marker_seen_squarely_from_near_has_one_pose():
+    for distance in (0.5, 1.0, 2.0):
+        pose = pose_of(corners_in_image(Panel(0, distance), CAMERA), 0.2, CAMERA)
+        assert (pose.ambiguity, pose.other) == (0.0, None)
+
+
 def test_pose_is_the_same_through_a_distorting_lens():
     import cv2
 

@@ -4,8 +4,13 @@ changes.
 
 from __future__ import annotations
 
+import dataclasses
+
+import pytest
+
 from owl_reasoner.feed import Changes
 from owl_reasoner.knowledge_base import KnowledgeBase
+from owl_reasoner.owl import axioms as ax
 from owl_reasoner.owl.axioms import (
     AnnotationAssertion,
     ClassAssertion,
@@ -45,6 +50,20 @@ def test_adding_and_removing_say_whether_anything_changed() -> None:
     assert not kb.remove(fact)
     assert list(kb.axioms_about(n('R1'))) == []
     assert not kb.is_known('individual', n('R1'))
+
+
+def test_no_axiom_can_be_changed_once_it_is_written() -> None:
+    kinds = [
+        kind
+        for kind in vars(ax).values()
+        if isinstance(kind, type) and issubclass(kind, ax.Axiom) and dataclasses.is_dataclass(kind)
+    ]
+    assert len(kinds) > 30
+    for kind in kinds:
+        for field in dataclasses.fields(kind):
+            axiom = object.__new__(kind)
+            with pytest.raises(dataclasses.FrozenInstanceError):
+                setattr(axiom, field.name, 'x:other')
 
 
 def test_known_entities() -> None:

@@ -191,7 +191,7 @@ def test_a_rule_that_makes_values_without_end_is_stopped_and_reported() -> None:
     )
     kb = KnowledgeBase('x:', [counting, has(S, i, 1)])
     assert kb.reason()
-    assert 'without end' in kb.unsupported[0]
+    assert 'make values without end: stopped after' in kb.unsupported[0]
     assert num(2) in kb.data_values(S, i)
 
 

@@ -72,6 +72,10 @@ def test_a_checkpoint_of_another_machine_is_refused_and_changes_nothing():
         saved['states'] = [{}, {'label': 'INNER', 'in': within}]
         with pytest.raises(checkpoint.CheckpointError, match='expected the number of a container'):
             checkpoint.restore(first.root, saved)
+    for states in ([], {'0': {}}, 'INNER', None):
+        saved['states'] = states
+        with pytest.raises(checkpoint.CheckpointError, match='a list of states'):
+            checkpoint.restore(first.root, saved)
     saved['states'] = [{'raised': ['NIX']}]
     with pytest.raises(checkpoint.CheckpointError, match="no interrupt 'NIX'"):
         checkpoint.restore(first.root, saved)

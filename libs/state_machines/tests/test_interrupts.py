@@ -175,6 +175,26 @@ def test_an_interrupt_that_came_in_a_states_last_moment_runs_before_the_exit(clo
     assert stop.runs == 1
 
 
+def test_a_state_that_made_way_runs_again_after_the_interrupt():
+    class MakesWay(fsm.State):
+        def __init__(self):
+            super().__init__(['done', 'preempted'])
+            self.runs = 0
+
+        def execute(self, ud):
+            self.runs += 1
+            if self.runs == 1:
+                root.raise_interrupt('STOP')
+            return 'preempted' if self.preempt_requested() else 'done'
+
+    state, stop, root = MakesWay(), Answer('done'), fsm.StateMachine(['done', 'preempted'])
+    with root:
+        fsm.StateMachine.add('WORK', state)
+    root.add_interrupt('STOP', stop)
+    assert root.execute() == 'done'
+    assert (state.runs, stop.runs) == (2, 1)
+
+
 def test_an_interrupt_that_waits_for_the_end_of_a_container_does_not_hold_up_an_outer_one():
     ran = []
 
