@@ -353,15 +353,36 @@ def _overdue(world: World, fleet: FleetOutlook, share: Share, settings: Decision
 
     The way to it may lead through places that are never URGENT, since other robots visit them, nor
     of the class whose turn it is; a robot that is alone would find them URGENT some time. Or two
-    robots that arrive by turns left it to each other.
+    robots that arrive by turns left it to each other. One that another robot of the group drives to
+    is left to that one; where two do, to the nearer one, then to the first by name.
     """
     if URGENT not in settings.rules.classes:
         return ''
     late = fleet.graph.tour.length
+    distances, index = fleet.graph.distances, fleet.graph.index
+    driving = {
+        robot.name: robot
+        for robot in fleet.robots
+        if robot.share is not None and robot.share.tour == share.tour and robot.place in index
+    }
+
+    def away(name: str, stop: str) -> tuple[float, str]:
+        place = world.place if name == fleet.name else driving[name].place
+        return float(distances[index[place], index[stop]]), name
+
+    def is_taken(stop: str) -> bool:
+        # Who charges is on no way, and comes to it later than whoever finds it overdue.
+        to_it = fleet.sharing(world.now) & {
+            robot.name
+            for robot in driving.values()
+            if robot.share and robot.share.stop == stop and robot.charging_until is None
+        }
+        return bool(to_it) and fleet.name != min(to_it, key=lambda name: away(name, stop))
+
     for stop in _onward(share):
         if stop == world.place or stop not in world.graph.index or is_closed(world, stop):
             continue
-        if world.unvisited(stop) > world.threshold_of(stop) + late:
+        if world.unvisited(stop) > world.threshold_of(stop) + late and not is_taken(stop):
             return stop
     return ''
 

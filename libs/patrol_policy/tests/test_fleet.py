@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from patrol_policy.battery import Battery
-from patrol_policy.decision import DecisionSettings, Rules
+from patrol_policy.decision import DecisionSettings, Rules, decide
 from patrol_policy.fleet import (
     ChargeNeed,
     FleetError,
@@ -461,3 +461,30 @@ def test_what_two_leave_to_each_other_is_visited_when_it_is_overdue() -> None:
         run = FleetPatrol(graph, {f'robot{n}': 'P0' for n in range(count)}, policy)
         run.until(8.0 * tour)
         assert run.longest(2.0 * tour) < 3.0 * tour
+
+
+def test_what_is_overdue_is_driven_to_by_one_robot_alone() -> None:
+    rules = DecisionSettings(rules=Rules(('URGENT', 'CORRIDOR')))
+    tour = fleet_plan(seven_rooms(), 1).groups[0].stops
+    ways = {'robot1': 'C1', 'robot2': 'C2'}
+
+    def rule_of(name: str, stops: dict[str, str]) -> tuple[str, str]:
+        """Return what a robot drives to where R4 is overdue and all else was just visited."""
+        robots = [
+            replace(robot, place=ways[robot.name], share=Share(tour, stops[robot.name]))
+            for robot in fleet('C1', 'C2')
+        ]
+        robots.sort(key=lambda robot: robot.name != name)
+        seen = fleet_world(robots)
+        seen = replace(seen, visited_at=dict.fromkeys(tour, 1000.0) | {'R4': 0.0}, now=1000.0)
+        robots = [replace(robot, heard_at=1000.0) for robot in robots]
+        assert seen.fleet is not None
+        seen = replace(seen, fleet=replace(seen.fleet, robots=robots))
+        made = decide(seen, Battery(), rules)
+        return made.rule, made.target
+
+    assert rule_of('robot1', {'robot1': 'R1', 'robot2': 'E'}) == ('share', 'R4')
+    assert rule_of('robot1', {'robot1': 'R1', 'robot2': 'R4'})[1] != 'R4', 'robot2 drives there'
+    assert rule_of('robot2', {'robot1': 'R1', 'robot2': 'R4'}) == ('share', 'R4')
+    # Of two that drive there the nearer one goes on.
+    assert rule_of('robot2', {'robot1': 'R4', 'robot2': 'R4'}) == ('share', 'R4')
