@@ -52,7 +52,7 @@ def visit(grid: Grid, *looks: list[tuple[float, float, float]], seed: int = 0) -
     path = [(2.0, 4.0), (2.5, 4.2), (3.0, 4.4), (3.5, 4.6), (4.0, 4.8), (4.5, 5.0)]
     for number, sensor in enumerate(path):
         things = looks[number % len(looks)]
-        gathered.add(sensor, *sweep(grid, things, sensor, seed + number))
+        gathered.add(sensor, *sweep(grid, things, sensor, seed + number), stamp=0.2 * number)
     return gathered.view()
 
 
@@ -80,7 +80,7 @@ def test_a_far_wall_stays_a_wall_when_the_heading_is_a_degree_off() -> None:
             turned = np.array(
                 [[math.cos(error), -math.sin(error)], [math.sin(error), math.cos(error)]]
             )
-            gathered.add(sensor, (ends - sensor) @ turned.T + sensor, met)
+            gathered.add(sensor, (ends - sensor) @ turned.T + sensor, met, 0.2 * seed)
         views.append(gathered.view())
     for now in views[1:]:
         assert changes(views[0], now) == []
@@ -100,9 +100,9 @@ def test_a_slanting_far_wall_stays_a_wall_when_place_and_heading_are_off() -> No
             ends, met = sweep(grid, [], sensor, seed)
             if off:
                 told = sensor[0], sensor[1] + 0.04
-                gathered.add(told, (ends - sensor) @ turn.T + told, met)
+                gathered.add(told, (ends - sensor) @ turn.T + told, met, float(gathered.sweeps))
             else:
-                gathered.add(sensor, ends, met)
+                gathered.add(sensor, ends, met, float(gathered.sweeps))
         views.append(gathered.view())
     assert changes(*views) == []
 
@@ -163,7 +163,7 @@ def test_on_real_floor_plans_a_barrel_is_found_and_nothing_else(path):
         gathered = FloorVisit(grid)
         for number in range(5):
             sensor = (x - 0.3 * room + 0.05 * number, y + 0.02 * number)
-            gathered.add(sensor, *sweep(grid, things, sensor, seed + number))
+            gathered.add(sensor, *sweep(grid, things, sensor, seed + number), stamp=0.2 * number)
         return gathered.view()
 
     before = look([], 0)

@@ -384,6 +384,35 @@ def test_one_who_walks_is_seen_by_the_lidar_and_is_over_when_nobody_is_there():
     assert event.state == EventState.OVER
 
 
+def test_one_who_walks_to_and_fro_is_seen_each_time():
+    watch = Round()
+    watch.watcher.arrive('R1', watch.time)
+    walk(watch, (-9.0, -9.0), (0.0, 0.0), 20)
+    for _ in range(2):
+        told = len(watch.told)
+        walk(watch, (1.2, 1.0), (0.25, 0.0), 10)
+        assert any(each.kind == Kind.PERSON for each in watch.told[told:])
+        walk(watch, (-9.0, -9.0), (0.0, 0.0), 15)
+        watch.time += 20.0
+
+
+def test_one_who_walks_past_a_door_is_seen_and_its_leaf_is_not():
+    for x, seen in ((3.8, True), (None, False)):
+        watch = Round()
+        watch.watcher.arrive('R1', watch.time)
+        walk(watch, (-9.0, -9.0), (0.0, 0.0), 8)
+        for number in range(14):
+            watch.time += 0.25
+            angle = math.radians(6.5 * number)
+            leaf = [
+                (DOOR[0] - r * math.sin(angle), DOOR[1] + r * math.cos(angle), 0.03)
+                for r in np.arange(0.05, DOOR[3] - DOOR[1], 0.05)
+            ]
+            things = leaf if x is None else [(x, 0.8 + 0.25 * number, 0.15)]
+            watch.watcher.sweep(HERE, *beams(room(), HERE, things, True, seed=number), watch.time)
+        assert any(each.kind == Kind.PERSON for each in watch.told) is seen
+
+
 def test_what_stands_or_is_uncovered_by_the_robot_does_not_walk():
     watch = Round()
     watch.watcher.arrive('R1', watch.time)

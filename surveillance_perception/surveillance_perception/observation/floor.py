@@ -13,9 +13,11 @@ kept for each visit alone, so that an old look never outvotes a new one.
 from __future__ import annotations
 
 import math
+from collections import deque
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
@@ -44,7 +46,14 @@ SAME_SIZE = 1.6
 LEAF_SLACK = 0.13
 """How far from the line of a door's leaf its cells may lie, metres: a cell, noise, its depth."""
 FAR_FROM_WALL, NEAR_END, PASSED_BEFORE = 0.25, 0.1, 3
-"""Where all was free: so far from walls and from any end of a beam, metres; passed so often."""
+"""Where all was free: so far from walls and from what is met there, metres; passed so often."""
+HEADING_OFF = 0.035
+"""And so many rad, where that is more: a heading is off by 2 degrees at times."""
+LEAVES = 1.0
+"""What is met at a spot longer ago than this is there still, or has left it, seconds."""
+MOST_MET = 0.15
+"""A spot is free again when something was met there in this part of the sweeps that passed it, at
+most: the leg of a chair, which thin beams miss now and then, is met in more."""
 _WITH_CORNERS = np.ones((3, 3), np.bool_)
 
 
@@ -118,16 +127,20 @@ class FloorVisit:
         # Since a pass followed an end, or an end a pass, in a later sweep.
         self._last_end = np.zeros(shape, np.uint16)
         self._changes = np.zeros(shape, np.uint8)
+        # Sweeps that met something near a cell, longer ago than `LEAVES`; and the later ones.
+        self._met_near = np.zeros(shape, np.uint16)
+        self._lately: deque[tuple[float, Mask]] = deque()
         self._walls = ndimage.distance_transform_edt(~grid.occupied) * grid.resolution
         self.sweeps = 0
 
-    def add(self, sensor: tuple[float, float], ends: Points, met: Mask) -> None:
+    def add(self, sensor: tuple[float, float], ends: Points, met: Mask, stamp: float) -> None:
         """Take one sweep.
 
         Args:
             sensor: Where the lidar was, map frame, metres.
             ends: Where beams ended, (n, 2), same frame.
             met: Whether something was met there, (n,); False for a beam at its greatest range.
+            stamp: Seconds; not before the last one.
         """
         self.sweeps += 1
         origin = np.asarray(sensor, float)
@@ -149,6 +162,11 @@ class FloorVisit:
         self._passes += passed
         self._ends += of_things
         self._met |= hit
+        reach = max(1, round(NEAR_END / self._grid.resolution))
+        around = np.ones((2 * reach + 1, 2 * reach + 1), np.uint8)
+        self._lately.append((stamp, cv2.dilate(hit.astype(np.uint8), around).astype(np.bool_)))
+        while stamp - self._lately[0][0] > LEAVES:
+            self._met_near += self._lately.popleft()[1]
         was_end = self._last_end == self.sweeps - 1
         self._changes += (passed & (self._ends > 0) & was_end & (self._last_end > 0)).astype(
             np.uint8
@@ -163,25 +181,37 @@ class FloorVisit:
         slack = np.hypot(NEAR_WALL, YAW_SLACK * lengths)
         return np.asarray(self._walls[rows, columns] <= slack, np.bool_)
 
-    def fresh(self, points: Points) -> Mask:
+    def fresh(self, sensor: tuple[float, float], points: Points) -> Mask:
         """Tell of each point whether all was free there until now, as far as this visit knows.
 
+        Where somebody went is free again after them. What was met there within the last second may
+        be who is met there now.
+
         Args:
-            points: (n, 2), map frame, metres.
+            sensor: Where the lidar was, map frame, metres.
+            points: (n, 2), same frame.
         """
         cells = self._grid.cells_of(points)
-        free = self._grid.contains(cells)
         height, width = self._grid.cells.shape
-        rows, columns = np.clip(cells[:, 0], 0, height - 1), np.clip(cells[:, 1], 0, width - 1)
-        free &= (self._walls[rows, columns] > FAR_FROM_WALL) & (
-            self._passes[rows, columns] >= PASSED_BEFORE
+        at = np.clip(cells[:, 0], 0, height - 1), np.clip(cells[:, 1], 0, width - 1)
+        slack = HEADING_OFF * np.linalg.norm(points - np.asarray(sensor, float), axis=1)
+        free = np.asarray(
+            self._grid.contains(cells)
+            & (self._walls[at] > np.maximum(FAR_FROM_WALL, slack))
+            & (self._passes[at] >= PASSED_BEFORE),
+            np.bool_,
         )
-        reach = max(1, round(NEAR_END / self._grid.resolution))
-        for down in range(-reach, reach + 1):
-            for right in range(-reach, reach + 1):
-                beside = np.clip(rows + down, 0, height - 1), np.clip(columns + right, 0, width - 1)
-                free &= ~self._met[beside]
-        return np.asarray(free, np.bool_)
+        kept = np.flatnonzero(free)
+        if len(kept):
+            # Cells about each point, (kept, cells), as far as an error of the heading may move it.
+            reach = math.ceil(float(slack[kept].max()) / self._grid.resolution)
+            down, right = (each.ravel() for each in np.indices((2 * reach + 1,) * 2) - reach)
+            rows = np.clip(at[0][kept, None] + down, 0, height - 1)
+            columns = np.clip(at[1][kept, None] + right, 0, width - 1)
+            near = np.hypot(down, right) * self._grid.resolution <= slack[kept, None]
+            passes, ends = self._passes[rows, columns], self._met_near[rows, columns]
+            free[kept] = ~(near & (ends > MOST_MET * passes)).any(axis=1)
+        return free
 
     def view(self) -> FloorView:
         """Return what was seen so far."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 
@@ -17,7 +17,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.cluster.hierarchy import fcluster, linkage
 
+from surveillance_perception.observation.doors import Segment
+from surveillance_perception.observation.floor import LEAF_SLACK
+
 Points = NDArray[np.float64]
+_Spot = tuple[float, tuple[float, float]]
+"""When something was met, seconds, and where, map frame, metres."""
 
 TOGETHER = 0.45
 """Points so near to each other are of one thing, metres: two legs."""
@@ -27,14 +32,23 @@ FASTEST = 2.5
 """Metres per second."""
 SPAN = 3.0
 """A walk is told from what was met within so many seconds."""
-STEPS = 4
+STEPS = 5
 """It was met at so many spots."""
 WAY = 0.5
 """It went so far, metres."""
+WAY_AFAR = 0.12
+"""And so many rad as seen from the lidar: an error of the heading moves what stands far off."""
+STEADY = 0.85
+"""So much of the variance of the spots is a steady motion along a line."""
 STRAIGHT = 0.6
 """The way from the first spot to the last is this part of the whole way, at least."""
 MOST_SHARE = 0.25
 """When more of a sweep ends where all was free, the pose is wrong, not the room full."""
+APART = 0.2
+"""Spots that were met within a shorter time count as one, seconds: the middle of what is seen of a
+person jumps by a leg from one sweep to the next, and many small jumps look like a long way."""
+OFF_DOOR = 2
+"""So many spots of a walk lie beyond the reach of any one leaf, which swings about its hinge."""
 
 
 @dataclass(frozen=True)
@@ -52,32 +66,49 @@ class Walk:
 
 @dataclass
 class _Track:
-    spots: deque[tuple[float, tuple[float, float]]] = field(
-        default_factory=lambda: deque(maxlen=20)
-    )
+    spots: deque[_Spot] = field(default_factory=deque)
+
+    def add(self, spot: _Spot) -> None:
+        """Add where it is met now; the one before is replaced if it was met just before."""
+        if len(self.spots) > 1 and spot[0] - self.spots[-2][0] < APART:
+            self.spots.pop()
+        self.spots.append(spot)
+        while spot[0] - self.spots[0][0] > SPAN:
+            self.spots.popleft()
 
 
 class WalkFinder:
-    """Follows what was met where all was free."""
+    """Follows what was met where all was free.
 
-    def __init__(self) -> None:
+    Args:
+        doors: The doors' openings, map frame, metres.
+    """
+
+    def __init__(self, doors: Iterable[Segment] = ()) -> None:
         self._tracks: list[_Track] = []
+        # Each jamb may be the hinge of its leaf.
+        self._leaves = [
+            (jamb, math.dist(each[:2], each[2:]) + LEAF_SLACK)
+            for each in doors
+            for jamb in (each[:2], each[2:])
+        ]
 
     def clear(self) -> None:
         """Forget all: another visit begins."""
         self._tracks = []
 
-    def add(self, fresh: Points, beams: int, stamp: float) -> list[Walk]:
+    def add(
+        self, sensor: tuple[float, float], fresh: Points, beams: int, stamp: float
+    ) -> list[Walk]:
         """Take the ends of one sweep that lie where all was free before; return what walks.
 
         Args:
-            fresh: (n, 2), map frame, metres; without walls, known things and leaves of doors.
+            sensor: Where the lidar was, map frame, metres.
+            fresh: (n, 2), map frame, metres; without walls and known things.
             beams: How many beams the sweep has.
             stamp: Seconds; a later one than before.
         """
-        self._tracks = [
-            each for each in self._tracks if stamp - each.spots[-1][0] <= SPAN and each.spots
-        ]
+        self._tracks = [each for each in self._tracks if stamp - each.spots[-1][0] <= SPAN]
         if not len(fresh) or len(fresh) > MOST_SHARE * beams:
             return []
         found = []
@@ -86,11 +117,18 @@ class WalkFinder:
             if track is None:
                 track = _Track()
                 self._tracks.append(track)
-            track.spots.append((stamp, spot))
-            walk = _walk([each for each in track.spots if stamp - each[0] <= SPAN])
-            if walk is not None:
+            track.add((stamp, spot))
+            walk = _walk(track.spots, math.dist(sensor, spot))
+            if walk is not None and not self._is_leaf(track.spots):
                 found.append(walk)
         return found
+
+    def _is_leaf(self, spots: Sequence[_Spot]) -> bool:
+        """Tell whether one leaf may have been met at all spots but a stray one."""
+        return any(
+            sum(math.dist(jamb, at) > reach for _, at in spots) < OFF_DOOR
+            for jamb, reach in self._leaves
+        )
 
     def _nearest(self, spot: tuple[float, float], stamp: float) -> _Track | None:
         near = [
@@ -118,12 +156,24 @@ def _things(points: Points) -> list[tuple[float, float]]:
     return found
 
 
-def _walk(spots: Sequence[tuple[float, tuple[float, float]]]) -> Walk | None:
+def _walk(spots: Sequence[_Spot], distance: float) -> Walk | None:
     if len(spots) < STEPS:
         return None
     (began, first), (ended, last) = spots[0], spots[-1]
     away = math.dist(first, last)
     way = sum(math.dist(a[1], b[1]) for a, b in pairwise(spots))
-    if away < WAY or away < STRAIGHT * way:
+    if away < max(WAY, WAY_AFAR * distance) or away < STRAIGHT * way:
+        return None
+    if _steadiness(spots) < STEADY:
         return None
     return Walk(last, away / max(ended - began, 1e-3))
+
+
+def _steadiness(spots: Sequence[_Spot]) -> float:
+    """Return how much of the variance of the spots a constant velocity explains, 0 to 1."""
+    times = np.array([stamp for stamp, _ in spots])
+    offsets = np.array([at for _, at in spots])
+    times, offsets = times - times.mean(), offsets - offsets.mean(axis=0)
+    velocity = times @ offsets / max(float(times @ times), 1e-9)
+    rest = offsets - times[:, None] * velocity
+    return 1.0 - float((rest**2).sum()) / max(float((offsets**2).sum()), 1e-9)

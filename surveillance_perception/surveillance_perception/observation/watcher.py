@@ -193,7 +193,7 @@ class Watcher:
         self._rooms, self._ways_of = rooms, ways_of
         self._find_persons, self._looked = find_persons, looked
         self._ways: Ways | None = None
-        self._walks = WalkFinder()
+        self._walks = WalkFinder([each.segment for each in self._doors.values()])
         self._verify_seconds = verify_seconds
         self._others = others
         self._doubts: dict[int, float] = {}
@@ -283,17 +283,15 @@ class Watcher:
         found = None if self._rooms is None else self._rooms.place_at(point)
         return found or self._place
 
-    def _walk(self, ends: Points, met: Mask, stamp: float) -> None:
+    def _walk(self, sensor: tuple[float, float], ends: Points, met: Mask, stamp: float) -> None:
         """Tell of what walks; before the sweep is taken into the visit."""
         assert self._visit is not None
         fresh = ends[met]
-        fresh = fresh[self._visit.fresh(fresh)]
+        fresh = fresh[self._visit.fresh(sensor, fresh)]
         if self._normal is not None and len(fresh):
             cells = self._normal.grid.cells_of(fresh)
             fresh = fresh[~self._normal.occupied[cells[:, 0], cells[:, 1]]]
-        if self._at_door(fresh):
-            return
-        for walk in self._walks.add(fresh, len(ends), stamp)[:1]:
+        for walk in self._walks.add(sensor, fresh, len(ends), stamp)[:1]:
             self._persons += 1
             place = self._place_of(walk.position)
             seen = Observation(Kind.PERSON, 'seen', place, '', walk.position, WALKING, stamp)
@@ -316,8 +314,8 @@ class Watcher:
         if self._grid is not None:
             if self._visit is None:
                 self._visit = FloorVisit(self._grid)
-            self._walk(ends, met, stamp)
-            self._visit.add(sensor, ends, met)
+            self._walk(sensor, ends, met, stamp)
+            self._visit.add(sensor, ends, met, stamp)
         for name, door in self._doors.items():
             x1, y1, x2, y2 = door.segment
             middle = (x1 + x2) / 2, (y1 + y2) / 2
