@@ -75,7 +75,9 @@ def beams(
 class Halves:
     """The two rooms, west and east of the door."""
 
-    def place_at(self, point) -> str:
+    def place_at(self, point) -> str | None:
+        if point[0] < 0.0:
+            return None
         return 'R1' if point[0] < DOOR[0] else 'R2'
 
     def cells_of(self, place: str) -> np.ndarray:
@@ -446,6 +448,36 @@ def test_the_light_of_each_room_is_its_own():
         ('R1', 'off'),
         ('R2', 'off'),
     ]
+
+
+def test_a_lit_doorway_does_not_make_a_dark_room_lit():
+    watch = Round()
+    dark = np.full((240, 320), 3, np.uint8)
+    doorway = dark.copy()
+    doorway[40:, 130:190] = texture()[40:240, 130:190]
+
+    def look(picture: np.ndarray) -> None:
+        for _ in range(3):
+            watch.time += 2.0
+            watch.watcher.picture(picture, None, watch.time, None)
+
+    watch.watcher.arrive('R1', watch.time)
+    look(dark)
+    look(doorway)
+    look(texture())
+    assert [each.state for each in watch.told if each.kind == Kind.LIGHT] == ['off', 'on']
+    watch.watcher.arrive('R2', watch.time)
+    look(doorway)
+    assert len([each for each in watch.told if each.kind == Kind.LIGHT]) == 2, 'nothing is said'
+
+
+def test_no_marker_hangs_off_the_map():
+    watch = Round(markers={14: (2.0, 0.0, 1.0)})
+    watch.watcher.marker(14, (-3.0, 0.0, 1.0), 1.0)
+    watch.watcher.marker(77, (-3.0, 1.0, 1.0), 2.0)
+    assert not watch.book.events
+    watch.watcher.marker(14, (5.0, 0.0, 1.0), 3.0)
+    assert [(each.subject, each.seen) for each in watch.book.events] == [('14', 'moved')]
 
 
 def test_boxes_across_a_doorway_block_the_way_until_they_are_gone():

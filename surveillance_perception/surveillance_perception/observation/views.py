@@ -122,6 +122,23 @@ def sight_of(picture: Picture) -> Sight:
     return Sight.CLEAR
 
 
+def light_of(picture: Picture, sight: Sight) -> str:
+    """Return whether the light of the room is 'on' or 'off'; empty: the picture does not tell.
+
+    Through an open door a dark room shows a lit one: its own light is on only where half of the
+    picture is not dark.
+
+    Args:
+        picture: The view.
+        sight: What `sight_of` says of it.
+    """
+    if sight == Sight.DARK:
+        return 'off'
+    if sight == Sight.CLEAR and float(np.median(_scaled(grey_of(picture)))) > DARK:
+        return 'on'
+    return ''
+
+
 def view_changes(reference: Picture, picture: Picture) -> list[ViewChange] | None:
     """Return what differs; None where the views cannot be laid over each other.
 

@@ -47,7 +47,7 @@ from surveillance_perception.observation.reference_views import (
     ReferenceViews,
     Viewpoint,
 )
-from surveillance_perception.observation.views import Grey, Sight, sight_of, view_changes
+from surveillance_perception.observation.views import Grey, Sight, light_of, sight_of, view_changes
 from surveillance_perception.observation.watch_rules import Level, WatchRule, severity_of
 from surveillance_perception.observation.ways import Ways
 from surveillance_runtime.place.occupancy_grid import Grid
@@ -218,6 +218,8 @@ class Watcher:
         self._strange: dict[int, int] = {}
         self._sights: deque[Sight] = deque(maxlen=AGREED_PICTURES)
         self._sight: Sight | None = None
+        self._lights: deque[str] = deque(maxlen=AGREED_PICTURES)
+        self._light = ''
 
     # --- the floor and its doors ---
 
@@ -246,6 +248,8 @@ class Watcher:
         # The light is that of the place.
         self._sights.clear()
         self._sight = None
+        self._lights.clear()
+        self._light = ''
         self._look += 1
         self._visit = None
         self._candidates = []
@@ -516,11 +520,14 @@ class Watcher:
         self._sights.append(sight_of(grey))
         settled = len(self._sights) == AGREED_PICTURES and len(set(self._sights)) == 1
         sight = self._sights[-1]
+        light = light_of(grey, sight)
+        self._lights.append(light)
+        agree = len(self._lights) == AGREED_PICTURES and len(set(self._lights)) == 1
+        if agree and light and light != self._light:
+            self._light = light
+            self._take(Observation(Kind.LIGHT, light, self._place, stamp=stamp), grey)
         if settled and sight != self._sight:
             self._sight = sight
-            light = 'off' if sight == Sight.DARK else 'on'
-            if sight != Sight.BLOCKED:
-                self._take(Observation(Kind.LIGHT, light, self._place, stamp=stamp), grey)
             if sight != Sight.DARK:
                 view = 'blocked' if sight == Sight.BLOCKED else 'clear'
                 self._take(Observation(Kind.VIEW, view, self._place, stamp=stamp), grey)
@@ -664,6 +671,8 @@ class Watcher:
             )
             if hangs_twice:
                 return  # either panel is where it was
+        if state != 'here' and self._rooms is not None and self._rooms.place_at(where) is None:
+            return  # nothing hangs off the map: it was measured wrongly
         place = self._place_of(where)
         seen = Observation(Kind.MARKER, state, place, str(number), where, 0.95, stamp)
         if self._is_due(seen):
