@@ -2,7 +2,7 @@
 
     python benchmarks/surveil.py --quick          # below 50 s
     python benchmarks/surveil.py                  # all tables but the week
-    python benchmarks/surveil.py --only week      # a week in which nothing happens: 15 minutes
+    python benchmarks/surveil.py --only week      # a week in which nothing happens: ten minutes
 
 An observer without ROS (`Watcher`) goes about the seven rooms: sweeps of the simulated lidar at
 poses that localisation would tell (2 cm and 0.6 degrees off), pictures of the simulated camera.
