@@ -49,7 +49,7 @@ FAR_FROM_WALL, NEAR_END, PASSED_BEFORE = 0.25, 0.1, 3
 """Where all was free: so far from walls and from what is met there, metres; passed so often."""
 HEADING_OFF = 0.035
 """And so many rad, where that is more: a heading is off by 2 degrees at times."""
-LEAVES = 1.0
+LEAVES = 0.5
 """What is met at a spot longer ago than this is there still, or has left it, seconds."""
 MOST_MET = 0.15
 """A spot is free again when something was met there in this part of the sweeps that passed it, at
