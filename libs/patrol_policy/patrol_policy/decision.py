@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -261,7 +261,9 @@ def _decide(world: World, battery: Battery, settings: DecisionSettings) -> Decis
         if isinstance(scores, Charge):
             return _to_charge(world, (scores.place,), scores.words)
         decision = _best(world, rule, allowed, scores, settings.policy)
-    if energy is not None and (why := _too_far(world, decision.place, energy)):
+    # A dock of the fleet that is closed for long is driven to, and is not on the plan's map.
+    is_on_map = decision.place in world.graph.index
+    if energy is not None and is_on_map and (why := _too_far(world, decision.place, energy)):
         here = world.graph.index[world.place]
         if not (here in energy.stations and world.level >= energy.full):
             return _to_charge(world, settings.recharge_rooms, why)
@@ -306,7 +308,8 @@ def _shared(
     own = {p: limit if p in mine else math.inf for p, limit in world.own_thresholds.items()}
     rule, allowed = settings.rules.candidates(replace(within, classes=classes, own_thresholds=own))
     goal, graph = choice.place, world.graph
-    if rule != URGENT and (far := _overdue(world, fleet, choice.share, settings)):
+    enterable = frozenset(Rules(()).candidates(within)[1])
+    if rule != URGENT and (far := _overdue(world, fleet, choice.share, settings, enterable)):
         common['share'] = Share(choice.share.tour, far)
         step = graph.route(here, far)[0]
         reason = (
@@ -321,10 +324,9 @@ def _shared(
         stay = max(1.0, (choice.until or world.now + 1.0) - world.now)
         reason = choice.reason
         return Decision(**common, place=here, target=here, rule=SHARE, reason=reason, stay=stay)
-    step = here if goal == here else graph.route(here, goal)[0]
-    if step in allowed or goal not in graph.index:
-        named = rule if step in allowed else SHARE
-        return Decision(**common, place=step, target=goal, rule=named, reason=choice.reason)
+    # A stop that is closed for long is not on this robot's map, and is passed over.
+    if goal in graph.index and goal != here and (step := graph.route(here, goal)[0]) in allowed:
+        return Decision(**common, place=step, target=goal, rule=rule, reason=choice.reason)
     for stop in _onward(choice.share):
         wanted = rule == ANY or not classes.get(stop, frozenset()).isdisjoint((rule, URGENT))
         if wanted and stop != here and stop in graph.index:
@@ -335,8 +337,11 @@ def _shared(
                 if goal != here:  # why it would stay is no reason to go
                     reason += f'; {choice.reason}'
                 return Decision(**common, place=step, target=stop, rule=rule, reason=reason)
+    onward = graph if goal in graph.index else fleet.graph
     scores = {
-        place: -graph.move(here, place) - graph.seconds(place, goal) + world.unvisited(place) * 1e-3
+        place: -graph.move(here, place)
+        - onward.seconds(place, goal)
+        + world.unvisited(place) * 1e-3
         for place in allowed
     }
     best = max(sorted(scores), key=lambda place: scores[place])
@@ -348,43 +353,64 @@ def _shared(
     return Decision(**common, place=best, target=best, rule=rule, reason=reason, scores=scores)
 
 
-def _overdue(world: World, fleet: FleetOutlook, share: Share, settings: DecisionSettings) -> str:
+def _overdue(
+    world: World,
+    fleet: FleetOutlook,
+    share: Share,
+    settings: DecisionSettings,
+    enterable: Collection[str],
+) -> str:
     """Return a stop of the robot's group that has been URGENT for a whole tour; empty: none.
 
     The way to it may lead through places that are never URGENT, since other robots visit them, nor
     of the class whose turn it is; a robot that is alone would find them URGENT some time. Or two
     robots that arrive by turns left it to each other. One that another robot of the group drives to
     is left to that one; where two do, to the nearer one, then to the first by name.
+
+    Args:
+        world: What is known.
+        fleet: The same of all robots.
+        share: What the robot drives to by its share.
+        settings: Of decisions.
+        enterable: The neighbours that may be entered now, whatever their class.
     """
     if URGENT not in settings.rules.classes:
         return ''
     late = fleet.graph.tour.length
+
+    def can_go(stop: str) -> bool:
+        if stop == world.place or stop not in world.graph.index or stop in world.avoided:
+            return False
+        return not is_closed(world, stop) and world.graph.route(world.place, stop)[0] in enterable
+
+    overdue = [
+        stop
+        for stop in _onward(share)
+        if world.unvisited(stop) > world.threshold_of(stop) + late and can_go(stop)
+    ]
+    if not overdue:
+        return ''
     distances, index = fleet.graph.distances, fleet.graph.index
-    driving = {
-        robot.name: robot
+    sharing = fleet.sharing(world.now)
+    # Who charges is on no way, and comes to it later than whoever finds it overdue.
+    ways = {
+        robot.name: (world.place if robot.name == fleet.name else robot.place, robot.share.stop)
         for robot in fleet.robots
-        if robot.share is not None and robot.share.tour == share.tour and robot.place in index
+        if robot.name in sharing
+        and robot.share is not None
+        and robot.share.tour == share.tour
+        and robot.charging_until is None
     }
 
-    def away(name: str, stop: str) -> tuple[float, str]:
-        place = world.place if name == fleet.name else driving[name].place
-        return float(distances[index[place], index[stop]]), name
-
     def is_taken(stop: str) -> bool:
-        # Who charges is on no way, and comes to it later than whoever finds it overdue.
-        to_it = fleet.sharing(world.now) & {
-            robot.name
-            for robot in driving.values()
-            if robot.share and robot.share.stop == stop and robot.charging_until is None
-        }
-        return bool(to_it) and fleet.name != min(to_it, key=lambda name: away(name, stop))
+        away = [
+            (float(distances[index[place], index[stop]]), name)
+            for name, (place, goal) in ways.items()
+            if goal == stop
+        ]
+        return bool(away) and min(away)[1] != fleet.name
 
-    for stop in _onward(share):
-        if stop == world.place or stop not in world.graph.index or is_closed(world, stop):
-            continue
-        if world.unvisited(stop) > world.threshold_of(stop) + late and not is_taken(stop):
-            return stop
-    return ''
+    return next((stop for stop in overdue if not is_taken(stop)), '')
 
 
 def _onward(share: Share) -> tuple[str, ...]:

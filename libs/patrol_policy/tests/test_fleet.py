@@ -29,6 +29,7 @@ from patrol_policy.fleet.charging_bound import charging_wait
 from patrol_policy.fleet.ruled import ruled
 from patrol_policy.fleet.simulation import FleetBattery, FleetPatrol, Outage
 from patrol_policy.graph import PatrolGraph, graph_of_places
+from patrol_policy.hours import Openings
 from patrol_policy.promises import promises
 from patrol_policy.world import World
 
@@ -376,6 +377,7 @@ def fleet_world(robots: list[FleetRobot], **changes: object) -> World:
     return world(
         now=0.0,
         place=robots[0].place,
+        reachable=tuple(graph.leg_seconds[robots[0].place]),
         graph=graph,
         threshold=40.0,
         classes={
@@ -488,3 +490,47 @@ def test_what_is_overdue_is_driven_to_by_one_robot_alone() -> None:
     assert rule_of('robot2', {'robot1': 'R1', 'robot2': 'R4'}) == ('share', 'R4')
     # Of two that drive there the nearer one goes on.
     assert rule_of('robot2', {'robot1': 'R4', 'robot2': 'R4'}) == ('share', 'R4')
+
+
+def test_a_fleet_enters_nothing_that_is_closed_and_passes_over_what_is_for_long() -> None:
+    graph = seven_rooms()
+    tour = fleet_plan(graph, 1).groups[0].stops
+    for rules, shut, opens_in, here, stop in itertools.product(
+        ((), ('URGENT', 'CORRIDOR')),
+        ('C1', 'C2', 'R4'),
+        ({}, {'C1': 5.0, 'C2': 5.0, 'R4': 5.0}),
+        ('E', 'C1', 'C2'),
+        tour,
+    ):
+        if here == shut:
+            continue
+        robots = [
+            replace(robot, heard_at=1000.0, share=Share(tour, share))
+            for robot, share in zip(fleet(here, 'E'), (stop, 'C2'), strict=True)
+        ]
+        seen = replace(
+            fleet_world(robots),
+            now=1000.0,
+            visited_at=dict.fromkeys(tour, 1000.0) | dict.fromkeys(('R1', 'R3', 'R4'), 0.0),
+            openings=Openings({shut: 'closed'}, frozenset(), {}, opens_in=opens_in),
+        )
+        made = decide(seen, Battery(), DecisionSettings(rules=Rules(rules)))
+        assert made.place != shut, (rules, opens_in, here, stop, made.reason)
+
+
+def test_the_way_to_what_is_overdue_leads_through_nothing_that_could_not_be_reached() -> None:
+    graph = seven_rooms()
+    tour = fleet_plan(graph, 1).groups[0].stops
+    robots = [replace(robot, heard_at=1000.0) for robot in fleet('E')]
+    seen = replace(
+        fleet_world(robots),
+        now=1000.0,
+        visited_at=dict.fromkeys(tour, 1000.0) | {'R4': 0.0},
+    )
+    rules = DecisionSettings(rules=Rules(('URGENT', 'CORRIDOR')))
+    first = decide(seen, Battery(), rules)
+    assert 'R4 is overdue' in first.reason
+    for avoided in ({first.place}, {'R4'}):
+        made = decide(replace(seen, avoided=frozenset(avoided)), Battery(), rules)
+        assert 'overdue' not in made.reason
+        assert made.place not in avoided
