@@ -13,7 +13,7 @@ from pathlib import Path
 from patrol_policy.battery import Battery, ChargeCurve, Draw
 from patrol_policy.decision import LONGEST_THRESHOLD, DecisionSettings
 from patrol_policy.graph import PatrolGraph
-from patrol_policy.promises import WITHIN, Promise, promises
+from patrol_policy.promises import Promise, promises
 from patrol_policy.promises import lines as promise_lines
 from patrol_policy.world import World
 from surveillance_behaviour.mission import mission_log
@@ -273,7 +273,7 @@ def _draw(options: argparse.Namespace) -> list[str]:
             )
         lines.append(f'{options.record}: {run.summary}')
         told = mission_log.last_promises(mission_log.read(record))
-        lines += [str(each['words']) for each in told if each.get('verdict') != WITHIN]
+        lines += promise_lines(told) if told else []
     elif options.threshold is not None:
         found = promised(file, options.threshold, options.charge_lasts, time.time())
         lines += promise_lines(found)

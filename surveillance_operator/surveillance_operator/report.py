@@ -16,6 +16,7 @@ from html import escape
 from itertools import groupby, pairwise
 from pathlib import Path
 
+from patrol_policy.promises import lines as promise_lines
 from surveillance_behaviour.mission import mission_log
 from surveillance_behaviour.mission.mission_log import Event
 from surveillance_operator.map_command import facts, graph_over_doors, in_words, run_of
@@ -356,13 +357,10 @@ def _promises(events: Sequence[Event]) -> str:
     found = mission_log.last_promises(events)
     if not found:
         return ''
-    kept = sum(each.get('verdict') == 'within' for each in found)
-    rows = [
-        [str(each.get(key, '')) for key in ('place', 'verdict', 'words')]
-        for each in found[:MOST_LINES]
-    ]
-    head = f'What could be kept ({kept} of {len(found)} places within their thresholds)'
-    opened = '' if kept == len(found) else ' open'
+    first, *rest = promise_lines(found)
+    rows = [[each.place, each.verdict, each.words] for each in found[:MOST_LINES]]
+    head = f'What could be kept: {escape(first)}'
+    opened = ' open' if rest else ''
     table = _table(['place', 'verdict', 'in words'], rows)
     return f'<details{opened}><summary>{head}</summary>{table}</details>'
 

@@ -53,7 +53,9 @@ def test_promises_pass_through_their_message_with_the_hours():
 def test_the_record_and_the_report_tell_what_cannot_be_kept(tmp_path: Path):
     world, path = World(), tmp_path / 'mission.jsonl'
     Killed('surveillance', world, path, urgency_threshold=20.0, policy='tour').run(120.0)
-    told = {each['place']: each for each in last_promises(read(path))}
-    assert told['R1']['verdict'] == LATER
-    assert told['R1']['threshold'] == 20.0
-    assert told['R1']['words'] in write_report(tmp_path).read_text()
+    found = last_promises(read(path))
+    told = {each.place: each for each in found}
+    assert (told['R1'].verdict, told['R1'].threshold) == (LATER, 20.0)
+    report = write_report(tmp_path).read_text()
+    assert told['R1'].words in report
+    assert f'What could be kept: {lines(found)[0]}' in report, 'as in the log and on the page'

@@ -37,6 +37,7 @@ before the robot has looked where it is, what the rules allow now, and whether i
 
 from __future__ import annotations
 
+import dataclasses
 import glob
 import gzip
 import json
@@ -51,6 +52,7 @@ from pathlib import Path
 from typing import Any
 
 from patrol_policy.decision import RECHARGE
+from patrol_policy.promises import Promise
 from state_machines.files import parse_json
 from surveillance_runtime.files import FileError, LineFile, read_file
 
@@ -427,13 +429,27 @@ def on_present_clock(times: Mapping[str, float], before: float, now: float) -> d
     return {name: at - max(0.0, before - now) for name, at in times.items()}
 
 
-def last_promises(events: Iterable[Event]) -> list[dict[str, Any]]:
-    """Return what was said last of what can be kept, one mapping for each place; may be empty."""
-    found: list[dict[str, Any]] = []
+def last_promises(events: Iterable[Event]) -> tuple[Promise, ...]:
+    """Return what was said last of what can be kept; may be empty."""
+    found: tuple[Promise, ...] = ()
     for event in events:
         if event.name == 'promises' and isinstance(places := event.fields['places'], list):
-            found = [each for each in places if isinstance(each, dict) and 'words' in each]
+            found = tuple(filter(None, map(_promise, places)))
     return found
+
+
+def _promise(kept: Any) -> Promise | None:
+    """Return a promise as the record keeps it, without bounds as null; None: it is none."""
+    if not isinstance(kept, dict) or not kept.keys() >= {
+        each.name for each in dataclasses.fields(Promise)
+    }:
+        return None
+    numbers = (math.inf if kept[name] is None else kept[name] for name in ('threshold', 'wait'))
+    try:
+        threshold, wait = map(float, numbers)
+    except (TypeError, ValueError):
+        return None
+    return Promise(str(kept['place']), str(kept['verdict']), threshold, wait, str(kept['words']))
 
 
 def account_of(events: Iterable[Event]) -> Account:
