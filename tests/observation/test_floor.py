@@ -144,6 +144,25 @@ def test_a_person_who_walks_through_is_no_thing(office):
     assert [each for each in found if each.confidence > 0.6] == []
 
 
+def test_a_stay_of_many_hours_is_counted_to_its_end(office):
+    sensor = (2.0, 4.0)
+    gathered = FloorVisit(office)
+    for number in range(5):
+        gathered.add(sensor, *sweep(office, [CHAIR], sensor, number), stamp=0.2 * number)
+    # A hundred thousand sweeps like these, of a robot at its dock.
+    gathered._ends *= 20_000
+    gathered._passes *= 20_000
+    gathered.sweeps *= 20_000
+    before = gathered.view()
+    gathered.add(sensor, *sweep(office, [CHAIR], sensor, 0), stamp=1.0)
+    after = gathered.view()
+    x, y, radius = CHAIR
+    assert after.occupied[office.cell_of(x, y - radius)], 'its near side stands'
+    assert gathered.sweeps == 100_001
+    assert np.array_equal(after.occupied, before.occupied)
+    assert np.array_equal(after.free, before.free)
+
+
 MAPS = sorted((Path(__file__).resolve().parents[3] / 'shared' / 'maps').glob('*_scan.png'))
 
 

@@ -120,15 +120,13 @@ class FloorVisit:
         self._grid = grid
         self._farthest = farthest
         shape = grid.cells.shape
-        self._ends = np.zeros(shape, np.uint16)
+        # A robot may stand at its dock for days: ten sweeps a second fill 16 bits in two hours.
+        self._ends = np.zeros(shape, np.uint32)
         # Where beams ended at all, also at what may be a wall.
         self._met = np.zeros(shape, np.bool_)
-        self._passes = np.zeros(shape, np.uint16)
-        # Since a pass followed an end, or an end a pass, in a later sweep.
-        self._last_end = np.zeros(shape, np.uint16)
-        self._changes = np.zeros(shape, np.uint8)
+        self._passes = np.zeros(shape, np.uint32)
         # Sweeps that met something near a cell, longer ago than `LEAVES`; and the later ones.
-        self._met_near = np.zeros(shape, np.uint16)
+        self._met_near = np.zeros(shape, np.uint32)
         self._lately: deque[tuple[float, Mask]] = deque()
         self._walls = ndimage.distance_transform_edt(~grid.occupied) * grid.resolution
         self.sweeps = 0
@@ -167,11 +165,6 @@ class FloorVisit:
         self._lately.append((stamp, cv2.dilate(hit.astype(np.uint8), around).astype(np.bool_)))
         while stamp - self._lately[0][0] > LEAVES:
             self._met_near += self._lately.popleft()[1]
-        was_end = self._last_end == self.sweeps - 1
-        self._changes += (passed & (self._ends > 0) & was_end & (self._last_end > 0)).astype(
-            np.uint8
-        )
-        self._last_end[of_things] = self.sweeps
 
     def _of_wall(self, hits: Points, lengths: NDArray[np.float64]) -> Mask:
         """Tell of each end whether a wall of the map may be what was met, so far off."""
