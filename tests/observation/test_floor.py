@@ -163,6 +163,17 @@ def test_a_stay_of_many_hours_is_counted_to_its_end(office):
     assert np.array_equal(after.free, before.free)
 
 
+def test_what_stands_is_not_fresh_for_long_though_the_clock_was_set_back(office):
+    sensor, spot = (2.0, 4.0), np.array([[CHAIR[0], CHAIR[1] - CHAIR[2]]])
+    gathered = FloorVisit(office)
+    for number in range(10):
+        gathered.add(sensor, *sweep(office, [], sensor, number), stamp=3600.0 + 0.2 * number)
+    assert gathered.fresh(sensor, spot).all()
+    for number in range(10):
+        gathered.add(sensor, *sweep(office, [CHAIR], sensor, number), stamp=0.2 * number)
+    assert not gathered.fresh(sensor, spot).any()
+
+
 MAPS = sorted((Path(__file__).resolve().parents[3] / 'shared' / 'maps').glob('*_scan.png'))
 
 

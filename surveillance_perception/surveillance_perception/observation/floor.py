@@ -138,7 +138,7 @@ class FloorVisit:
             sensor: Where the lidar was, map frame, metres.
             ends: Where beams ended, (n, 2), same frame.
             met: Whether something was met there, (n,); False for a beam at its greatest range.
-            stamp: Seconds; not before the last one.
+            stamp: Seconds.
         """
         self.sweeps += 1
         origin = np.asarray(sensor, float)
@@ -163,7 +163,8 @@ class FloorVisit:
         reach = max(1, round(NEAR_END / self._grid.resolution))
         around = np.ones((2 * reach + 1, 2 * reach + 1), np.uint8)
         self._lately.append((stamp, cv2.dilate(hit.astype(np.uint8), around).astype(np.bool_)))
-        while stamp - self._lately[0][0] > LEAVES:
+        # Later than now: the clock was set back, and what was met before counts as met long ago.
+        while not 0.0 <= stamp - self._lately[0][0] <= LEAVES:
             self._met_near += self._lately.popleft()[1]
 
     def _of_wall(self, hits: Points, lengths: NDArray[np.float64]) -> Mask:
@@ -177,8 +178,8 @@ class FloorVisit:
     def fresh(self, sensor: tuple[float, float], points: Points) -> Mask:
         """Tell of each point whether all was free there until now, as far as this visit knows.
 
-        Where somebody went is free again after them. What was met there within the last second may
-        be who is met there now.
+        Where somebody went is free again after them. What was met there within `LEAVES` may be who
+        is met there now.
 
         Args:
             sensor: Where the lidar was, map frame, metres.
