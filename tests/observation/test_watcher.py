@@ -347,6 +347,32 @@ def test_a_second_marker_with_an_id_is_double_until_it_is_gone():
     }
 
 
+def test_a_view_that_is_learned_anew_keeps_no_marker_double():
+    watch = Round()
+    first, second = wall(), wall(2)
+    hung = hang(first, 14, 120, 100)
+    changed = second.copy()
+    changed[40:200, 150:300] = wall(3)[40:200, 150:300]
+    copied = hang(changed, 14, 60, 60)
+    view, other = (1.0, 1.0, 0.5), (1.0, 1.0, 2.5)
+    watch.watcher.picture(first, view, 1.0, [hung])
+    watch.watcher.picture(second, other, 2.0, [])
+    for stamp in (10.0, 40.0):
+        watch.watcher.arrive('', stamp)
+        watch.watcher.arrive('R1', stamp)
+        for number in range(3):
+            watch.watcher.picture(changed, other, stamp + number, [copied])
+    watch.watcher.picture(first, view, 50.0, [hung])
+    (double,) = [each for each in watch.book.current if each.kind == Kind.MARKER]
+    assert double.seen == 'double'
+    (event,) = [each for each in watch.book.current if each.kind == Kind.VIEW]
+    watch.watcher.answer(event.number, EventState.NORMAL)
+    # The copy is taken down before the other wall is looked at again.
+    for number in range(3):
+        watch.watcher.picture(first, view, 70.0 + number, [hung])
+    assert watch.book.find(double.number).state == EventState.OVER
+
+
 def test_a_marker_in_pictures_that_no_file_knows_is_unknown():
     watch = Round(markers={14: None})
     picture = wall()

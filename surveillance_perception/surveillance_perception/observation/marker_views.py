@@ -10,7 +10,7 @@ other case nothing is known. What is found counts after several pictures in a ro
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -358,6 +358,12 @@ class MarkerMemory:
     at_spot: dict[int, int] = field(default_factory=dict)
     elsewhere: dict[int, tuple[str, int]] = field(default_factory=dict)
     gone: dict[int, str] = field(default_factory=dict)
+
+    def keep(self, views: Container[str]) -> None:
+        """Forget what other viewpoints showed than these: they are looked from no more."""
+        self.in_a_row = {key: each for key, each in self.in_a_row.items() if key[0] in views}
+        self.elsewhere = {key: each for key, each in self.elsewhere.items() if each[0] in views}
+        self.gone = {key: each for key, each in self.gone.items() if each in views}
 
     def take(
         self, view: str, findings: Iterable[MarkerFinding], hung: Iterable[int], look: int

@@ -93,6 +93,11 @@ class ReferenceViews:
         self._views: list[ReferenceView] = []
         self._next = 1
 
+    @property
+    def names(self) -> frozenset[str]:
+        """The names of all views."""
+        return frozenset(each.name for each in self._views)
+
     def at(
         self, viewpoint: Viewpoint, doors: Mapping[str, str] | None = None
     ) -> ReferenceView | None:

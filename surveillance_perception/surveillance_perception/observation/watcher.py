@@ -546,6 +546,7 @@ class Watcher:
             # Who walks about here is no part of how it looks normally.
             if not self._persons:
                 self._views.add(viewpoint, picture, stamp, markers or (), doors)
+                self._marker_memory.keep(self._views.names)
             return
         if markers is not None and not self._persons:
             self._compare_markers(known, markers, picture, viewpoint, stamp)
@@ -687,6 +688,7 @@ class Watcher:
         event = self.book.answer(number, state)
         if state == EventState.NORMAL and event.kind == Kind.VIEW and event.subject:
             self._views.forget(event.subject)
+            self._marker_memory.keep(self._views.names)
         return event
 
     # --- what is made of it ---
