@@ -350,19 +350,19 @@ class MarkerMemory:
         in_a_row: In how many pictures of a viewpoint in a row a marker was found so, by the
             viewpoint's name and the id.
         at_spot: In which look an id was read last where it hangs.
-        elsewhere: The viewpoint that shows an id where it did not hang, and in which look.
-        gone: The viewpoints that show that it is gone.
+        elsewhere: The viewpoint that shows an id where it did not hang.
+        gone: The viewpoint that shows that it is gone.
     """
 
     in_a_row: dict[tuple[str, int], tuple[str, int]] = field(default_factory=dict)
     at_spot: dict[int, int] = field(default_factory=dict)
-    elsewhere: dict[int, tuple[str, int]] = field(default_factory=dict)
+    elsewhere: dict[int, str] = field(default_factory=dict)
     gone: dict[int, str] = field(default_factory=dict)
 
     def keep(self, views: Container[str]) -> None:
         """Forget what other viewpoints showed than these: they are looked from no more."""
         self.in_a_row = {key: each for key, each in self.in_a_row.items() if key[0] in views}
-        self.elsewhere = {key: each for key, each in self.elsewhere.items() if each[0] in views}
+        self.elsewhere = {key: each for key, each in self.elsewhere.items() if each in views}
         self.gone = {key: each for key, each in self.gone.items() if each in views}
 
     def take(
@@ -393,15 +393,13 @@ class MarkerMemory:
             state, count = self.in_a_row.get((view, number), ('', 0))
             count = count + 1 if state == finding.state else 1
             self.in_a_row[view, number] = finding.state, count
-            came_back = False
             if finding.state == 'here':
                 self.at_spot[number] = look
                 came_back = self.gone.pop(number, None) is not None
-                other = self.elsewhere.get(number, ('', 0))[0]
-                if came_back or (other == view and count >= AGREED):
+                if came_back or (self.elsewhere.get(number) == view and count >= AGREED):
                     self.elsewhere.pop(number, None)
             if finding.state in ('moved', 'double', 'new') and count >= AGREED:
-                self.elsewhere[number] = view, look
+                self.elsewhere[number] = view
             if finding.state in ('missing', 'moved') and count >= AGREED:
                 self.gone[number] = view
             if count >= AGREED or finding.state == 'here':
@@ -413,7 +411,7 @@ class MarkerMemory:
     def _verdict(self, finding: MarkerFinding, view: str, look: int) -> str:
         number, state = finding.number, finding.state
         other = self.elsewhere.get(number)
-        if state == 'here' and other is not None and other[0] != view:
+        if state == 'here' and other is not None and other != view:
             # Read at its spot after it was read in another view.
             return 'double'
         if state == 'new':
