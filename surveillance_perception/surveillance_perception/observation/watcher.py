@@ -47,7 +47,14 @@ from surveillance_perception.observation.reference_views import (
     ReferenceViews,
     Viewpoint,
 )
-from surveillance_perception.observation.views import Grey, Sight, light_of, sight_of, view_changes
+from surveillance_perception.observation.views import (
+    Grey,
+    Sight,
+    grey_of,
+    light_of,
+    sight_of,
+    view_changes,
+)
 from surveillance_perception.observation.watch_rules import Level, WatchRule, severity_of
 from surveillance_perception.observation.ways import Ways
 from surveillance_runtime.place.occupancy_grid import Grid
@@ -513,9 +520,7 @@ class Watcher:
             stamp: Seconds since 1970.
             markers: The markers in it; None: nobody looked for markers.
         """
-        grey = picture
-        if picture.ndim == 3:
-            grey = np.asarray(cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY), np.uint8)
+        grey = grey_of(picture)
         self._pictures += 1
         self._sights.append(sight_of(grey))
         settled = len(self._sights) == AGREED_PICTURES and len(set(self._sights)) == 1
