@@ -17,7 +17,7 @@ import threading
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 
-from patrol_policy.battery import Battery, ChargeCurve
+from patrol_policy.battery import Battery, ChargeCurve, Energy
 from patrol_policy.decision import (
     ALERT,
     RECHARGE,
@@ -535,19 +535,20 @@ class WorldModel:
             decision = decide(replace(world, requested=''), battery, self.settings)
         # Of the same plan: nothing is planned for it.
         self._tell_promises(world)
-        decision = self._in_traffic(decision, world, interrupt)
-        self._target = decision.target
-        if decision.rule == RECHARGE and not self.experience.sent_to_charge:
+        why = ''
+        if is_new := decision.rule == RECHARGE and not self.experience.sent_to_charge:
             why = why_charge(world, battery, self.settings)
             # A charge that was planned is a charge: it goes on until it is enough; one in passing
-            # until its time is over.
-            in_passing = not why and decision.slot is not None and decision.place == world.place
+            # until its time is over, which the others are told.
             self._charge_until = None
-            if in_passing and decision.slot is not None:
+            if not why and decision.slot is not None and decision.place == world.place:
                 approach = battery.approaches.get(decision.place, 0.0)
                 self._charge_until = decision.slot.end + approach
-            if why or not battery.charged_enough(self.settings.battery):
-                self.experience.sent_to_charge = why or decision.reason.partition(';')[0]
+        decision = self._in_traffic(decision, world, interrupt)
+        self._target = decision.target
+        goes_on = not why and battery.charged_enough(self.settings.battery)
+        if is_new and decision.rule == RECHARGE and not goes_on:
+            self.experience.sent_to_charge = why or decision.reason.partition(';')[0]
         if world.contradiction:
             decision = replace(decision, reason=f'{decision.reason}; {world.contradiction}')
         self._leg, self._leg_began = decision, self._passed(decision.time)
@@ -682,8 +683,16 @@ class WorldModel:
         self.fleet.charges_at(energy.charge_ratio(self._fleet_graph.tour.length))
         facts['runs_until'] = world.now + max(0.0, battery.level - least) / energy.draw
         if dock is not None:
-            facts['charging_until'] = world.now + energy.charge_seconds(0, battery.level)
+            facts['charging_until'] = self._charges_until(world.now, energy, battery.level)
         return facts
+
+    def _charges_until(self, now: float, energy: Energy, level: float) -> float:
+        """Return when this robot leaves its dock: when it is full, or its time in passing is over.
+
+        Where that is over, and the battery does not let it go on, it charges until it is full.
+        """
+        full, ends = now + energy.charge_seconds(0, level), self._charge_until
+        return full if ends is None or ends <= now else min(full, ends)
 
     def _tell_charge(self) -> None:
         """Tell the others until when this robot charges, as the level rises."""
@@ -693,8 +702,8 @@ class WorldModel:
         battery = self.battery()
         energy = energy_of(world, battery, self.settings)
         if energy is not None and battery.level is not None:
-            now = self.experience.now or world.now
-            fleet.tell(charging_until=max(now, world.now) + energy.charge_seconds(0, battery.level))
+            now = max(self.experience.now or world.now, world.now)
+            fleet.tell(charging_until=self._charges_until(now, energy, battery.level))
 
     def _stands(self) -> None:
         """Tell the others that this robot is not on its way any more."""

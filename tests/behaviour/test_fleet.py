@@ -351,6 +351,11 @@ def test_a_charge_in_passing_keeps_the_share_and_has_its_time() -> None:
     assert decision.slot is not None
     own = second.fleet.outlook(model.graph, now).robots[0]
     assert own.dock == 'E'
+    assert own.charging_until == pytest.approx(decision.slot.end, abs=5.0)
+    model.learn_draw(lambda: now + 1.0)
+    first.world.set_level(61.0)
+    own = second.fleet.outlook(model.graph, now).robots[0]
+    assert own.charging_until == pytest.approx(decision.slot.end, abs=5.0)
     assert own.share == Share(tour, tour[(tour.index('E') + 1) % len(tour)])
     assert not model.charge_is_over(now + 2.0)
     assert model.why_charge()
