@@ -172,8 +172,13 @@ class FleetKnowledge:
         return self._own
 
     def charges_at(self, ratio: float) -> None:
-        """Take how many seconds this robot charges for each second of patrol."""
-        self.settings = replace(self.settings, charge_ratio=round(ratio, 2))
+        """Take how many seconds this robot charges for each second of patrol.
+
+        Rounded, so that what is learned seldom changes a plan, and up: a charge in passing is to
+        make good all that a round has cost, and ends by itself when the battery is full.
+        """
+        hundredths = math.ceil(100.0 * ratio - 1e-6)
+        self.settings = replace(self.settings, charge_ratio=hundredths / 100.0)
 
     # --- what follows ---
 

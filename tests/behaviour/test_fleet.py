@@ -363,3 +363,10 @@ def test_a_charge_in_passing_keeps_the_share_and_has_its_time() -> None:
     model.charged()
     assert model.why_charge() == ''
     assert second.fleet.outlook(model.graph, now).robots[0].share == own.share
+
+
+def test_a_planned_charge_makes_good_what_a_round_has_cost() -> None:
+    _air, (robot,) = patrol(1)
+    for ratio, taken in ((0.0, 0.0), (0.004, 0.01), (0.07, 0.07), (0.125, 0.13)):
+        robot.fleet.charges_at(ratio)
+        assert robot.fleet.settings.charge_ratio == taken
