@@ -229,20 +229,35 @@ class Watcher:
 
     def visited_at(self, reference: str, places: Sequence[str]) -> dict[str, int]:
         """Return what the ontology has as each place's last visit, seconds."""
-        found = {}
-        for place in places:
-            request = ArmorDirective.Request()
-            asked = request.armor_request
-            asked.client_name, asked.reference_name = 'campaign', reference
-            asked.command, asked.primary_command_spec = 'QUERY', 'DATAPROP'
-            asked.secondary_command_spec, asked.args = 'IND', ['visitedAt', place]
-            values = self._armor.call(request, 20.0).armor_response.queried_objects
-            numbers = [
-                int(number) for value in values for number in re.findall(r'"(-?\d+)"', value)
-            ]
-            if numbers:
-                found[place] = max(numbers)
-        return found
+        return visited_at(self._armor, reference, places, 20.0)
+
+
+def visited_at(
+    armor: ServiceCaller, reference: str, places: Sequence[str], timeout: float
+) -> dict[str, int]:
+    """Return what the ontology has as each place's last visit, seconds.
+
+    Args:
+        armor: Calls the service for one directive.
+        reference: The ontology's name.
+        places: Of which it is asked; one that was never visited is missing in the answer.
+        timeout: Of each call, seconds.
+
+    Raises:
+        CallError: It does not answer.
+    """
+    found = {}
+    for place in places:
+        request = ArmorDirective.Request()
+        asked = request.armor_request
+        asked.client_name, asked.reference_name = 'visited_at', reference
+        asked.command, asked.primary_command_spec = 'QUERY', 'DATAPROP'
+        asked.secondary_command_spec, asked.args = 'IND', ['visitedAt', place]
+        values = armor.call(request, timeout).armor_response.queried_objects
+        numbers = [int(each) for value in values for each in re.findall(r'"(-?\d+)"', value)]
+        if numbers:
+            found[place] = max(numbers)
+    return found
 
 
 @dataclass(frozen=True)

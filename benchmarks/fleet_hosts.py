@@ -20,7 +20,6 @@ from __future__ import annotations
 import contextlib
 import math
 import os
-import re
 import shutil
 import tempfile
 import threading
@@ -30,7 +29,7 @@ from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 
-from campaign import CLOSE_IN_TIME, Launcher, events_of
+from campaign import CLOSE_IN_TIME, Launcher, events_of, visited_at
 from hosts import Link, Network, may_be_made
 from tables import table
 
@@ -160,18 +159,7 @@ class Onlooker:
         Raises:
             CallError: It does not answer.
         """
-        found = {}
-        for place in self._places:
-            request = ArmorDirective.Request()
-            asked = request.armor_request
-            asked.client_name, asked.reference_name = 'onlooker', reference
-            asked.command, asked.primary_command_spec = 'QUERY', 'DATAPROP'
-            asked.secondary_command_spec, asked.args = 'IND', ['visitedAt', place]
-            values = self._armor.call(request, 5.0).armor_response.queried_objects
-            numbers = [int(each) for value in values for each in re.findall(r'"(-?\d+)"', value)]
-            if numbers:
-                found[place] = max(numbers)
-        return found
+        return visited_at(self._armor, reference, self._places, 5.0)
 
 
 @dataclass
