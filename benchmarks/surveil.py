@@ -46,6 +46,7 @@ from surveillance_perception.observation.views import view_changes
 from surveillance_perception.observation.watch_rules import rule_from
 from surveillance_perception.observation.watcher import Watcher
 from surveillance_runtime.incidents import Cause, Severity, Told
+from surveillance_runtime.place.occupancy_grid import Grid
 from surveillance_runtime.place.plan_grid import draw
 from surveillance_simulation.camera.model import Camera, Conditions, covered, expose
 from surveillance_simulation.camera.rendering import Renderer
@@ -411,6 +412,17 @@ def measure_things(trials: int) -> list[list[str]]:
 # --- persons ---
 
 
+def watcher_of(rule: dict[str, str], told: list[Observation]) -> Watcher:
+    """Return a watcher by one rule, without rooms and doors, that tells what it sees to a list."""
+    return Watcher(
+        [rule_from(rule)],
+        EventBook(),
+        local=lambda stamp: datetime.fromtimestamp(stamp, UTC),
+        robot='Robot1',
+        tell=told.append,
+    )
+
+
 def let_walk(rounds: Rounds, place: str) -> None:
     """Let somebody walk to and fro in a place, past the robot.
 
@@ -651,13 +663,7 @@ def measure_markers(trials: int) -> list[list[str]]:
             if at is None:
                 continue
             told: list[Observation] = []
-            watcher = Watcher(
-                [rule_from({'marker': 'all'})],
-                EventBook(),
-                local=lambda stamp: datetime.fromtimestamp(stamp, UTC),
-                robot='Robot1',
-                tell=told.append,
-            )
+            watcher = watcher_of({'marker': 'all'}, told)
             watcher.arrive(str(place), rounds.time)
             yaw = math.atan2(home.y - at[1], home.x - at[0]) + float(rng.uniform(-0.2, 0.2))
             away = math.dist(at, (home.x, home.y))
@@ -860,21 +866,13 @@ def _scanned(path: Path) -> Any:
 
 def _walks_told(plain: Any, with_things: Any, rng: Any, degrees: float) -> bool:
     """Drive through rooms with furniture that the map does not show, and in which nobody is."""
-    from surveillance_runtime.place.occupancy_grid import Grid
-
     known, real = Grid(plain, 0.05), Grid(with_things, 0.05)
     clear = cv2.distanceTransform((with_things == 0).astype(np.uint8), cv2.DIST_L2, 5)
     row, column = np.argwhere(clear > 8)[int(rng.integers((clear > 8).sum()))]
     x, y = real.centre_of(int(row), int(column))
     yaw = rng.uniform(-math.pi, math.pi)
     told: list[Observation] = []
-    watcher = Watcher(
-        [rule_from({'person': 'nobody'})],
-        EventBook(),
-        local=lambda stamp: datetime.fromtimestamp(stamp, UTC),
-        robot='Robot1',
-        tell=told.append,
-    )
+    watcher = watcher_of({'person': 'nobody'}, told)
     watcher.use_map(known)
     watcher.arrive('a', 1e6)
     angles = np.linspace(-math.pi, math.pi, 360, endpoint=False)
@@ -900,8 +898,6 @@ def _walks_told(plain: Any, with_things: Any, rng: Any, degrees: float) -> bool:
 
 
 def _still(cells: Any, rng: Any, visits: int) -> tuple[int, int]:
-    from surveillance_runtime.place.occupancy_grid import Grid
-
     grid = Grid(cells, 0.05)
     clear = cv2.distanceTransform((cells == 0).astype(np.uint8), cv2.DIST_L2, 5)
     spots = np.argwhere(clear > 12)
@@ -911,13 +907,7 @@ def _still(cells: Any, rng: Any, visits: int) -> tuple[int, int]:
     angles = np.linspace(-math.pi, math.pi, 360, endpoint=False)
     for _ in range(visits):
         told: list[Observation] = []
-        watcher = Watcher(
-            [rule_from({'object': 'none'})],
-            EventBook(),
-            local=lambda stamp: datetime.fromtimestamp(stamp, UTC),
-            robot='Robot1',
-            tell=told.append,
-        )
+        watcher = watcher_of({'object': 'none'}, told)
         watcher.use_map(grid)
         row, column = spots[int(rng.integers(len(spots)))]
         at = grid.centre_of(int(row), int(column))
