@@ -15,6 +15,7 @@ from itertools import groupby
 from pathlib import Path
 from typing import Any
 
+from surveillance_operator.map_command import counted
 from surveillance_perception.observation.day_book import DayBook, Seen
 from surveillance_perception.observation.events import Event, EventState
 from surveillance_perception.observation.privacy import PictureError, shareable
@@ -164,14 +165,10 @@ def _page(
     return '\n'.join(lines) + '\n'
 
 
-def _times(count: int, what: str) -> str:
-    return f'{count} {what}{"" if count == 1 else "s"}'
-
-
 def _event(event: Event, pictures: _Pictures) -> str:
     level = ('', '', 'warning', 'alert')[min(event.severity, ALERT)]
     rule = f'<p class="quiet">{escape(event.rule)}</p>' if event.rule else ''
-    seen = f'{_times(event.sightings, "sighting")} in {_times(event.looks, "look")}'
+    seen = f'{counted(event.sightings, "sighting")} in {counted(event.looks, "look")}'
     return (
         f'<div class="event {level}"><p><b>{escape(event.words())}</b> ({escape(event.state)})</p>'
         f'<p>{_clock(event.began)} to {_clock(event.last)}, {seen}, '

@@ -56,12 +56,12 @@ def graph_over_doors(plan: FloorPlan) -> PatrolGraph:
 
 def facts(plan: FloorPlan) -> str:
     """Return what there is to say about a place in one line."""
-    parts = [_count(len(plan.place.rooms), 'place'), _count(len(plan.place.doors), 'door')]
+    parts = [counted(len(plan.place.rooms), 'place'), counted(len(plan.place.doors), 'door')]
     zones = len(plan.zones.keep_out) + len(plan.zones.slow)
     if zones:
-        parts.append(_count(zones, 'zone'))
+        parts.append(counted(zones, 'zone'))
     if plan.markers:
-        parts.append(_count(len(plan.markers), 'marker'))
+        parts.append(counted(len(plan.markers), 'marker'))
     tour = graph_over_doors(plan).tour
     if tour.exact:
         parts.append(f'shortest tour {tour.length:.1f} m')
@@ -150,13 +150,13 @@ def in_words(summary: mission_log.Summary) -> str:
     charged = f' ({summary.charging_seconds:.0f} s)' if summary.recharges else ''
     parts = [
         f'{lasted} of patrol',
-        _count(sum(summary.visits.values()), 'visit'),
+        counted(sum(summary.visits.values()), 'visit'),
         f'{summary.distance:.0f} m driven',
-        _count(summary.recharges, 'recharge') + charged,
-        _count(sum(summary.failures.values()), 'failure'),
+        counted(summary.recharges, 'recharge') + charged,
+        counted(sum(summary.failures.values()), 'failure'),
     ]
     if summary.restarts:
-        parts.append(f'the behaviour was started again {_count(summary.restarts, "time")}')
+        parts.append(f'the behaviour was started again {counted(summary.restarts, "time")}')
     return ' · '.join(parts)
 
 
@@ -199,7 +199,8 @@ def _drives(
     return [way for way in driven if len(way) > 1], [way for way in planned if way], failures
 
 
-def _count(number: int, word: str) -> str:
+def counted(number: int, word: str) -> str:
+    """Return a number of things in words: '1 door', '2 doors'."""
     return f'{number} {word}{"" if number == 1 else "s"}'
 
 

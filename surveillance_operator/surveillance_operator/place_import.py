@@ -15,7 +15,7 @@ import yaml
 from PIL import Image
 
 from surveillance_operator.graph_import import SUFFIXES, read_graph
-from surveillance_operator.map_command import facts
+from surveillance_operator.map_command import counted, facts
 from surveillance_operator.rmf_building import RmfLevel, is_rmf_building, read_rmf_building
 from surveillance_runtime.files import FileError, in_one_line, read_file, replace_text
 from surveillance_runtime.map_rooms import Proposal, propose
@@ -183,7 +183,7 @@ def _import_graph(request: ImportRequest, document: Any) -> list[str]:
             f'{source}: a graph has no pixels: expected neither --labels nor --resolution'
         )
     parameters = read_graph(source, document, request.level)
-    said = f'{_count(len(parameters["map"]), "room")} of a graph'
+    said = f'{counted(len(parameters["map"]), "room")} of a graph'
     title = f'{said}\nWritten by: python3 launch.py import {source}'
     text = format_place(parameters, title)
     return [f'{source}: {said}', *_draw(request, text, request.place.with_suffix('.png'))]
@@ -203,7 +203,7 @@ def _import_building(request: ImportRequest, level: RmfLevel) -> list[str]:
     left = sorted(doors.keys() - parameters.get('doors', {}).keys())
     more = [f'level {level.name} as a map: {drawn}']
     if left:
-        more.append(f'{_count(len(left), "door")} that join no two rooms: {", ".join(left)}')
+        more.append(f'{counted(len(left), "door")} that join no two rooms: {", ".join(left)}')
     return _written(request, proposal, {'map_file': drawn.name}, parameters, more)
 
 
@@ -283,14 +283,10 @@ def write_labels(proposal: Proposal, path: Path) -> None:
 def _found(proposal: Proposal) -> str:
     corridors = sum(name.startswith('C') for name in proposal.names.values())
     rooms = len(proposal.names) - corridors
-    said = [_count(rooms, 'room')]
+    said = [counted(rooms, 'room')]
     if corridors:
-        said.append(_count(corridors, 'corridor'))
-    said.append(_count(len(proposal.parameters.get('doors', {})), 'door'))
+        said.append(counted(corridors, 'corridor'))
+    said.append(counted(len(proposal.parameters.get('doors', {})), 'door'))
     if proposal.left_out:
         said.append(f'{len(proposal.left_out)} left out that the robot cannot reach')
     return ', '.join(said)
-
-
-def _count(number: int, word: str) -> str:
-    return f'{number} {word}{"" if number == 1 else "s"}'

@@ -19,7 +19,7 @@ from pathlib import Path
 from patrol_policy.promises import lines as promise_lines
 from surveillance_behaviour.mission import mission_log
 from surveillance_behaviour.mission.mission_log import Event
-from surveillance_operator.map_command import facts, graph_over_doors, in_words, run_of
+from surveillance_operator.map_command import counted, facts, graph_over_doors, in_words, run_of
 from surveillance_operator.recording import bag
 from surveillance_operator.recording.runs import find_run, robots_of, run_parser
 from surveillance_runtime.command_line import EXIT_BAD_INPUT
@@ -175,7 +175,7 @@ def _together(runs: Sequence[Run]) -> Run:
 
 def _robots(each: Sized) -> str:
     """Return how many robots there are, in words."""
-    return f'{len(each)} robot{"" if len(each) == 1 else "s"}'
+    return counted(len(each), 'robot')
 
 
 def _fleet_page(
