@@ -77,6 +77,8 @@ from surveillance_runtime.process import run_node
 from surveillance_runtime.profile.parameters import declared_frames
 from surveillance_runtime.qos import SENSOR_QOS
 from surveillance_runtime.robot_base import robot_radius
+from surveillance_runtime.stamp_offset import StampOffset
+from surveillance_runtime.stamped_readings import StampedReadings
 from surveillance_runtime.state_topics import OwnedTopic, StateSubscription
 
 SAME_TIME = 0.02
@@ -90,7 +92,11 @@ MOST_PIXELS = 20_000_000
 SECTORS = 36
 """Of the horizon: lidars see all around when each sector has a beam."""
 STILL = 0.02
-"""The camera stands where neither metres nor radians change by more between two messages."""
+"""The camera stands where neither metres nor radians change by more."""
+SETTLED = 0.5
+"""It has to stand for so long before a picture that is compared, seconds."""
+MOST_HELD = 8
+"""So many pictures, and what the detector says of so many, wait for each other."""
 FACTS_PERIOD = 10.0
 """Seconds after which it is looked whether the ontology still has the events."""
 _GOING_ON = (EventState.OPEN, EventState.ACKNOWLEDGED)
@@ -148,6 +154,22 @@ class ObserverSettings:
     person_weights: str = parameter(
         '', 'The file pose_detection.tflite; empty: the one of the package mediapipe.'
     )
+
+
+@dataclass(frozen=True)
+class _HeldImage:
+    """A picture that waits for what the marker detector says of it.
+
+    Attributes:
+        data: The message as it came.
+        stamp: What it says, seconds of the camera's clock.
+        first, last: Between these times it was taken, seconds.
+    """
+
+    data: bytes
+    stamp: float
+    first: float
+    last: float
 
 
 class Observer(PatrolNode):
@@ -216,13 +238,15 @@ class Observer(PatrolNode):
             self.get_logger().info(f'watching: {rule.words()}')
         self._scans: deque[tuple[float, Scan]] = deque(maxlen=10)
         self._poses: deque[tuple[float, PlanarPose]] = deque(maxlen=5)
-        self._pose: PlanarPose | None = None
         self._odometry: deque[tuple[float, PlanarPose]] = deque(maxlen=50)
         self._odom_in_map: PlanarPose | None = None
-        self._joints: tuple[float, ...] = ()
-        self._moved_at = -math.inf
-        self._seen_markers: tuple[SeenMarker, ...] | None = None
-        self._next_picture = 0.0
+        # Where base and arm stood, by stamps: on the map, by the odometry, and the joints.
+        self._standing, self._odometry_standing = (StampedReadings(STILL, [2]) for _ in range(2))
+        self._joints = StampedReadings(STILL)
+        self._image_stamps = StampOffset('camera/rgb/image_raw')
+        self._images: deque[_HeldImage] = deque(maxlen=MOST_HELD)
+        self._detected: deque[tuple[float, tuple[SeenMarker, ...]]] = deque(maxlen=MOST_HELD)
+        self._next_picture = self._waits_since = 0.0
         self._work: queue.Queue[Callable[[], object] | None] = queue.Queue()
         self._lidar.subscribe(self._on_scan)
         StateSubscription(self, OccupancyGrid, 'map', self._on_map, owner='simulator')
@@ -234,7 +258,7 @@ class Observer(PatrolNode):
         self.create_subscription(MarkerDetectionArray, 'arm/markers', self._on_markers, 10)
         self.create_subscription(Odometry, 'odom', self._on_odometry, SENSOR_QOS, raw=True)
         if self._settings.camera:
-            self.create_subscription(
+            self._detections = self.create_subscription(
                 MarkerDetectionArray, 'aruco_detector/detections', self._on_detections, 10
             )
             self.create_subscription(JointState, 'joint_states', self._on_joints, SENSOR_QOS)
@@ -346,10 +370,8 @@ class Observer(PatrolNode):
         with conversions.refusing(self, 'amcl_pose'):
             pose = pose_of_serialized(serialized)
             stamp = stamp_of_serialized(serialized)
-            if self._pose is None or not _is_near(pose, self._pose):
-                self._moved_at = time.monotonic()
-            self._pose = pose
             self._poses.append((stamp, pose))
+            self._standing.add(stamp or self._now(), pose)
             for measured, odometry in self._odometry:
                 if abs(measured - stamp) <= SAME_TIME:
                     # map <- odom = (map <- base) (base <- odom)
@@ -380,8 +402,9 @@ class Observer(PatrolNode):
 
     def _on_odometry(self, serialized: bytes) -> None:
         with conversions.refusing(self, 'odom'):
-            pose = pose_of_serialized(serialized, texts=1)
-            self._odometry.append((stamp_of_serialized(serialized), pose))
+            pose, stamp = pose_of_serialized(serialized, texts=1), stamp_of_serialized(serialized)
+            self._odometry.append((stamp, pose))
+            self._odometry_standing.add(stamp or self._now(), pose)
 
     def _pair(self) -> None:
         """Look at the scans whose pose is known; either may come first."""
@@ -404,10 +427,7 @@ class Observer(PatrolNode):
         self._later(compare)
 
     def _on_joints(self, message: JointState) -> None:
-        joints = tuple(message.position)
-        if not _is_near(joints, self._joints):
-            self._moved_at = time.monotonic()
-        self._joints = joints
+        self._joints.add(seconds_of(message.header.stamp) or self._now(), message.position)
 
     def _on_detections(self, message: MarkerDetectionArray) -> None:
         found = []
@@ -417,7 +437,8 @@ class Observer(PatrolNode):
                 side, ahead = float(each.size), float(each.pose.position.z)
                 side, ahead = (e if math.isfinite(e) and e > 0 else 0.0 for e in (side, ahead))
                 found.append(SeenMarker(int(each.id), corners, side, ahead))
-        self._seen_markers = tuple(found)
+        self._detected.append((seconds_of(message.header.stamp), tuple(found)))
+        self._look_at_next()
 
     def _on_markers(self, message: MarkerDetectionArray) -> None:
         stamp, frame = self._now(), message.header.frame_id.removeprefix('/')
@@ -432,15 +453,51 @@ class Observer(PatrolNode):
                 self._later(partial(self._watcher.marker, number, where, stamp))
 
     def _on_image(self, serialized: bytes) -> None:
-        now = time.monotonic()
-        if now < self._next_picture:
+        stamp, now = stamp_of_serialized(serialized), time.monotonic()
+        taken_at = self._image_stamps.span_of(stamp, self._now())
+        if now >= self._next_picture:
+            if not self._images:
+                self._waits_since = now
+            self._images.append(_HeldImage(serialized, stamp, *taken_at))
+            self._look_at_next()
+
+    def _look_at_next(self) -> None:
+        """Look at the newest picture in which the detector has looked for markers.
+
+        Without a detector, or where it says nothing for long, at the newest one.
+        """
+        if not self._images:
             return
-        self._next_picture = now + PICTURE_PERIOD
-        viewpoint: Viewpoint | None = None
-        if self._pose is not None and now - self._moved_at > PICTURE_PERIOD:
-            viewpoint = (*self._pose, *self._joints)
-        stamp, markers = self._now(), self._seen_markers
-        self._later(lambda: self._look(serialized, viewpoint, stamp, markers))
+        image, markers = self._images[-1], None
+        # A camera that gives all pictures one stamp does not tell which of them was looked at.
+        stamps = [each.stamp for each in self._images]
+        told = {stamp: seen for stamp, seen in self._detected if stamps.count(stamp) == 1}
+        if found := [each for each in self._images if each.stamp in told]:
+            image, markers = found[-1], told[found[-1].stamp]
+        elif (
+            time.monotonic() < self._waits_since + PICTURE_PERIOD
+            and self._detections.get_publisher_count()
+        ):
+            return
+        viewpoint = self._viewpoint(image.first, image.last)
+        self._images.clear()
+        self._next_picture = time.monotonic() + PICTURE_PERIOD
+        data, taken = image.data, image.last
+        self._later(lambda: self._look(data, viewpoint, taken, markers))
+
+    def _viewpoint(self, first: float, last: float) -> Viewpoint | None:
+        """Return where the camera stood between two stamps and shortly before; None: unknown."""
+        first -= SETTLED
+        joints = self._joints.stood(first, last) if self._joints else ()
+        pose = self._standing.stood(first, last)
+        if self._odometry_standing and self._odom_in_map is not None:
+            # Who localises by few scans tells a pose now and then; the odometry is always there.
+            odometry = self._odometry_standing.stood(first, last)
+            if odometry is None:
+                return None
+            x, y, yaw = odometry
+            pose = composed(self._odom_in_map, (x, y, yaw))
+        return None if joints is None or pose is None else (*pose, *joints)
 
     async def _on_command(self, request: Any, response: Any) -> Any:
         def take() -> str:
@@ -642,12 +699,6 @@ def _fact(event: Event, checked_every: int) -> EventFact:
             by[-1],
         ),
         checked_every,
-    )
-
-
-def _is_near(one: Sequence[float], other: Sequence[float]) -> bool:
-    return len(one) == len(other) and all(
-        abs(a - b) <= STILL for a, b in zip(one, other, strict=True)
     )
 
 

@@ -39,6 +39,7 @@ from surveillance_runtime.qos import SENSOR_QOS
 from surveillance_runtime.robot_arm import ARM, REST_PATIENCE, Arm, Array
 from surveillance_runtime.settled_frames import SettledFrames
 from surveillance_runtime.stamp_offset import StampOffset
+from surveillance_runtime.stamped_readings import StampedReadings
 from surveillance_runtime.state_topics import OwnedTopic
 
 _POSES = {
@@ -125,7 +126,7 @@ class ArmController(PatrolNode):
         self._settings = arm_settings(self, ARM)
         group = ReentrantCallbackGroup()
         self._base: tuple[str, np.ndarray] | None = None
-        self._rest_since: float | None = None
+        self._bases, self._postures = StampedReadings(), StampedReadings()
         self._stamps = StampOffset('aruco_detector/detections')
         commands = ArmCommands(self)
         self._at_rest = OwnedTopic(self, Bool, 'arm/at_rest')
@@ -133,15 +134,10 @@ class ArmController(PatrolNode):
             ARM,
             lambda motion: commands.send(trajectory_to_ros(motion, ARM.names)),
             self._now,
-            self._tell_rest,
+            lambda resting: self._at_rest.publish(Bool(data=resting)),
         )
         self.stopping.subscribe(self._driver.wake)
-        self.create_subscription(
-            JointState,
-            'joint_states',
-            lambda msg: self._driver.report(msg.name, msg.position, msg.velocity),
-            SENSOR_QOS,
-        )
+        self.create_subscription(JointState, 'joint_states', self._on_joints, SENSOR_QOS)
         self._read = SettledFrames(self)
         self._fused = FusedPositions()
         self._twins: dict[int, str] = {}
@@ -154,29 +150,32 @@ class ArmController(PatrolNode):
         self.create_service(PointCamera, 'point_camera', self._on_point, callback_group=group)
         GoalServer(self, ScanSurroundings, 'scan_surroundings', self._scan)
 
+    def _on_joints(self, message: JointState) -> None:
+        if self._driver.report(message.name, message.position, message.velocity):
+            stamp = seconds_of(message.header.stamp)
+            self._postures.add(stamp or self._now(), self._driver.posture.tolist())
+
     def _on_odometry(self, message: Odometry) -> None:
         try:
-            self._base = (message.header.frame_id, base_pose_from_ros(message))
+            frame, base = message.header.frame_id, base_pose_from_ros(message)
         except ValueError as error:
             self.get_logger().warn(str(error), throttle_duration_sec=60.0)
-
-    def _tell_rest(self, resting: bool) -> None:
-        self._rest_since = self._now() if resting else None
-        self._at_rest.publish(Bool(data=resting))
+            return
+        self._base = frame, base
+        self._bases.add(seconds_of(message.header.stamp) or self._now(), base[:3].ravel().tolist())
 
     def _now(self) -> float:
         return float(self.get_clock().now().nanoseconds / 1e9)
 
     def _on_detections(self, message: MarkerDetectionArray) -> None:
         """Fuse what is seen at rest with what was seen from elsewhere, in the odometry's frame."""
-        seen_at = self._stamps.time_of(seconds_of(message.header.stamp), self._now())
-        since = self._rest_since
-        if self._base is None or since is None or not message.detections:
+        taken_at = self._stamps.span_of(seconds_of(message.header.stamp), self._now())
+        base, posture = self._bases.stood(*taken_at), self._postures.stood(*taken_at)
+        if self._base is None or base is None or posture is None or not message.detections:
             return
-        if seen_at < since:
-            return
-        frame, base = self._base
-        camera = base @ ARM.camera_frame(self._driver.posture)
+        frame = self._base[0]
+        standing = np.vstack([np.reshape(base, (3, 4)), [0.0, 0.0, 0.0, 1.0]])
+        camera = standing @ ARM.camera_frame(posture)
         taken = fuse_views(self._fused, message, camera)
         self._report_twins(frame)
         fused = [(each, self._fused.position_of(each)) for each in taken]

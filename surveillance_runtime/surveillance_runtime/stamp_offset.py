@@ -18,6 +18,8 @@ _LARGE = 2.0
 _WINDOW, _MOST_SAMPLES = 5.0, 50
 # of the last so many messages, how many must be odd before it is said
 _RECENT, _ENOUGH = 10, 3
+# seconds that a message may be late, which a clock that is behind looks like
+_LATEST = 30.0
 # seconds that only a clock of another kind is off by
 _OTHER_CLOCK = 1e6
 
@@ -68,6 +70,26 @@ class StampOffset:
         self._offset = least if abs(least) > _LARGE else 0.0
         self._odd.append('jump' if jumped else 'offset' if self._offset else '')
         return stamp + self._offset
+
+    def span_of(self, stamp: float, now: float) -> tuple[float, float]:
+        """Return between which times a message was stamped, by the node's clock.
+
+        Where all messages are late, as on a busy machine in fast simulated time, that looks as if
+        the source's clock were behind. Who pairs a message with something that changes has to
+        reckon with both. Call this or `time_of` for a message, not both.
+
+        Args:
+            stamp: The message's stamp, seconds of the source's clock.
+            now: When it arrived, seconds of the node's clock.
+
+        Returns:
+            Twice the stamp while the clocks agree.
+        """
+        taken = self.time_of(stamp, now)
+        if taken == stamp:
+            return stamp, stamp
+        earliest = taken - _LARGE
+        return (min(earliest, stamp) if now - stamp <= _LATEST else earliest), taken
 
     def finding(self) -> str | None:
         """Return what is wrong with the stamps in one line; None while nothing is."""

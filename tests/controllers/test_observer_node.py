@@ -7,15 +7,23 @@ import math
 from pathlib import Path
 
 import numpy as np
+from builtin_interfaces.msg import Time
 from geometry_msgs.msg import PoseWithCovarianceStamped
-from nav_msgs.msg import OccupancyGrid
+from nav_msgs.msg import OccupancyGrid, Odometry
+from rclpy.serialization import serialize_message
 from sensor_msgs.msg import Image, LaserScan
 from std_msgs.msg import Bool, String
 
 from state_machines import Interrupt
 from state_machines.ros import ServiceCaller
+from surveillance_controllers import observer_node
 from surveillance_controllers.observer_node import Observer
-from surveillance_interfaces.msg import FleetRobot, RobotPlace
+from surveillance_interfaces.msg import (
+    FleetRobot,
+    MarkerDetection,
+    MarkerDetectionArray,
+    RobotPlace,
+)
 from surveillance_interfaces.srv import ConsoleCommand
 from surveillance_runtime.incidents import Cause
 from surveillance_runtime.node import PatrolNode
@@ -144,3 +152,79 @@ def test_it_says_when_a_turn_would_show_nothing_more(graph):
     graph.until(lambda: measured(360, -math.pi) and told[-1].data)
     graph.node.create_publisher(Image, 'camera/rgb/image_raw', SENSOR_QOS)
     graph.until(lambda: not told[-1].data)
+
+
+class Eyes:
+    """Hands an observer what its robot tells, and keeps what it looks at.
+
+    Attributes:
+        node: The observer.
+        looked: Of each picture where it was taken from, and the ids of the markers in it.
+    """
+
+    def __init__(self, graph, monkeypatch):
+        self.node = graph.add(Observer, {'facts': False})
+        monkeypatch.setattr(observer_node, 'PICTURE_PERIOD', 0.0)
+        self.now = 1e-9 * graph.node.get_clock().now().nanoseconds
+        self.looked: list[tuple[tuple[float, ...] | None, list[int] | None]] = []
+        monkeypatch.setattr(self.node, '_look', self._look)
+        monkeypatch.setattr(self.node, '_later', lambda work: work())
+
+    def _look(self, _data, viewpoint, _stamp, markers):
+        numbers = None if markers is None else [each.number for each in markers]
+        self.looked.append((viewpoint, numbers))
+
+    def stamp(self, since: float) -> Time:
+        nanoseconds = round(1e9 * (self.now + since))
+        return Time(sec=nanoseconds // 10**9, nanosec=nanoseconds % 10**9)
+
+    def carry(self, x: float, since: float) -> None:
+        pose, odometry = PoseWithCovarianceStamped(), Odometry()
+        for message in (pose, odometry):
+            message.header.stamp = self.stamp(since)
+            message.pose.pose.position.x, message.pose.pose.orientation.w = x, 1.0
+        pose.pose.pose.position.y = 5.0  # the odometry began elsewhere
+        self.node._on_odometry(serialize_message(odometry))
+        self.node._on_pose(serialize_message(pose))
+
+    def show(self, since: float) -> None:
+        image = Image()
+        image.header.stamp = self.stamp(since)
+        self.node._on_image(serialize_message(image))
+
+    def detect(self, since: float, *numbers: int) -> None:
+        found = [MarkerDetection(id=each, confirmed=True) for each in numbers]
+        message = MarkerDetectionArray(detections=found)
+        message.header.stamp = self.stamp(since)
+        self.node._on_detections(message)
+
+
+def test_a_picture_counts_from_where_the_robot_was_when_it_was_taken(graph, monkeypatch):
+    eyes = Eyes(graph, monkeypatch)
+    for tick in range(-100, 1):
+        since = tick / 10
+        eyes.carry(min(max(since + 4.0, 0.0), 2.0), since)
+    eyes.show(-5.0)  # five seconds late: it stood at 0 then, or the camera's clock is behind
+    eyes.show(-2.5)
+    eyes.show(-1.0)
+    assert [viewpoint for viewpoint, _ in eyes.looked] == [None, None, (2.0, 5.0, 0.0)]
+
+
+def test_markers_count_for_the_picture_that_they_were_read_in(graph, monkeypatch):
+    eyes = Eyes(graph, monkeypatch)
+    eyes.detect(-0.4, 14)
+    eyes.show(-0.3)
+    eyes.show(-0.4)
+    assert [numbers for _, numbers in eyes.looked] == [None, [14]]
+    # The detector died: nobody looked for markers in what follows.
+    eyes.show(-0.2)
+    assert eyes.looked[-1][1] is None
+    # One that is alive is waited for, and what it says of another picture is no answer.
+    graph.node.create_publisher(MarkerDetectionArray, 'aruco_detector/detections', 10)
+    graph.until(lambda: eyes.node._detections.get_publisher_count())
+    monkeypatch.setattr(observer_node, 'PICTURE_PERIOD', 100.0)
+    eyes.show(-0.1)
+    eyes.detect(-0.2, 15)
+    assert len(eyes.looked) == 3
+    eyes.detect(-0.1, 16)
+    assert [numbers for _, numbers in eyes.looked[3:]] == [[16]]

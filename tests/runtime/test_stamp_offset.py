@@ -91,3 +91,22 @@ def test_clock_of_the_node_that_stands_still_blinds_nobody() -> None:
     """With use_sim_time and no clock, now is 0 for ever."""
     stamps = StampOffset('images')
     assert all(stamps.time_of(BEGIN + index, 0.0) >= 0.0 for index in range(20))
+
+
+def test_messages_that_are_all_late_may_be_as_old_as_they_say() -> None:
+    """At speed 10 a camera of a busy machine was 2.4 s behind, and not its clock."""
+    stamps = StampOffset('images')
+    for index in range(20):
+        taken = BEGIN + index * PERIOD
+        first, last = stamps.span_of(taken, taken + 2.4)
+        assert first <= taken <= last
+
+
+def test_another_clock_leaves_two_seconds_and_a_good_one_none() -> None:
+    stamps = StampOffset('images')
+    for index in range(20):
+        taken = BEGIN + index * PERIOD
+        first, last = stamps.span_of(index * PERIOD, taken + DELAY)
+    assert taken - 2.1 < first < taken < last < taken + 0.1
+    stamps = StampOffset('images')
+    assert stamps.span_of(BEGIN, BEGIN + DELAY) == (BEGIN, BEGIN)

@@ -73,26 +73,30 @@ class ArmDriver:
 
     def report(
         self, names: Sequence[str], positions: Sequence[float], speeds: Sequence[float]
-    ) -> None:
+    ) -> bool:
         """Take a report of the joints; one that lacks a joint of the arm is not for it.
 
         One with a number that is not finite is left out.
+
+        Returns:
+            Whether it was taken.
         """
         where = {name: index for index, name in enumerate(names)}
         if any(name not in where for name in self.arm.names) or len(positions) < len(names):
-            return
+            return False
         order = [where[name] for name in self.arm.names]
         found = np.array([positions[index] for index in order])
         moving = np.zeros(len(order))
         if len(speeds) >= len(names):
             moving = np.array([speeds[index] for index in order])
         if not np.isfinite(found).all() or not np.isfinite(moving).all():
-            return
+            return False
         with self._changed:
             self._measured = ArmState(found, moving, np.zeros(len(order)))
             self._reports += 1
             self._settle()
             self._changed.notify_all()
+        return True
 
     def wake(self) -> None:
         """Make a waiting motion look at its `ended` again."""

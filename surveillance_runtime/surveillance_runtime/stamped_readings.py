@@ -1,0 +1,89 @@
+"""Where something stood, by the stamps of its readings: a robot's base, or the joints of its arm.
+
+A picture is worth what is known of its camera's pose at the moment it was taken. It arrives later,
+by seconds on a busy machine or where simulated time runs fast, and the robot may be elsewhere by
+then. So the last readings are kept, and a picture is paired with those around its own stamp. One
+that was taken in motion, or at a time of which no reading tells, has no pose.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+AHEAD = 0.2
+"""The last reading counts for so much longer, seconds: the next one is still on its way."""
+LONGEST_GAP = 5.0
+"""Equal readings that are farther apart do not tell that nothing moved in between, seconds."""
+KEPT = 60.0
+"""For so long readings are kept, seconds."""
+_MOST_RESTS = 4000
+
+
+@dataclass
+class _Rest:
+    """A time in which all readings were nearly the same."""
+
+    first: float
+    last: float
+    at: tuple[float, ...]
+
+
+class StampedReadings:
+    """The last readings of something that moves and rests, as the times of its rests.
+
+    Args:
+        within: Readings that differ by less, in each value, are the same.
+        angles: Which of the values are angles that jump by a full turn, rad.
+    """
+
+    def __init__(self, within: float = 0.01, angles: Sequence[int] = ()) -> None:
+        self._within, self._angles = within, frozenset(angles)
+        self._rests: deque[_Rest] = deque(maxlen=_MOST_RESTS)
+
+    def __bool__(self) -> bool:
+        """Tell whether there are any."""
+        return bool(self._rests)
+
+    def add(self, stamp: float, values: Sequence[float]) -> None:
+        """Take a reading; an older one than the last counts for nothing.
+
+        Where the clock was set back, all before is forgotten.
+        """
+        if self._rests:
+            rest = self._rests[-1]
+            step = stamp - rest.last
+            if step < -KEPT:
+                self._rests.clear()
+            elif step <= 0.0:
+                return
+            elif step <= LONGEST_GAP and self._is_near(rest.at, values):
+                rest.last = stamp
+                return
+        self._rests.append(_Rest(stamp, stamp, tuple(map(float, values))))
+        while stamp - self._rests[0].last > KEPT:
+            self._rests.popleft()
+
+    def stood(self, first: float, last: float) -> tuple[float, ...] | None:
+        """Return where it stood all the time from one stamp to another; None: nobody knows.
+
+        That is so where it moved, where the readings begin later or have a gap, and where they end
+        before, by more than `AHEAD`.
+        """
+        for rest in reversed(self._rests):
+            if rest.first <= first:
+                known = rest.last + (AHEAD if rest is self._rests[-1] else 0.0)
+                # One reading alone was taken in passing.
+                return rest.at if rest.first < rest.last and last <= known else None
+        return None
+
+    def _is_near(self, one: Sequence[float], other: Sequence[float]) -> bool:
+        if len(one) != len(other):
+            return False
+        for index, (a, b) in enumerate(zip(one, other, strict=True)):
+            apart = math.remainder(a - b, math.tau) if index in self._angles else a - b
+            if not abs(apart) <= self._within:
+                return False
+        return True

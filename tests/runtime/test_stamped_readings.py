@@ -1,0 +1,61 @@
+"""Where base and arm stood when a picture was taken, by its stamp alone."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from surveillance_runtime.stamped_readings import StampedReadings
+
+
+@pytest.fixture
+def driven() -> StampedReadings:
+    """Return a base that stands at 0 until 2 s, drives for 2 s, and stands at 1 m until 9 s."""
+    readings = StampedReadings(angles=[2])
+    for tick in range(91):
+        stamp = tick / 10
+        readings.add(stamp, (min(max(stamp / 2 - 1, 0.0), 1.0), 0.0, 0.0))
+    return readings
+
+
+@pytest.mark.parametrize(
+    ('first', 'last', 'at'),
+    [
+        (0.5, 1.5, 0.0),
+        (4.5, 4.5, 1.0),
+        (5.0, 9.1, 1.0),
+        (1.5, 2.5, None),
+        (3.0, 3.0, None),
+        (1.0, 8.0, None),
+        (3.5, 5.0, None),
+        (8.0, 9.9, None),
+        (-1.0, 1.0, None),
+    ],
+)
+def test_it_is_known_where_it_stood_all_the_time_and_nothing_else(driven, first, last, at):
+    found = driven.stood(first, last)
+    assert found == (None if at is None else (at, 0.0, 0.0))
+
+
+def test_a_silence_and_a_clock_that_is_set_back_leave_nothing_known(driven):
+    driven.add(19.0, (1.0, 0.0, 0.0))
+    assert driven.stood(8.0, 18.0) is None
+    driven.add(-100.0, (1.0, 0.0, 0.0))
+    assert driven.stood(8.0, 8.0) is None
+    driven.add(-99.9, (1.0, 0.0, 0.0))
+    assert driven.stood(-100.0, -99.8) is not None
+
+
+def test_a_robot_that_faces_backwards_does_not_turn_around_for_a_sign():
+    readings = StampedReadings(angles=[2])
+    for tick in range(20):
+        readings.add(tick / 10, (0.0, 0.0, math.pi * (-1) ** tick))
+    assert readings.stood(0.0, 1.9) is not None
+
+
+def test_readings_of_a_drive_of_hours_are_bounded():
+    readings = StampedReadings()
+    for tick in range(20_000):
+        readings.add(tick / 10, (float(tick),))
+    assert len(readings._rests) <= 601
