@@ -22,7 +22,7 @@ from owl_reasoner.owl.axioms import (
     Declaration,
     SubClassOf,
 )
-from owl_reasoner.owl.entities import entities_of
+from owl_reasoner.owl.entities import entities_of, names_anonymous
 from owl_reasoner.reasoner.answers import Unknown
 from owl_reasoner.reasoner.budget import Budget
 from owl_reasoner.reasoner.engine import BY_CASES
@@ -79,9 +79,12 @@ def follows(axioms: Iterable[Axiom], goal: Axiom | None, budget: Budget | None =
         ReasoningBudgetError: A limit of the budget was passed.
     """
     axioms = list(axioms)
-    found = entails(axioms, goal, budget)
-    if not isinstance(found, Unknown):
-        return found
+    # An anonymous individual stands for somebody in OWL's entailment, and the goal is about the one
+    # that the axioms have: what is derived of him.
+    if goal is None or not names_anonymous(goal):
+        found = entails(axioms, goal, budget)
+        if not isinstance(found, Unknown):
+            return found
     # What follows for everything follows for an individual that no axiom names.
     asked = () if goal is None else entities_of(goal)
     derived = _derived_from(

@@ -8,11 +8,16 @@ from owl_reasoner import KnowledgeBase
 from owl_reasoner.owl.axioms import (
     Axiom,
     ClassAssertion,
+    DataPropertyAssertion,
     DifferentIndividuals,
+    InverseFunctionalObjectProperty,
+    ObjectPropertyAssertion,
     SameIndividual,
     SubClassOf,
+    SubDataPropertyOf,
+    SubObjectPropertyOf,
 )
-from owl_reasoner.owl.expressions import ObjectSomeValuesFrom
+from owl_reasoner.owl.expressions import Literal, ObjectSomeValuesFrom, ObjectUnionOf
 
 from .patrol_map import (
     IRI,
@@ -196,3 +201,39 @@ def test_a_contradiction_has_a_justification() -> None:
 def holds_in(axioms: Iterable[Axiom], fact: Axiom) -> bool:
     kb = KnowledgeBase(IRI, axioms)
     return kb.reason() and kb.holds(fact)
+
+
+def test_a_fact_about_an_anonymous_individual_is_explained() -> None:
+    """Foreign ontologies (SOSA's mapping to O&M) have blank nodes, and facts about them follow."""
+    some, same = '_:b1', SameIndividual(frozenset((n('k'), '_:b1')))
+    kb = KnowledgeBase(
+        IRI,
+        [
+            SubClassOf(n('A'), ObjectUnionOf((n('B'), n('C')))),
+            SubClassOf(n('B'), n('D')),
+            SubClassOf(n('C'), n('D')),
+            ClassAssertion(n('A'), some),
+            InverseFunctionalObjectProperty(n('r')),
+            link('r', 'k', 'j'),
+            ObjectPropertyAssertion(n('r'), some, n('j')),
+            SubObjectPropertyOf(n('r'), n('s')),
+        ],
+    )
+    kb.reason()
+    for fact in (same, ClassAssertion(n('D'), some), ObjectPropertyAssertion(n('s'), some, n('j'))):
+        explanation = kb.explain(fact)
+        assert explanation is not None
+        needed = set(kb.justification(fact))
+        assert needed == set(explanation.sources())
+        assert holds_in(needed, fact)
+        assert not any(holds_in(needed - {axiom}, fact) for axiom in needed)
+
+
+def test_a_text_with_the_mark_of_anonymous_individuals_is_a_text() -> None:
+    stated, above = (
+        DataPropertyAssertion(n(prop), n('i'), Literal('a_:b')) for prop in ('d', 'e')
+    )
+    kb = KnowledgeBase(IRI, [stated, SubDataPropertyOf(n('d'), n('e'))])
+    kb.reason()
+    assert kb.explain(above) is not None
+    assert kb.entails(DataPropertyAssertion(n('e'), n('j'), Literal('a_:b'))) is False

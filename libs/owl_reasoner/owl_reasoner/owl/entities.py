@@ -78,6 +78,11 @@ def entities_of(record: object) -> Iterator[tuple[str, str]]:
                 yield from entities_of(part)
 
 
+def names_anonymous(record: object) -> bool:
+    """Tell whether a record mentions an individual that has no IRI."""
+    return any(name.startswith('_:') for _, name in entities_of(record))
+
+
 def renamed(axiom: Axiom, kind: str, old: str, new: str) -> Axiom:
     """Return the axiom with an entity's IRI replaced wherever it stands for an entity of that
     kind.

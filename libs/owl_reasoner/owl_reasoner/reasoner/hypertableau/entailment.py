@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterable, Iterator
 from functools import partial
 
 from owl_reasoner.owl.axioms import Axiom
+from owl_reasoner.owl.entities import names_anonymous
 from owl_reasoner.reasoner.answers import Unknown
 from owl_reasoner.reasoner.budget import Budget
 from owl_reasoner.reasoner.clauses import StoppedError, UnsupportedError
@@ -199,7 +200,7 @@ def entails(
         UnsupportedError: The goal is a key, a rule, a datatype definition or about anonymous
             individuals, or compares data properties.
     """
-    if '_:' in repr(goal):
+    if goal is not None and names_anonymous(goal):
         raise UnsupportedError('an axiom about anonymous individuals')
     axioms = list(axioms)
     against: list[Denial] = [()] if goal is None else list(denials(goal))
