@@ -190,3 +190,98 @@ def test_a_moment_is_read_as_it_was_written(year: int, day: int, seconds: int, z
     assert literal_of(moment).lexical == text
     next_day = value(f'{"-" * (year < 0)}{abs(year):04}-02-{day:02}T24:00:00{zone}', 'dateTime')
     assert order(moment, next_day) == -1
+
+
+@pytest.mark.parametrize(
+    ('datatype', 'forms'),
+    [
+        ('date', ('2020-01-01Z', '2020-01-01+00:00', '2020-01-01-00:00')),
+        ('date', ('-0044-03-15',)),
+        ('time', ('00:00:00', '24:00:00', '00:00:00.0')),
+        ('time', ('00:30:00.25+01:00', '00:30:00.250+01:00')),
+        ('gYear', ('-0001Z', '-0001+00:00')),
+        ('gYearMonth', ('2020-12-05:30',)),
+        ('gMonthDay', ('--02-29',)),
+        ('gMonth', ('--05Z', '--05+00:00')),
+        ('gDay', ('---31',)),
+        ('duration', ('P1Y', 'P12M', 'P0Y12M')),
+        ('duration', ('-P1DT2H1M1.5S', '-PT26H1M1.50S', '-PT1561M1.5S')),
+        ('duration', ('PT0S', '-P0D', 'P0M')),
+        ('dayTimeDuration', ('P1D', 'PT24H')),
+        ('yearMonthDuration', ('P1Y', 'P12M')),
+    ],
+)
+def test_dates_and_durations_are_values(datatype: str, forms: tuple[str, ...]) -> None:
+    """XML Schema 1.1, part 2, 3.3.6 to 3.3.14: forms of one value, the first as it is written."""
+    values = {value(form, datatype) for form in forms}
+    assert len(values) == 1
+    written = literal_of(values.pop())
+    assert written.lexical == forms[0]
+    assert value_of(written) == value(forms[0], datatype)
+    for name in (datatype, 'anyURI'):
+        found = value_set(XSD + name)
+        assert found is not None
+        assert found.contains(value(forms[0], datatype)) == (name == datatype)
+
+
+@pytest.mark.parametrize(
+    ('text', 'datatype'),
+    [
+        ('2020-02-30', 'date'),
+        ('2020-1-1', 'date'),
+        ('1:00:00', 'time'),
+        ('02020', 'gYear'),
+        ('--13', 'gMonth'),
+        ('---32', 'gDay'),
+        ('--02-30', 'gMonthDay'),
+        ('P', 'duration'),
+        ('PT', 'duration'),
+        ('P1YT', 'duration'),
+        ('P-1Y', 'duration'),
+        ('P1M', 'dayTimeDuration'),
+        ('P1D', 'yearMonthDuration'),
+    ],
+)
+def test_what_is_no_date_and_no_duration_is_in_no_datatype(text: str, datatype: str) -> None:
+    found = value_set(XSD + datatype)
+    assert found is not None
+    assert not found.contains(value(text, datatype))
+
+
+def test_a_duration_is_of_the_types_that_it_suits() -> None:
+    for text, kinds in (
+        ('P1M', {'yearMonthDuration'}),
+        ('PT1M', {'dayTimeDuration'}),
+        ('P1M1D', set()),
+    ):
+        for name in ('duration', 'dayTimeDuration', 'yearMonthDuration'):
+            found = value_set(XSD + name)
+            assert found is not None
+            assert found.contains(value(text, 'duration')) == (name == 'duration' or name in kinds)
+
+
+@pytest.mark.parametrize(
+    ('first', 'second', 'sign'),
+    [
+        ('P1M', 'P30D', None),
+        ('P1M', 'P27D', 1),
+        ('P1M', 'P32D', -1),
+        ('P1Y', 'P364D', 1),
+        ('P1Y', 'P365D', None),
+        ('P100Y', 'P36525D', None),
+        ('P400Y', 'P146097D', 0),
+        ('-P1D', 'PT0S', -1),
+    ],
+)
+def test_durations_are_compared_as_far_as_no_month_matters(
+    first: str, second: str, sign: int | None
+) -> None:
+    """XML Schema 1.1, part 2, 3.3.6.2."""
+    assert order(value(first, 'duration'), value(second, 'duration')) == sign
+
+
+def test_a_plain_text_without_a_language_is_a_text() -> None:
+    """So do the OWL API and others write rdf:PlainLiteral, whose forms end in @."""
+    kind = 'http://www.w3.org/1999/02/22-rdf-syntax-ns#PlainLiteral'
+    assert value_of(Literal('pc', kind)) == value_of(Literal('pc@', kind)) == 'pc'
+    assert value_of(Literal('a@b@en', kind)) == ('langString', 'a@b', 'en')

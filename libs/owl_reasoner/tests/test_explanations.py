@@ -230,9 +230,7 @@ def test_a_fact_about_an_anonymous_individual_is_explained() -> None:
 
 
 def test_a_text_with_the_mark_of_anonymous_individuals_is_a_text() -> None:
-    stated, above = (
-        DataPropertyAssertion(n(prop), n('i'), Literal('a_:b')) for prop in ('d', 'e')
-    )
+    stated, above = (DataPropertyAssertion(n(prop), n('i'), Literal('a_:b')) for prop in ('d', 'e'))
     kb = KnowledgeBase(IRI, [stated, SubDataPropertyOf(n('d'), n('e'))])
     kb.reason()
     assert kb.explain(above) is not None

@@ -141,6 +141,8 @@ def parse_value(literal: Literal) -> Value:
     if datatype == RDF + 'langString' or literal.language:
         return ('langString', text, literal.language)
     if datatype == RDF + 'PlainLiteral':
+        if '@' not in text:
+            return text  # As many tools write a text without a language.
         plain, _, language = text.rpartition('@')
         return ('langString', plain, language.lower()) if language else plain
     if datatype.startswith(XSD):
@@ -170,6 +172,10 @@ def parse_value(literal: Literal) -> Value:
             return ('boolean', text.strip(_SPACES) in ('true', '1'))
         if name in ('float', 'double'):
             return _floating(name, text.strip(_SPACES))
+        if name in moments.CALENDAR:
+            return moments.calendar_value(name, text.strip(_SPACES))
+        if name in moments.DURATIONS:
+            return moments.duration_of(name, text.strip(_SPACES))
         if name in ('dateTime', 'dateTimeStamp'):
             value = moment_of(text.strip(_SPACES))
             if name == 'dateTimeStamp' and value[1] != 'utc':
@@ -235,6 +241,10 @@ def literal_of(value: Value) -> Literal:
         return Literal(text, XSD + space)
     if space == 'dateTime':
         return Literal(text_of(value), XSD + space)
+    if space in moments.CALENDAR:
+        return Literal(moments.calendar_text(value), XSD + space)
+    if space == 'duration':
+        return Literal(moments.duration_text(value), XSD + space)
     if space == 'anyURI':
         return Literal(value[1], XSD + space)
     if space == 'hexBinary':
@@ -287,12 +297,11 @@ def order(first: Value, second: Value) -> int | None:
     Equal by order may be different values: 0.0 and -0.0, or one instant in two zones.
     """
     if isinstance(first, tuple) and isinstance(second, tuple) and first[0] == second[0]:
-        if first[0] == 'dateTime':
+        if first[0] == 'dateTime' or first[0] in moments.CALENDAR:
             return moments.order(first, second)
-        if first[0] == 'other':
-            named = ((kind.removeprefix(XSD), text) for _, kind, text in (first, second))
-            return moments.calendar_order(*named)
-        if first[0] == 'ill-formed':
+        if first[0] == 'duration':
+            return moments.duration_order(first, second)
+        if first[0] in ('ill-formed', 'other'):
             return None
         if first[0] == 'langString' and first[2] != second[2]:
             return None

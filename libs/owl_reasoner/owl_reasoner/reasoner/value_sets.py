@@ -33,7 +33,7 @@ from owl_reasoner.reasoner.datatypes import (
     schema_pattern,
     value_of,
 )
-from owl_reasoner.reasoner.moments import LARGEST_OFFSET
+from owl_reasoner.reasoner.moments import CALENDAR, DURATIONS, LARGEST_OFFSET, is_duration
 
 _NUMBERS = ('whole', 'decimal', 'rational', 'real')
 _MOMENTS = ('utc', 'local')
@@ -41,7 +41,8 @@ _FLOATS = ('float', 'double')
 _ORDERED = (*_NUMBERS, *_FLOATS, *_MOMENTS)
 _OCTETS = ('hexBinary', 'base64Binary')
 _WITH_LENGTH = ('string', 'langString', 'anyURI', *_OCTETS)
-_PLAIN = (*_WITH_LENGTH, 'boolean', 'other')
+_CALENDAR = (*CALENDAR, 'duration')
+_PLAIN = (*_WITH_LENGTH, *_CALENDAR, 'boolean', 'other')
 _BOOLEANS = frozenset([('boolean', True), ('boolean', False)])
 
 
@@ -204,9 +205,12 @@ def _passes(value: Value, tests: Iterable[tuple[DataRange, bool]]) -> bool:
 
 @cache
 def _test(data_range: DataRange) -> Callable[[Value], bool]:
-    """Return the predicate of a type of strings, or of the facet of a range."""
+    """Return the predicate of a type of strings or durations, or of the facet of a range."""
     if isinstance(data_range, str):
-        types = STRING_PATTERNS[data_range.removeprefix(XSD)]
+        name = data_range.removeprefix(XSD)
+        if name in DURATIONS:
+            return lambda value: is_duration(value, name)  # type: ignore[arg-type]
+        types = STRING_PATTERNS[name]
         return lambda value: isinstance(value, str) and types.fullmatch(value) is not None
     assert isinstance(data_range, ex.DatatypeRestriction)
     ((facet, bound),) = data_range.facets
@@ -231,6 +235,8 @@ def _includes(outer: DataRange, inner: DataRange) -> bool:
     """Tell whether all texts of a string type or a pattern are known to be in another."""
     if isinstance(inner, ex.DatatypeRestriction):
         return outer == inner or _includes(outer, inner.datatype)
+    if isinstance(inner, str) and inner.removeprefix(XSD) in DURATIONS:
+        return outer == inner
     wider = [XSD + name for name in _STRING_TYPES]
     if inner == XSD + 'language':
         return outer in (inner, *wider[: wider.index(XSD + 'Name')])
@@ -490,8 +496,10 @@ def _datatype(datatype: str) -> ValueSet | None:
         return ValueSet(dict.fromkeys(layers_of_moments, _EVERY), {})
     if name == 'boolean':
         return ValueSet({}, {'boolean': _listed(_BOOLEANS)})
-    if name in ('string', 'anyURI', *_OCTETS):
+    if name in ('string', 'anyURI', *_OCTETS, *_CALENDAR):
         return ValueSet({}, {name: _ANY})
+    if name in DURATIONS:
+        return ValueSet({}, {'duration': _tested(datatype)})
     return ValueSet({}, {'string': _tested(datatype)}) if name in STRING_PATTERNS else None
 
 
@@ -530,8 +538,10 @@ def _facet(datatype: str, facet: str, bound: ex.Literal) -> ValueSet | None:
         if kind == 'dateTime':
             return _moments(name, key)
     values = _datatype(datatype)
-    if values is None or 'boolean' in values.parts or (ends is None and values.intervals):
-        return None  # Truth values have no facets, numbers and moments no patterns and lengths.
+    if values is None or 'boolean' in values.parts:
+        return None  # Truth values have no facets.
+    if ends is None and (values.intervals or not values.parts.keys().isdisjoint(_CALENDAR)):
+        return None  # Numbers, moments and dates have no patterns and lengths.
     if name in ('length', 'minLength', 'maxLength'):
         size = value_of(bound)
         if not isinstance(size, int):

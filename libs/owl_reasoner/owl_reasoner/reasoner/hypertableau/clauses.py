@@ -394,7 +394,8 @@ class CaseRules:
             subject = f'assertions with {expression_text(data_range)}'
             if self._origin is not None:
                 subject = axiom_text(self._origin)
-            what = 'whether values suit a pattern or a type of strings is not decided'
+            untold = 'a pattern, a type of strings or a bound of dates'
+            what = f'whether values suit {untold} is not decided'
             self.tested[f'{subject}: {what}'] = None
         return found
 
