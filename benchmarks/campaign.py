@@ -55,7 +55,6 @@ if str(ROOT) not in sys.path:
 import rclpy
 from geometry_msgs.msg import PoseStamped
 from rcl_interfaces.srv import ListParameters
-from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import qos_profile_sensor_data
 from std_msgs.msg import UInt32
@@ -69,6 +68,7 @@ from surveillance_interfaces.srv import ArmorDirective
 from surveillance_runtime.discovery import prefer_quick_discovery
 from surveillance_runtime.place import read_place_file
 from surveillance_runtime.place.regions import Regions
+from surveillance_runtime.process import ExecutorThread
 from surveillance_runtime.qos import STATE_QOS
 from surveillance_runtime.run_parameters import PLACES
 from surveillance_runtime.testing import claim_domain
@@ -191,15 +191,13 @@ class Watcher:
         self.node.create_subscription(UInt32, 'collisions', self._on_collisions, STATE_QOS)
         self._armor = ServiceCaller(self.node, ArmorDirective, 'armor_interface_srv')
         self._clients: dict[str, Any] = {}
-        self._executor = SingleThreadedExecutor(context=self.context)
-        self._executor.add_node(self.node)
-        self._thread = threading.Thread(target=self._executor.spin, daemon=True)
-        self._thread.start()
+        self._spinning = ExecutorThread(self.context)
+        self._spinning.executor.add_node(self.node)
+        self._spinning.start()
 
     def close(self) -> None:
         """Leave the graph."""
-        self._executor.shutdown()
-        self._thread.join()
+        self._spinning.stop()
         self.node.destroy_node()
         rclpy.try_shutdown(context=self.context)
 

@@ -49,13 +49,13 @@ from rclpy.action import (
     ActionClient,
     get_action_server_names_and_types_by_node,
 )
-from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 
 from benchmarks.processes import end_processes, memory_mb
 from benchmarks.whole_stack import ros_arguments
 from surveillance_runtime import node_table
+from surveillance_runtime.process import ExecutorThread
 from surveillance_runtime.testing import claim_domain
 
 STRANGE_FLOATS = (
@@ -282,15 +282,13 @@ class Fuzzer:
         self._generator = Generator(random.Random(seed), most)
         self._chance = random.Random(seed + 1)
         self._lister: Any = None
-        self._executor = SingleThreadedExecutor(context=self.context)
-        self._executor.add_node(self.node)
-        self._thread = threading.Thread(target=self._executor.spin, daemon=True)
-        self._thread.start()
+        self._spinning = ExecutorThread(self.context)
+        self._spinning.executor.add_node(self.node)
+        self._spinning.start()
 
     def close(self) -> None:
         """Leave the graph."""
-        self._executor.shutdown()
-        self._thread.join()
+        self._spinning.stop()
         self.node.destroy_node()
         rclpy.try_shutdown(context=self.context)
 

@@ -61,10 +61,14 @@ def machine_on(node: Node) -> fsm.StateMachine:
     return machine
 
 
-def spin(executor: SingleThreadedExecutor) -> None:
-    """Spin until ROS goes down."""
+def spin(executor: SingleThreadedExecutor, ended: threading.Event) -> None:
+    """Spin until the example has ended, or ROS goes down.
+
+    An executor that another thread shuts down while it spins can fail within rclpy.
+    """
     with contextlib.suppress(ExternalShutdownException):
-        executor.spin()
+        while not ended.is_set():
+            executor.spin_once(timeout_sec=0.1)
 
 
 def main() -> None:
@@ -75,7 +79,8 @@ def main() -> None:
     executor = SingleThreadedExecutor()
     for node in (robot, mission):
         executor.add_node(node)
-    thread = threading.Thread(target=spin, args=(executor,))
+    ended = threading.Event()
+    thread = threading.Thread(target=spin, args=(executor, ended))
     thread.start()
     machine = machine_on(mission)
     set_preempt_handler(mission, machine)
@@ -83,8 +88,9 @@ def main() -> None:
         print('ended with', machine.execute())
     finally:
         server.stop()
-        executor.shutdown()
+        ended.set()
         thread.join()
+        executor.shutdown()
         for node in (robot, mission):
             node.destroy_node()
         rclpy.try_shutdown()
