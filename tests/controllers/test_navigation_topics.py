@@ -153,6 +153,33 @@ def test_a_robot_that_does_not_know_where_it_is_tells_no_place(
     assert told == ['R1', None, 'R2']
 
 
+def test_a_pose_that_somebody_tells_makes_the_place_known(graph: Any, steersman: Steersman) -> None:
+    said = graph.said()
+    navigator: Any = steersman
+    told: list[str | None] = []
+    motion = motion_of(graph.node, navigator, told.append)
+    navigator.place, navigator.ambiguous = 'R1', True
+    navigator.believe = lambda _pose: setattr(navigator, 'ambiguous', False)
+    motion._see(Scan(np.zeros(9), np.ones(9), 8.0), Time(sec=1))
+    assert told == []
+    poses = graph.node.create_publisher(PoseWithCovarianceStamped, 'initialpose', 1)
+
+    def published_in(frame: str) -> None:
+        message = PoseWithCovarianceStamped()
+        message.header.frame_id = frame
+        poses.publish(message)
+
+    def is_refused() -> bool:
+        published_in('odom')
+        return any("in the frame 'odom': expected 'map'" in line for line in said)
+
+    graph.until(is_refused)
+    assert navigator.ambiguous
+    graph.until(lambda: published_in('map') or not navigator.ambiguous)
+    motion._see(Scan(np.zeros(9), np.ones(9), 8.0), Time(sec=2))
+    assert told == ['R1']
+
+
 def test_messages_that_are_not_sound_end_nothing(graph: Any, steersman: Steersman) -> None:
     said = graph.said()
     navigator: Any = steersman

@@ -112,6 +112,7 @@ class NavigationMotion:
         self._awaited: Callable[[], bool] = lambda: False
         self._on_step: Callable[[Pose], None] = lambda _pose: None
         self._pose_sent = float('-inf')
+        self._place_told: str | None = None
         self._was_lost = self._was_ambiguous = False
         self._jumps = 0
         self._planner = GoalCaller(node, ComputePath, 'compute_path')
@@ -354,7 +355,9 @@ class NavigationMotion:
 
     def _on_initial_pose(self, message: PoseWithCovarianceStamped) -> None:
         with conversions.refusing(self._node, 'initialpose'):
-            pose = pose_from(message.pose.pose)
+            pose, frame = pose_from(message.pose.pose), message.header.frame_id.removeprefix('/')
+            if frame not in ('', self._frames.map):
+                raise ValueError(f'a pose in the frame {frame!r}: expected {self._frames.map!r}')
             self._node.get_logger().info(f'pose set to ({pose[0]:.2f}, {pose[1]:.2f})')
             with self._lock:
                 self._navigator.believe(pose)
@@ -374,7 +377,6 @@ class NavigationMotion:
         measured = seconds_of(stamp)
         self._silence.hear('scan', time.monotonic())
         with self._stepped:
-            before = self._place
             self._base.hear(topic)
             self._stands_for_search = False
             velocity = self._navigator.see(scan, measured, topic)
@@ -384,7 +386,9 @@ class NavigationMotion:
                 if self._navigator.pose is not None:
                     self._on_step(self._navigator.pose)
             self._publish_pose(measured, stamp)
-            if self._settings.track_place and self._place != before:
+            # Not only a scan makes the robot sure: a pose that somebody tells does, too.
+            if self._settings.track_place and self._place != self._place_told:
+                self._place_told = self._place
                 self._recorder.tell(self._place, stamp)
             self._steps += 1
             if self._navigator.task is not None and self._awaited():
