@@ -269,7 +269,7 @@ class RobotBattery:
         assert driver is not None
         with conversions.refusing(self._node, self._topic):
             charging = charging_from(message)
-            driver.hear(message.percentage, message.voltage, charging, now)
+            driver.hear(message.percentage, message.voltage, charging, now, present=message.present)
             self._take_driver(driver, now)
 
     def _take_driver(self, driver: DrivenBattery, now: float) -> bool:

@@ -1,8 +1,8 @@
 """What the driver of a real battery says: a charge in percent, from messages of several habits.
 
 `sensor_msgs/BatteryState` has a `percentage` from 0 to 1, NaN where it is not measured; many
-drivers fill it from 0 to 100, others tell the voltage alone. Which it is stands in the robot's
-profile.
+drivers fill it from 0 to 100, others tell the voltage alone and leave the percentage NaN, or at the
+0 that a message begins with. Which it is stands in the robot's profile.
 """
 
 from __future__ import annotations
@@ -38,8 +38,8 @@ class DriverSettings:
     )
     voltages: tuple[float, ...] = parameter(
         (),
-        'Voltage, V, and the percent that it stands for, pairs that rise; of a driver that tells '
-        'no percentage.',
+        'Voltage, V, and the percent that it stands for, pairs that rise: of a driver whose '
+        'percentage is none. It is not looked at then.',
         of=float,
         check=voltage_curve,
     )
@@ -48,30 +48,43 @@ class DriverSettings:
     )
 
 
-def level_from(percentage: float, voltage: float, settings: DriverSettings) -> float:
+def level_from(
+    percentage: float, voltage: float, settings: DriverSettings, *, present: bool = False
+) -> float:
     """Return the charge that a driver's message tells, percent.
+
+    Args:
+        percentage: As the message has it.
+        voltage: As the message has it, V.
+        settings: The driver's habits.
+        present: Whether the message says that there is a battery; many drivers leave that out.
 
     Raises:
         ValueError: It tells none.
     """
-    if math.isfinite(percentage):
-        share = percentage / settings.full
-        if not 0.0 <= share <= _SLACK:
-            hint = (
-                '; battery.full: 100 in the profile fits it'
-                if settings.full == 1.0 and 0.0 <= percentage <= 100.0 * _SLACK
-                else ''
-            )
-            raise ValueError(f'percentage {percentage:g}: expected 0 to {settings.full:g}{hint}')
-        # Six percent are less than 0.06 as the message's 32 bits have it.
-        return round(min(100.0, 100.0 * share), 3)
-    if not settings.voltages:
+    if settings.voltages:
+        if not (math.isfinite(voltage) and voltage > 0.0):
+            raise ValueError(f'voltage is {voltage:g}: expected V, for battery.voltages')
+        return float(np.interp(voltage, settings.voltages[::2], settings.voltages[1::2]))
+    if not math.isfinite(percentage):
         raise ValueError(
             'percentage is not a number: expected one, or battery.voltages in the profile'
         )
-    if not (math.isfinite(voltage) and voltage > 0.0):
-        raise ValueError(f'percentage is not a number and voltage is {voltage:g}: expected V')
-    return float(np.interp(voltage, settings.voltages[::2], settings.voltages[1::2]))
+    if percentage == 0.0 and not voltage > 0.0 and not present:
+        raise ValueError(
+            f'percentage is 0 and voltage {voltage:g}, as in a message that nobody filled: '
+            'expected a charge'
+        )
+    share = percentage / settings.full
+    if not 0.0 <= share <= _SLACK:
+        hint = (
+            '; battery.full: 100 in the profile fits it'
+            if settings.full == 1.0 and 0.0 <= percentage <= 100.0 * _SLACK
+            else ''
+        )
+        raise ValueError(f'percentage {percentage:g}: expected 0 to {settings.full:g}{hint}')
+    # Six percent are less than 0.06 as the message's 32 bits have it.
+    return round(min(100.0, 100.0 * share), 3)
 
 
 class DrivenBattery:
@@ -92,13 +105,21 @@ class DrivenBattery:
         self._heard = -math.inf
         self._not_charging_since: float | None = None
 
-    def hear(self, percentage: float, voltage: float, charging: bool | None, now: float) -> None:
-        """Take a message that came at `now`, seconds.
+    def hear(
+        self,
+        percentage: float,
+        voltage: float,
+        charging: bool | None,
+        now: float,
+        *,
+        present: bool = False,
+    ) -> None:
+        """Take a message that came at `now`, seconds; see `level_from`.
 
         Raises:
             ValueError: It tells no charge.
         """
-        self.level = level_from(percentage, voltage, self._settings)
+        self.level = level_from(percentage, voltage, self._settings, present=present)
         self._heard = now
         self.charging = charging
         if charging is not False:

@@ -85,6 +85,11 @@ def test_the_charge_comes_from_a_driver_that_offers_no_more_than_drivers_do(
         (DriverSettings(), math.nan, 11.0, 'battery.voltages in the profile'),
         (DriverSettings(voltages=(10.0, 0.0, 12.0, 100.0)), math.nan, math.nan, 'expected V'),
         (DriverSettings(), -1.0, 11.0, 'expected 0 to 1$'),
+        # What a driver leaves out begins at 0.
+        (DriverSettings(voltages=(10.0, 0.0, 12.0, 100.0)), 0.0, 11.0, 50.0),
+        (DriverSettings(voltages=(10.0, 0.0, 12.0, 100.0)), 0.0, 0.0, 'expected V'),
+        (DriverSettings(), 0.0, 0.0, 'as in a message that nobody filled'),
+        (DriverSettings(), 0.0, 10.0, 0.0),
     ],
 )
 def test_drivers_of_several_habits_tell_a_charge_or_why_not(

@@ -232,8 +232,8 @@ class BatterySource:
     )
     voltages: tuple[float, ...] = parameter(
         (),
-        'Voltage, V, and the percent that it stands for, pairs that rise; of a driver that tells '
-        'no percentage.',
+        'Voltage, V, and the percent that it stands for, pairs that rise: of a driver whose '
+        'percentage is none. It is not looked at then.',
         of=float,
         check=voltage_curve,
     )
