@@ -22,6 +22,7 @@ from geometry_msgs.msg import PoseWithCovarianceStamped
 from nav_msgs.msg import OccupancyGrid, Odometry
 from sensor_msgs.msg import LaserScan
 
+from state_machines.ros import ClockWait
 from surveillance_controllers import conversions
 from surveillance_controllers.exploration.exploration import Exploration, Phase
 from surveillance_controllers.exploration.foreign_map import ForeignMap
@@ -30,7 +31,7 @@ from surveillance_controllers.exploration.map_building import MapBuilder, Mappin
 from surveillance_controllers.geometry import Pose, composed, relative
 from surveillance_controllers.motion.command_publisher import CommandPublisher
 from surveillance_controllers.motion.holding import Hold
-from surveillance_controllers.motion.odometry import OdometryBuffer, joined
+from surveillance_controllers.motion.odometry import ContinuousOdometry, OdometryBuffer, joined
 from surveillance_controllers.motion.path_following import DriveParameters, Velocity
 from surveillance_controllers.motion.transforms import MapFrame, MapFrameReader, ScanReader
 from surveillance_controllers.planning.grid_planning import PlanningParameters
@@ -111,8 +112,13 @@ class Explorer(PatrolNode):
             self._foreign or MapBuilder(parameters=mapping), drive, planning, frontiers
         )
         self._readings = OdometryBuffer()
+        # Another program that maps has its own way with odometry that begins anew.
+        self._continuous = ContinuousOdometry() if self._foreign is None else None
         self._odometry: Pose | None = None
+        self._reading: Pose | None = None
         self._heard_scan = False
+        # No setting of the clock makes a drive wait, or give up.
+        self._wait = ClockWait(self)
         self._lock, self._saving = threading.Lock(), threading.Lock()
         self._saved_at = self._published_at = 0.0
         self._base = CommandPublisher(
@@ -174,11 +180,13 @@ class Explorer(PatrolNode):
 
     def _on_odometry(self, serialized: bytes) -> None:
         with conversions.refusing(self, 'odom'):
-            pose, stamp = pose_of_serialized(serialized, texts=1), stamp_of_serialized(serialized)
+            reading = pose_of_serialized(serialized, texts=1)
+            stamp = stamp_of_serialized(serialized)
             with self._lock:
                 self._base.hear('odom')
+                pose = reading if self._continuous is None else self._continuous.take(reading)
                 self._readings.add(stamp if stamp > 0.0 else self._now(), pose)
-                self._odometry = pose
+                self._odometry, self._reading = pose, reading
 
     def _on_scan(self, topic: str, message: LaserScan) -> None:
         with conversions.refusing(self, topic):
@@ -190,28 +198,29 @@ class Explorer(PatrolNode):
                 self._base.hear(topic)
                 if self._odometry is None:
                     return
-                odometry = self._odometry
+                odometry, reading = self._odometry, self._reading
                 scan = joined(scan, self._readings, seconds_of(stamp))
                 self._heard_scan = True
                 stands = self._hold.active or self.stopping.is_set()
-                velocity = self.exploration.see(scan, odometry, self._now(), stands=stands)
+                passed = self._wait.elapsed()
+                velocity = self.exploration.see(scan, odometry, passed, stands=stands)
                 self._base.command(velocity)
-            self._tell_pose(odometry, stamp)
+            self._tell_pose(odometry, reading, stamp)
 
     def _on_hold(self) -> None:
         with self._lock:
             if self._hold.active:
                 self._base.command(Velocity())
 
-    def _tell_pose(self, odometry: Pose, stamp: Time) -> None:
+    def _tell_pose(self, odometry: Pose, reading: Pose | None, stamp: Time) -> None:
         if self.exploration.correction is None:
             return
         pose = self.exploration.pose(odometry)
         estimate = PoseWithCovarianceStamped(pose=pose_estimate(pose, 0.03, 0.02))
         estimate.header.frame_id, estimate.header.stamp = self._frames.map, stamp
         self._poses.publish(estimate)
-        if self._foreign is None:
-            self._map_frame.publish(pose, odometry, stamp)
+        if self._foreign is None and reading is not None:
+            self._map_frame.publish(pose, reading, stamp)
 
     def _explore(self) -> None:
         """Think until all is seen; the thread's work."""

@@ -39,6 +39,7 @@ from surveillance_controllers.geometry import (
     in_map,
     relative,
 )
+from surveillance_controllers.motion.odometry import is_jump
 from surveillance_runtime.place.occupancy_grid import Grid, distance_to
 
 
@@ -81,8 +82,6 @@ class LocalisationParameters:
         doubt_time: How long scans are doubtful before it looks, seconds; one scan is enough when it
             would be lost.
         lost_pause: Time between two looks while it is lost, seconds.
-        top_step: Odometry that jumps further than this between two readings is not believed, m.
-        top_turn: Likewise, rad.
         near: Radius of the first search around the last pose, metres.
         at_once: A better pose within this distance is taken at once, metres; a farther one is
             followed first.
@@ -121,8 +120,6 @@ class LocalisationParameters:
     rounds: int = 5
     doubt_time: float = 0.2
     lost_pause: float = 1.0
-    top_step: float = 0.3
-    top_turn: float = 0.6
     near: float = 2.5
     at_once: float = 1.0
     lattice: float = 0.25
@@ -231,8 +228,7 @@ class Localiser:
         if self._odometry is not None:
             dx, dy, turn = relative(self._odometry, odometry)
             step = math.hypot(dx, dy)
-            p = self.parameters
-            if step <= p.top_step and abs(turn) <= p.top_turn:
+            if not is_jump(self._odometry, odometry):
                 self.pose = composed(self.pose, (dx, dy, turn))
                 for rival in self._rivals:
                     rival.pose = composed(rival.pose, (dx, dy, turn))

@@ -21,7 +21,34 @@ AHEAD = 0.2
 """A scan may be this much younger than the odometry, seconds; the robot goes on as it did."""
 _VELOCITY_OVER = 0.1
 """The velocity is that of this time, seconds."""
+LATE = 0.1
+"""A reading that is older than the one before by this much, seconds, or less came late; by more,
+the clock was set back."""
+TOP_STEP, TOP_TURN = 0.3, 0.6
+"""Odometry that moves further between two readings, metres or rad, began anew."""
 _MOST_READINGS = 4000
+
+
+def is_jump(first: Pose, second: Pose) -> bool:
+    """Tell whether no robot drove from one reading to the next: its odometry began anew."""
+    dx, dy, turn = relative(first, second)
+    return math.hypot(dx, dy) > TOP_STEP or abs(turn) > TOP_TURN
+
+
+class ContinuousOdometry:
+    """Odometry that goes on where it was when its driver begins anew at 0."""
+
+    def __init__(self) -> None:
+        self._last: Pose | None = None
+        self._begins: Pose = (0.0, 0.0, 0.0)
+
+    def take(self, reading: Pose) -> Pose:
+        """Return where a reading has the robot, in the frame in which the first reading was."""
+        last, self._last = self._last, reading
+        if last is not None and is_jump(last, reading):
+            before = composed(self._begins, last)
+            self._begins = composed(before, relative(reading, (0.0, 0.0, 0.0)))
+        return composed(self._begins, reading)
 
 
 class OdometryBuffer:
@@ -36,23 +63,20 @@ class OdometryBuffer:
         return self._readings[-1] if self._readings else None
 
     def add(self, stamp: float, pose: Pose) -> None:
-        """Take a reading; one that is not younger than the last counts for nothing.
+        """Take a reading; one that is a little older than the last counts for nothing.
 
-        Where the clock began anew, or the odometry, all before is forgotten.
+        Where the clock was set, or the odometry began anew, all before is forgotten.
         """
         if self._readings:
-            step = stamp - self._readings[-1][0]
-            if not -KEPT < step < KEPT:
+            last, before = self._readings[-1]
+            step = stamp - last
+            if not -LATE < step < KEPT or is_jump(before, pose):
                 self._readings.clear()
             elif step <= 0.0:
                 return
         self._readings.append((stamp, pose))
         while stamp - self._readings[0][0] > KEPT:
             self._readings.popleft()
-
-    def restart(self) -> None:
-        """Forget all readings: the odometry jumped."""
-        self._readings.clear()
 
     def covers(self, first: float, last: float) -> bool:
         """Tell whether it is known where the robot was from one time to another, seconds."""
