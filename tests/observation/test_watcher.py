@@ -462,6 +462,41 @@ def test_a_person_in_a_picture_is_an_event_with_a_picture_of_it(tmp_path: Path):
     assert (tmp_path / event.evidence[0]).is_file()
 
 
+@pytest.mark.parametrize('first', ['lidar', 'camera'])
+def test_one_who_is_seen_by_lidar_and_camera_is_one_event_and_surer(first: str):
+    """The alert needs no second look then."""
+    watch = Round(find_persons=lambda _: [Person((10, 20, 60, 80), 0.8)], verify_seconds=20.0)
+    watch.watcher.arrive('R1', watch.time)
+    walk(watch, (-9.0, -9.0), (0.0, 0.0), 8)
+    if first == 'camera':
+        watch.watcher.picture(texture(), None, watch.time, None)
+    else:
+        walk(watch, (1.0, 1.0), (0.3, 0.0), 12)
+    assert not watch.alerts
+    if first == 'camera':
+        walk(watch, (1.0, 1.0), (0.3, 0.0), 12)
+    else:
+        watch.watcher.picture(texture(), None, watch.time, None)
+    (event,) = [each for each in watch.book.events if each.kind == Kind.PERSON]
+    assert event.confirmed
+    assert event.number in watch.alerts
+    assert max(each.confidence for each in watch.told if each.kind == Kind.PERSON) > 0.95
+
+
+def test_one_who_walks_in_the_next_room_is_the_one_whom_the_camera_sees_there():
+    """Through the open door."""
+    watch = Round(find_persons=lambda _: [Person((10, 20, 60, 80), 0.8)])
+    watch.watcher.arrive('R1', watch.time)
+    at = (5.0, 2.5)
+    for number in range(20):
+        watch.time += 0.25
+        things = [(7.0 + 0.25 * (number - 8), 2.5, 0.15)] if number >= 8 else []
+        watch.watcher.sweep(at, *beams(room(), at, things, False, seed=number), watch.time)
+    watch.watcher.picture(texture(), None, watch.time, None)
+    people = [each for each in watch.book.events if each.kind == Kind.PERSON]
+    assert [each.place for each in people] == ['R2']
+
+
 def test_the_light_of_each_room_is_its_own():
     watch = Round()
     dark = np.full((240, 320), 3, np.uint8)

@@ -82,6 +82,8 @@ ONE_LOOK, SEEN_TWICE = 0.5, 0.9
 """Confidence in a changed view after one look, at most, and after two, at least."""
 WALKING = 0.8
 """Confidence that what walks is a person."""
+BOTH = 5.0
+"""Lidar and camera see the same person within this time, seconds."""
 LOOKED = 0.6
 """Share of a place's floor that must have been in view before nobody is said to be there."""
 LOOKED_SECONDS = 5.0
@@ -206,6 +208,8 @@ class Watcher:
         self._doubts: dict[int, float] = {}
         self._habits = Habits()
         self._persons = 0
+        # The last person of this stay whom each sensor saw.
+        self._person_by: dict[str, Observation] = {}
         self._began = math.nan
         self._pictures = 0
         self._store = store
@@ -251,6 +255,7 @@ class Watcher:
         self._learn()
         self._place = place
         self._began, self._pictures, self._persons = stamp, 0, 0
+        self._person_by = {}
         self._walks.clear()
         # The light is that of the place.
         self._sights.clear()
@@ -303,11 +308,27 @@ class Watcher:
             cells = self._normal.grid.cells_of(fresh)
             fresh = fresh[~self._normal.occupied[cells[:, 0], cells[:, 1]]]
         for walk in self._walks.add(sensor, fresh, len(ends), stamp)[:1]:
-            self._persons += 1
             place = self._place_of(walk.position)
             seen = Observation(Kind.PERSON, 'seen', place, '', walk.position, WALKING, stamp)
-            if self._is_due(seen):
-                self._take(seen)
+            self._see_person('lidar', seen)
+
+    def _see_person(self, sensor: str, seen: Observation, picture: Picture | None = None) -> None:
+        """Tell of a person, with more confidence where the other sensor saw one there just now."""
+        self._persons += 1
+        other = self._person_by.get('camera' if sensor == 'lidar' else 'lidar')
+        if other is not None and abs(seen.stamp - other.stamp) > BOTH:
+            other = None
+        if other is not None and seen.position is None:
+            # The camera does not know where: it is who walks there.
+            seen = replace(seen, place=other.place, position=other.position)
+        self._person_by[sensor] = seen
+        both = other is not None and other.place == seen.place
+        if other is not None and both:
+            # They err for different reasons.
+            sure = 1.0 - (1.0 - seen.confidence) * (1.0 - other.confidence)
+            seen = replace(seen, confidence=sure)
+        if self._is_due(seen, 'both' if both else sensor):
+            self._take(seen, picture)
 
     def sweep(self, sensor: tuple[float, float], ends: Points, met: Mask, stamp: float) -> None:
         """Take a sweep of the lidar.
@@ -596,15 +617,13 @@ class Watcher:
         found = [] if self._find_persons is None else self._find_persons(picture)
         if not found:
             return
-        self._persons += len(found)
         sure = max(each.confidence for each in found)
         seen = Observation(Kind.PERSON, 'seen', self._place, confidence=sure, stamp=stamp)
-        if self._is_due(seen):
-            shown = picture.copy()
-            for each in found:
-                left, top, width, height = each.box
-                cv2.rectangle(shown, (left, top), (left + width, top + height), (0, 200, 0), 2)
-            self._take(seen, shown)
+        shown = picture.copy()
+        for each in found:
+            left, top, width, height = each.box
+            cv2.rectangle(shown, (left, top), (left + width, top + height), (0, 200, 0), 2)
+        self._see_person('camera', seen, shown)
 
     def _look_for_strange(self, seen: Sequence[SeenMarker], stamp: float, grey: Grey) -> None:
         """Tell of markers that no file knows, once several pictures in a row show them."""
@@ -698,10 +717,10 @@ class Watcher:
 
     # --- what is made of it ---
 
-    def _is_due(self, seen: Observation) -> bool:
-        """Tell whether a thing was not told of a moment ago, or from elsewhere."""
+    def _is_due(self, seen: Observation, sensor: str = '') -> bool:
+        """Tell whether a thing was not told of a moment ago, or from elsewhere, or otherwise."""
         cell = [] if seen.position is None else [str(round(each)) for each in seen.position]
-        key = (seen.kind, seen.state, seen.subject, *cell)
+        key = (seen.kind, seen.state, seen.subject, sensor, *cell)
         stamp, at = self._told.get(key, (-math.inf, None))
         if seen.stamp - stamp < SEEN_AGAIN:
             here = self._at
