@@ -35,6 +35,21 @@ int16 number_of_recoveries
 float32 distance_remaining
 int16 number_of_poses_remaining
 """,
+    'Spin': """
+float32 target_yaw
+builtin_interfaces/Duration time_allowance
+---
+uint16 NONE=0
+uint16 UNKNOWN=700
+uint16 TIMEOUT=701
+uint16 TF_ERROR=702
+uint16 COLLISION_AHEAD=703
+builtin_interfaces/Duration total_elapsed_time
+uint16 error_code
+string error_msg
+---
+float32 angular_distance_traveled
+""",
     'FollowPath': """
 nav_msgs/Path path
 string controller_id

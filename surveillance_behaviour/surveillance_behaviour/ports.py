@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from enum import StrEnum
 from typing import Protocol
 
 from patrol_policy.promises import Promise
@@ -200,20 +199,13 @@ class Doubt:
         number: Of the event.
         place: Where it was noticed.
         look_from: From where to look again; None: from anywhere in the place.
+        position: Where it was noticed; None: nobody knows.
     """
 
     number: int
     place: str
     look_from: Point | None = None
-
-
-class Side(StrEnum):
-    """Where the arm points."""
-
-    FRONT = 'front'
-    LEFT = 'left'
-    BACK = 'back'
-    RIGHT = 'right'
+    position: Point | None = None
 
 
 class Looking(Protocol):
@@ -228,6 +220,12 @@ class Looking(Protocol):
     def position(self) -> Point | None:
         """Return where the robot is; None: nobody has said."""
 
+    def heading(self) -> float:
+        """Return where the robot's front points, map frame, rad; 0 where nobody has said."""
+
+    def await_watcher(self, interrupt: Interrupt) -> None:
+        """Wait until who watches is ready to look; once, and not for ever."""
+
     def sees_around(self) -> bool:
         """Tell whether a turn shows nothing more: lidars all around, and no camera."""
 
@@ -237,11 +235,11 @@ class Looking(Protocol):
     def drive(self, point: Point, interrupt: Interrupt) -> None:
         """Drive to a point in the same place."""
 
-    def turn(self, interrupt: Interrupt) -> None:
-        """Turn the base once around."""
+    def face(self, bearing: float, interrupt: Interrupt) -> None:
+        """Turn the camera to a bearing in the map frame, rad: the arm, or the base without one."""
 
-    def point_arm(self, side: Side, interrupt: Interrupt) -> None:
-        """Point the arm to a side."""
+    def rest_arm(self) -> None:
+        """Have the arm look ahead, if there is one; nobody waits for it."""
 
 
 class Announcer(Protocol):

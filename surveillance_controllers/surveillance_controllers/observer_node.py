@@ -85,6 +85,8 @@ SAME_TIME = 0.02
 """A pose belongs to the scan whose stamp is so near, seconds."""
 ASSESS_PERIOD, PICTURE_PERIOD, KEEP_PERIOD = 2.0, 2.0, 20.0
 """Seconds of real time between two comparisons, pictures, and writings of the state."""
+CAMERA_PATIENCE = 10.0
+"""The first picture is waited for so long after the first sweep, seconds of real time."""
 MOST_WAITING = 20
 """What comes while so much waits for the worker is left out."""
 MOST_CELLS = 25_000_000
@@ -194,6 +196,8 @@ class Observer(PatrolNode):
         self._told_viewpoints = OwnedTopic(self, String, 'viewpoints')
         self._sees_around = OwnedTopic(self, Bool, 'sees_around')
         self._told_around: bool | None = None
+        self._scanned_since: float | None = None
+        self._is_pictured = False
         self._directions = np.zeros(SECTORS, np.bool_)
         self._viewpoints: Viewpoints | None = None
         self._grid: Grid | None = None
@@ -364,6 +368,8 @@ class Observer(PatrolNode):
             scan = self._lidar.read(message, topic)
             self._scans.append((seconds_of(message.header.stamp), scan))
             self._directions |= sectors_of(scan)
+            if self._scanned_since is None:
+                self._scanned_since = time.monotonic()
             self._pair()
 
     def _on_pose(self, serialized: bytes) -> None:
@@ -454,6 +460,7 @@ class Observer(PatrolNode):
 
     def _on_image(self, serialized: bytes) -> None:
         stamp, now = stamp_of_serialized(serialized), time.monotonic()
+        self._is_pictured = True
         taken_at = self._image_stamps.span_of(stamp, self._now())
         if now >= self._next_picture:
             if not self._images:
@@ -570,10 +577,18 @@ class Observer(PatrolNode):
         return chosen.aside(floor, thing, origin)
 
     def _tell_sees_around(self) -> None:
-        """Tell whether a turn of the base or the arm would show nothing more."""
+        """Tell whether a turn of the base or the arm would show nothing more, once all is there
+        that a look needs.
+        """
         camera = self._settings.camera and self.count_publishers(
             self.resolve_topic_name('camera/rgb/image_raw')
         )
+        if self._told_around is None:
+            if self._scanned_since is None or self._grid is None:
+                return
+            is_late = time.monotonic() - self._scanned_since > CAMERA_PATIENCE
+            if camera and not self._is_pictured and not is_late:
+                return
         around = not camera and bool(self._directions.all())
         if around != self._told_around:
             self._told_around = around

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
+from pathlib import Path
 
 import pytest
 
@@ -10,7 +12,9 @@ import state_machines as fsm
 from state_machines import Interrupt
 from state_machines.exceptions import CallError, CallInterruptedError
 from surveillance_behaviour.machines import MACHINES
-from surveillance_behaviour.ports import Doubt, Point, Side
+from surveillance_behaviour.mission.looking import one_way
+from surveillance_behaviour.mission.mission_log import MissionRecord, read
+from surveillance_behaviour.ports import Doubt, Point
 
 from .machine_runs import settings
 from .scripted_world import World
@@ -24,11 +28,14 @@ class ScriptedLooking:
         self.points: dict[str, list[Point]] = {}
         self.waiting: list[Doubt] = []
         self.driven: list[tuple[float, Point]] = []
-        self.turns: list[float] = []
         self.fails = False
         self.arm = False
         self.around = False
-        self.sides: list[tuple[str, Side]] = []
+        self.ready_at = 0.0
+        self.front = 0.0
+        self.camera = 0
+        self.sides: list[tuple[str, int]] = []
+        self.rests: list[float] = []
 
     def viewpoints(self, place: str) -> Sequence[Point]:
         return self.points.get(place, [])
@@ -45,10 +52,23 @@ class ScriptedLooking:
     def has_arm(self) -> bool:
         return self.arm
 
-    def point_arm(self, side: Side, interrupt: Interrupt) -> None:
+    def heading(self) -> float:
+        return self.front
+
+    def await_watcher(self, interrupt: Interrupt) -> None:
+        self.world.clock.sleep(max(0.0, self.ready_at - self.world.clock.time), interrupt)
+
+    def face(self, bearing: float, interrupt: Interrupt) -> None:
+        self.camera = round(math.degrees(bearing)) % 360
         if not self.world.clock.sleep(2.0, interrupt):
             raise CallInterruptedError
-        self.sides.append((self.world.place, side))
+        if not self.arm:
+            self.front = bearing
+        self.sides.append((self.world.place, self.camera))
+
+    def rest_arm(self) -> None:
+        self.rests.append(self.world.clock.time)
+        self.camera = round(math.degrees(self.front)) % 360
 
     def drive(self, point: Point, interrupt: Interrupt) -> None:
         if self.fails:
@@ -57,19 +77,21 @@ class ScriptedLooking:
         self.driven.append((self.world.clock.time, point))
         self.waiting = [each for each in self.waiting if each.look_from != point]
 
-    def turn(self, interrupt: Interrupt) -> None:
-        if not self.world.clock.sleep(8.0, interrupt):
-            raise CallInterruptedError
-        self.turns.append(self.world.clock.time)
-
 
 class Watched:
     """A machine whose robot looks, run up to a time."""
 
-    def __init__(self, machine: str, **choice: object) -> None:
-        self.world = World(speed=1.0)
+    def __init__(
+        self,
+        machine: str,
+        *,
+        record: MissionRecord | None = None,
+        world: World | None = None,
+        **choice: object,
+    ) -> None:
+        self.world = world or World(speed=1.0)
         self.looking = ScriptedLooking(self.world)
-        mission = self.world.mission(settings(**choice), machine=machine)
+        mission = self.world.mission(settings(**choice), record, machine=machine)
         mission.ports.looking = self.looking
         self.mission = mission
         self.machine = MACHINES[machine](mission)
@@ -88,7 +110,7 @@ def test_a_room_is_looked_at_from_its_viewpoints_within_its_time(machine: str):
     run.until(200.0)
     in_c1 = [point for _, point in run.looking.driven]
     assert set(in_c1) == {(9.0, 8.0, 0.0), (11.0, 8.5, 0.0)}
-    assert run.looking.turns
+    assert run.looking.sides
     assert len({place for _, place in run.world.arrivals}) >= 3
 
 
@@ -97,16 +119,16 @@ def test_a_short_stay_leaves_no_time_to_look():
     run.looking.points = {'C1': [(9.0, 8.0, 0.0)], 'C2': [(9.0, 12.0, 0.0)]}
     run.until(150.0)
     assert not run.looking.driven
-    assert not run.looking.turns
+    assert not run.looking.sides
 
 
 @pytest.mark.parametrize(
     ('seconds', 'first'),
     [
         (8.0, []),
-        (12.0, [Side.LEFT, Side.FRONT]),
-        (18.0, [Side.LEFT, Side.BACK, Side.FRONT]),
-        (40.0, [Side.LEFT, Side.BACK, Side.RIGHT, Side.FRONT]),
+        (12.0, [90, 0]),
+        (18.0, [90, 180, 0]),
+        (40.0, [90, 180, 270, 0]),
     ],
 )
 def test_the_arm_looks_at_as_many_sides_as_the_time_allows_in_one_sweep(seconds, first):
@@ -117,13 +139,49 @@ def test_the_arm_looks_at_as_many_sides_as_the_time_allows_in_one_sweep(seconds,
     assert [side for where, side in run.looking.sides if where == place][: len(first)] == first
 
 
+@pytest.mark.parametrize(('seconds', 'count'), [(8.0, 0), (12.0, 1), (18.0, 2), (40.0, 4)])
+def test_a_base_without_an_arm_turns_to_as_many_sides_as_the_time_allows(seconds, count):
+    run = Watched('surveillance', exploration_seconds=seconds)
+    run.until(150.0)
+    stays = dict.fromkeys(place for place, _ in run.looking.sides)
+    for place in list(stays)[:1]:
+        sides = [side for where, side in run.looking.sides if where == place]
+        assert len(set(sides[:count])) == count
+        assert set(sides) <= {0, 90, 180, 270}
+    assert bool(stays) == bool(count)
+
+
+def test_a_base_that_has_time_for_one_side_looks_at_another_one_in_each_visit():
+    run = Watched('surveillance', exploration_seconds=12.0)
+    run.until(900.0)
+    by_place: dict[str, list[int]] = {}
+    for place, side in run.looking.sides:
+        by_place.setdefault(place, []).append(side)
+    often = max(by_place.values(), key=len)
+    assert sorted(often[:4]) == [0, 90, 180, 270]
+
+
+@pytest.mark.parametrize(
+    ('ahead', 'sides', 'order'),
+    [
+        (0, [0, 90, 180, 270], [0, 90, 180, 270]),
+        (10, [0, 90, 180, 270], [0, 270, 180, 90]),
+        (80, [0, 90, 180, 270], [90, 180, 270, 0]),
+        (200, [90, 180], [180, 90]),
+        (300, [], []),
+    ],
+)
+def test_the_base_passes_the_sides_in_the_shorter_turn(ahead, sides, order):
+    passed = one_way([math.radians(each) for each in sides], math.radians(ahead))
+    assert [round(math.degrees(each)) for each in passed] == order
+
+
 @pytest.mark.parametrize('arm', [False, True])
 def test_who_sees_all_around_stands_at_each_viewpoint_and_turns_nothing(arm: bool):
     run = Watched('surveillance', exploration_seconds=25.0)
     run.looking.arm, run.looking.around = arm, True
     run.looking.points = {'C1': [(9.0, 8.0, 0.0), (11.0, 8.5, 0.0)]}
     run.until(150.0)
-    assert not run.looking.turns
     assert not run.looking.sides
     (arrived, first), (_, second) = run.looking.driven[0], run.looking.driven[1]
     assert {first, second} == {(9.0, 8.0, 0.0), (11.0, 8.5, 0.0)}
@@ -143,16 +201,96 @@ def test_sides_that_one_visit_left_out_are_looked_at_in_the_next():
     run = Watched('surveillance', exploration_seconds=12.0)
     run.looking.arm = True
     run.until(900.0)
-    by_place: dict[str, list[Side]] = {}
+    by_place: dict[str, list[int]] = {}
     for place, side in run.looking.sides:
-        if side != Side.FRONT:
+        if side != 0:
             by_place.setdefault(place, []).append(side)
     often = max(by_place.values(), key=len)
-    assert often[:3] == [Side.LEFT, Side.BACK, Side.RIGHT]
+    assert often[:3] == [90, 180, 270]
+
+
+@pytest.mark.parametrize('machine', ['surveillance', 'patrol'])
+@pytest.mark.parametrize('seconds', [1.0, 4.0, 8.0, 14.0, 20.0])
+def test_whatever_ends_a_look_the_arm_looks_ahead_again(machine: str, seconds: float):
+    whole = Watched(machine, exploration_seconds=40.0)
+    whole.looking.arm = True
+    began = 0.0 if machine == 'surveillance' else whole.until(300.0).world.arrivals[0][0]
+    run = Watched(machine, exploration_seconds=40.0)
+    run.looking.arm = True
+    run.until(began + seconds)
+    assert run.looking.sides or run.looking.camera or seconds < 3.0
+    # While it is turned aside, something else ends the look.
+    assert run.looking.camera == 0
+
+
+def test_a_low_battery_that_ends_a_look_leaves_the_arm_ahead():
+    run = Watched('surveillance', exploration_seconds=40.0)
+    run.looking.arm = True
+    run.world.level = 100.0
+    run.world.clock.at = [(4.0, lambda: run.world.drain(85.0))]
+    run.until(6.0)
+    assert run.looking.camera == 0
+
+
+@pytest.mark.parametrize('machine', ['surveillance', 'patrol'])
+def test_an_arm_that_an_earlier_process_left_aside_is_brought_ahead_before_the_robot_drives(
+    machine: str,
+):
+    run = Watched(machine, exploration_seconds=2.0)
+    run.looking.arm, run.looking.camera = True, 90
+    run.until(60.0)
+    assert run.looking.rests[0] < run.world.arrivals[0][0]
+
+
+@pytest.mark.parametrize('machine', ['surveillance', 'patrol'])
+def test_the_first_look_waits_until_somebody_watches(machine: str):
+    run = Watched(machine, exploration_seconds=12.0)
+    run.looking.arm, run.looking.ready_at = True, 60.0
+    asked: list[float] = []
+    run.looking.face = lambda *_: asked.append(run.world.clock.time)  # type: ignore[method-assign]
+    run.until(100.0)
+    assert asked
+    assert min(asked) >= 60.0
+
+
+@pytest.mark.parametrize('machine', ['surveillance', 'patrol'])
+def test_a_look_that_was_cut_off_is_gone_on_with_where_it_was(machine: str, tmp_path: Path):
+    file = tmp_path / 'mission.jsonl'
+    first = Watched(machine, record=MissionRecord(file), exploration_seconds=24.0)
+    first.looking.arm = True
+    after = 7.0
+    if machine == 'patrol':
+        after = first.until(300.0).world.arrivals[0][0] + 7.0
+        file.unlink()
+        first = Watched(machine, record=MissionRecord(file), exploration_seconds=24.0)
+        first.looking.arm = True
+    first.until(after)
+    place, side = first.looking.sides[-1]
+    assert side == 90
+    # A process that is killed writes no end.
+    kept = [each for each in file.read_text().splitlines() if '"end"' not in each]
+    file.write_text('\n'.join(kept) + '\n')
+    again = Watched(
+        machine, record=MissionRecord(file), world=first.world, exploration_seconds=24.0
+    )
+    again.looking.arm = True
+    again.until(after + 60.0)
+    assert again.looking.sides[:2] == [(place, 180), (place, 0)]
+    looks = [each for each in read(file) if each.name == 'look']
+    assert looks[0].fields['place'] == place
+    assert looks[0].fields['sides'] == [180]
+
+
+def test_a_patrol_that_begins_anew_does_not_look_where_it_has_just_looked_around(tmp_path: Path):
+    record = MissionRecord(tmp_path / 'mission.jsonl')
+    run = Watched('patrol', record=record, exploration_seconds=40.0)
+    run.looking.arm = True
+    run.until(100.0)
+    assert run.looking.sides[0][0] != run.world.decisions[0].from_place
 
 
 def test_where_time_is_short_the_viewpoint_that_shows_most_comes_first():
-    run = Watched('surveillance', exploration_seconds=11.5)
+    run = Watched('surveillance', exploration_seconds=17.5)
     far, near = (13.0, 8.0, 0.0), (10.6, 8.0, 0.0)
     run.looking.points = {'C1': [far, near]}
     run.until(200.0)
@@ -164,7 +302,7 @@ def test_the_robot_stays_at_its_station():
     run.looking.points = {'E': [(4.0, 9.0, 0.0)]}
     run.until(39.0)
     assert not run.looking.driven
-    assert not run.looking.turns
+    assert not run.looking.sides
 
 
 @pytest.mark.parametrize('machine', ['surveillance', 'patrol'])

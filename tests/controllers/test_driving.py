@@ -180,6 +180,25 @@ def test_a_spin_turns_once() -> None:
     assert spin.step(yaw, now) == Velocity()
 
 
+@pytest.mark.parametrize(
+    ('yaw', 'bearing', 'way'), [(2.0, 2.5, 0.5), (3.0, -3.0, 0.283), (0.1, 0.11, 0.0), (0, -2, -2)]
+)
+def test_a_spin_to_a_bearing_takes_the_shorter_way(yaw: float, bearing: float, way: float) -> None:
+    spin, turned, now, late = Spin(bearing), 0.0, 0.0, 0.0
+    for _ in range(100):
+        now += PERIOD
+        velocity = spin.step(yaw, now)
+        if spin.done:
+            break
+        # The base does in one period what it was told in the one before.
+        turned += late * PERIOD
+        yaw = math.remainder(yaw + late * PERIOD, math.tau)
+        late = velocity.turn
+    assert spin.done
+    assert turned == pytest.approx(way, abs=0.03)
+    assert now < 6.0
+
+
 def test_a_spin_that_does_not_go_on_ends() -> None:
     spin = Spin()
     steps = 0

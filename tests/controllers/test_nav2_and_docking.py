@@ -23,11 +23,12 @@ from surveillance_controllers.motion import nav2 as nav2_motion
 from surveillance_controllers.motion.arrival import MotionFailedError
 from surveillance_controllers.motion_controller_node import MotionController
 from surveillance_interfaces.action import FollowPath
-from surveillance_runtime.conversions import map_message, point_messages
+from surveillance_runtime.conversions import map_message, point_messages, pose_estimate
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.parameters import ParameterError
 from surveillance_runtime.place.stations import Station
 from surveillance_runtime.qos import STATE_QOS
+from surveillance_runtime.turning_path import turning_path
 from tests.nav2_definitions import ACTIONS, stand_in
 
 PATH = np.array([[0.0, 0, 0], [3, 0, 0], [3, 4, 0]])
@@ -216,6 +217,27 @@ def test_what_nav2_cannot_do_fails_with_the_reason(
     servers.ends['navigate_through_poses'] = end
     with pytest.raises(MotionFailedError, match=text):
         nav2(graph).follow(PATH, run, lambda _: None)
+
+
+def test_a_path_that_leads_nowhere_is_a_turn_by_the_shorter_way(
+    graph: Any, servers: Servers, run: Any
+) -> None:
+    motion = nav2(graph)
+    path = np.array(turning_path((1.0, 2.0), np.pi))
+    with pytest.raises(MotionFailedError, match='nobody tells where the robot points'):
+        motion.follow(path, run, lambda _: None)
+    poses = graph.node.create_publisher(PoseWithCovarianceStamped, 'amcl_pose', STATE_QOS)
+    poses.publish(PoseWithCovarianceStamped(pose=pose_estimate((1.0, 2.0, -2.0), 0.1, 0.1)))
+    graph.until(lambda: np.isfinite(motion._yaw))
+    assert tuple(motion.follow(path, run, lambda _: None)) == (1.0, 2.0, 0.0)
+    ((name, goal),) = servers.asked
+    assert name == 'spin'
+    assert goal.target_yaw == pytest.approx(np.pi - 2.0 * np.pi + 2.0)
+    refused = result('Spin', error_code=703, error_msg='Collision ahead')
+    servers.ends['spin'] = GoalEnd('aborted', refused)
+    reason = r'aborted the turn \(error code 703 COLLISION_AHEAD, Collision ahead\)'
+    with pytest.raises(MotionFailedError, match=reason):
+        motion.follow(path, run, lambda _: None)
 
 
 def docked(graph: Any, station: tuple[float, float, float]) -> nav2_motion.DockingMotion:

@@ -46,6 +46,18 @@ def ranges(box: tuple[float, float, float] | None) -> list[float]:
     return found
 
 
+def room_map() -> OccupancyGrid:
+    """Return the map of that room."""
+    grid = OccupancyGrid()
+    cells = np.zeros((100, 120), np.int8)
+    cells[[0, 1, -1, -2], :] = 100
+    cells[:, [0, 1, -1, -2]] = 100
+    grid.info.width, grid.info.height, grid.info.resolution = 120, 100, 0.05
+    grid.info.origin.orientation.w = 1.0
+    grid.data = cells.ravel().tolist()
+    return grid
+
+
 def test_a_box_is_told_with_a_picture_and_a_person_calls_it_normal(graph, tmp_path: Path):
     (tmp_path / 'watch.yaml').write_text(WATCH)
     parameters = {
@@ -62,14 +74,7 @@ def test_a_box_is_told_with_a_picture_and_a_person_calls_it_normal(graph, tmp_pa
     poses = make(PoseWithCovarianceStamped, 'amcl_pose', STATE_QOS)
     scans = make(LaserScan, 'scan', SENSOR_QOS)
     events = graph.listen(String, 'events', STATE_QOS)
-    grid = OccupancyGrid()
-    cells = np.zeros((100, 120), np.int8)
-    cells[[0, 1, -1, -2], :] = 100
-    cells[:, [0, 1, -1, -2]] = 100
-    grid.info.width, grid.info.height, grid.info.resolution = 120, 100, 0.05
-    grid.info.origin.orientation.w = 1.0
-    grid.data = cells.ravel().tolist()
-    maps.publish(grid)
+    maps.publish(room_map())
     graph.until(lambda: scans.get_subscription_count() and poses.get_subscription_count())
 
     def look(place: str, box: tuple[float, float, float] | None, done) -> None:
@@ -137,6 +142,7 @@ def test_it_hears_of_the_other_robots_of_its_fleet_and_where_they_are(graph):
 def test_it_says_when_a_turn_would_show_nothing_more(graph):
     graph.add(Observer)
     scans = graph.node.create_publisher(LaserScan, 'scan', SENSOR_QOS)
+    graph.node.create_publisher(OccupancyGrid, 'map', STATE_QOS).publish(room_map())
     told = graph.listen(Bool, 'sees_around', STATE_QOS)
 
     def measured(beams: int, first: float) -> bool:

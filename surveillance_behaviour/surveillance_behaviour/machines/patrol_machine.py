@@ -8,14 +8,13 @@ On the way to the dock it is known already and ends nothing.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from functools import partial
 from typing import Any
 
 import state_machines as fsm
 from patrol_policy.decision import RECHARGE
-from state_machines.clock import elapsed_of
-from state_machines.exceptions import CallInterruptedError
 from surveillance_behaviour.machines.shared_states import (
     FAILED,
     PREEMPTED,
@@ -36,16 +35,27 @@ BATTERY_LOW = 'battery_low'
 
 
 class Initial(MissionState):
-    """Has the robot look around and build its ontology."""
+    """Has the robot look around and build its ontology.
+
+    Args:
+        mission: The mission's memory and ports.
+        looks: Whether a look that the end of an earlier run cut off is gone on with.
+    """
 
     task = 'starting'
-    ends = ('start', FAILED)
+
+    def __init__(self, mission: Mission, *, looks: bool) -> None:
+        self.ends = ['start', *(['look_on'] if looks else []), FAILED]
+        super().__init__(mission)
+        self._looks = looks
 
     def work(self, ud: Any, interrupt: fsm.Interrupt) -> str:
-        routine_of(self.mission).start(interrupt)
-        self.mission.ports.ontology.wait_until_built(interrupt)
-        self.mission.begin(interrupt)
-        return 'start'
+        mission = self.mission
+        routine_of(mission).start(interrupt)
+        mission.ports.ontology.wait_until_built(interrupt)
+        mission.begin(interrupt)
+        goes_on = mission.goes_on and not mission.astray and not math.isinf(mission.explored)
+        return 'look_on' if self._looks and goes_on and not mission.battery.low else 'start'
 
 
 class Reasoning(MissionState):
@@ -139,11 +149,7 @@ class Looking(MissionState):
         mission = self.mission
         seconds = mission.settings.choice.exploration_seconds
         with mission.battery.interrupting(interrupt, lambda: mission.battery.low) as either:
-            elapsed = elapsed_of(mission.clock)
-            end = elapsed() + seconds
-            self._room_look.look(seconds, either)
-            if not mission.clock.sleep(max(0.0, end - elapsed()), either):
-                raise CallInterruptedError
+            self._room_look.explore(seconds, either)
             self._room_look.verify(either)
         return 'looked'
 
@@ -260,7 +266,13 @@ def patrol_machine(mission: Mission) -> fsm.StateMachine:
     looks = mission.ports.looking is not None
     machine.set_clock(mission.clock)
     with machine:
-        add('Initial', Initial(mission), start='Reasoning', failed='WaitForStart')
+        add(
+            'Initial',
+            Initial(mission, looks=looks),
+            start='Reasoning',
+            failed='WaitForStart',
+            **({'look_on': 'Looking'} if looks else {}),
+        )
         add('WaitForStart', WaitForHelp(mission), try_again='Initial')
         add_asking(
             'Reasoning',

@@ -6,11 +6,9 @@ states are this project's. One round of the machine is one room.
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import state_machines as fsm
-from state_machines.clock import elapsed_of
 from state_machines.exceptions import CallInterruptedError
 from surveillance_behaviour.machines.shared_states import (
     FAILED,
@@ -27,9 +25,6 @@ from surveillance_behaviour.mission.looking import RoomLook
 from surveillance_behaviour.mission.mission import Mission
 from surveillance_behaviour.mission.recovery import Step
 from surveillance_behaviour.ports import Point
-
-NOTE_SECONDS = 1.0
-"""The shortest time between two notes of how far a place is explored, seconds."""
 
 
 class Initialization(MissionState):
@@ -60,8 +55,7 @@ class ChooseRoomTask(MissionState):
 class ExploreTask(MissionState):
     """Looks around for a while; a battery that gets low ends it.
 
-    Where somebody watches the robot drives to the place's viewpoints and turns; what is left of the
-    time it waits.
+    Where somebody watches the robot looks at the place, and again at alerts that are not sure.
     """
 
     ends = ('explored',)
@@ -77,28 +71,19 @@ class ExploreTask(MissionState):
             mission.say(f'exploring {mission.place} ends early: {why()}')
         return 'explored'
 
-    def __init__(self, mission: Mission) -> None:
+    def __init__(self, mission: Mission, room_look: RoomLook) -> None:
         super().__init__(mission)
-        self._room_look = RoomLook(mission)
+        self._room_look = room_look
 
     def _explore(self, interrupt: fsm.Interrupt) -> bool:
         """Explore the place for what is left of its time since the last visit; whether it did."""
         mission = self.mission
         usual = mission.settings.choice.exploration_seconds
         seconds = mission.ports.reasoner.exploring(mission.place, usual)
-        elapsed = elapsed_of(mission.clock)
-        begin = elapsed() - min(mission.explored, seconds)
-        mission.explored = 0.0
         try:
-            self._room_look.look(begin + seconds - elapsed(), interrupt)
+            self._room_look.explore(seconds, interrupt)
         except CallInterruptedError:
             return False
-        while (left := begin + seconds - elapsed()) > 0.0:
-            if not mission.clock.sleep(min(left, max(NOTE_SECONDS, seconds / 20.0)), interrupt):
-                return False
-            explored = round(elapsed() - begin, 3)
-            mission.note('exploring', place=mission.place, seconds=explored)
-        mission.explored = math.inf
         return True
 
 
@@ -107,9 +92,9 @@ class VerifyTask(MissionState):
 
     ends = ('verified',)
 
-    def __init__(self, mission: Mission) -> None:
+    def __init__(self, mission: Mission, room_look: RoomLook) -> None:
         super().__init__(mission)
-        self._room_look = RoomLook(mission)
+        self._room_look = room_look
 
     def work(self, ud: Any, interrupt: fsm.Interrupt) -> str:
         with self.mission.battery.interrupting(
@@ -220,14 +205,14 @@ def surveillance_machine(mission: Mission) -> fsm.StateMachine:
             recharge='RECHARGE_TASK',
             explore='EXPLORE_TASK',
         )
-        verifies = mission.ports.looking is not None
+        verifies, room_look = mission.ports.looking is not None, RoomLook(mission)
         add(
             'EXPLORE_TASK',
-            ExploreTask(mission),
+            ExploreTask(mission, room_look),
             explored='VERIFY_TASK' if verifies else 'explored',
         )
         if verifies:
-            add('VERIFY_TASK', VerifyTask(mission), verified='explored')
+            add('VERIFY_TASK', VerifyTask(mission, room_look), verified='explored')
         add('RECHARGE_TASK', RechargeTask(mission), recharged='recharged', failed=FAILED)
 
     machine = fsm.StateMachine([PREEMPTED])

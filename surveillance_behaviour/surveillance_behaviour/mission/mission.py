@@ -15,7 +15,11 @@ from state_machines import Clock, Interrupt
 from state_machines.clock import elapsed_of
 from state_machines.exceptions import CallError, CallInterruptedError
 from surveillance_behaviour.charging import BatteryMonitor, charge
-from surveillance_behaviour.mission.mission_log import MissionRecord, is_other_simulation
+from surveillance_behaviour.mission.mission_log import (
+    LookedSides,
+    MissionRecord,
+    is_other_simulation,
+)
 from surveillance_behaviour.mission.recovery import Failure, Recovery, RecoveryLimits
 from surveillance_behaviour.ports import Point, Ports, UnknownPlaceError
 from surveillance_runtime.files import FileError
@@ -88,6 +92,8 @@ class Mission:
         astray: Whether it has left its place and not arrived anywhere since.
         staying: Why it was decided to stay where it is for a while; empty: it was not.
         explored: Seconds for which it explored its place since it came there; inf: it is done.
+        looked: Where the camera looked in each place.
+        goes_on: Whether an earlier run of the same record is gone on with.
         docking: Whether a drive to a recharge room ends at its station, not at the room's point.
     """
 
@@ -118,6 +124,8 @@ class Mission:
         self._docked = self._will_dock = True
         self._record = record
         self._cut_off = None if record is None else record.left_at
+        self.goes_on = record is not None and record.is_begun
+        self.looked = LookedSides(None if record is None else record.looked.to_json())
         self._started: float | None = None
         self._noted_places: frozenset[str] = frozenset()
         self._noted_threshold = 0.0
@@ -137,6 +145,9 @@ class Mission:
         self.say(f'{len(reasoner.places)} places to patrol, starting in {self.place}')
         if self._started is not None:
             return
+        if self.ports.looking is not None:
+            # Whoever ended before may have left it turned aside.
+            self.ports.looking.rest_arm()
         for station in self.settings.choice.recharge_rooms:
             # Where they are is known then, also while the map does not answer.
             with contextlib.suppress(CallError):

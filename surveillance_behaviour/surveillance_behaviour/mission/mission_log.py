@@ -16,8 +16,10 @@ and the event's own fields::
 
 A start, and a decision under another threshold than the last one, has ``urgency_threshold``,
 seconds. The ``path`` was planned; ``driven`` is where the robot was, where the motion controller
-tells it. ``promises`` says what can be kept of each place: ``place``, ``verdict``, ``words``, and
-``threshold`` and ``wait`` in seconds, null where they have no end.
+tells it. An ``exploring`` may have ``bearing``: the camera had looked there then, whole degrees of
+the map frame, as the ``sides`` of a ``look`` are. ``promises`` says what can be kept of each place:
+``place``, ``verdict``, ``words``, and ``threshold`` and ``wait`` in seconds, null where they have
+no end.
 
 A record of a month stays small to read: a file that has grown to :data:`SEGMENT_BYTES` is packed as
 ``FILE.0001.gz``, ``FILE.0002.gz``, ..., and the new one begins with a ``snapshot`` of all that was
@@ -154,6 +156,16 @@ class MissionRecord:
     def left_at(self) -> CutOff | None:
         """Where the mission stands; None: it ended as told, or never began."""
         return self._account.left_at
+
+    @property
+    def is_begun(self) -> bool:
+        """Whether it holds a mission already, which is gone on with."""
+        return self._account.now is not None
+
+    @property
+    def looked(self) -> LookedSides:
+        """Where the camera looked in each place."""
+        return self._account.looked
 
     def write(self, name: str, time: float, **fields: object) -> None:
         """Append one event, after those that the disk did not take before.
@@ -331,6 +343,47 @@ class Summary:
         return '\n'.join(lines)
 
 
+SAME_SIDE = 45.0
+"""Bearings that differ by less show the same side, degrees."""
+
+
+class LookedSides:
+    """Where the camera looked in each place, so that what waits longest comes first.
+
+    Args:
+        kept: What `to_json` gave; nothing: nowhere.
+    """
+
+    def __init__(self, kept: Mapping[str, Iterable[int]] | None = None) -> None:
+        self._sides = {
+            str(place): [int(each) for each in sides] for place, sides in (kept or {}).items()
+        }
+
+    def note(self, place: str, bearing: float) -> int:
+        """Take that the camera looked to a bearing, map frame, rad; return it in whole degrees."""
+        degrees = round(math.degrees(bearing)) % 360
+        others = [each for each in self._sides.get(place, ()) if not _is_same(each, degrees)]
+        self._sides[place] = [*others, degrees]
+        return degrees
+
+    def rank(self, place: str, bearing: float) -> int:
+        """Return how long ago the camera looked there, among the sides of a place: 0: never, else
+        greater where it is less long ago.
+        """
+        degrees = math.degrees(bearing)
+        sides = self._sides.get(place, ())
+        same = (number for number, each in enumerate(sides, start=1) if _is_same(each, degrees))
+        return max(same, default=0)
+
+    def to_json(self) -> dict[str, list[int]]:
+        """Return it as plain values: the bearings of each place, the latest last."""
+        return {place: list(sides) for place, sides in self._sides.items()}
+
+
+def _is_same(one: float, other: float) -> bool:
+    return abs(math.remainder(one - other, 360.0)) < SAME_SIDE
+
+
 @dataclass
 class Account:
     """What is counted and known of a mission while its events are taken one by one.
@@ -341,6 +394,7 @@ class Account:
         now: Time of the last event; None: there was none.
         left_at: Where the mission stands; None: it ended as told, or never began.
         visits: When the robot was in each place last, seconds on the present clock.
+        looked: Where the camera looked in each place.
     """
 
     summary: Summary = field(default_factory=Summary)
@@ -348,6 +402,7 @@ class Account:
     now: float | None = None
     left_at: CutOff | None = None
     visits: dict[str, float] = field(default_factory=dict)
+    looked: LookedSides = field(default_factory=LookedSides)
 
     def take(self, event: Event) -> None:
         """Count one event.
@@ -372,6 +427,8 @@ class Account:
         _count(summary, event, self.last_seen)
         if event.name == 'visit':
             self.visits[event.text('place')] = event.time
+        if isinstance(bearing := event.fields.get('bearing'), int):
+            self.looked.note(event.text('place'), math.radians(bearing))
         self.left_at = _after(self.left_at, event)
         if self.left_at is not None:
             self.left_at = replace(self.left_at, time=event.time)
@@ -386,6 +443,7 @@ class Account:
             'last_seen': self.last_seen,
             'left_at': left_at,
             'visits': self.visits,
+            'looked': self.looked.to_json(),
         }
 
     def _restore(self, kept: Any) -> None:
@@ -405,6 +463,7 @@ class Account:
                 left_at = replace(left_at, explored=math.inf)
             self.summary, self.left_at = summary, left_at
             self.last_seen, self.visits = _times(kept['last_seen']), _times(kept['visits'])
+            self.looked = LookedSides(kept.get('looked', {}))
         except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
             raise FileError(f'a snapshot of the mission record is damaged: {error}') from None
 

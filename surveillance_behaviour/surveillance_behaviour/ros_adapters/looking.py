@@ -1,12 +1,14 @@
 """Viewpoints and doubts as the node `observer` tells them, and the driving and turning for a look.
 
 `viewpoints` is JSON of the form `{"R1": [[x, y], ...]}`, `doubts` a list of alerts that wait for a
-second look, `sees_around` whether it sees all around without a turn. Without an observer there are
-none, and the robot looks nowhere.
+second look, `sees_around` whether it sees all around without a turn. The first word of that says
+that the observer sees, which the first look of this process waits for. Without an observer there
+are no viewpoints, and the robot looks nowhere.
 """
 
 from __future__ import annotations
 
+import contextlib
 import json
 import math
 from collections.abc import Sequence
@@ -17,9 +19,9 @@ from std_msgs.msg import Bool, String
 
 from state_machines import Interrupt
 from state_machines.ros import CallError, GoalCaller, ServiceCaller
-from surveillance_behaviour.ports import Doubt, Point, Side
+from surveillance_behaviour.ports import Doubt, Point
 from surveillance_behaviour.ros_adapters.peers import Deadlines, MissionClock, run
-from surveillance_interfaces.action import ComputePath, Control, FollowPath
+from surveillance_interfaces.action import ComputePath, FollowPath
 from surveillance_interfaces.srv import MarkerRoutine
 from surveillance_runtime.conversions import (
     point_from,
@@ -29,31 +31,39 @@ from surveillance_runtime.conversions import (
 )
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.state_topics import StateSubscription
+from surveillance_runtime.turning_path import turning_path
 
 ARM_DEADLINE = 60.0
 """Within which the arm is at a pose, seconds of real time."""
-POSES = {
-    Side.LEFT: MarkerRoutine.Request.LEFT,
-    Side.BACK: MarkerRoutine.Request.BACK,
-    Side.RIGHT: MarkerRoutine.Request.RIGHT,
-    Side.FRONT: MarkerRoutine.Request.HOME,
-}
+SENDING = 0.5
+"""Seconds of real time for which a pose that nobody waits for is sent."""
+WATCHER_DEADLINE = 20.0
+"""The first look waits so long for the observer, seconds of real time."""
+POSES = (
+    MarkerRoutine.Request.HOME,
+    MarkerRoutine.Request.LEFT,
+    MarkerRoutine.Request.BACK,
+    MarkerRoutine.Request.RIGHT,
+)
+"""Of the arm, a quarter turn apart, anticlockwise."""
 
 
 class RosLooking:
-    """The observer's topics, `compute_path`, `follow_path`, `motion/controller` and `move_arm`."""
+    """The observer's topics, `compute_path`, `follow_path` and `move_arm`."""
 
     def __init__(self, node: PatrolNode, deadlines: Deadlines, clock: MissionClock) -> None:
         self._deadlines, self._clock = deadlines, clock
         self._planner = GoalCaller(node, ComputePath, 'compute_path')
         self._follower = GoalCaller(node, FollowPath, 'follow_path')
-        self._turner = GoalCaller(node, Control, 'motion/controller')
         self._arm = ServiceCaller(node, MarkerRoutine, 'move_arm')
         self._node = node
         self._viewpoints: dict[str, list[Point]] = {}
         self._doubts: list[Doubt] = []
         self._position: Point | None = None
+        self._heading = 0.0
         self._sees_around = False
+        self._watches = Interrupt()
+        self._resting = Interrupt()
         StateSubscription(node, Bool, 'sees_around', self._on_sees_around)
         StateSubscription(node, String, 'viewpoints', self._on_viewpoints)
         StateSubscription(node, String, 'doubts', self._on_doubts)
@@ -70,6 +80,24 @@ class RosLooking:
     def position(self) -> Point | None:
         """Return where the robot is."""
         return self._position
+
+    def heading(self) -> float:
+        """Return where the robot's front points, map frame, rad; 0 where nobody has said."""
+        return self._heading
+
+    def await_watcher(self, interrupt: Interrupt) -> None:
+        """Wait until the observer sees; it may have been started together with this process."""
+        if self._watches.is_set():
+            return
+        self._clock.wait_for_event()
+        either = Interrupt()
+        forget = self._watches.subscribe(either.set), interrupt.subscribe(either.set)
+        either.wait(WATCHER_DEADLINE)
+        for each in forget:
+            each()
+        if not interrupt.is_set():
+            # Once: who is not there by then may never be.
+            self._watches.set()
 
     def sees_around(self) -> bool:
         """Tell whether a turn shows nothing more, as the observer says."""
@@ -88,24 +116,50 @@ class RosLooking:
         request = FollowPath.Goal(path=point_messages(path))
         run(self._follower, request, limits.answer, limits.move, interrupt)
 
-    def turn(self, interrupt: Interrupt) -> None:
-        """Turn the base once around."""
+    def face(self, bearing: float, interrupt: Interrupt) -> None:
+        """Turn the camera to a bearing: the arm to its nearest pose, or the base without one."""
         limits, here = self._deadlines, self._position
-        goal = Control.Goal(point_set=point_messages([here] if here is not None else []))
-        run(self._turner, goal, limits.answer, limits.move, interrupt)
-
-    def point_arm(self, side: Side, interrupt: Interrupt) -> None:
-        """Point the arm to a side."""
-        limits = self._deadlines
-        request = MarkerRoutine.Request(pos=POSES[side])
+        if not self.has_arm():
+            if here is None:
+                raise CallError('amcl_pose: nobody tells where the robot is')
+            turn = FollowPath.Goal(path=point_messages(turning_path(here, bearing)))
+            run(self._follower, turn, limits.answer, limits.move, interrupt)
+            return
+        self._resting.set()
+        self._clock.wait_for_event()
+        quarters = round((bearing - self._heading) / (math.pi / 2)) % len(POSES)
+        request = MarkerRoutine.Request(pos=POSES[quarters])
         answer = self._arm.call(
             request, limits.move or ARM_DEADLINE, interrupt, discovery=limits.answer
         )
         if not answer.success:
             raise CallError(f'{self._arm.name}: {answer.message}')
 
+    def rest_arm(self) -> None:
+        """Have the arm look ahead; what points it elsewhere afterwards comes before it."""
+        self._resting.set()
+        self._resting = ended = Interrupt()
+        is_known = self._arm.is_ready()
+        forget = self._node.stopping.subscribe(ended.set) if not is_known else None
+
+        def rest() -> None:
+            # One that was killed may have left it turned aside: its server is found first.
+            seconds = SENDING if is_known else self._deadlines.answer
+            with contextlib.suppress(CallError):
+                self._arm.call(
+                    MarkerRoutine.Request(pos=MarkerRoutine.Request.HOME),
+                    seconds,
+                    ended,
+                    discovery=seconds,
+                )
+            if forget is not None:
+                forget()
+
+        self._node.spawn(rest, 'arm')
+
     def _on_sees_around(self, message: Bool) -> None:
         self._sees_around = bool(message.data)
+        self._watches.set()
 
     def _on_viewpoints(self, message: String) -> None:
         told = _read(self._node, 'viewpoints', message.data, dict)
@@ -120,13 +174,14 @@ class RosLooking:
                 int(each['number']),
                 str(each['place']),
                 None if each.get('look_from') is None else _point(each['look_from']),
+                None if each.get('position') is None else _point(each['position']),
             )
             for each in told
         ]
 
     def _on_pose(self, serialized: bytes) -> None:
-        x, y, _ = pose_of_serialized(serialized)
-        self._position = (x, y, 0.0)
+        x, y, yaw = pose_of_serialized(serialized)
+        self._position, self._heading = (x, y, 0.0), yaw
 
 
 def _point(values: Sequence[float]) -> Point:

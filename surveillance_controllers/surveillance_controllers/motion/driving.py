@@ -339,9 +339,16 @@ class Drive:
 
 
 class Spin:
-    """One turn on the spot; it ends early where the robot cannot turn."""
+    """A turn on the spot; it ends early where the robot cannot turn.
 
-    def __init__(self) -> None:
+    Args:
+        bearing: Where the robot's front shall point at the end, map frame, rad; it turns the
+            shorter way. None: once around, anticlockwise.
+    """
+
+    def __init__(self, bearing: float | None = None) -> None:
+        self._bearing = bearing
+        self._whole = math.tau
         self._turned = 0.0
         self._last: float | None = None
         self._moved_at: float | None = None
@@ -350,7 +357,10 @@ class Spin:
     @property
     def done(self) -> bool:
         """Whether the turn is complete, to a degree, or does not go on."""
-        return self._is_stuck or self._turned >= math.tau - 0.02
+        if self._last is None:
+            return False
+        left = self._whole - self._turned
+        return self._is_stuck or (left if self._bearing is None else abs(left)) <= 0.02
 
     def step(self, yaw: float, now: float) -> Velocity:
         """Decide the velocity for the next moment.
@@ -359,6 +369,8 @@ class Spin:
             yaw: The robot's, rad.
             now: The time, seconds.
         """
+        if self._last is None and self._bearing is not None:
+            self._whole = angle_between(yaw, self._bearing)
         step = 0.0 if self._last is None else angle_between(self._last, yaw)
         self._turned += step
         self._last = yaw
@@ -367,5 +379,6 @@ class Spin:
         self._is_stuck = now - self._moved_at >= SPIN_PATIENCE
         if self.done:
             return Velocity()
-        left = math.tau - self._turned
-        return Velocity(0.0, min(SPIN_SPEED, math.sqrt(2 * SPIN_ACCELERATION * left)))
+        left = self._whole - self._turned
+        speed = min(SPIN_SPEED, math.sqrt(2 * SPIN_ACCELERATION * abs(left)))
+        return Velocity(0.0, math.copysign(speed, left))

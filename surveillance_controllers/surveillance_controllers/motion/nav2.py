@@ -2,6 +2,7 @@
 
 A path becomes a NavigateThroughPoses goal, so that Nav2 goes the way that was planned here, through
 the doors that are open. (Its action FollowPath has the name of this project's own, `follow_path`.)
+A path that only says where to turn (`turning_path`) becomes a Spin goal.
 At the end of a way to the station a docking server (opennav_docking) may dock the robot, whoever
 drove it there.
 
@@ -19,6 +20,7 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
+from builtin_interfaces.msg import Duration
 from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped
 from nav_msgs.msg import OccupancyGrid
 
@@ -32,6 +34,7 @@ from surveillance_controllers.controller_parameters import (
 )
 from surveillance_controllers.geometry import (
     Points,
+    angle_between,
     distance_nearest,
     equally_spaced,
     length,
@@ -49,9 +52,12 @@ from surveillance_runtime.parameters import ParameterError
 from surveillance_runtime.place.stations import station_at, stations_in
 from surveillance_runtime.place_changes import follow_place
 from surveillance_runtime.state_topics import StateSubscription
+from surveillance_runtime.turning_path import bearing_of
 
 SPACING = 1.5
 """The largest distance of the poses that Nav2 is led through, metres."""
+SPIN_ALLOWANCE = Duration(sec=30)
+"""So long a turn on the spot may take."""
 MOST_POSES = 10_000
 """A path that would need more poses is led through poses farther apart."""
 
@@ -102,13 +108,17 @@ class Nav2Motion:
     ) -> None:
         self._node = node
         self._recorder = recorder
-        (self._type,) = nav2_actions('navigator', 'nav2', 'own', 'NavigateThroughPoses')
+        self._type, self._spin = nav2_actions(
+            'navigator', 'nav2', 'own', 'NavigateThroughPoses', 'Spin'
+        )
         self._timeout = settings.peer_timeout
         self._navigator = GoalCaller(node, self._type, 'navigate_through_poses')
+        self._spinner = GoalCaller(node, self._spin, 'spin')
         self._hold = Hold(node)
         self._lock = threading.Lock()
         self._places = PlaceLocator(door_segments(node).values())
         self._point: Points | None = None
+        self._yaw = math.nan
         positions = place_positions(node)
         self._places.set_positions(positions)
         knowledge.assume(positions)
@@ -131,6 +141,8 @@ class Nav2Motion:
         Raises:
             MotionFailedError: It did not get there.
         """
+        if (bearing := bearing_of(path.tolist())) is not None:
+            return self._turn(bearing, path[0], run)
         position: Points | None = None
 
         def on_feedback(feedback: Any) -> None:
@@ -173,6 +185,31 @@ class Nav2Motion:
         self._tell(position)
         return position
 
+    def _turn(self, bearing: float, at: Points, run: GoalRun) -> Points:
+        """Turn on the spot, which Nav2 does by an angle; return where the robot is."""
+        self._hold.await_end(run.interrupt)
+        if not math.isfinite(self._yaw):
+            raise MotionFailedError('amcl_pose: nobody tells where the robot points', at)
+        goal = self._spin.Goal(
+            target_yaw=angle_between(self._yaw, bearing), time_allowance=SPIN_ALLOWANCE
+        )
+        either = Interrupt()
+        forget = run.interrupt.subscribe(either.set), self._hold.begun.subscribe(either.set)
+        try:
+            end = self._spinner.run(goal, accept_timeout=self._timeout, interrupt=either)
+        except CallInterruptedError:
+            if run.interrupt.is_set():
+                return at
+            raise MotionFailedError('the robot is to stand', at) from None
+        except CallError as error:
+            raise MotionFailedError(str(error), at) from error
+        finally:
+            for each in forget:
+                each()
+        if end.status != 'succeeded':
+            raise MotionFailedError(f'Nav2 {end.status} the turn{reason_of(end.result)}', at)
+        return at if self._point is None else self._point
+
     def _poses(self, path: Points) -> list[PoseStamped]:
         """Return the poses behind the start, each facing along the path."""
         points = equally_spaced(path, max(SPACING, length(path) / MOST_POSES))
@@ -190,7 +227,8 @@ class Nav2Motion:
 
     def _on_pose(self, message: PoseWithCovarianceStamped) -> None:
         with conversions.refusing(self._node, 'amcl_pose'):
-            self._point = point_of(pose_from(message.pose.pose))
+            pose = pose_from(message.pose.pose)
+            self._point, self._yaw = point_of(pose), pose[2]
             self._tell(self._point)
 
     def _on_map(self, message: OccupancyGrid) -> None:

@@ -64,6 +64,7 @@ from surveillance_runtime.profile.parameters import declared_frames
 from surveillance_runtime.profile.record import RobotProfile, Topics
 from surveillance_runtime.qos import SENSOR_QOS
 from surveillance_runtime.state_topics import OwnedTopic, StateSubscription
+from surveillance_runtime.turning_path import bearing_of
 
 POSE_PERIOD = 0.19
 """Least time between two messages on amcl_pose, seconds: with every second scan at 10 Hz."""
@@ -190,6 +191,8 @@ class NavigationMotion:
         Raises:
             MotionFailedError: It did not get there.
         """
+        if (bearing := bearing_of(path.tolist())) is not None:
+            return self._turn(bearing, run)
         drive = Drive(path[:, :2], self._robot)
         interrupt = run.interrupt
         with self._carrying_out(drive, interrupt, lambda pose: report(point_of(pose))):
@@ -202,6 +205,13 @@ class NavigationMotion:
             raise MotionFailedError(drive.reason, end)
         self._recorder.tell(self._navigator.place_at(end) if self._is_sure else None)
         return end
+
+    def _turn(self, bearing: float, run: GoalRun) -> Points:
+        """Turn on the spot; return where the robot is then."""
+        spin = Spin(bearing)
+        with self._carrying_out(spin, run.interrupt):
+            self._await(lambda: spin.done, run.interrupt)
+        return point_of(self._navigator.pose or (float('nan'),) * 3)
 
     def place_reached(self, goal: Points, end: Points) -> str:
         """Return the place the robot is in after a drive.

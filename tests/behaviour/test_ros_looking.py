@@ -1,0 +1,117 @@
+"""The robot's camera is turned by whoever turns it: the arm's poses, or `follow_path`."""
+
+from __future__ import annotations
+
+import math
+import threading
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
+import pytest
+from geometry_msgs.msg import PoseWithCovarianceStamped
+from rclpy.callback_groups import ReentrantCallbackGroup
+from std_msgs.msg import Bool
+
+from state_machines import Interrupt
+from state_machines.exceptions import CallInterruptedError
+from state_machines.ros import GoalServer, work_aside
+from surveillance_behaviour.ros_adapters.looking import RosLooking
+from surveillance_behaviour.ros_adapters.peers import Deadlines, MissionClock
+from surveillance_interfaces.action import FollowPath
+from surveillance_interfaces.srv import MarkerRoutine
+from surveillance_runtime.conversions import point_from, pose_estimate
+from surveillance_runtime.node import PatrolNode
+from surveillance_runtime.qos import STATE_QOS
+from surveillance_runtime.turning_path import bearing_of
+
+REQUEST = MarkerRoutine.Request
+
+
+class Arm(PatrolNode):
+    """Takes a while for each pose, until it is released."""
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__('arm_controller', **options)
+        self.asked: list[int] = []
+        self.released = threading.Event()
+        group = ReentrantCallbackGroup()
+        self.create_service(MarkerRoutine, 'move_arm', self._move, callback_group=group)
+
+    async def _move(self, request: Any, response: Any) -> Any:
+        self.asked.append(request.pos)
+        await work_aside(self, lambda: self.released.wait(60.0), 'arm motion')
+        response.success = True
+        return response
+
+
+def looking_of(graph: Any) -> RosLooking:
+    node = graph.add(PatrolNode, name='robot_behavior')
+    return RosLooking(node, Deadlines(), MissionClock(node))
+
+
+def tell_pose(graph: Any, looking: RosLooking, x: float, y: float, yaw: float) -> None:
+    poses = graph.node.create_publisher(PoseWithCovarianceStamped, 'amcl_pose', STATE_QOS)
+    poses.publish(PoseWithCovarianceStamped(pose=pose_estimate((x, y, yaw), 0.1, 0.1)))
+    graph.until(lambda: looking.position() is not None)
+
+
+def test_a_look_that_is_interrupted_has_the_arm_look_ahead(graph: Any) -> None:
+    looking, arm = looking_of(graph), graph.add(Arm)
+    tell_pose(graph, looking, 1.0, 2.0, math.pi / 2)
+    graph.until(looking.has_arm)
+    interrupt = Interrupt()
+    with ThreadPoolExecutor() as threads:
+        ended = threads.submit(looking.face, math.pi, interrupt)
+        graph.until(lambda: arm.asked == [REQUEST.LEFT])
+        interrupt.set()
+        with pytest.raises(CallInterruptedError):
+            ended.result(60.0)
+    looking.rest_arm()
+    graph.until(lambda: arm.asked == [REQUEST.LEFT, REQUEST.HOME])
+    arm.released.set()
+    looking.face(-math.pi / 2 + 0.2, Interrupt())
+    assert arm.asked[-1] == REQUEST.BACK
+
+
+def test_an_arm_that_comes_late_is_brought_ahead_and_not_after_it_was_pointed(graph: Any) -> None:
+    looking = looking_of(graph)
+    looking.rest_arm()
+    arm = graph.add(Arm)
+    arm.released.set()
+    graph.until(lambda: arm.asked == [REQUEST.HOME])
+    graph.remove(arm)
+    graph.until(lambda: not looking.has_arm())
+    looking.rest_arm()
+    looking._resting.set()  # as pointing it elsewhere does
+    later = graph.add(Arm)
+    later.released.set()
+    graph.until(looking.has_arm)
+    looking.face(math.pi / 2, Interrupt())
+    assert later.asked == [REQUEST.LEFT]
+
+
+def test_without_an_arm_the_base_turns(graph: Any) -> None:
+    looking = looking_of(graph)
+    bearings = []
+
+    def follow(goal: Any, _run: Any) -> Any:
+        bearings.append(bearing_of([point_from(each) for each in goal.path]))
+        return FollowPath.Result()
+
+    node = graph.add(PatrolNode, name='motion_controller')
+    GoalServer(node, FollowPath, 'follow_path', follow)
+    tell_pose(graph, looking, 1.0, 2.0, 0.0)
+    looking.face(2.5, Interrupt())
+    assert bearings == [pytest.approx(2.5)]
+
+
+def test_the_first_look_waits_for_the_observer(graph: Any) -> None:
+    looking = looking_of(graph)
+    with ThreadPoolExecutor() as threads:
+        waited = threads.submit(looking.await_watcher, Interrupt())
+        graph.node.create_publisher(Bool, 'sees_around', STATE_QOS).publish(Bool(data=True))
+        waited.result(60.0)
+    assert looking.sees_around()
+    interrupt = Interrupt()
+    interrupt.set()
+    looking_of(graph).await_watcher(interrupt)
