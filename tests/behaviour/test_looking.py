@@ -226,10 +226,10 @@ def test_whatever_ends_a_look_the_arm_looks_ahead_again(machine: str, seconds: f
 def test_a_low_battery_that_ends_a_look_leaves_the_arm_ahead():
     run = Watched('surveillance', exploration_seconds=40.0)
     run.looking.arm = True
-    run.world.level = 100.0
-    run.world.clock.at = [(4.0, lambda: run.world.drain(85.0))]
+    run.world.clock.after(4.0, lambda: run.world.set_level(5.0))
     run.until(6.0)
     assert run.looking.camera == 0
+    assert len(run.looking.rests) == 2, 'at the start, and when the battery got low'
 
 
 @pytest.mark.parametrize('machine', ['surveillance', 'patrol'])
