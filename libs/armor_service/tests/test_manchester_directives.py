@@ -34,6 +34,32 @@ def test_axioms_come_and_go(rooms: Ask) -> None:
     assert rooms('QUERY AXIOMS', 'R1').queried_objects == []
 
 
+@pytest.mark.parametrize(
+    'axiom',
+    [
+        'Individual: R1 Annotations: rdfs:comment "opens at :30 (:45 on Sundays)"',
+        'Individual: R1 Types: <http://bnc/exp-rob-lab/2022-23#some>',
+        'Individual: R1 Facts: <http://bnc/exp-rob-lab/2022-23#value> R2',
+    ],
+)
+def test_what_is_shown_is_taken_back_as_it_stands(rooms: Ask, axiom: str) -> None:
+    before = rooms('QUERY AXIOMS', 'R1').queried_objects
+    assert rooms('ADD AXIOM', axiom).error_description == ''
+    (shown,) = set(rooms('QUERY AXIOMS', 'R1').queried_objects) - set(before)
+    assert shown == axiom
+    assert rooms('REMOVE AXIOM', shown).error_description == ''
+    assert rooms('QUERY AXIOMS', 'R1').queried_objects == before
+
+
+def test_an_axiom_comes_and_goes_with_what_is_said_of_it(rooms: Ask) -> None:
+    axiom = 'Class: Hall SubClassOf: Annotations: rdfs:comment "large" ROOM'
+    assert rooms('ADD AXIOM', axiom).error_description == ''
+    saved = rooms('QUERY AXIOMS', 'Hall').queried_objects
+    assert 'Class: Hall SubClassOf: ROOM' in saved
+    assert rooms('REMOVE AXIOM', axiom).error_description == ''
+    assert rooms('QUERY AXIOMS', 'Hall').queried_objects == ['Class: Hall']
+
+
 def test_a_name_whose_prefix_nobody_declared_is_an_iri(rooms: Ask) -> None:
     assert rooms('ADD AXIOM', 'Individual: urn:hall Types: ROOM').error_description == ''
     assert '<urn:hall>' in rooms('QUERY IND CLASS', 'ROOM').queried_objects
@@ -66,6 +92,13 @@ def test_the_individuals_of_an_expression(rooms: Ask) -> None:
         (('ADD RULE', 'ROOM(?r)'), "argument rule: 1:9: expected '->'"),
         (('QUERY IND EXPRESSION', 'ROOM and'), 'argument class expression: 1:9: expected a'),
         (('ADD AXIOM', 'Prefix: x: <urn:x>'), 'expected'),
+        (
+            (
+                'ADD AXIOM',
+                'Class: A SubClassOf: Annotations: Annotations: n "x" n "y" B',
+            ),
+            'ADD AXIOM: argument axiom: line 1: an annotation on an annotation is not kept',
+        ),
     ],
 )
 def test_a_wrong_text_is_refused_with_its_place(

@@ -122,3 +122,95 @@ def test_an_expression_comes_back_as_it_was(text: str) -> None:
     written = ManchesterWriter({}).expression(first).replace('owl:Thing', 'Thing')
     again = read(written.replace('Thing', '<http://www.w3.org/2002/07/owl#Thing>'))
     assert again == first
+
+
+ANNOTATED = """
+Prefix: : <urn:o#>
+Ontology: <urn:o>
+Annotations: Annotations: rdfs:comment "of the label" rdfs:label "o", rdfs:comment "two"
+ObjectProperty: p
+    Characteristics: Annotations: rdfs:comment "f" Functional, Irreflexive
+    Domain: Annotations: rdfs:comment "d" A
+    InverseOf: Annotations: rdfs:comment "i" q
+    SubPropertyChain: Annotations: rdfs:comment "ch" p o q
+ObjectProperty: q
+DataProperty: d
+    Characteristics: Annotations: rdfs:comment "df" Functional
+    Range: Annotations: rdfs:comment "dr" xsd:int
+    SubPropertyOf: Annotations: rdfs:comment "ds" e
+DataProperty: e
+Datatype: T EquivalentTo: Annotations: rdfs:comment "t" {"low"}
+Class: A
+    Annotations: Annotations: rdfs:comment "n" rdfs:label "a"@en, rdfs:seeAlso <urn:x>
+    SubClassOf: Annotations: rdfs:comment "one", rdfs:label "two" p some B, B
+    EquivalentTo: Annotations: rdfs:comment "e" (p only B)
+    HasKey: Annotations: rdfs:comment "k" p d
+    DisjointUnionOf: Annotations: rdfs:comment "u" B, C
+Class: B
+Class: C
+Individual: a
+    Types: Annotations: rdfs:comment "ty" A, B
+    Facts: Annotations: rdfs:comment "p" p b, d 5, Annotations: rdfs:comment "n" not q b
+    SameAs: Annotations: rdfs:comment "s" c
+Individual: b
+DisjointClasses: Annotations: rdfs:comment "dc" A, B, C
+DifferentIndividuals: Annotations: rdfs:comment "di" a, b
+Rule: Annotations: rdfs:label "R" A(?x) -> B(?x)
+"""
+
+
+def test_what_is_said_of_axioms_is_read_and_written() -> None:
+    document = read_ontology(ANNOTATED.encode(), 'urn:base')
+    assert document.unsupported == []
+    notes = {a.axiom: a.annotations for a in document.axioms if isinstance(a, ax.AxiomAnnotation)}
+    assert len(notes) == 20
+    comment, label = (f'http://www.w3.org/2000/01/rdf-schema#{n}' for n in ('comment', 'label'))
+    some = ax.SubClassOf(f'{N}A', ex.ObjectSomeValuesFrom(f'{N}p', f'{N}B'))
+    assert notes[some] == ((comment, Literal('one')), (label, Literal('two')))
+    assert ax.SubClassOf(f'{N}A', f'{N}B') not in notes
+    rule = next(axiom for axiom in document.axioms if isinstance(axiom, ax.Rule))
+    assert rule.label == 'R'
+    for form in ('manchester', 'rdfxml'):
+        written = ontology_bytes(document.axioms, 'urn:o', form, {'': N})
+        again = read_ontology(written, 'urn:base')
+        assert (again.unsupported, set(again.axioms)) == ([], set(document.axioms))
+        assert next(axiom for axiom in again.axioms if isinstance(axiom, ax.Rule)).label == 'R'
+
+
+@pytest.mark.parametrize(
+    ('frame', 'report'),
+    [
+        (
+            'Class: A SubClassOf:\n Annotations: Annotations: rdfs:label "x" rdfs:label "y" B',
+            'line 3: an annotation on an annotation is not kept',
+        ),
+        (
+            'Class: A and B\n Annotations: rdfs:label "x"',
+            'line 3: annotations of what has no name are not kept',
+        ),
+    ],
+)
+def test_what_no_axiom_holds_is_reported(frame: str, report: str) -> None:
+    document = read_ontology(f'Ontology: <urn:o>\n{frame}'.encode(), 'urn:base')
+    assert document.unsupported == [report]
+
+
+def test_annotations_nest_no_deeper_than_expressions() -> None:
+    text = 'Ontology: <urn:o> Class: A ' + 'Annotations: ' * 5000 + 'rdfs:label "x"'
+    with pytest.raises(OntologyFileError, match='nest no deeper'):
+        read_ontology(text.encode(), 'urn:base')
+
+
+def test_a_declaration_is_annotated_in_other_formats_only() -> None:
+    declared = ax.Declaration('class', f'{N}A')
+    said = ax.AxiomAnnotation(declared, ((f'{N}n', Literal('x')),))
+    with pytest.raises(OntologyFileError, match='annotate the declaration of <urn:o#A>; save it'):
+        ontology_bytes([declared, said], 'urn:o', 'manchester')
+
+
+def test_what_nobody_declared_keeps_its_kind() -> None:
+    """The functional syntax needs no declarations; a reader of Manchester syntax does."""
+    text = 'Ontology(<urn:o> SubClassOf(<urn:A> DataSomeValuesFrom(<urn:d> <urn:T>)))'
+    axioms = read_ontology(text.encode(), 'urn:base').axioms
+    again = read_ontology(ontology_bytes(axioms, 'urn:o', 'manchester'), 'urn:base')
+    assert [axiom for axiom in axioms if axiom not in again.axioms] == []

@@ -6,6 +6,7 @@ Names are local names as in other directives; ``<iri>`` stands for itself.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 from armor_service.changes import AddAxiom, Change, RemoveAxiom
@@ -17,7 +18,14 @@ from armor_service.workspace import Workspace
 from owl_reasoner.documents.manchester import ManchesterParser, ManchesterWriter
 from owl_reasoner.documents.structural import PREFIXES
 from owl_reasoner.documents.xml_reading import OntologyFileError
-from owl_reasoner.owl.axioms import Axiom, Declaration, EquivalentClasses
+from owl_reasoner.owl.axioms import (
+    Axiom,
+    AxiomAnnotation,
+    Declaration,
+    EquivalentClasses,
+    Import,
+    Rule,
+)
 from owl_reasoner.owl.entities import entities_of
 
 ASKED = 'urn:asked'
@@ -61,9 +69,15 @@ def _read(words: str, what: str, read: Callable[[], Any]) -> Any:
         raise DirectiveError(f'{words}: argument {what}: {error}') from None
 
 
+def _check_all_kept(words: str, what: str, parser: ManchesterParser) -> None:
+    for told in parser.unsupported:
+        raise DirectiveError(f'{words}: argument {what}: {told}')
+
+
 def _axioms(words: str, ref: Reference, written: str) -> list[Axiom]:
     parser = _read(words, 'axiom', lambda: _parser(ref, written))
     axioms: list[Axiom] = _read(words, 'axiom', parser.axioms)
+    _check_all_kept(words, 'axiom', parser)
     # What a frame declares comes into being with it; removing says nothing of it.
     stated = [axiom for axiom in axioms if not isinstance(axiom, Declaration)]
     if words.startswith('ADD'):
@@ -124,6 +138,7 @@ def _rule(words: str, ref: Reference, written: str) -> Axiom:
     shortened = written.strip().removeprefix('Rule:')
     parser = _read(words, 'rule', lambda: _parser(ref, shortened))
     rule: Axiom = _read(words, 'rule', lambda: parser.whole(parser.rule))
+    _check_all_kept(words, 'rule', parser)
     return rule
 
 
@@ -169,7 +184,7 @@ def _about(ref: Reference, name: str) -> DirectiveResponse:
     summary='The rules, one each, as ADD RULE and REMOVE RULE take them.',
 )
 def _rules(ref: Reference) -> DirectiveResponse:
-    rules = (axiom for axiom in ref.kb.axioms() if type(axiom).__name__ == 'Rule')
+    rules = (replace(a, annotations=()) for a in ref.kb.axioms() if isinstance(a, Rule))
     texts = [text.removeprefix('Rule: ') for text in _written(ref, rules)]
     return DirectiveResponse(queried_objects=texts)
 
@@ -179,12 +194,6 @@ def _entities(axiom: Axiom) -> set[str]:
 
 
 def _written(ref: Reference, axioms: Any) -> list[str]:
-    base = f'{ref.kb.iri}#'
-    writer = ManchesterWriter({'': base})
-    found: list[str] = []
-    for axiom in axioms:
-        try:
-            found.append(writer.axiom(axiom).replace(' :', ' ').replace('(:', '('))
-        except (AttributeError, StopIteration):
-            continue
-    return found
+    writer = ManchesterWriter({'': f'{ref.kb.iri}#'}, bare=True)
+    kept = (axiom for axiom in axioms if not isinstance(axiom, AxiomAnnotation | Import))
+    return [writer.axiom(axiom) for axiom in kept]

@@ -9,13 +9,14 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias, TypeVar
 
 from owl_reasoner.documents.structural import PREFIXES, Axioms
 from owl_reasoner.documents.xml_reading import DEEPEST, OntologyFileError, is_absolute
 from owl_reasoner.owl import axioms as ax
 from owl_reasoner.owl import expressions as ex
 from owl_reasoner.owl.axioms import Axiom
+from owl_reasoner.owl.entities import entities_of
 from owl_reasoner.owl.expressions import Literal, language_tag
 from owl_reasoner.owl.vocabulary import (
     OWL,
@@ -28,6 +29,8 @@ from owl_reasoner.owl.vocabulary import (
     local_name,
 )
 
+T = TypeVar('T')
+_Notes: TypeAlias = 'tuple[tuple[str, str | Literal], ...]'
 _TOKENS = re.compile(
     r'\s+|(?<!\S)\#[^\n]*'
     r'|(?P<iri><[^<>\s]*>)'
@@ -62,6 +65,13 @@ _CHARACTERISTICS: dict[str, Any] = {
     'Asymmetric': ax.AsymmetricObjectProperty,
     'Transitive': ax.TransitiveObjectProperty,
 }
+_WORDS = frozenset(
+    (
+        *('and', 'or', 'not', 'that', 'inverse', 'o', 'true', 'false', *_RESTRICTIONS),
+        *('sameAs', 'SameAs', 'differentFrom', 'DifferentFrom', *_DATATYPES, *_FACETS),
+    )
+)
+"""What a name alone may not be."""
 _FRAMES = {
     'Class': 'class',
     'ObjectProperty': 'object_property',
@@ -76,6 +86,7 @@ _SETS: dict[str, Any] = {
     'DifferentIndividuals': ax.DifferentIndividuals,
 }
 _RULES = ('Rule', 'DLSafeRule')
+_BUILT_IN = (OWL, RDF, RDFS, XSD)
 _HEADS = (*_FRAMES, *_LISTS, *_SETS, *_RULES, 'Prefix', 'Ontology', 'Import')
 MOST_DIGITS = 18
 
@@ -131,6 +142,11 @@ class _Tokens:
             raise self.error(' or '.join(map(repr, texts)))
         self.at += 1
         return token
+
+    @property
+    def line(self) -> int:
+        """The line of the next token, the first one is 1."""
+        return self._text.count('\n', 0, self.next.place) + 1
 
     def error(self, expected: str, place: int | None = None) -> OntologyFileError:
         """Return the error that something else was expected; `place`: in characters."""
@@ -209,6 +225,9 @@ class ManchesterParser:
         named: Gives the IRI of a name, prefixed or not; raises ValueError.
         kinds: What is known of names: (kind, IRI).
 
+    Attributes:
+        unsupported: One sentence for each annotation that axioms do not hold.
+
     Raises:
         OntologyFileError: From every method, with line and column: what was expected.
     """
@@ -219,33 +238,49 @@ class ManchesterParser:
         self._tokens = _Tokens(text, named)
         self._kinds = set(kinds)
         self._depth = 0
+        self.unsupported: list[str] = []
 
-    def _several(self, read: Callable[[], Any]) -> list[Any]:
-        """Read a list with commas; annotations in front of a member are read over."""
-        found = []
-        while True:
-            self._skip_annotations()
+    def _several(self, read: Callable[[], T]) -> list[T]:
+        """Read a list with commas."""
+        found = [read()]
+        while self._tokens.accept(','):
             found.append(read())
-            if not self._tokens.accept(','):
-                return found
+        return found
 
-    def _skip_annotations(self) -> None:
+    def _annotated(self, read: Callable[[], T]) -> list[tuple[_Notes, T]]:
+        """Read a list with commas whose members may have annotations in front of them."""
+        return self._several(lambda: (self._notes(), read()))
+
+    def _notes(self) -> _Notes:
+        """Read the annotations in front of what they annotate."""
+        found: list[tuple[str, str | Literal]] = []
         while self._tokens.accept('Annotations:'):
-            self._annotations()
+            self._depth += 1
+            if self._depth > DEEPEST:
+                raise self._tokens.error(f'annotations that nest no deeper than {DEEPEST}')
+            line = self._tokens.line
+            for inner, note in self._annotated(self._annotation):
+                found.append(note)
+                if inner:
+                    told = f'line {line}: an annotation on an annotation is not kept'
+                    self.unsupported.append(told)
+            self._depth -= 1
+        return tuple(found)
 
-    def _annotations(self) -> list[tuple[str, str | Literal]]:
-        found = []
-        while True:
-            prop = self._tokens.iri('an annotation property')
-            value = self._tokens.literal() if self._tokens.at_literal() else self._tokens.iri()
-            found.append((prop, value))
-            if not self._tokens.accept(','):
-                return found
+    def _annotation(self) -> tuple[str, str | Literal]:
+        prop = self._tokens.iri('an annotation property')
+        at_value = self._tokens.at_literal()
+        return prop, self._tokens.literal() if at_value else self._tokens.iri()
 
-    def header_annotations(self) -> Iterator[tuple[str, str | Literal]]:
-        """Read the annotations of an ontology's header, as pairs (property, value)."""
+    def annotations(self, subject: str) -> Iterator[Axiom]:
+        """Read the annotations of a header or frame, of which the first word may be read."""
+        for notes, (prop, value) in self._annotated(self._annotation):
+            yield from _noted(notes, ax.AnnotationAssertion(prop, subject, value))
+
+    def header(self, iri: str) -> Iterator[Axiom]:
+        """Read the annotations of an ontology's header."""
         while self._tokens.accept('Annotations:'):
-            yield from self._annotations()
+            yield from self.annotations(iri)
 
     # --- expressions ---
 
@@ -409,10 +444,11 @@ class ManchesterParser:
 
     def rule(self) -> ax.Rule:
         """Read ``ROOM(?r), hasDoor(?r, ?d) -> Open(?r)``."""
+        notes = self._notes()
         body = [] if self._tokens.is_next('->') else self._several(self._atom)
         self._tokens.take('->')
         head = [] if self._tokens.next.kind in ('end', 'keyword') else self._several(self._atom)
-        return ax.Rule(tuple(body), tuple(head))
+        return ax.Rule(tuple(body), tuple(head), notes)
 
     def _atom(self) -> Any:
         if self._tokens.is_next('sameAs', 'SameAs', 'differentFrom', 'DifferentFrom'):
@@ -491,12 +527,13 @@ class ManchesterParser:
             self._tokens.at -= 1
             raise self._tokens.error('a frame such as Class: or Individual:')
         if head in _RULES:
-            self._skip_annotations()
             return [self.rule()]
         if head in _SETS:
-            return [_SETS[head](frozenset(self._several(self._tokens.iri)))]
+            notes = self._notes()
+            return [*_noted(notes, _SETS[head](frozenset(self._several(self._tokens.iri))))]
         if head in _LISTS:
-            return [self._listed(head)]
+            notes = self._notes()
+            return [*_noted(notes, self._listed(head))]
         if head not in _FRAMES:
             raise self._tokens.error(f'no {word} here')
         return list(self._entity(_FRAMES[head]))
@@ -526,9 +563,11 @@ class ManchesterParser:
         while self._tokens.next.kind == 'keyword' and self._tokens.next.text[:-1] not in _HEADS:
             word = self._tokens.take().text[:-1]
             if word == 'Annotations':
-                for prop, value in self._annotations():
-                    if isinstance(subject, str):
-                        yield ax.AnnotationAssertion(prop, subject, value)
+                if not isinstance(subject, str):
+                    told = f'line {self._tokens.line}: annotations of what has no name are not kept'
+                    self.unsupported.append(told)
+                found = list(self.annotations(str(subject)))
+                yield from found if isinstance(subject, str) else ()
                 continue
             sections = getattr(self, f'_{kind}_section')
             yield from sections(word, subject)
@@ -539,64 +578,58 @@ class ManchesterParser:
 
     def _class_section(self, word: str, cls: Any) -> Iterator[Axiom]:
         if word == 'HasKey':
+            notes = self._notes()
             objects: list[ex.PropertyExpression] = []
             datas: list[ex.PropertyExpression] = []
-            while self._tokens.next.kind in ('iri', 'name'):
+            while self._tokens.next.kind in ('iri', 'name') or self._tokens.is_next('('):
                 key = self._property()
                 is_data = ('data_property', key) in self._kinds
                 (datas if is_data else objects).append(key)
                 self._tokens.accept(',')
-            yield ax.HasKey(cls, tuple(objects), tuple(map(str, datas)))
-            return
-        if word not in ('SubClassOf', 'EquivalentTo', 'DisjointWith', 'DisjointUnionOf'):
+            yield from _noted(notes, ax.HasKey(cls, tuple(objects), tuple(map(str, datas))))
+        elif word == 'DisjointUnionOf':
+            notes = self._notes()
+            parts = self._several(self.class_expression)
+            yield from _noted(notes, ax.DisjointUnion(cls, tuple(parts)))
+        elif word in _OF_CLASSES:
+            for notes, other in self._annotated(self.class_expression):
+                yield from _noted(notes, _OF_CLASSES[word](cls, other))
+        else:
             raise self._no_section(word)
-        others = self._several(self.class_expression)
-        if word == 'DisjointUnionOf':
-            yield ax.DisjointUnion(cls, tuple(others))
-            return
-        for other in others:
-            if word == 'SubClassOf':
-                yield ax.SubClassOf(cls, other)
-            elif word == 'EquivalentTo':
-                yield ax.EquivalentClasses((cls, other))
-            else:
-                yield ax.DisjointClasses((cls, other))
 
     def _object_property_section(self, word: str, prop: Any) -> Iterator[Axiom]:
         if word == 'Characteristics':
-            for name in self._several(lambda: self._tokens.take(*_CHARACTERISTICS).text):
-                yield _CHARACTERISTICS[name](prop)
+            for notes, token in self._annotated(lambda: self._tokens.take(*_CHARACTERISTICS)):
+                yield from _noted(notes, _CHARACTERISTICS[token.text](prop))
         elif word == 'SubPropertyChain':
+            notes = self._notes()
             chain = [self._property()]
             while self._tokens.accept('o'):
                 chain.append(self._property())
-            yield ax.SubPropertyChainOf(tuple(chain), prop)
+            yield from _noted(notes, ax.SubPropertyChainOf(tuple(chain), prop))
         elif word in ('Domain', 'Range'):
             record = ax.ObjectPropertyDomain if word == 'Domain' else ax.ObjectPropertyRange
-            yield from (record(prop, cls) for cls in self._several(self.class_expression))
+            for notes, cls in self._annotated(self.class_expression):
+                yield from _noted(notes, record(prop, cls))
         elif word in _PAIRED:
-            yield from (_PAIRED[word](prop, other) for other in self._several(self._property))
+            for notes, other in self._annotated(self._property):
+                yield from _noted(notes, _PAIRED[word](prop, other))
         else:
             raise self._no_section(word)
 
     def _data_property_section(self, word: str, prop: str) -> Iterator[Axiom]:
         if word == 'Characteristics':
-            self._tokens.take('Functional')
-            yield ax.FunctionalDataProperty(prop)
+            for notes, _ in self._annotated(lambda: self._tokens.take('Functional')):
+                yield from _noted(notes, ax.FunctionalDataProperty(prop))
         elif word == 'Domain':
-            yield from (
-                ax.DataPropertyDomain(prop, cls) for cls in self._several(self.class_expression)
-            )
+            for notes, cls in self._annotated(self.class_expression):
+                yield from _noted(notes, ax.DataPropertyDomain(prop, cls))
         elif word == 'Range':
-            yield from (ax.DataPropertyRange(prop, one) for one in self._several(self.data_range))
-        elif word in ('SubPropertyOf', 'EquivalentTo', 'DisjointWith'):
-            for other in self._several(self._tokens.iri):
-                if word == 'SubPropertyOf':
-                    yield ax.SubDataPropertyOf(prop, other)
-                elif word == 'EquivalentTo':
-                    yield ax.EquivalentDataProperties((prop, other))
-                else:
-                    yield ax.DisjointDataProperties((prop, other))
+            for notes, values in self._annotated(self.data_range):
+                yield from _noted(notes, ax.DataPropertyRange(prop, values))
+        elif word in _OF_VALUES:
+            for notes, other in self._annotated(self._tokens.iri):
+                yield from _noted(notes, _OF_VALUES[word](prop, other))
         else:
             raise self._no_section(word)
 
@@ -604,24 +637,26 @@ class ManchesterParser:
         names = {'SubPropertyOf': 'subPropertyOf', 'Domain': 'domain', 'Range': 'range'}
         if word not in names:
             raise self._no_section(word)
-        for other in self._several(self._tokens.iri):
-            yield ax.AnnotationAssertion(RDFS + names[word], prop, other)
+        for notes, other in self._annotated(self._tokens.iri):
+            yield from _noted(notes, ax.AnnotationAssertion(RDFS + names[word], prop, other))
 
     def _datatype_section(self, word: str, datatype: str) -> Iterator[Axiom]:
         if word != 'EquivalentTo':
             raise self._no_section(word)
-        yield ax.DatatypeDefinition(datatype, self.data_range())
+        for notes, values in self._annotated(self.data_range):
+            yield from _noted(notes, ax.DatatypeDefinition(datatype, values))
 
     def _individual_section(self, word: str, ind: str) -> Iterator[Axiom]:
         if word in ('Types', 'Type'):
-            for cls in self._several(self.class_expression):
-                yield ax.ClassAssertion(cls, ind)
+            for notes, cls in self._annotated(self.class_expression):
+                yield from _noted(notes, ax.ClassAssertion(cls, ind))
         elif word == 'Facts':
-            yield from self._several(lambda: self._fact(ind))
+            for notes, fact in self._annotated(lambda: self._fact(ind)):
+                yield from _noted(notes, fact)
         elif word in ('SameAs', 'DifferentFrom'):
             record = _SETS['SameIndividual' if word == 'SameAs' else 'DifferentIndividuals']
-            for other in self._several(self._tokens.iri):
-                yield record(frozenset((ind, other)))
+            for notes, other in self._annotated(self._tokens.iri):
+                yield from _noted(notes, record(frozenset((ind, other))))
         else:
             raise self._no_section(word)
 
@@ -638,6 +673,23 @@ class ManchesterParser:
         return record(prop, ind, other)
 
 
+def _noted(notes: _Notes, axiom: Axiom) -> Iterator[Axiom]:
+    """Yield an axiom, and what is said of it."""
+    yield axiom
+    if notes:
+        yield ax.AxiomAnnotation(axiom, notes)
+
+
+_OF_CLASSES: dict[str, Callable[[Any, Any], Axiom]] = {
+    'SubClassOf': ax.SubClassOf,
+    'EquivalentTo': lambda first, second: ax.EquivalentClasses((first, second)),
+    'DisjointWith': lambda first, second: ax.DisjointClasses((first, second)),
+}
+_OF_VALUES: dict[str, Callable[[str, str], Axiom]] = {
+    'SubPropertyOf': ax.SubDataPropertyOf,
+    'EquivalentTo': lambda first, second: ax.EquivalentDataProperties((first, second)),
+    'DisjointWith': lambda first, second: ax.DisjointDataProperties((first, second)),
+}
 _PAIRED: dict[str, Callable[[Any, Any], Axiom]] = {
     'SubPropertyOf': ax.SubObjectPropertyOf,
     'InverseOf': ax.InverseObjectProperties,
@@ -689,9 +741,9 @@ class ManchesterDocument(Axioms):
         """Read the frames."""
         known = [*declared, *self.declared]
         parser = ManchesterParser(self._body, self._full, known)
-        for prop, value in parser.header_annotations():
-            self.axioms[ax.AnnotationAssertion(prop, self.iri, value)] = None
+        self.axioms.update(dict.fromkeys(parser.header(self.iri)))
         self.axioms.update(dict.fromkeys(parser.axioms()))
+        self.unsupported += parser.unsupported
 
     def _full(self, name: str) -> str:
         if name.startswith('_:'):
@@ -712,9 +764,11 @@ class ManchesterWriter:
 
     Args:
         prefixes: What namespaces are written as; others are written in full.
+        bare: Whether names behind the empty prefix are written without its colon.
     """
 
-    def __init__(self, prefixes: Mapping[str, str]) -> None:
+    def __init__(self, prefixes: Mapping[str, str], *, bare: bool = False) -> None:
+        self._bare = bare
         known = {**PREFIXES, **prefixes}
         self.prefixes = {name: base for name, base in known.items() if base}
         self._bases = sorted(self.prefixes.items(), key=lambda item: -len(item[1]))
@@ -725,16 +779,41 @@ class ManchesterWriter:
         axioms = list(axioms)
         lines += ['', f'Ontology: <{iri}>']
         lines += [f'Import: <{axiom.iri}>' for axiom in axioms if isinstance(axiom, ax.Import)]
-        own = [a for a in axioms if isinstance(a, ax.AnnotationAssertion) and a.subject == iri]
-        lines += [f'Annotations: {self._note(a.prop, a.value)}' for a in own]
+        notes: dict[Axiom, _Notes] = {}
+        for axiom in axioms:
+            if isinstance(axiom, ax.AxiomAnnotation):
+                notes[axiom.axiom] = (*notes.get(axiom.axiom, ()), *axiom.annotations)
         left = [a for a in axioms if not isinstance(a, ax.Import | ax.AxiomAnnotation)]
         kinds: dict[str, list[str]] = {}
         for axiom in left:
             if isinstance(axiom, ax.Declaration):
                 kinds.setdefault(axiom.iri, []).append(axiom.kind)
-        taken = set(own)
-        lines += [self.axiom(axiom, kinds) for axiom in left if axiom not in taken]
-        return '\n'.join(lines) + '\n'
+        frames = []
+        for axiom in left:
+            said = self._said(notes.get(axiom, ()))
+            if isinstance(axiom, ax.AnnotationAssertion) and axiom.subject == iri:
+                lines.append(f'Annotations: {said}{self._note(axiom.prop, axiom.value)}')
+            elif said and isinstance(axiom, ax.Declaration):
+                raise OntologyFileError(
+                    f'Manchester syntax cannot annotate the declaration of {self.name(axiom.iri)};'
+                    ' save it as RDF/XML or N-Triples (.nt)'
+                )
+            else:
+                frames.append(self.axiom(axiom, kinds, said))
+        return '\n'.join((*lines, *self._used(left, kinds), *frames)) + '\n'
+
+    def _used(
+        self, axioms: Iterable[Axiom], declared: Mapping[str, Iterable[str]]
+    ) -> Iterator[str]:
+        """Yield the declarations of the properties and datatypes that axioms use undeclared.
+
+        Without, a reader could not tell a data property from an object property.
+        """
+        used = dict.fromkeys(entity for axiom in axioms for entity in entities_of(axiom))
+        for kind, iri in used:
+            told = kind in ('object_property', 'data_property', 'datatype')
+            if told and kind not in declared.get(iri, ()) and not iri.startswith(_BUILT_IN):
+                yield self.axiom(ax.Declaration(kind, iri))
 
     def name(self, iri: str) -> str:
         """Return a name with its prefix, or in full."""
@@ -742,7 +821,11 @@ class ManchesterWriter:
             return iri
         for prefix, base in self._bases:
             if iri.startswith(base) and re.fullmatch(r'[A-Za-z_][\w-]*', iri[len(base) :]):
-                return f'{prefix}:{iri[len(base) :]}'
+                local = iri[len(base) :]
+                if prefix or not self._bare:
+                    return f'{prefix}:{local}'
+                if local not in _WORDS:
+                    return local
         return f'<{iri}>'
 
     def literal(self, literal: Literal) -> str:
@@ -798,11 +881,15 @@ class ManchesterWriter:
             return f'{prop} {word} {part.n} {filler}'
         return f'{prop} {"some" if "Some" in kind else "only"} {filler}'
 
-    def axiom(self, axiom: Axiom, kinds: Mapping[str, list[str]] | None = None) -> str:
+    def axiom(
+        self, axiom: Axiom, kinds: Mapping[str, list[str]] | None = None, said: str = ''
+    ) -> str:
         """Return an axiom as a frame of its own.
 
-        Raises:
-            OntologyFileError: Manchester syntax has no form for it.
+        Args:
+            axiom: Any but an import.
+            kinds: What each name is declared as, for annotations.
+            said: The annotations of the axiom, as they are written in front.
         """
         kind = type(axiom).__name__
         say = self.expression
@@ -815,49 +902,54 @@ class ManchesterWriter:
         if isinstance(axiom, ax.AnnotationAssertion):
             found = (kinds or {}).get(axiom.subject, ['individual'])[0]
             word = next(word for word, one in _FRAMES.items() if one == found)
-            return f'{word}: {self.name(axiom.subject)} Annotations: ' + self._note(
-                axiom.prop, axiom.value
-            )
+            note = self._note(axiom.prop, axiom.value)
+            return f'{word}: {self.name(axiom.subject)} Annotations: {said}{note}'
         if isinstance(axiom, ax.Rule):
             body, head = (', '.join(map(self._atom, atoms)) for atoms in (axiom.body, axiom.head))
-            return f'Rule: {body} -> {head}'
+            return f'Rule: {self._said(axiom.annotations)}{body} -> {head}'
         if isinstance(axiom, ax.SubClassOf):
-            return f'Class: {say(axiom.sub)} SubClassOf: {say(axiom.sup)}'
+            return f'Class: {say(axiom.sub)} SubClassOf: {said}{say(axiom.sup)}'
         if isinstance(axiom, ax.EquivalentClasses | ax.DisjointClasses):
-            return f'{kind}: {", ".join(map(say, axiom.classes))}'
+            return f'{kind}: {said}{", ".join(map(say, axiom.classes))}'
         if isinstance(axiom, ax.DisjointUnion):
             listed = ', '.join(map(say, axiom.classes))
-            return f'Class: {say(axiom.cls)} DisjointUnionOf: {listed}'
+            return f'Class: {say(axiom.cls)} DisjointUnionOf: {said}{listed}'
         if isinstance(axiom, ax.HasKey):
             keys = ', '.join(map(say, (*axiom.object_props, *axiom.data_props)))
-            return f'Class: {say(axiom.cls)} HasKey: {keys}'
+            return f'Class: {say(axiom.cls)} HasKey: {said}{keys}'
         if isinstance(axiom, ax.SameIndividual | ax.DifferentIndividuals):
-            return f'{kind}: {", ".join(map(self.name, sorted(axiom.individuals)))}'
+            return f'{kind}: {said}{", ".join(map(self.name, sorted(axiom.individuals)))}'
         if isinstance(axiom, ax.ClassAssertion):
-            return f'Individual: {self.name(axiom.individual)} Types: {say(axiom.cls)}'
+            return f'Individual: {self.name(axiom.individual)} Types: {said}{say(axiom.cls)}'
         if plain in ('PropertyAssertion', 'NegativePropertyAssertion'):
             held: Any = getattr(axiom, 'literal', None) or getattr(axiom, 'object', '')
             no = 'not ' if plain[0] == 'N' else ''
             subject, prop = axiom.subject, axiom.prop  # type: ignore[attr-defined]
-            return f'Individual: {self.name(subject)} Facts: {no}{say(prop)} {say(held)}'
+            return f'Individual: {self.name(subject)} Facts: {said}{no}{say(prop)} {say(held)}'
         if isinstance(axiom, ax.SubPropertyChainOf):
             chain = ' o '.join(map(say, axiom.chain))
-            return f'ObjectProperty: {say(axiom.sup, inner=False)} SubPropertyChain: {chain}'
+            return f'ObjectProperty: {say(axiom.sup, inner=False)} SubPropertyChain: {said}{chain}'
         if isinstance(axiom, ax.DatatypeDefinition):
-            return f'Datatype: {self.name(axiom.datatype)} EquivalentTo: {say(axiom.range)}'
+            return f'Datatype: {self.name(axiom.datatype)} EquivalentTo: {said}{say(axiom.range)}'
         if plain in ('EquivalentProperties', 'DisjointProperties'):
-            return f'{plain}: {", ".join(map(say, axiom.props))}'  # type: ignore[attr-defined]
+            return f'{plain}: {said}{", ".join(map(say, axiom.props))}'  # type: ignore[attr-defined]
         if isinstance(axiom, ax.InverseObjectProperties):
-            return f'ObjectProperty: {say(axiom.first, inner=False)} InverseOf: {say(axiom.second)}'
+            first, second = say(axiom.first, inner=False), say(axiom.second)
+            return f'ObjectProperty: {first} InverseOf: {said}{second}'
         if plain == 'SubPropertyOf':
             sub, sup = axiom.sub, axiom.sup  # type: ignore[attr-defined]
-            return f'{frame}: {say(sub, inner=False)} SubPropertyOf: {say(sup)}'
+            return f'{frame}: {say(sub, inner=False)} SubPropertyOf: {said}{say(sup)}'
         prop = say(axiom.prop, inner=False)  # type: ignore[attr-defined]
         if plain == 'PropertyDomain':
-            return f'{frame}: {prop} Domain: {say(axiom.domain)}'  # type: ignore[attr-defined]
+            return f'{frame}: {prop} Domain: {said}{say(axiom.domain)}'  # type: ignore[attr-defined]
         if plain == 'PropertyRange':
-            return f'{frame}: {prop} Range: {say(axiom.range)}'  # type: ignore[attr-defined]
-        return f'{frame}: {prop} Characteristics: {plain.removesuffix("Property")}'
+            return f'{frame}: {prop} Range: {said}{say(axiom.range)}'  # type: ignore[attr-defined]
+        return f'{frame}: {prop} Characteristics: {said}{plain.removesuffix("Property")}'
+
+    def _said(self, notes: _Notes) -> str:
+        """Return annotations as they stand in front of what they annotate; '' without any."""
+        listed = ', '.join(self._note(*note) for note in notes)
+        return f'Annotations: {listed} ' if notes else ''
 
     def _note(self, prop: str, value: str | Literal) -> str:
         return f'{self.name(prop)} {self.expression(value)}'
