@@ -9,11 +9,13 @@ import random
 import pytest
 
 from patrol_policy.battery import (
+    Battery,
     BatteryLimits,
     ChargeCurve,
     Draw,
     Energy,
     Station,
+    way_home,
 )
 from patrol_policy.bounds import charge_bound, default_ranks
 from patrol_policy.decision import RECHARGE, Rules
@@ -72,9 +74,109 @@ def test_the_fastest_part_of_a_charge_ends_where_the_charge_does() -> None:
     assert energy.fastest == pytest.approx(1.0)
 
 
+def test_a_charge_from_any_level_takes_what_the_curve_says() -> None:
+    curve = ChargeCurve((1.0,) * 16 + (0.25,) * 4)
+    graph, limits = seven_rooms(), BatteryLimits(10, 87, 5)
+    energy = Energy(graph, [Station('R1'), Station('E', curve)], Draw(0.1), 0.0, limits)
+    for level in (0.0, 0.5, 30.25, 79.5, 80.0, 86.5, 87.0, 95.0):
+        assert energy.charge_seconds(1, level) == pytest.approx(curve.seconds(level, 87.0))
+    assert energy.charge_seconds(1, -4.0) > energy.charge_seconds(1, 0.0)
+    # Of a station that was never used, a charge is taken to be three times as fast as the draw.
+    assert energy.charge_seconds(0, 57.0) == pytest.approx(30.0 / 0.3)
+    # From the least level up by the slower one, and down again.
+    assert energy.cycle_seconds == pytest.approx(77.0 / 0.1 + 77.0 / 0.3)
+    assert ChargeCurve.even(0.0) == ChargeCurve()
+
+
+def test_the_time_at_a_dock_for_each_second_away_counts_the_way_to_it() -> None:
+    graph, limits = seven_rooms(), BatteryLimits(20, 90, 5)
+    station = Station('E', ChargeCurve((2.0,) * 16 + (0.5,) * 4), 6.0)
+    energy = Energy(graph, [station], Draw(0.5), 0.0, limits)
+    # 10 % are made good with 0.5 %/s.
+    assert energy.charge_ratio(20.0) == pytest.approx((20.0 + 12.0) / 20.0)
+    assert energy.charge_ratio(40.0) == pytest.approx((20.0 + 5.0 + 12.0) / 40.0)
+    # No more than the charge between full and least: 70 % in 140 s.
+    assert energy.charge_ratio(500.0) == pytest.approx((20.0 + 30.0 + 12.0) / 140.0)
+    assert energy.charge_ratio(0.0) == 0.0
+    unknown = Energy(graph, [Station('E', station.curve, math.inf)], Draw(0.5), 0.0, limits)
+    assert unknown.charge_ratio(20.0) == 0.0
+
+
+def test_of_uncertain_times_and_rates_99_of_100_ways_keep_to_what_is_reckoned_with() -> None:
+    draw = random.Random(1)
+    for rate, spread, time_spread, seconds in (
+        (0.1, 0.2, 0.0, 20.0),
+        (0.1, 0.2, 0.0, 400.0),
+        (0.1, 0.0, 0.3, 100.0),
+        (0.1, 0.2, 0.2, 100.0),
+    ):
+        falls = []
+        for _ in range(4000):
+            mean = rate * seconds * (1.0 + time_spread * draw.gauss(0.0, 1.0))
+            # The rate deviates anew over each 2 % of the charge, and over the least as over those.
+            parts = max(1.0, rate * seconds / 2.0)
+            falls.append(mean + 2.0 * spread * math.sqrt(parts) * draw.gauss(0.0, 1.0))
+        most = Draw(rate, spread).most(seconds, time_spread)
+        assert most == pytest.approx(sorted(falls)[3960], rel=0.06)
+    assert Draw(0.1).most(50.0, 0.0) == pytest.approx(5.0)
+
+
+def test_a_plan_serves_until_the_battery_differs_by_a_tenth() -> None:
+    graph = seven_rooms()
+
+    def energy(rate: float = 0.1, charge: float = 1.0, *places: str, stop: float = 90.0) -> Energy:
+        stations = [Station(place, ChargeCurve.even(charge)) for place in places or ('E',)]
+        return Energy(graph, stations, Draw(rate), 0.0, BatteryLimits(20, stop, 5))
+
+    known = energy()
+    assert known.alike(energy())
+    assert not known.alike(None)
+    for factor, alike in ((0.92, True), (1.08, True), (0.88, False), (1.12, False)):
+        assert energy(0.1 * factor).alike(energy(0.1)) == (abs(1.0 / factor - 1.0) < 0.1)
+        assert known.alike(energy(0.1 * factor)) == alike
+        assert known.alike(energy(0.1, 1.0 / factor)) == alike
+    assert not known.alike(energy(0.1, 1.0, 'E', 'R1'))
+    assert not known.alike(energy(0.1, 1.0, 'R1'))
+    assert not known.alike(energy(stop=80.0))
+    both = energy(0.1, 1.0, 'E', 'R1')
+    stations = [Station('E', ChargeCurve.even(1.0)), Station('R1', ChargeCurve.even(0.5))]
+    assert not both.alike(Energy(graph, stations, Draw(0.1), 0.0, BatteryLimits(20, 90, 5)))
+
+
+def test_a_robot_may_leave_the_station_when_it_is_charged_and_no_warning_is_up() -> None:
+    limits = BatteryLimits(20, 90, 5)
+    assert Battery(90.0).charged_enough(limits)
+    assert not Battery(89.9).charged_enough(limits)
+    assert Battery().charged_enough(limits)
+    assert not Battery(95.0, low=True).charged_enough(limits)
+    assert (Battery().level_text(), Battery(12.5).level_text()) == ('level unknown', '12.5 %')
+
+
+def test_a_place_is_within_range_while_a_full_charge_leaves_what_it_must() -> None:
+    graph = seven_rooms()
+    for rate in (0.5, 1.0, 2.0, 3.0):
+        energy = Energy(graph, [Station('E')], Draw(rate), 0.1, BatteryLimits(10, 90, 5))
+        for place, at in graph.index.items():
+            out, home = energy.out_seconds[at], energy.home_seconds[at]
+            assert energy.within_range[at] == energy.suffices(out, home)
+            assert energy.least[at] == max(10.0, Draw(rate).most(home, 0.1) + 5.0)
+            assert home == way_home(graph, place, ['E', 'NOWHERE'])
+    only = Energy(PatrolGraph({'A': {}, 'B': {}}), [Station('A')], Draw(0.1), 0.0, BatteryLimits())
+    assert (only.home, only.within_range) == ([0, -1], [True, False])
+    assert math.isinf(only.least[1])
+    assert math.isinf(way_home(PatrolGraph({'A': {}, 'B': {}}), 'A', ['B']))
+
+
 def test_battery_limits_out_of_order_are_named() -> None:
     with pytest.raises(ValueError, match=r'expected 0 <= battery_require_recharge < .* got 95 and'):
         BatteryLimits(95.0, 90.0)
+    with pytest.raises(ValueError, match='expected 0 <= battery_require_recharge'):
+        BatteryLimits(90.0, 90.0)
+    with pytest.raises(ValueError, match='got -1 and 90'):
+        BatteryLimits(-1.0, 90.0)
+    with pytest.raises(ValueError, match=r'got 20 and 100\.5'):
+        BatteryLimits(20.0, 100.5)
+    assert BatteryLimits(0.0, 100.0).stop_recharge == 100.0
 
 
 def patrolled(
@@ -159,9 +261,24 @@ def shortest_lawful_wait(rules: RuleMap, most: int) -> float:
     return best
 
 
-@pytest.mark.parametrize(('reach', 'factor'), [(200.0, 0.5), (90.0, 0.5), (140.0, 1.0)])
-def test_the_bound_is_that_of_trying_all_walks(reach: float, factor: float) -> None:
-    legs = {'A': {'B': 8.0, 'C': 9.0}, 'B': {'A': 8.0, 'C': 7.0}, 'C': {'A': 9.0, 'B': 7.0}}
+TRIANGLE = {'A': {'B': 8.0, 'C': 9.0}, 'B': {'A': 8.0, 'C': 7.0}, 'C': {'A': 9.0, 'B': 7.0}}
+DEAD_ENDS = {'A': {'B': 8.0, 'C': 9.0}, 'B': {'A': 8.0}, 'C': {'A': 9.0}}
+
+
+@pytest.mark.parametrize(
+    ('legs', 'reach', 'factor'),
+    [
+        (TRIANGLE, 200.0, 0.5),
+        (TRIANGLE, 90.0, 0.5),
+        (TRIANGLE, 140.0, 1.0),
+        # Places that are entered only when they are URGENT.
+        (DEAD_ENDS, 300.0, 1.5),
+        (DEAD_ENDS, 110.0, 0.9),
+    ],
+)
+def test_the_bound_is_that_of_trying_all_walks(
+    legs: dict[str, dict[str, float]], reach: float, factor: float
+) -> None:
     graph = PatrolGraph(legs, 6.0)
     station = Station('A', ChargeCurve.even(2.0))
     energy = Energy(graph, [station], Draw(100.0 / reach), 0.0, BatteryLimits())
