@@ -169,8 +169,8 @@ def test_a_map_is_the_same_whether_all_distances_are_kept_or_not(
     monkeypatch.setattr('patrol_policy.graph.TREES_KEPT', 2)
     large = PatrolGraph(small.leg_seconds, small.exploration_seconds)
     assert not large.has_all_pairs
-    for start in range(12):
-        assert large.row(start) == pytest.approx(small.row(start))
+    for row in range(12):
+        assert large.row(row) == pytest.approx(small.row(row))
     for start, goal in itertools.permutations(small.places, 2):
         assert large.route(start, goal) == small.route(start, goal)
         assert large.seconds(start, goal) == pytest.approx(small.seconds(start, goal))
