@@ -128,10 +128,10 @@ class Course:
                     ):
                         state.position = self.after(state.position)
                         continue
-                gate = rules.gates[target] if idle >= self.skip else -2
-                if gate == -1:
-                    return target
-                if gate >= 0:
+                if idle >= self.skip:
+                    gate = rules.gates[target]
+                    if gate < 0:
+                        return target
                     wait = rules.thresholds[target] - idle - rules.away[place][gate]
                     if wait <= self.patience:
                         return target

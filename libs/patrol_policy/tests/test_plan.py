@@ -160,6 +160,37 @@ def test_little_more_than_the_round_is_accepted_for_shorter_first_waits() -> Non
     assert settled(graph, 'tour', threshold) <= 1.03 * bound
 
 
+def test_the_way_into_the_round_that_is_tried_first_leaves_short_first_waits(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """On a map that takes all the time there is for its round."""
+    monkeypatch.setattr('patrol_policy.plan.FIRST_WORK', 1.0)
+    monkeypatch.setattr('patrol_policy.plan.SIMPLE', ())
+    longer = []
+    for seed, factor in itertools.product(range(12), (0.5, 1.0, 2.0)):
+        draw = random.Random(seed)
+        graph = PatrolGraph(ring(12, draw, 0.6).leg_seconds)
+        tour = graph.tour.length
+        patrol = Patrol(graph, Rules(()), 'tour', factor * tour, 'P0')
+        patrol.visited_at = {place: -draw.uniform(0.0, tour) for place in graph.places}
+        patrol.visited_at['P0'] = 0.0
+        shortest = math.inf
+        order = [f'P{number}' for number in range(12)]
+        for way, first in itertools.product((order, order[::-1]), range(12)):
+            now, at, seen = 0.0, 'P0', patrol.visited_at.copy()
+            longest = 0.0
+            for stop in [*way[first:], *way[:first]]:
+                for step in graph.route(at, stop):
+                    now += graph.leg_seconds[at][step]
+                    longest, at = max(longest, now - seen[step]), step
+                    seen[step] = now
+            shortest = min(shortest, longest)
+        for _ in patrol.until(2.0 * tour):
+            pass
+        longer.append(patrol.run.longest / shortest)
+    assert sum(longer) / len(longer) < 1.075
+
+
 @pytest.mark.parametrize('seed', [2, 3])
 def test_leg_times_that_are_learned_do_not_turn_the_round(seed: int) -> None:
     draw = random.Random(seed)
