@@ -137,7 +137,7 @@ class Reach:
         return {test for line in chosen for test in of_module.get(line, ())}
 
     def ordered(self, tests: Iterable[str], module: str) -> list[str]:
-        """Return tests as they are tried: the cheap first, and those whose file names the module."""
+        """Return tests in their order: the cheap and those whose file names the module first."""
         name = re.compile(rf'\b{Path(module).stem}\b')
         near = {file: bool(name.search(text)) for file, text in self.texts(module)}
 
