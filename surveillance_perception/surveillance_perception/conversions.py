@@ -4,20 +4,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 from geometry_msgs.msg import Point, Pose, PoseArray, Quaternion, TransformStamped, Vector3
 from nav_msgs.msg import Odometry
-from scipy.spatial.transform import Rotation
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 from std_msgs.msg import Header
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from marker_detection.camera_model import DISTORTION_MODELS, Array, CameraModel
 from marker_detection.fusion import FusedPosition, FusedPositions, is_measured
-from marker_detection.marker_stream import Sighting
 from marker_detection.pose import MarkerPose
+from marker_detection.rotations import rotation_of
 from surveillance_interfaces.action import ScanSurroundings
 from surveillance_interfaces.msg import MarkerDetection, MarkerDetectionArray, RoomConnection
 from surveillance_interfaces.srv import RoomInformation
@@ -26,6 +26,9 @@ from surveillance_perception.arm.trajectory import ArmTrajectory
 from surveillance_perception.marker_registry import MarkedPlace
 from surveillance_perception.stream.encodings import image_of_pixels, printable
 from surveillance_perception.stream.image_files import ImageArray, decode_image
+
+if TYPE_CHECKING:  # the detector behind it takes 0.2 s to import: one node needs it
+    from marker_detection.marker_stream import Sighting
 
 
 def image_from_ros(message: Image, max_pixels: int) -> ImageArray:
@@ -266,7 +269,7 @@ def base_pose_from_ros(message: Odometry) -> npt.NDArray[np.float64]:
     if not np.isfinite(place).all() or not np.isfinite(turn).all() or not turn.any():
         raise ValueError('odometry: position and orientation must be finite, the latter not zero')
     pose = np.eye(4)
-    pose[:3, :3] = Rotation.from_quat(turn).as_matrix()
+    pose[:3, :3] = rotation_of(turn)
     pose[:3, 3] = place
     return pose
 

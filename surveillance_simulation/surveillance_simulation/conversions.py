@@ -5,15 +5,16 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 
+import cv2
 import numpy as np
 import numpy.typing as npt
 from builtin_interfaces.msg import Time
 from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped, TransformStamped
 from nav_msgs.msg import Odometry
-from scipy.spatial.transform import Rotation
 from sensor_msgs.msg import CameraInfo, Image, JointState, LaserScan
 from std_msgs.msg import Header
 
+from marker_detection.rotations import quaternion_of
 from surveillance_interfaces.msg import DoorStates
 from surveillance_interfaces.srv import SetMarker
 from surveillance_runtime.conversions import (
@@ -78,16 +79,16 @@ def matrix_to_ros(matrix: npt.NDArray[np.floating], frame: str, child: str) -> T
     message = TransformStamped(header=Header(frame_id=frame), child_frame_id=child)
     moved = message.transform.translation
     moved.x, moved.y, moved.z = (float(each) for each in matrix[:3, 3])
-    turned = Rotation.from_matrix(matrix[:3, :3]).as_quat()
     rotation = message.transform.rotation
-    rotation.x, rotation.y, rotation.z, rotation.w = (float(each) for each in turned)
+    rotation.x, rotation.y, rotation.z, rotation.w = quaternion_of(matrix[:3, :3])
     return message
 
 
 def fixed_frame_to_ros(frame: FixedFrame, stamp: Time) -> TransformStamped:
     """Convert a frame that does not move to a transform message."""
     matrix = np.eye(4)
-    matrix[:3, :3] = Rotation.from_euler('xyz', frame.rpy).as_matrix()
+    about_x, about_y, about_z = (cv2.Rodrigues(turn)[0] for turn in np.diag(frame.rpy))
+    matrix[:3, :3] = about_z @ about_y @ about_x
     matrix[:3, 3] = frame.xyz
     message = matrix_to_ros(matrix, frame.parent, frame.name)
     message.header.stamp = stamp

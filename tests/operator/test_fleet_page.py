@@ -484,14 +484,23 @@ class Prompt:
 
 
 def test_the_console_commands_no_other_robot_than_the_one_that_was_named(
-    graph: Any, tmp_path: Path, capfd: Any
+    graph: Any, capfd: Any
 ) -> None:
     anna = Robot(graph, 'anna')
-    lines = tmp_path / 'lines'
-    lines.write_text('robots\nstop\nrobot anna\nstop\n')
-    with lines.open() as source:
+    receiver, sender = os.pipe()
+    with os.fdopen(receiver) as source:
         given = {'robot': 'ana', 'peer_timeout': 3.0}
         console = graph.add(ConsoleNode, given, console_source=source)
+
+        def is_heard() -> bool:
+            try:
+                return 'anna' in ''.join(console.lines())
+            except ValueError:  # it is alone yet
+                return False
+
+        graph.until(is_heard)
+        with os.fdopen(sender, 'w') as keyboard:
+            keyboard.write('stop\nrobot anna\nstop\n')
         assert console.ended.wait(60.0)
     assert "robot 'ana' is not heard: expected anna" in capfd.readouterr().out
     assert anna.told == [True], 'told once, by its own name'

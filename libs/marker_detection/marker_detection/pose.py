@@ -7,10 +7,10 @@ from typing import NamedTuple
 
 import cv2
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from marker_detection.camera_model import Array, CameraModel
 from marker_detection.image_sampling import homographies_of
+from marker_detection.rotations import quaternion_of
 
 # in the order that OpenCV's IPPE_SQUARE asks for: clockwise from the top left, y up
 _OUTLINE = np.array([[-1.0, 1.0, 0.0], [1.0, 1.0, 0.0], [1.0, -1.0, 0.0], [-1.0, -1.0, 0.0]])
@@ -53,8 +53,7 @@ class MarkerPose:
     @property
     def quaternion(self) -> tuple[float, float, float, float]:
         """The rotation as x, y, z, w with w >= 0."""
-        x, y, z, w = Rotation.from_matrix(self.rotation).as_quat(canonical=True).tolist()
-        return x, y, z, w
+        return quaternion_of(self.rotation)
 
 
 def pose_of(corners: Array, size: float, camera: CameraModel) -> MarkerPose | None:

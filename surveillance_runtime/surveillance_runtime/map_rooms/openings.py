@@ -19,7 +19,6 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 Mask = NDArray[np.bool_]
 Floats = NDArray[np.float64]
@@ -147,6 +146,8 @@ def _facing(free: Mask, points: Floats, directions: Floats) -> Iterable[Cut]:
     points, directions = points[ends], directions[ends]
     if len(points) < 2:
         return
+    from scipy.spatial import cKDTree  # takes 0.2 s: most only show a place
+
     pairs = cKDTree(points).query_pairs(LONGEST, output_type='ndarray')
     across = points[pairs[:, 1]] - points[pairs[:, 0]]
     lengths = np.hypot(*across.T)
@@ -197,6 +198,8 @@ def without_doubles(cuts: Sequence[Cut]) -> list[Cut]:
     ordered = sorted(cuts, key=lambda cut: cut.length)
     if not ordered:
         return []
+    from scipy.spatial import cKDTree  # see above
+
     count = len(ordered)
     forth = np.array([(*cut.start, *cut.end) for cut in ordered])
     ends = np.vstack([forth, forth[:, [2, 3, 0, 1]]])

@@ -19,7 +19,6 @@ from typing import Any
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from skimage.segmentation import watershed
 
 from surveillance_runtime.map_rooms import joining, openings
 from surveillance_runtime.place.occupancy_grid import Grid, distance_to
@@ -196,6 +195,8 @@ def _saddles(free: Mask, clearance: NDArray[np.float32]) -> list[tuple[int, int,
     """
     if not free.any():
         return []
+    from skimage.segmentation import watershed  # takes 0.3 s: most only show a place
+
     basins = watershed(-clearance, _widest_places(clearance), mask=free)
     peaks = np.zeros(int(basins.max()) + 1, np.float32)
     np.maximum.at(peaks, basins.ravel(), clearance.ravel())
