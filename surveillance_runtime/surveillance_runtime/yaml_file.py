@@ -152,14 +152,13 @@ def _compose(path: Path) -> yaml.Node | None:
     except UnicodeDecodeError as error:
         raise FileError(f'{path}: not UTF-8 text (byte {error.start})') from None
     try:
-        # PyYAML says better than libyaml where a mistake is.
-        loader_kind = RosLoader if len(text) < _SMALL else _FastLoader
-        _look_over(text, loader_kind)
-        loader = loader_kind(text)
         try:
-            node: yaml.Node | None = loader.get_single_node()
-        finally:
-            loader.dispose()
+            return _composed(text, _FastLoader)
+        except yaml.YAMLError:
+            if len(text) >= _SMALL:
+                raise
+            # PyYAML says better than libyaml where a mistake is.
+            return _composed(text, RosLoader)
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         line = mark.line + 1 if mark else 1
@@ -167,7 +166,16 @@ def _compose(path: Path) -> yaml.Node | None:
     except yaml.YAMLError as error:
         first_line = str(error).splitlines()[0]
         raise FileError(f'{path}: not valid YAML: {first_line}') from None
-    return node
+
+
+def _composed(text: str, kind: Any) -> yaml.Node | None:
+    _look_over(text, kind)
+    loader = kind(text)
+    try:
+        node: yaml.Node | None = loader.get_single_node()
+        return node
+    finally:
+        loader.dispose()
 
 
 def _look_over(text: str, kind: Any) -> None:

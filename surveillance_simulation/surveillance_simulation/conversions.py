@@ -74,7 +74,7 @@ def transform_to_ros(pose: PlanePose, frame: str, child: str, stamp: Time) -> Tr
     return message
 
 
-def matrix_to_ros(matrix: npt.NDArray[np.floating], frame: str, child: str) -> TransformStamped:
+def matrix_to_ros(matrix: npt.NDArray[np.float64], frame: str, child: str) -> TransformStamped:
     """Convert a frame in another one, shape (4, 4), metres, to a transform message."""
     message = TransformStamped(header=Header(frame_id=frame), child_frame_id=child)
     moved = message.transform.translation
