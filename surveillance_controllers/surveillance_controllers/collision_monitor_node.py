@@ -212,15 +212,14 @@ class CollisionMonitor(PatrolNode):
         way = going.speed * passed
         return composed(pose, (way * math.cos(half), way * math.sin(half), 2 * half))
 
-    def _on_scan(self, topic: str, message: LaserScan) -> None:
-        with conversions.refusing(self, topic):
-            self._seen[topic] = self._lidar.read(message, topic)
-            self._note_lidar(topic, message.header.frame_id)
-            self._base.hear(topic)
-            now, before = self._allowed(), self._base.wanted
-            # Only what cannot wait for the next command.
-            if abs(now.speed) < abs(before.speed) or abs(now.turn) < abs(before.turn):
-                self._base.command(now)
+    def _on_scan(self, topic: str, scan: Scan, message: LaserScan) -> None:
+        self._seen[topic] = scan
+        self._note_lidar(topic, message.header.frame_id)
+        self._base.hear(topic)
+        now, before = self._allowed(), self._base.wanted
+        # Only what cannot wait for the next command.
+        if abs(now.speed) < abs(before.speed) or abs(now.turn) < abs(before.turn):
+            self._base.command(now)
 
     def _note_lidar(self, topic: str, frame: str) -> None:
         """Warn once of a second lidar on a topic: a scan takes the place of the one before."""

@@ -51,6 +51,11 @@ def refusing(node: Node, topic: str) -> Iterator[None]:
         refused.pop(topic, None)
 
 
+def refusal(node: Node, topic: str) -> str:
+    """Return why the last message of a topic was refused; empty where it was not."""
+    return _refused.get(node, {}).get(topic, '')
+
+
 def array_from_points(points: Iterable[Point]) -> Points:
     """Return points as an array of shape (n, 3), metres."""
     return np.array([(p.x, p.y, p.z) for p in points], dtype=float).reshape(-1, 3)

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from builtin_interfaces.msg import Time
 from geometry_msgs.msg import PoseWithCovarianceStamped
-from nav_msgs.msg import OccupancyGrid, Odometry
+from nav_msgs.msg import OccupancyGrid
 from sensor_msgs.msg import LaserScan
 
 from state_machines.ros import ClockWait
@@ -28,20 +28,20 @@ from surveillance_controllers.exploration.exploration import Exploration, Phase
 from surveillance_controllers.exploration.foreign_map import ForeignMap
 from surveillance_controllers.exploration.frontiers import FrontierParameters
 from surveillance_controllers.exploration.map_building import MapBuilder, MappingParameters
-from surveillance_controllers.geometry import Pose, composed, relative
+from surveillance_controllers.geometry import Pose, Scan, composed, relative
 from surveillance_controllers.motion.command_publisher import CommandPublisher
 from surveillance_controllers.motion.holding import Hold
 from surveillance_controllers.motion.odometry import ContinuousOdometry, OdometryBuffer, joined
 from surveillance_controllers.motion.path_following import DriveParameters, Velocity
+from surveillance_controllers.motion.sensors import OdometryReader
+from surveillance_controllers.motion.silence import SensorWatch
 from surveillance_controllers.motion.transforms import MapFrame, MapFrameReader, ScanReader
 from surveillance_controllers.planning.grid_planning import PlanningParameters
 from surveillance_runtime.conversions import (
     map_message,
     pose_estimate,
     pose_from,
-    pose_of_serialized,
     seconds_of,
-    stamp_of_serialized,
 )
 from surveillance_runtime.files import FileError, in_one_line, replace_text
 from surveillance_runtime.node import PatrolNode
@@ -50,7 +50,6 @@ from surveillance_runtime.place.occupancy_grid import Grid
 from surveillance_runtime.place.occupancy_map import write_map
 from surveillance_runtime.process import run_node
 from surveillance_runtime.profile.parameters import declared_frames
-from surveillance_runtime.qos import SENSOR_QOS
 from surveillance_runtime.state_topics import OwnedTopic, StateSubscription
 
 MAP_FILE = 'map.yaml'
@@ -137,17 +136,15 @@ class Explorer(PatrolNode):
             self._map_frame = MapFrame(self, self._frames)
         else:
             self._follow_foreign()
-        StateSubscription(
-            self,
-            Odometry,
-            'odom',
-            self._on_odometry,
-            raw=True,
-            each=True,
-            qos=SENSOR_QOS,
-            owner='simulator',
-        )
+        self._odometer = OdometryReader(self, self._on_odometry)
         self._lidar.subscribe(self._on_scan)
+        self._watch = SensorWatch(
+            self,
+            self._frames,
+            self._lidar.streams,
+            self._odometer.stream,
+            None if self._foreign is None else self._awaits_map,
+        )
         self.spawn(self._explore, 'explore')
 
     def _follow_foreign(self) -> None:
@@ -178,34 +175,27 @@ class Explorer(PatrolNode):
         x, y, yaw = self._readings.at(np.array([stamp]))[0].tolist()
         return (x, y, yaw)
 
-    def _on_odometry(self, serialized: bytes) -> None:
-        with conversions.refusing(self, 'odom'):
-            reading = pose_of_serialized(serialized, texts=1)
-            stamp = stamp_of_serialized(serialized)
-            with self._lock:
-                self._base.hear('odom')
-                pose = reading if self._continuous is None else self._continuous.take(reading)
-                self._readings.add(stamp if stamp > 0.0 else self._now(), pose)
-                self._odometry, self._reading = pose, reading
+    def _on_odometry(self, reading: Pose, measured: float) -> None:
+        with self._lock:
+            self._base.hear('odom')
+            pose = reading if self._continuous is None else self._continuous.take(reading)
+            self._readings.add(measured, pose)
+            self._odometry, self._reading = pose, reading
 
-    def _on_scan(self, topic: str, message: LaserScan) -> None:
-        with conversions.refusing(self, topic):
-            stamp = message.header.stamp
-            if stamp == Time():
-                stamp = self.get_clock().now().to_msg()
-            scan = self._lidar.read(message, topic)
-            with self._lock:
-                self._base.hear(topic)
-                if self._odometry is None:
-                    return
-                odometry, reading = self._odometry, self._reading
-                scan = joined(scan, self._readings, seconds_of(stamp))
-                self._heard_scan = True
-                stands = self._hold.active or self.stopping.is_set()
-                passed = self._wait.elapsed()
-                velocity = self.exploration.see(scan, odometry, passed, stands=stands)
-                self._base.command(velocity)
-            self._tell_pose(odometry, reading, stamp)
+    def _on_scan(self, topic: str, scan: Scan, message: LaserScan) -> None:
+        stamp = message.header.stamp
+        with self._lock:
+            self._base.hear(topic)
+            if self._odometry is None:
+                return
+            odometry, reading = self._odometry, self._reading
+            scan = joined(scan, self._readings, seconds_of(stamp))
+            self._heard_scan = True
+            stands = self._hold.active or self.stopping.is_set()
+            passed = self._wait.elapsed()
+            velocity = self.exploration.see(scan, odometry, passed, stands=stands)
+            self._base.command(velocity)
+        self._tell_pose(odometry, reading, stamp)
 
     def _on_hold(self) -> None:
         with self._lock:
@@ -220,7 +210,7 @@ class Explorer(PatrolNode):
         estimate.header.frame_id, estimate.header.stamp = self._frames.map, stamp
         self._poses.publish(estimate)
         if self._foreign is None and reading is not None:
-            self._map_frame.publish(pose, reading, stamp)
+            self._map_frame.publish(pose, reading, stamp, self._odometer.stream.offset)
 
     def _explore(self) -> None:
         """Think until all is seen; the thread's work."""
@@ -260,6 +250,9 @@ class Explorer(PatrolNode):
         if self._foreign is not None:
             names.append(self._foreign.missing)
         return ', '.join(name for name in names if name)
+
+    def _awaits_map(self) -> bool:
+        return self._foreign is not None and self._foreign.missing == 'map'
 
     def _show(self, now: float) -> None:
         """Publish and write the map, each not too often."""

@@ -34,7 +34,9 @@ from state_machines.ros.waiting import reported
 from surveillance_controllers import conversions
 from surveillance_controllers.controller_parameters import door_segments, place_positions
 from surveillance_controllers.geometry import Scan, composed, relative
+from surveillance_controllers.motion.odometry import OdometryBuffer
 from surveillance_controllers.motion.place_locator import PlaceLocator
+from surveillance_controllers.motion.sensors import SensorStream
 from surveillance_controllers.motion.transforms import ScanReader
 from surveillance_interfaces.msg import FleetRobot, MarkerDetectionArray, RobotPlace
 from surveillance_interfaces.srv import ConsoleCommand, ReferenceName
@@ -83,6 +85,8 @@ from surveillance_runtime.state_topics import OwnedTopic, StateSubscription
 
 SAME_TIME = 0.02
 """A pose belongs to the scan whose stamp is so near, seconds."""
+NEAR_TIME = 0.5
+"""By the odometry, a pose tells of a scan whose stamp is so near, seconds."""
 ASSESS_PERIOD, PICTURE_PERIOD, KEEP_PERIOD = 2.0, 2.0, 20.0
 """Seconds of real time between two comparisons, pictures, and writings of the state."""
 CAMERA_PATIENCE = 10.0
@@ -243,6 +247,7 @@ class Observer(PatrolNode):
         self._scans: deque[tuple[float, Scan]] = deque(maxlen=10)
         self._poses: deque[tuple[float, PlanarPose]] = deque(maxlen=5)
         self._odometry: deque[tuple[float, PlanarPose]] = deque(maxlen=50)
+        self._odometer, self._readings = SensorStream(self, 'odom'), OdometryBuffer()
         self._odom_in_map: PlanarPose | None = None
         # Where base and arm stood, by stamps: on the map, by the odometry, and the joints.
         self._standing, self._odometry_standing = (StampedReadings(STILL, [2]) for _ in range(2))
@@ -363,14 +368,12 @@ class Observer(PatrolNode):
         place, stamp = message.place, self._now()
         self._work.put(lambda: self._watcher.arrive(place, stamp))
 
-    def _on_scan(self, topic: str, message: LaserScan) -> None:
-        with conversions.refusing(self, topic):
-            scan = self._lidar.read(message, topic)
-            self._scans.append((seconds_of(message.header.stamp), scan))
-            self._directions |= sectors_of(scan)
-            if self._scanned_since is None:
-                self._scanned_since = time.monotonic()
-            self._pair()
+    def _on_scan(self, _topic: str, scan: Scan, message: LaserScan) -> None:
+        self._scans.append((seconds_of(message.header.stamp), scan))
+        self._directions |= sectors_of(scan)
+        if self._scanned_since is None:
+            self._scanned_since = time.monotonic()
+        self._pair()
 
     def _on_pose(self, serialized: bytes) -> None:
         with conversions.refusing(self, 'amcl_pose'):
@@ -408,18 +411,42 @@ class Observer(PatrolNode):
 
     def _on_odometry(self, serialized: bytes) -> None:
         with conversions.refusing(self, 'odom'):
-            pose, stamp = pose_of_serialized(serialized, texts=1), stamp_of_serialized(serialized)
-            self._odometry.append((stamp, pose))
-            self._odometry_standing.add(stamp or self._now(), pose)
+            pose = pose_of_serialized(serialized, texts=1)
+            stamp = stamp_of_serialized(serialized)
+            measured = self._odometer.come(stamp, serialized)
+            if measured is None:
+                return
+            self._odometry_standing.add(stamp or measured, pose)
+            self._readings.add(measured, pose)
+            # `amcl_pose` has the node's clock, or the driver's, as who localises likes it.
+            self._odometry += [(each, pose) for each in {stamp, measured}]
 
     def _pair(self) -> None:
         """Look at the scans whose pose is known; either may come first."""
         for measured, scan in list(self._scans):
-            for stamp, pose in self._poses:
-                if abs(measured - stamp) <= SAME_TIME:
-                    self._scans.remove((measured, scan))
-                    self._see(pose, scan)
-                    break
+            if (pose := self._pose_at(measured)) is not None:
+                self._scans.remove((measured, scan))
+                self._see(pose, scan)
+
+    def _pose_at(self, measured: float) -> PlanarPose | None:
+        """Return where the robot was at a time, seconds; None while that is not known.
+
+        A pose is told of the time of the odometry, which seldom is that of a scan: between the two
+        the robot went as its odometry says.
+        """
+        stamp, pose = min(
+            self._poses, key=lambda told: abs(told[0] - measured), default=(-math.inf, (0, 0, 0))
+        )
+        if abs(stamp - measured) <= SAME_TIME:
+            return pose
+        first, last = min(stamp, measured), max(stamp, measured)
+        if last - first > NEAR_TIME or not self._readings.covers(first, last):
+            return None
+        (x, y, yaw), then = (
+            (float(x), float(y), float(yaw))
+            for x, y, yaw in self._readings.at(np.array([measured, stamp]))
+        )
+        return composed(pose, relative(then, (x, y, yaw)))
 
     def _see(self, pose: PlanarPose, scan: Scan) -> None:
         sensor, ends, met = _on_the_map(pose, scan)

@@ -74,6 +74,11 @@ def nanoseconds_of(stamp: Time) -> int:
     return int(stamp.sec) * 1_000_000_000 + int(stamp.nanosec)
 
 
+def stamp_from(nanoseconds: int) -> Time:
+    """Return the stamp of whole nanoseconds since the clock's start."""
+    return Time(sec=nanoseconds // 1_000_000_000, nanosec=nanoseconds % 1_000_000_000)
+
+
 def point_message(coordinates: Sequence[float] | NDArray[np.float64]) -> Point:
     """Return a point from x, y and perhaps z, metres."""
     x, y, z = (*(float(each) for each in coordinates), 0.0)[:3]

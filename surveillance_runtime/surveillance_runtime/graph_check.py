@@ -108,6 +108,7 @@ class InputWatch:
         node: The node.
         wanted: What it may wait for.
         missing: Returns which of their topics it waits for now.
+        refused: Returns why what comes on one of them is of no use; empty: nothing comes.
     """
 
     def __init__(
@@ -115,10 +116,12 @@ class InputWatch:
         node: PatrolNode,
         wanted: Sequence[Awaited],
         missing: Callable[[], Iterable[str]],
+        refused: Callable[[str], str] = lambda _topic: '',
     ) -> None:
         self._node = node
         self._wanted = {each.topic: each for each in wanted}
         self._missing = missing
+        self._refused = refused
         self._since = {each.topic: time.monotonic() for each in wanted}
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         node.create_timer(LOOK_PERIOD, self._look, clock=steady)
@@ -133,5 +136,9 @@ class InputWatch:
             return
         seen = endpoints_of(self._node)
         for topic in late:
-            if lines := list(findings(self._wanted[topic], seen, now - self._since[topic])):
+            if why := self._refused(topic):
+                lines = [f'{topic}: what comes is of no use: {why}']
+            else:
+                lines = list(findings(self._wanted[topic], seen, now - self._since[topic]))
+            if lines:
                 self._node.incidents.begin(('robot', topic), '; '.join(lines), Severity.ALARM)

@@ -40,6 +40,11 @@ class StampOffset:
         self._offset = 0.0
         self._said = False
 
+    @property
+    def offset(self) -> float:
+        """What the source's clock is behind the node's, seconds; 0 while they agree."""
+        return self._offset
+
     def time_of(self, stamp: float, now: float) -> float:
         """Return when a message was stamped, by the node's clock.
 

@@ -9,6 +9,7 @@ believes the owner: see `belief`. Where the owner is another program
 
 from __future__ import annotations
 
+import math
 import threading
 import time
 from collections import deque
@@ -37,6 +38,8 @@ REMEMBERED = 32
 """Of how many of its last messages an owner knows that they are its own."""
 FOREIGN_FOR = 10.0
 """How long the last foreign value counts as going on, seconds."""
+TELL_AGAIN = 10.0
+"""A reader tells of a stamp that it refuses at most once in this time, seconds."""
 ANSWER_PERIOD = 0.05
 """An owner answers no faster, seconds: two owners would answer each other for ever."""
 UNNUMBERED = 0
@@ -203,6 +206,7 @@ class StateSubscription(Generic[M]):
             owner = f'{node.get_namespace().rstrip("/")}/{owner}'
         self._belief = Belief(self._publishers, owner, only)
         self._told = ''
+        self._refused_at = -math.inf
         self._timer: Timer | None = None
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._subscription = node.create_subscription(kind, name, self._on_heard, qos, raw=True)
@@ -265,8 +269,11 @@ class StateSubscription(Generic[M]):
         ahead = self._stamp(message) - 1e-9 * self._node.get_clock().now().nanoseconds
         if ahead <= self._ahead:
             return False
-        self._node.get_logger().error(
-            f'{self._name}: a stamp {ahead:.1f} s ahead of this clock is refused; expected at most '
-            f'{self._ahead:g} s'
-        )
+        now = time.monotonic()
+        if now - self._refused_at >= TELL_AGAIN:
+            self._refused_at = now
+            self._node.get_logger().error(
+                f'{self._name}: a stamp {ahead:.1f} s ahead of this clock is refused; expected at '
+                f'most {self._ahead:g} s'
+            )
         return True

@@ -111,7 +111,7 @@ def test_two_lidars_on_one_topic_are_told_of_once(graph: Any) -> None:
     def see(frame: str) -> None:
         scan = LaserScan(angle_increment=0.02, range_max=8.0, ranges=[3.0] * 21)
         scan.header.frame_id = frame
-        monitor._on_scan('scan', scan)
+        monitor._lidar._take('scan', monitor._on_scan, scan)
 
     def warnings() -> list[str]:
         return [line for line in said if 'hide each other' in line]

@@ -7,6 +7,7 @@ import math
 from pathlib import Path
 
 import numpy as np
+import pytest
 from builtin_interfaces.msg import Time
 from geometry_msgs.msg import PoseWithCovarianceStamped
 from nav_msgs.msg import OccupancyGrid, Odometry
@@ -214,6 +215,25 @@ def test_a_picture_counts_from_where_the_robot_was_when_it_was_taken(graph, monk
     eyes.show(-2.5)
     eyes.show(-1.0)
     assert [viewpoint for viewpoint, _ in eyes.looked] == [None, None, (2.0, 5.0, 0.0)]
+
+
+def test_a_scan_counts_from_where_the_robot_was_when_it_was_made(graph, monkeypatch):
+    eyes = Eyes(graph, monkeypatch)
+    seen: list[tuple[float, float]] = []
+    monkeypatch.setattr(eyes.node, '_see', lambda pose, _scan: seen.append(pose[:2]))
+
+    def scan(since: float) -> None:
+        message = LaserScan(angle_increment=0.1, range_max=8.0, ranges=[1.0] * 63)
+        message.header.stamp = eyes.stamp(since)
+        eyes.node._lidar._take('scan', eyes.node._on_scan, message)
+
+    for tick in range(-20, 1):
+        eyes.carry(0.5 + tick / 20, tick / 20)  # a metre a second
+    # A lidar's scan is stamped when it begins, and comes later than the odometry of that time.
+    scan(-0.125)
+    assert seen == [pytest.approx((0.375, 5.0), abs=0.01)]
+    scan(-3.0)
+    assert len(seen) == 1
 
 
 def test_markers_count_for_the_picture_that_they_were_read_in(graph, monkeypatch):

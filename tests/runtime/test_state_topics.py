@@ -96,10 +96,12 @@ def test_a_stamp_ahead_of_the_clock_is_refused(graph: Any) -> None:
         publisher.publish(RobotPlace(header=Header(stamp=stamp), place=place))
 
     graph.until(lambda: publisher.get_subscription_count())
-    tell('R1', 3600.0)
+    for number in range(5):
+        tell(f'R{number}', 3600.0)
     graph.until(lambda: any('ahead of this clock' in line for line in said))
     tell('R2', 0.0)
     graph.until(lambda: places)
+    assert sum('ahead of this clock' in line for line in said) == 1
     assert [each.place for each in places] == ['R2']
 
 

@@ -8,16 +8,12 @@ have (`obstacles`). Asks `compute_path` for another path when a drive does not g
 from __future__ import annotations
 
 import threading
-import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import replace
 from typing import Any
 
-from builtin_interfaces.msg import Time
 from geometry_msgs.msg import PoseWithCovarianceStamped
-from nav_msgs.msg import OccupancyGrid, Odometry
-from rclpy.clock import Clock, ClockType
+from nav_msgs.msg import OccupancyGrid
 from sensor_msgs.msg import LaserScan, PointCloud2
 
 from state_machines import Interrupt
@@ -41,7 +37,8 @@ from surveillance_controllers.motion.holding import Hold
 from surveillance_controllers.motion.navigator import Navigator
 from surveillance_controllers.motion.path_following import DriveParameters, Velocity
 from surveillance_controllers.motion.place_recording import PlaceRecorder
-from surveillance_controllers.motion.silence import SilenceWatch
+from surveillance_controllers.motion.sensors import OdometryReader
+from surveillance_controllers.motion.silence import SensorWatch
 from surveillance_controllers.motion.transforms import MapFrame, ScanReader
 from surveillance_controllers.planning.grid_planning import NoPathError
 from surveillance_interfaces.action import ComputePath
@@ -51,18 +48,13 @@ from surveillance_runtime.conversions import (
     point_message,
     pose_estimate,
     pose_from,
-    pose_of_serialized,
     seconds_of,
-    stamp_of_serialized,
+    stamp_from,
 )
-from surveillance_runtime.graph_check import InputWatch
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.place.zones import zones_from
 from surveillance_runtime.place_changes import follow_place
-from surveillance_runtime.profile.check_up import awaited
 from surveillance_runtime.profile.parameters import declared_frames
-from surveillance_runtime.profile.record import RobotProfile, Topics
-from surveillance_runtime.qos import SENSOR_QOS
 from surveillance_runtime.state_topics import OwnedTopic, StateSubscription
 from surveillance_runtime.turning_path import bearing_of
 
@@ -138,44 +130,16 @@ class NavigationMotion:
         self._hold = Hold(node, self._on_hold)
         StateSubscription(node, OccupancyGrid, 'map', self._on_map, owner='simulator')
         StateSubscription(node, DoorStates, 'door_states', self._on_doors, owner='simulator')
-        StateSubscription(
-            node,
-            Odometry,
-            'odom',
-            self._on_odometry,
-            raw=True,
-            each=True,
-            qos=SENSOR_QOS,
-            owner='simulator',
-        )
+        self._odometry = OdometryReader(node, self._on_odometry)
         self._lidar.subscribe(self._on_scan)
         node.create_subscription(PoseWithCovarianceStamped, 'initialpose', self._on_initial_pose, 1)
-        self._silence = SilenceWatch(node.incidents)
-        steady = Clock(clock_type=ClockType.STEADY_TIME)
-        node.create_timer(1.0, lambda: self._silence.look(time.monotonic()), clock=steady)
-
-        self._watch_inputs()
-
-    def _watch_inputs(self) -> None:
-        """Have what never comes told by its name."""
-        node, scans = self._node, self._lidar.settings.scans
-        named = {name: str(node.resolve_topic_name(name)) for name in ('map', 'odom', *scans)}
-        topics = replace(
-            Topics(),
-            map=named['map'],
-            odom=named['odom'],
-            scans=tuple(named[scan] for scan in scans),
+        self._watch = SensorWatch(
+            node,
+            self._frames,
+            self._lidar.streams,
+            self._odometry.stream,
+            lambda: 'map' in self._navigator.awaits,
         )
-        profile = replace(RobotProfile(), topics=topics, frames=self._frames)
-        wanted = [each for each in awaited(profile) if each.key != 'topics.command']
-
-        def missing() -> list[str]:
-            awaits = self._navigator.awaits
-            keys = ['odom' if 'odom' in awaits else '', 'map' if 'map' in awaits else '']
-            keys += scans if 'scan' in awaits else ()
-            return [named[key] for key in keys if key]
-
-        self._inputs = InputWatch(node, wanted, missing)
 
     def follow(self, path: Points, run: GoalRun, report: Callable[[Points], None]) -> Points:
         """Drive along a path of shape (n, 3).
@@ -354,14 +318,10 @@ class NavigationMotion:
                 # At once: the next scan may be a tenth of a second away.
                 self._base.command(Velocity())
 
-    def _on_odometry(self, serialized: bytes) -> None:
-        with conversions.refusing(self._node, 'odom'):
-            pose = pose_of_serialized(serialized, texts=1)
-            stamp = stamp_of_serialized(serialized)
-            self._silence.hear('odom', time.monotonic())
-            with self._lock:
-                self._base.hear('odom')
-                self._navigator.move(pose, stamp if stamp > 0.0 else self._now())
+    def _on_odometry(self, pose: Pose, measured: float) -> None:
+        with self._lock:
+            self._base.hear('odom')
+            self._navigator.move(pose, measured)
 
     def _on_initial_pose(self, message: PoseWithCovarianceStamped) -> None:
         with conversions.refusing(self._node, 'initialpose'):
@@ -372,20 +332,11 @@ class NavigationMotion:
             with self._lock:
                 self._navigator.believe(pose)
 
-    def _now(self) -> float:
-        return float(self._node.get_clock().now().nanoseconds) / 1e9
-
-    def _on_scan(self, topic: str, message: LaserScan) -> None:
-        with conversions.refusing(self._node, topic):
-            stamp = message.header.stamp
-            if stamp == Time():
-                # A lidar without a clock; a drive needs the time that passes.
-                stamp = self._node.get_clock().now().to_msg()
-            self._see(self._lidar.read(message, topic), stamp, topic)
+    def _on_scan(self, topic: str, scan: Scan, message: LaserScan) -> None:
+        self._see(scan, message.header.stamp, topic)
 
     def _see(self, scan: Scan, stamp: Any, topic: str = 'scan') -> None:
         measured = seconds_of(stamp)
-        self._silence.hear('scan', time.monotonic())
         with self._stepped:
             self._base.hear(topic)
             self._stands_for_search = False
@@ -420,8 +371,7 @@ class NavigationMotion:
             return
         pose, at = told
         if at != measured:
-            nanoseconds = round(1e9 * at)
-            stamp = Time(sec=nanoseconds // 10**9, nanosec=nanoseconds % 10**9)
+            stamp = stamp_from(round(1e9 * at))
         deviation = (0.03, 0.02) if self._is_sure else (5.0, 3.0)
         estimate = PoseWithCovarianceStamped(pose=pose_estimate(pose, *deviation))
         estimate.header.frame_id, estimate.header.stamp = self._frames.map, stamp
@@ -453,4 +403,5 @@ class NavigationMotion:
             cloud.header.stamp = stamp
             self._obstacles.publish(cloud)
         if navigator.odometry is not None:
-            self._map_frame.publish(navigator.pose, navigator.odometry, stamp)
+            offset = self._odometry.stream.offset
+            self._map_frame.publish(navigator.pose, navigator.odometry, stamp, offset)

@@ -6,12 +6,12 @@ The frames are those of REP-105: map -> odom -> base -> lidar. The robot's profi
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Callable
 from functools import partial
 from typing import Any
 
 import numpy as np
-from builtin_interfaces.msg import Time
 from geometry_msgs.msg import TransformStamped
 from numpy.typing import NDArray
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
@@ -19,8 +19,9 @@ from sensor_msgs.msg import LaserScan
 
 from surveillance_controllers import conversions
 from surveillance_controllers.geometry import Mount, Pose, Scan, composed, relative
+from surveillance_controllers.motion.sensors import SensorStream
 from surveillance_runtime import parameter_checks
-from surveillance_runtime.conversions import nanoseconds_of, pose_message
+from surveillance_runtime.conversions import nanoseconds_of, pose_message, seconds_of, stamp_from
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.profile.parameters import LidarSettings
 from surveillance_runtime.profile.record import Frames
@@ -34,6 +35,8 @@ except ImportError:
 
 BASE_FRAMES = ('base_link', 'base_footprint', '')
 """Frames at the robot's centre, beside the one that the profile names."""
+TELL_WITHIN = 3.0
+"""A scan is left out for so long, seconds, while nobody says where its frame is."""
 
 
 class ScanReader:
@@ -48,6 +51,7 @@ class ScanReader:
 
     Attributes:
         settings: Which lidars there are.
+        streams: What comes on the topic of each.
 
     Raises:
         ParameterError: A parameter of the lidars is of the wrong type.
@@ -63,6 +67,8 @@ class ScanReader:
         self._parents: dict[str, tuple[str, NDArray[np.float64]]] = {}
         self._mounts: dict[str, Mount] = {}
         self._told: set[str] = set()
+        self.streams = {topic: SensorStream(node, topic) for topic in self.settings.scans}
+        self._waits_until: dict[str, float] = {}
         if TFMessage is not None:
             latched = QoSProfile(
                 depth=100,
@@ -72,25 +78,45 @@ class ScanReader:
             # All robots of a domain may share it.
             node.create_subscription(TFMessage, 'tf_static', self._on_static, latched)
 
-    def subscribe(self, heard: Callable[[str, LaserScan], None]) -> None:
-        """Hand over each scan with the name of its topic."""
+    def subscribe(self, heard: Callable[[str, Scan, LaserScan], None]) -> None:
+        """Hand over each scan: the name of its topic, the scan, and its message, whose stamp is the
+        time of the first ray by the node's clock.
+        """
         for topic in self.settings.scans:
             StateSubscription(
                 self._node,
                 LaserScan,
                 topic,
-                partial(heard, topic),
+                partial(self._take, topic, heard),
                 each=True,
                 qos=SENSOR_QOS,
                 owner='simulator',
             )
 
-    def read(self, message: LaserScan, topic: str = '') -> Scan:
-        """Return a scan of one of the lidars.
+    def _take(
+        self, topic: str, heard: Callable[[str, Scan, LaserScan], None], message: LaserScan
+    ) -> None:
+        stream, header = self.streams[topic], message.header
+        with conversions.refusing(self._node, topic):
+            given = seconds_of(header.stamp)
+            measured = stream.come(given, message.ranges.tobytes())
+            if measured is None or self._waits_for(header.frame_id):
+                return
+            if measured != given:
+                header.stamp = stamp_from(round(1e9 * measured))
+            heard(topic, self._read(message, topic), message)
+            stream.hear()
 
-        Raises:
-            ValueError: It is not sound; see `conversions.scan_from`.
+    def _waits_for(self, frame: str) -> bool:
+        """Tell whether it may still be told where a lidar is: a scan may come before `tf_static`
+        does.
         """
+        if self._given or TFMessage is None or self._matrix_of(frame) is not None:
+            return False
+        now = time.monotonic()
+        return now < self._waits_until.setdefault(frame, now + TELL_WITHIN)
+
+    def _read(self, message: LaserScan, topic: str) -> Scan:
         mount = self.mount_of(message.header.frame_id, topic)
         return conversions.scan_from(message, mount, self._radius, self.settings.sweep)
 
@@ -103,20 +129,27 @@ class ScanReader:
             self._mounts[frame] = self._looked_up(frame)
         return self._mounts[frame]
 
-    def _looked_up(self, frame: str) -> Mount:
+    def _matrix_of(self, frame: str) -> NDArray[np.float64] | None:
+        """Return where a frame is on the robot, shape (4, 4); None where nobody has said it."""
         matrix = np.eye(4)
         at, passed = _plain(frame), 0
         while at != self._base and at.rpartition('/')[2] not in BASE_FRAMES:
             if at not in self._parents or passed > len(self._parents):
-                self._tell_once(
-                    f'scan: where its frame {frame!r} is on the robot is not known: expected '
-                    f'it on tf_static below {self._base}, or lidars.mounts in the robot profile '
-                    "(parameter lidar_mounts); it is taken for the robot's centre"
-                )
-                return Mount()
+                return None
             at, step = self._parents[at]
             matrix = step @ matrix
             passed += 1
+        return matrix
+
+    def _looked_up(self, frame: str) -> Mount:
+        matrix = self._matrix_of(frame)
+        if matrix is None:
+            self._tell_once(
+                f'scan: where its frame {frame!r} is on the robot is not known: expected '
+                f'it on tf_static below {self._base}, or lidars.mounts in the robot profile '
+                "(parameter lidar_mounts); it is taken for the robot's centre"
+            )
+            return Mount()
         tilt = math.acos(min(abs(float(matrix[2, 2])), 1.0))
         if tilt > parameter_checks.MOST_TILT:
             self._tell_once(
@@ -151,11 +184,18 @@ class MapFrame:
         self._frames = frames
         self._publisher = None if TFMessage is None else node.create_publisher(TFMessage, 'tf', 10)
 
-    def publish(self, pose: Pose, odometry: Pose, stamp: Any) -> None:
+    def publish(self, pose: Pose, odometry: Pose, stamp: Any, offset: float = 0.0) -> None:
         """Publish the correction that leads from the odometry to the pose.
 
         It is dated ahead, as AMCL does: whoever asks for the present gets the last correction
-        instead of waiting for the next.
+        instead of waiting for the next. It is dated by the clock of the odometry, whose transform
+        it is joined with.
+
+        Args:
+            pose: Where the robot is.
+            odometry: Where its odometry has it.
+            stamp: The time of that, by the node's clock.
+            offset: What the clock of the odometry is behind the node's, seconds.
         """
         if self._publisher is None:
             return
@@ -163,8 +203,8 @@ class MapFrame:
         x, y, yaw = composed(pose, relative(odometry, (0.0, 0.0, 0.0)))
         transform = TransformStamped(child_frame_id=self._frames.odom)
         transform.header.frame_id = self._frames.map
-        ahead = nanoseconds_of(stamp) + round(1e9 * self._frames.transform_tolerance)
-        transform.header.stamp = Time(sec=ahead // 10**9, nanosec=ahead % 10**9)
+        ahead = round(1e9 * (self._frames.transform_tolerance - offset))
+        transform.header.stamp = stamp_from(nanoseconds_of(stamp) + ahead)
         transform.transform.translation.x, transform.transform.translation.y = x, y
         transform.transform.rotation = pose_message((x, y, yaw)).orientation
         self._publisher.publish(TFMessage(transforms=[transform]))

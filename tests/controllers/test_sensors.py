@@ -1,0 +1,113 @@
+"""When a sensor measured, by the node's clock, whatever the clock of its driver says."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from builtin_interfaces.msg import Time
+from geometry_msgs.msg import PoseWithCovarianceStamped, TransformStamped
+from sensor_msgs.msg import LaserScan
+from tf2_msgs.msg import TFMessage
+
+from surveillance_controllers.geometry import Pose
+from surveillance_controllers.motion.navigator import Navigator
+from surveillance_controllers.motion.sensors import SensorStream
+from surveillance_controllers.motion.transforms import TELL_WITHIN, ScanReader
+from surveillance_runtime.conversions import seconds_of, stamp_from
+from surveillance_runtime.node import PatrolNode
+from surveillance_runtime.qos import SENSOR_QOS
+from tests.controllers.test_navigation_topics import motion_of
+
+
+def now_of(node: Any) -> float:
+    return float(node.get_clock().now().nanoseconds) / 1e9
+
+
+@pytest.mark.parametrize('off', [-86400.0, -3600.0, 0.0, 3600.0])
+def test_a_stamp_counts_by_the_clock_of_the_node(graph: Any, capfd: Any, off: float) -> None:
+    stream = SensorStream(graph.node, 'scan')
+    for number in range(5):
+        now = now_of(graph.node)
+        measured = stream.come(now - 0.1 + off, bytes([number]))
+        assert measured is not None
+        assert measured - now == pytest.approx(0.0 if off else -0.1, abs=0.11)
+    assert stream.offset == pytest.approx(-off, abs=0.11)
+    assert capfd.readouterr().err.count('stamps of /scan are') == (1 if off else 0)
+
+
+def test_what_was_measured_once_counts_once(graph: Any) -> None:
+    stream = SensorStream(graph.node, 'odom')
+    now = now_of(graph.node)
+    assert stream.come(now, b'1') is not None
+    assert stream.come(now, b'1') is None
+    assert 'again and again' in stream.problem
+    assert stream.come(now, b'2') is not None, 'a clock that stands still'
+    assert stream.problem == ''
+    # Who gives no stamps may stand still.
+    assert stream.come(0.0, b'3') is not None
+    assert stream.come(0.0, b'3') is not None
+
+
+def test_simulated_time_is_taken_as_it_is(graph: Any) -> None:
+    node = graph.add(PatrolNode, {'use_sim_time': True}, name='simulated')
+    stream = SensorStream(node, 'scan')
+    assert stream.come(500.0, b'1') == 500.0
+    assert stream.offset == 0.0
+
+
+def test_the_pose_of_a_robot_whose_clock_is_ahead_is_of_now(graph: Any, flat: Any) -> None:
+    navigator = Navigator()
+    navigator.set_map(flat.grid)
+    node = graph.add(PatrolNode, {'lidar_mounts': [0.0] * 4}, name='driving')
+    motion_of(node, navigator)
+    true: Pose = (2.0, 1.5, 0.3)
+    navigator.move(true)
+    seen = flat.scan(true)
+    poses = graph.listen(PoseWithCovarianceStamped, 'amcl_pose', 10)
+    frames = graph.listen(TFMessage, 'tf', 10)
+    scans = graph.node.create_publisher(LaserScan, 'scan', SENSOR_QOS)
+
+    def told() -> bool:
+        message = LaserScan(
+            angle_min=float(seen.angles[0]),
+            angle_increment=float(seen.angles[1] - seen.angles[0]),
+            range_max=float(seen.range_max),
+            ranges=seen.ranges.astype('f4').tolist(),
+        )
+        message.header.stamp = stamp_from(graph.node.get_clock().now().nanoseconds + 3600 * 10**9)
+        scans.publish(message)
+        return bool(poses and frames)
+
+    graph.until(told)
+    assert abs(seconds_of(poses[-1].header.stamp) - now_of(graph.node)) < 2.0
+
+
+def test_a_scan_waits_a_while_for_where_its_frame_is(graph: Any, monkeypatch: Any) -> None:
+    said = graph.said()
+    node = graph.add(PatrolNode, {'lidar_mounts': []}, name='reading')
+    lidar = ScanReader(node, 0.2)
+    mounts: list[Any] = []
+    message = LaserScan(angle_increment=0.1, range_max=8.0, ranges=[1.0] * 20)
+    message.header.frame_id = 'laser'
+
+    def come() -> None:
+        message.header.stamp = Time()
+        lidar._take('scan', lambda _topic, scan, _message: mounts.append(scan.mount), message)
+
+    come()
+    assert mounts == []
+    step = TransformStamped(child_frame_id='laser')
+    step.header.frame_id = 'base_link'
+    step.transform.translation.x = 0.3
+    lidar._on_static(TFMessage(transforms=[step]))
+    come()
+    assert mounts == [pytest.approx((0.3, 0.0, 0.0))]
+    # Where nobody tells, it is taken for the centre after a while, and that is said.
+    message.header.frame_id = 'other'
+    come()
+    assert len(mounts) == 1
+    lidar._waits_until['other'] -= TELL_WITHIN
+    come()
+    assert mounts[1:] == [(0.0, 0.0, 0.0)]
+    graph.until(lambda: any("its frame 'other' is on the robot is not known" in e for e in said))
