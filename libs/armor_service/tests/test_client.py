@@ -13,6 +13,7 @@ from armor_service.client import (
     ArmorClient,
     ArmorServiceCallError,
     ArmorServiceInternalError,
+    InProcessTransport,
 )
 from armor_service.protocol import (
     DirectiveRequest,
@@ -21,6 +22,7 @@ from armor_service.protocol import (
     name_in,
     value_in,
 )
+from armor_service.service import ArmorService
 
 from .seven_rooms import IRI, ONTOLOGY, build_seven_rooms
 
@@ -201,6 +203,14 @@ def test_existence_explanations_and_facts(client: ArmorClient) -> None:
     assert client.utils.get_ref_client() == 'tester'
     client.utils.unmount_from_ref()
     assert client.utils.get_ref_client() is None
+
+
+@pytest.mark.parametrize('name', ['a', 'nobody', 'z'])
+def test_who_is_mounted_is_told_by_name(service: ArmorService, name: str) -> None:
+    client = ArmorClient(name, 'map', InProcessTransport(service))
+    client.utils.load_ref_from_file(ONTOLOGY, IRI)
+    client.utils.mount_on_ref()
+    assert client.utils.get_ref_client() == client.utils.get_ref_client('map') == name
 
 
 def test_refusals_are_raised_with_their_code(client: ArmorClient) -> None:

@@ -60,6 +60,19 @@ def test_an_axiom_comes_and_goes_with_what_is_said_of_it(rooms: Ask) -> None:
     assert rooms('QUERY AXIOMS', 'Hall').queried_objects == ['Class: Hall']
 
 
+def test_a_frame_declares_what_is_new_and_nothing_else(rooms: Ask) -> None:
+    before = rooms('QUERY AXIOMS', 'R1').queried_objects
+    assert rooms('ADD AXIOM', 'Individual: R1 Types: Kitchen').success
+    (more,) = set(rooms('QUERY AXIOMS', 'R1').queried_objects) - set(before)
+    assert 'Kitchen' in more
+    for _ in range(2):
+        answer = rooms('ADD AXIOM', 'Class: Cellar')
+        assert (answer.success, answer.error_description) == (True, '')
+    assert rooms('QUERY AXIOMS', 'Cellar').queried_objects
+    assert rooms('REMOVE AXIOM', 'Class: Cellar').success
+    assert rooms('QUERY AXIOMS', 'Cellar').queried_objects == []
+
+
 def test_a_name_whose_prefix_nobody_declared_is_an_iri(rooms: Ask) -> None:
     assert rooms('ADD AXIOM', 'Individual: urn:hall Types: ROOM').error_description == ''
     assert '<urn:hall>' in rooms('QUERY IND CLASS', 'ROOM').queried_objects

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import re
+import struct
 import tracemalloc
+from decimal import Decimal
 
 import pytest
 from hypothesis import given, settings
@@ -10,14 +13,17 @@ from hypothesis import strategies as st
 
 from armor_service.facts import ShortFact, parse_fact
 from armor_service.rendering import (
+    one_line,
     parse_entity,
     parse_literal,
     parse_rendered,
+    render_datatype,
     render_entity,
     render_literal,
+    shown,
 )
 from owl_reasoner.owl.expressions import Literal
-from owl_reasoner.owl.vocabulary import XSD
+from owl_reasoner.owl.vocabulary import RDF, XSD
 
 BASE = 'http://example.org/place'
 
@@ -77,6 +83,123 @@ def test_values_are_read_bare_or_as_answers_have_them(
     type_word: str, text: str, rendered: str
 ) -> None:
     assert render_literal(parse_literal(type_word, text)) == rendered
+
+
+@pytest.mark.parametrize(
+    ('number', 'text'),
+    [
+        ('INF', 'INF'),
+        ('+INF', 'INF'),
+        ('Infinity', 'INF'),
+        ('-INF', '-INF'),
+        ('-Infinity', '-INF'),
+        ('0', '0.0'),
+        ('-0', '-0.0'),
+        ('.5', '0.5'),
+        ('5.', '5.0'),
+        ('0.001', '0.001'),
+        ('0.000999', '9.99E-4'),
+        ('9999999', '9999999.0'),
+        ('1e7', '1.0E7'),
+        ('12345678.5', '1.23456785E7'),
+        ('-2.5e-7', '-2.5E-7'),
+    ],
+)
+def test_numbers_are_written_as_java_writes_them(number: str, text: str) -> None:
+    assert parse_literal('DOUBLE', number).lexical == text
+
+
+def test_a_number_that_no_float_holds_is_infinite() -> None:
+    assert parse_literal('FLOAT', '1e39').lexical == 'INF'
+    assert parse_literal('FLOAT', '-1e39').lexical == '-INF'
+    assert parse_literal('FLOAT', '1e-60').lexical == '0.0'
+    assert parse_literal('DOUBLE', '1e39').lexical == '1.0E39'
+
+
+@given(st.floats(allow_nan=False, allow_infinity=False))
+def test_a_double_is_written_so_that_it_reads_back(number: float) -> None:
+    text = parse_literal('DOUBLE', repr(number)).lexical
+    assert float(text) == number
+    mantissa, _, exponent = text.partition('E')
+    assert re.fullmatch(r'-?[0-9]+\.[0-9]+', mantissa)
+    if number == 0.0 or 1e-3 <= abs(number) < 1e7:
+        assert not exponent
+    else:
+        assert re.fullmatch('-?[0-9]+', exponent)
+        assert 1.0 <= abs(float(mantissa)) < 10.0
+
+
+@given(st.floats(width=32, allow_nan=False, allow_infinity=False))
+def test_a_float_is_written_with_the_fewest_digits_that_read_back(number: float) -> None:
+    text = parse_literal('FLOAT', repr(number)).lexical
+    assert struct.pack('f', float(text)) == struct.pack('f', number)
+    digits = len(Decimal(text).normalize().as_tuple().digits)
+    for fewer in range(1, digits):
+        assert struct.pack('f', float(f'{number:.{fewer}g}')) != struct.pack('f', number)
+
+
+@pytest.mark.parametrize(('word', 'bits'), [('INT', 31), ('INTEGER', 31), ('LONG', 63)])
+def test_whole_numbers_keep_to_their_range(word: str, bits: int) -> None:
+    for number in (-(2**bits), 2**bits - 1):
+        assert parse_literal(word, str(number)).lexical == str(number)
+    for number in (-(2**bits) - 1, 2**bits):
+        with pytest.raises(ValueError, match=f'is out of range, {word} has {bits + 1} bits'):
+            parse_literal(word, str(number))
+    assert parse_literal('INT', '0' * 3999 + '7').lexical == '7'
+    with pytest.raises(ValueError, match='is not a whole number'):
+        parse_literal('INT', '0' * 4000 + '7')
+
+
+def test_what_an_answer_showed_is_read_whatever_its_type() -> None:
+    shown_value = '"x"^^<http://example.org/t>'
+    for word in ('INT', 'FLOAT', 'BOOLEAN', 'STRING'):
+        literal = parse_literal(word, shown_value, stored=True)
+        assert literal == Literal('x', 'http://example.org/t')
+    with pytest.raises(ValueError, match='is not a value of INT'):
+        parse_literal('INT', shown_value)
+    assert parse_literal('STRING', shown_value).datatype == XSD + 'string'
+    for text in ('"5"^^xsd', '"5"^^foo:bar', 'x', '"5'):
+        with pytest.raises(ValueError, match='is not a literal, expected "text"'):
+            parse_rendered(text)
+    assert parse_rendered('"5"') == Literal('5', XSD + 'string')
+    assert parse_rendered('"5"^^http://example.org/t').datatype == 'http://example.org/t'
+
+
+def test_datatypes_of_the_built_in_vocabularies_are_short() -> None:
+    assert render_datatype(XSD + 'long') == 'xsd:long'
+    assert render_datatype(RDF + 'PlainLiteral') == 'rdf:PlainLiteral'
+    assert render_datatype('http://www.w3.org/2002/07/owl#real') == 'owl:real'
+    assert render_datatype('http://example.org/t') == '<http://example.org/t>'
+
+
+def test_texts_for_a_log_are_one_line_of_a_bounded_length() -> None:
+    assert one_line('a\nb\x1b') == r'a\nb\x1b'
+    assert one_line('x' * 20, 20) == 'x' * 20
+    assert one_line('x' * 21, 20) == 'x' * 17 + '...'
+    assert shown('x' * 80) == repr('x' * 80)
+    assert shown('x' * 81) == repr('x' * 77) + '...'
+    assert shown('abcdef', 5) == "'ab'..."
+
+
+@pytest.mark.parametrize(
+    ('text', 'words'),
+    [
+        ('', 'is empty, expected a name'),
+        ('a' * 2049, 'has 2049 characters, expected at most 2048'),
+        ('50%', "has a bare '%', in an IRI written %25"),
+        ('a b', "has the character ' ', not allowed in an IRI"),
+        ('<abc>', 'is not a full IRI'),
+        ('urn:', 'is not a full IRI'),
+        ('://x', 'is not a full IRI'),
+        ('a#b', "has the character '#', expected a local name or <iri>"),
+    ],
+)
+def test_what_is_wrong_with_a_name_is_said(text: str, words: str) -> None:
+    with pytest.raises(ValueError, match=re.escape(words)):
+        parse_entity(text, BASE)
+    assert parse_entity('a' * 2048, BASE) == f'{BASE}#{"a" * 2048}'
+    assert parse_entity('owl:', BASE) == f'{BASE}#owl:'
+    assert parse_entity('a%20b', BASE) == f'{BASE}#a%20b'
 
 
 def test_doubles_are_narrowed_when_asked_for() -> None:
