@@ -271,13 +271,13 @@ def groups_of(name: str) -> list[list[Mutant]]:
         if 'ros' in path.parts or ROS.search(source):
             continue
         module = str(path.relative_to(CHECKOUT))
-        kept_out = without_effect(ast.parse(source))
+        kept_out, checks = without_effect(tree := ast.parse(source)), own_checks(tree)
         nodes = list(ast_nodes(get_ast_from_path(path)))
         for operator_name, operator in plain:
             kind = operator_name.split('_')[0]
             places = (place for node in nodes for place in operator.mutation_positions(node))
             for occurrence, ((line, column), _) in enumerate(places):
-                if line not in kept_out:
+                if line not in kept_out and (line, column) not in checks:
                     mutant = Mutant(name, module, line, operator_name, occurrence)
                     groups[module, (line, column), kind].append(mutant)
     return list(groups.values())
@@ -308,6 +308,17 @@ def without_effect(tree: ast.Module) -> set[int]:
         if isinstance(node, ast.ExceptHandler) and isinstance(node.type, ast.Attribute):
             leave_out(node.type)
     return lines
+
+
+def own_checks(tree: ast.Module) -> set[tuple[int, int]]:
+    """Return where `strict=True` has its value: by it a module checks what it knows to hold."""
+    return {
+        (keyword.value.lineno, keyword.value.col_offset)
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Call)
+        for keyword in node.keywords
+        if keyword.arg == 'strict'
+    }
 
 
 def run(mutants: Sequence[Mutant]) -> dict[Mutant, str]:
