@@ -78,10 +78,8 @@ print('ready', environment.ready())
 
 @pytest.fixture(scope='module')
 def checkout(tmp_path_factory):
-    return made(tmp_path_factory.mktemp('checkout'))
-
-
-def made(folder: Path) -> Path:
+    """Provide a checkout whose environment the tests set up, and use, one after the other."""
+    folder = tmp_path_factory.mktemp('checkout')
     (folder / 'pyproject.toml').write_text(PROJECT)
     interfaces = folder / INTERFACES
     interfaces.mkdir()
@@ -184,18 +182,6 @@ def test_two_set_ups_at_once_are_one_after_the_other(checkout, start):
     assert sorted(worked) == [False, True]
 
 
-def test_half_an_environment_without_pip_is_made_anew(tmp_path, checkout, start):
-    # What Debian leaves behind when its python3-venv is missing.
-    if not (checkout / '.venv').exists():
-        prepare(checkout)
-    for path in (checkout / '.venv').glob('lib/*/site-packages/pip*'):
-        path.rename(tmp_path / path.name)
-    (checkout / '.venv' / JOURNAL).unlink()
-    anew = start('-u', '-c', PREPARE, str(checkout), environ=environ())
-    anew.until(r'\[1/3\] virtual environment')
-    anew.end(signal.SIGINT)  # the rest is as from nothing
-
-
 def test_an_environment_in_use_stays_and_a_new_one_is_set_up_beside_it(checkout):
     (checkout / INTERFACES / 'source.py').write_text('VALUE = 4\n')
     assert 'ready True' in prepare(checkout).stdout
@@ -234,26 +220,43 @@ def test_another_interpreter_gets_an_environment_of_its_own(checkout):
     assert prepare(checkout).stdout == 'ready True\n'
 
 
-def test_a_machine_without_internet_is_set_up_from_a_folder_of_wheels(tmp_path):
-    lab, wheels = made(tmp_path), tmp_path / 'wheels'
-    assert prepare(lab, str(wheels)).stderr == f'--wheels {wheels}: expected a folder of wheels\n'
+def test_a_machine_without_internet_is_set_up_from_a_folder_of_wheels(tmp_path, checkout):
+    wheels = tmp_path / 'wheels'
+    missing = f'--wheels {wheels}: expected a folder of wheels\n'
+    assert prepare(checkout, str(wheels)).stderr == missing
     wheels.mkdir()
-    assert f'setup --collect {wheels}' in prepare(lab, str(wheels)).stderr
+    project = checkout / 'pyproject.toml'
+    project.write_text(PROJECT.replace('"pip"', '"tiny==1"'))
+    assert f'setup --collect {wheels}' in prepare(checkout, str(wheels)).stderr
     with zipfile.ZipFile(wheels / 'tiny-1-py3-none-any.whl', 'w') as wheel:
         wheel.writestr('tiny.py', '')
         wheel.writestr('tiny-1.dist-info/METADATA', 'Metadata-Version: 2.1\nName: tiny\nVersion: 1')
         wheel.writestr('tiny-1.dist-info/WHEEL', 'Wheel-Version: 1.0\nTag: py3-none-any')
         wheel.writestr('tiny-1.dist-info/RECORD', '')
-    project = lab / 'pyproject.toml'
-    project.write_text(PROJECT.replace('"pip"', '"tiny==1"'))
-    assert 'ready True' in prepare(lab, str(wheels)).stdout
-    assert list(lab.glob('.venv/lib/*/site-packages/tiny.py'))
+    (checkout / INTERFACES / 'source.py').write_text('VALUE = 8\n')
+    assert 'ready True' in prepare(checkout, str(wheels)).stdout
+    assert list(checkout.glob('.venv/lib/*/site-packages/tiny.py'))
+    assert value(checkout) == '8'
     # What the set-up needs is gathered from wherever pip finds it.
     there = {'PIP_NO_INDEX': '1', 'PIP_FIND_LINKS': str(wheels)}
-    assert prepare(lab, '', str(tmp_path / 'gathered'), **there).returncode == 0
+    assert prepare(checkout, '', str(tmp_path / 'gathered'), **there).returncode == 0
     assert [path.name for path in (tmp_path / 'gathered').iterdir()] == ['tiny-1-py3-none-any.whl']
     project.write_text(PROJECT.replace('"pip"', '"tiny==2"'))
-    assert f'{wheels} has no wheel that fits tiny==2' in prepare(lab, str(wheels)).stderr
+    lacking = prepare(checkout, str(wheels)).stderr
+    project.write_text(PROJECT)
+    assert f'{wheels} has no wheel that fits tiny==2' in lacking
+
+
+def test_half_an_environment_without_pip_is_made_anew(tmp_path, checkout, start):
+    # What Debian leaves behind when its python3-venv is missing.
+    if not (checkout / '.venv').exists():
+        prepare(checkout)
+    for path in (checkout / '.venv').glob('lib/*/site-packages/pip*'):
+        path.rename(tmp_path / path.name)
+    (checkout / '.venv' / JOURNAL).unlink()
+    anew = start('-u', '-c', PREPARE, str(checkout), environ=environ())
+    anew.until(r'\[1/3\] virtual environment')
+    anew.end(signal.SIGINT)  # the rest is as from nothing
 
 
 def test_compiled_modules_are_kept_where_python_may_not_write_them_beside_the_sources(tmp_path):
