@@ -132,9 +132,9 @@ class MissionFeed:
             for topic, subscription in self._topics
             if streams and not topic.beside and not topic.period
         ]
+        self._left = threading.Event()
         self._facts = _Facts(node, self.update, robot)
         self._others = _OtherRobots(node) if streams and not robot else None
-        self._left = threading.Event()
         self.robots: Mapping[str, MissionFeed] = {}
         self._passed_on: deque[tuple[Topic, Any]] = deque(maxlen=MOST_PASSED_ON)
         self._publishers: Sequence[TopicEndpointInfo] = ()
@@ -163,7 +163,7 @@ class MissionFeed:
         with self._lock:
             old = self._snapshot
             new = self._with_place(change(old))
-            if new is old:
+            if new is old or self._left.is_set():
                 return
             if self._over and begins:
                 old = self._begin_anew()
@@ -176,7 +176,7 @@ class MissionFeed:
         self._on_change(new, told)
 
     def leave(self) -> None:
-        """Follow the mission no longer."""
+        """Follow the mission no longer: nothing more is told of it, and no topic heard."""
         self._left.set()
 
     def _with_place(self, snapshot: Snapshot) -> Snapshot:

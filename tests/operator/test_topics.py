@@ -11,6 +11,7 @@ from action_msgs.msg import GoalStatus, GoalStatusArray
 from builtin_interfaces.msg import Time
 from geometry_msgs.msg import PoseWithCovarianceStamped
 from sensor_msgs.msg import JointState
+from std_msgs.msg import String
 
 from armor_service.facts import parse_fact
 from surveillance_interfaces.action import ScanSurroundings
@@ -20,6 +21,7 @@ from surveillance_operator.mission_feed import MissionFeed
 from surveillance_operator.snapshot import Snapshot
 from surveillance_operator.topics import DETECTIONS_TOPIC, TOPICS, read_message, with_fact
 from surveillance_runtime.node import PatrolNode
+from surveillance_runtime.place_changes import description_text, follow_place
 from surveillance_runtime.qos import STATE_QOS
 from surveillance_runtime.robot_arm import ARM
 
@@ -143,6 +145,27 @@ def test_who_leaves_a_mission_hears_nothing_more(
     assert graph.node.count_subscribers('battery_level') == 0
     publisher.publish(pose(2.0, 0.0))
     assert watcher.feed.snapshot.pose == (1.0, 0.0, 0.0)
+
+
+def test_a_place_that_is_changed_brings_no_robot_back_that_was_left(graph: Any) -> None:
+    """The page showed the robots of an earlier fleet again after an edit of the place."""
+    heard: list[Snapshot] = []
+    feed = MissionFeed(graph.node, 0.05, lambda new, _told: heard.append(new), robot='anna')
+    sender = graph.node.create_publisher(String, 'place', STATE_QOS)
+
+    def changed(x: float) -> None:
+        sender.publish(String(data=description_text({'doors': {'D1': [x, 0.0, x, 1.0]}})))
+
+    changed(1.0)
+    graph.until(lambda: 'D1' in feed.snapshot.door_lines)
+    read: list[object] = []
+    follow_place(graph.node, read.append)  # made later, and so told later
+    feed.leave()
+    before, told = feed.snapshot.door_lines, len(heard)
+    changed(2.0)
+    graph.until(lambda: any('2.0' in str(each) for each in read))
+    assert feed.snapshot.door_lines == before
+    assert len(heard) == told
 
 
 def test_the_progress_of_a_scan_ends_with_its_goal() -> None:
