@@ -9,7 +9,7 @@ reach its line, found by coverage; a mutant that none of them notices is a survi
 assertion, or a change that makes no difference.
 
 A PART is a library, or a package of the robot: its modules without ROS, tried by the tests marked
-`unit` alone. A process collects the tests once. A fault within a function is put into a fork of it,
+`unit` alone, of the files that name the module's folder. A process collects the tests once. A fault within a function is put into a fork of it,
 which therefore costs its tests alone; a fault in what runs at import costs the imports as well.
 Limits are in processor time, since the machine may be busy. No file is changed.
 
@@ -65,6 +65,8 @@ ROBOT = 'robot'
 """The packages of the robot share their tests, and one process that collects them."""
 ROS = re.compile(r'^\s*(?:from|import) (?:rclpy|\w+_msgs|std_srvs|surveillance_interfaces)\b', re.M)
 """What a core module does not import."""
+OWN_PROCESSES = ('launcher', 'mission', 'examples')
+"""Folders of the robot's tests that mostly start processes."""
 LOGGED = re.compile(r'\b(?:log|logger|get_logger\(\))\.(?:debug|info|warn|warning|error|fatal)$')
 SKIPPED = ('BinaryOperator_BitOr', 'NoOp', 'Eq_Is', 'NotEq_IsNot', 'Is_Eq', 'IsNot_NotEq')
 """Operators whose mutants mostly make no difference: type unions, and identity for equality, which
@@ -379,8 +381,34 @@ def collected(root: Path, mutants: Sequence[Mutant]) -> tuple[Reach, dict[Mutant
     os.chdir(root)
     with tempfile.TemporaryDirectory() as scratch:
         server = Server(root, mutants)
-        pytest.main(options(root, scratch), plugins=[server])
+        pytest.main([*options(root, scratch), *test_files(root, mutants)], plugins=[server])
     return server.reach, server.trials.results
+
+
+def test_files(root: Path, mutants: Sequence[Mutant]) -> list[str]:
+    """Return the test files to collect: of the robot's those that name a module's folder.
+
+    What a file takes from the helpers beside it counts as its own. A folder that none names is
+    tried by the files that name its package. Tests in processes of their own meet no fault.
+    """
+    if root != CHECKOUT:
+        return []
+    texts: dict[str, str] = {}
+    for path in sorted((root / 'tests').rglob('test_*.py')):
+        if path.parent.name in OWN_PROCESSES:
+            continue
+        text = path.read_text(encoding='utf-8')
+        for helper in path.parent.glob('*.py'):
+            if re.search(rf'\b{helper.stem} import\b', text):
+                text += helper.read_text(encoding='utf-8')
+        texts[str(path.relative_to(root))] = text
+    chosen: set[str] = set()
+    for part, inner in {(each.part, Path(each.module).parts[2:]) for each in mutants}:
+        name = inner[0].removesuffix('.py')
+        near = re.compile(rf'\b{part}(?:\.| import (?:.*, )?){name}\b')
+        found = {file for file, text in texts.items() if near.search(text)}
+        chosen |= found or {file for file, text in texts.items() if part in text}
+    return sorted(chosen)
 
 
 class Server:
