@@ -9,9 +9,10 @@ reach its line, found by coverage; a mutant that none of them notices is a survi
 assertion, or a change that makes no difference.
 
 A PART is a library, or a package of the robot: its modules without ROS, tried by the tests marked
-`unit` alone, of the files that name the module's folder. A process collects the tests once. A fault within a function is put into a fork of it,
-which therefore costs its tests alone; a fault in what runs at import costs the imports as well.
-Limits are in processor time, since the machine may be busy. No file is changed.
+`unit` alone, of the files that name the module's folder. A process collects the tests once. A fault
+within a function is put into a fork of it, which therefore costs its tests alone; a fault in what
+runs at import costs the imports as well. Limits are in processor time, since the machine may be
+busy. No file is changed.
 
 `equivalent_mutants.toml` names changes that make no difference to a user, each with its reason;
 they are left out. `--report FILE` keeps the survivors, `--again FILE` tries those alone.
@@ -131,6 +132,15 @@ class Reach:
     lines: dict[str, dict[int, list[str]]] = field(default_factory=dict)
     seconds: dict[str, float] = field(default_factory=dict)
     failing: list[str] = field(default_factory=list)
+
+    def add(self, other: Reach) -> None:
+        """Take in what other tests reach."""
+        for module, lines in other.lines.items():
+            known = self.lines.setdefault(module, {})
+            for line, tests in lines.items():
+                known.setdefault(line, []).extend(tests)
+        self.seconds |= other.seconds
+        self.failing += other.failing
 
     def tests(self, module: str, lines: Iterable[int] | None = None) -> set[str]:
         """Return the tests that run one of the lines of a module, or any of them."""
@@ -288,7 +298,10 @@ def groups_of(name: str) -> list[list[Mutant]]:
 def without_effect(tree: ast.Module) -> set[int]:
     """Return the lines whose change no user notices: annotations, type checks, texts of a log.
 
-    An exception's dotted name (`except cv2.error`) counts too: Cosmic Ray makes no Python of it.
+    So do decorators of records (`frozen` keeps programmers from a mistake), constants of the module
+    beyond 10 (a bound or a tuned number that changes by a tenth), and what a module does as a
+    program of its own. An exception's dotted name (`except cv2.error`) counts too: Cosmic Ray makes
+    no Python of it.
     """
     lines: set[int] = set()
 
@@ -305,10 +318,19 @@ def without_effect(tree: ast.Module) -> set[int]:
             leave_out(node)
         if isinstance(node, ast.FunctionDef) and node.name == '__repr__':
             leave_out(node)
+        if isinstance(node, ast.If) and '__name__' in ast.unparse(node.test):
+            leave_out(node)
+        if isinstance(node, ast.ClassDef):
+            for decorator in node.decorator_list:
+                leave_out(decorator)
         if isinstance(node, ast.Call) and LOGGED.search(ast.unparse(node.func)):
             leave_out(node)
         if isinstance(node, ast.ExceptHandler) and isinstance(node.type, ast.Attribute):
             leave_out(node.type)
+    for node in tree.body:
+        value = getattr(getattr(node, 'value', None), 'value', None)
+        if isinstance(value, int | float) and abs(value) >= 10:
+            leave_out(node)
     return lines
 
 
@@ -331,7 +353,7 @@ def run(mutants: Sequence[Mutant]) -> dict[Mutant, str]:
         by_root[root_of(each.module)].append(each)
     for root, own in by_root.items():
         begun = time.monotonic()
-        reach, tried = in_fork(lambda root=root, own=own: collected(root, own))
+        ((reach, tried),) = in_forks([lambda root=root, own=own: collected(root, own)])
         trials = Trials()
         for mutant in own:
             if mutant not in tried:
@@ -342,27 +364,33 @@ def run(mutants: Sequence[Mutant]) -> dict[Mutant, str]:
     return results
 
 
-def in_fork(call: Any) -> Any:
-    """Return what a call returns in a process of its own."""
-    reading, writing = os.pipe()
-    child = os.fork()
-    if not child:
-        code = 1
-        try:
-            os.close(reading)
-            with os.fdopen(writing, 'wb') as pipe:
-                pickle.dump(call(), pipe)
-            code = 0
-        finally:
-            sys.stdout.flush()
-            os._exit(code)
-    os.close(writing)
-    with os.fdopen(reading, 'rb') as pipe:
-        data = pipe.read()
-    os.waitpid(child, 0)
-    if not data:
-        sys.exit('the tests cannot be run: see above')
-    return pickle.loads(data)
+def in_forks(calls: Sequence[Any]) -> list[Any]:
+    """Return what each of some calls returns in a process of its own, all at the same time."""
+    begun: list[tuple[int, int]] = []
+    for call in calls:
+        reading, writing = os.pipe()
+        child = os.fork()
+        if not child:
+            code = 1
+            try:
+                os.close(reading)
+                with os.fdopen(writing, 'wb') as pipe:
+                    pickle.dump(call(), pipe)
+                code = 0
+            finally:
+                sys.stdout.flush()
+                os._exit(code)
+        os.close(writing)
+        begun.append((child, reading))
+    returned = []
+    for child, reading in begun:
+        with os.fdopen(reading, 'rb') as pipe:
+            data = pipe.read()
+        os.waitpid(child, 0)
+        if not data:
+            sys.exit('the tests cannot be run: see above')
+        returned.append(pickle.loads(data))
+    return returned
 
 
 def options(root: Path, scratch: str) -> list[str]:
@@ -427,7 +455,14 @@ class Server:
         # Else each fork copies what the collector of garbage writes into all objects.
         gc.freeze()
         self.items = {item.nodeid: item for item in session.items}
-        self.reach = in_fork(self._reach)
+        by_file: dict[str, list[str]] = defaultdict(list)
+        for name in self.items:
+            by_file[name.split('::')[0]].append(name)
+        shares: list[list[str]] = [[] for _ in range(AT_ONCE)]
+        for names in sorted(by_file.values(), key=len, reverse=True):
+            min(shares, key=len).extend(names)
+        for each in in_forks([lambda s=share: self._reach(s) for share in shares]):
+            self.reach.add(each)
         if self.reach.failing:
             print('fail without a fault, left out:', ', '.join(self.reach.failing), flush=True)
         for mutant in self.mutants:
@@ -445,8 +480,8 @@ class Server:
         self.trials.finish()
         return True
 
-    def _reach(self) -> Reach:
-        """Run each test once and return which lines it reaches."""
+    def _reach(self, names: Sequence[str]) -> Reach:
+        """Run each of some tests once and return which lines it reaches."""
         from coverage import Coverage
 
         reach = Reach()
@@ -454,15 +489,17 @@ class Server:
         modules = sorted({str(each.path) for each in self.mutants})
         measured = Coverage(data_file=None, include=modules, config_file=False, messages=False)
         measured.start()
-        for name, item in self.items.items():
+        own_folder = self._own_folder()
+        for name in names:
             measured.switch_context(name)
             begun = cpu_seconds()
-            passed = run_item(item, None)
+            passed = run_item(self.items[name], None)
             if passed:
                 reach.seconds[name] = cpu_seconds() - begun
             else:
                 reach.failing.append(name)
         measured.stop()
+        shutil.rmtree(own_folder, ignore_errors=True)
         data = measured.get_data()
         for file in data.measured_files():
             module = str(Path(file).resolve().relative_to(CHECKOUT))
@@ -487,15 +524,19 @@ class Server:
                     replaced += 1
         if not replaced:
             raise LookupError(mutant)
-        # Each fork has its own folder for what its tests write.
-        own_folder = Path(tempfile.mkdtemp())
-        config = next(iter(self.items.values())).config
-        config._tmp_path_factory._given_basetemp = own_folder / 'base'  # type: ignore[attr-defined]
-        config._tmp_path_factory._basetemp = None  # type: ignore[attr-defined]
+        own_folder = self._own_folder()
         try:
             return self._all_pass(mutant, tests)
         finally:
             shutil.rmtree(own_folder, ignore_errors=True)
+
+    def _own_folder(self) -> Path:
+        """Return a new folder for what the tests of this fork write."""
+        folder = Path(tempfile.mkdtemp())
+        config = next(iter(self.items.values())).config
+        config._tmp_path_factory._given_basetemp = folder / 'base'  # type: ignore[attr-defined]
+        config._tmp_path_factory._basetemp = None  # type: ignore[attr-defined]
+        return folder
 
     def _all_pass(self, mutant: Mutant, tests: set[str]) -> bool:
         """Tell whether the tests pass, up to the first that does not."""
