@@ -115,6 +115,14 @@ class Mutant:
         source = self.path.read_text(encoding='utf-8')
         return source, mutate_code(source, get_operator(self.operator)(), self.occurrence) or source
 
+    def is_python(self) -> bool:
+        """Tell whether Python reads it; Cosmic Ray takes the star of a signature for a product."""
+        try:
+            ast.parse(self.sources()[1])
+        except SyntaxError:
+            return False
+        return True
+
     def difference(self) -> tuple[str, str]:
         """Return the lines that change, before and after."""
         old, new = (each.splitlines() for each in self.sources())
@@ -218,6 +226,8 @@ def main(words: Sequence[str] | None = None) -> int:
         wanted = QUICK if given.quick else round(given.mutants * len(groups[name]) / places)
         count = min(len(groups[name]), max(1, wanted))
         for mutant in (generator.choice(each) for each in generator.sample(groups[name], count)):
+            if not mutant.is_python():
+                continue
             if (mutant.module, *mutant.difference()) in known_equal:
                 left_out[name] += 1
             else:
@@ -488,6 +498,7 @@ class Server:
         # Only the modules that have a mutant: the rest runs at its own speed.
         modules = sorted({str(each.path) for each in self.mutants})
         measured = Coverage(data_file=None, include=modules, config_file=False, messages=False)
+        measured.set_option('run:disable_warnings', ['no-data-collected'])
         measured.start()
         own_folder = self._own_folder()
         for name in names:

@@ -27,7 +27,7 @@ from std_msgs.msg import UInt8
 from surveillance_interfaces.msg import Decision, FactChange, FactChanges, MissionStatus
 from surveillance_interfaces.msg import Fact as FactMessage
 from surveillance_operator.mission_markers_node import markers_of
-from surveillance_operator.recording.reading import Messages
+from surveillance_operator.recording.reading import Messages, files_of
 from surveillance_operator.recording.runs import find_recordings
 from surveillance_operator.recording.schemas import definition
 from surveillance_operator.recording.stored import Conversion, RecordedSights, prefix_of
@@ -280,3 +280,15 @@ def test_a_recording_of_something_else_is_refused(tmp_path: Path) -> None:
 def test_the_namespace_is_that_of_most_topics() -> None:
     assert prefix_of(['/decision', '/plan', '/robot/plan']) == '/'
     assert prefix_of(['/a/b/decision', '/a/b/plan', '/tf']) == '/a/b/'
+
+
+@pytest.mark.parametrize('name', ['empty', 'notes.txt', 'recording_0.db3', 'gone.mcap'])
+def test_what_holds_no_recording_is_named_and_what_is_expected(name: str, tmp_path: Path) -> None:
+    (tmp_path / 'empty').mkdir()
+    (tmp_path / 'notes.txt').touch()
+    (tmp_path / 'recording_0.db3').touch()
+    with pytest.raises(FileError, match=rf'{name}: expected a file \*\.mcap, or a folder'):
+        files_of(tmp_path / name)
+    (tmp_path / 'recording_0.mcap').touch()
+    (tmp_path / 'recording_1.mcap').touch()
+    assert [each.name for each in files_of(tmp_path)] == ['recording_0.mcap', 'recording_1.mcap']

@@ -15,8 +15,8 @@ from rich.console import Console
 
 from patrol_policy.world import Decision
 from state_machines import Interrupt
-from surveillance_operator.snapshot import Event, Health, Snapshot, Status, changes
-from surveillance_operator.watch import raster
+from surveillance_operator.snapshot import Event, Health, Snapshot, Status, changes, follow
+from surveillance_operator.watch import raster, view
 from surveillance_operator.watch.raster import Frame, rasterise
 from surveillance_operator.watch.view import MissionView, node_page, show_once
 from surveillance_runtime.place.occupancy_grid import Grid
@@ -258,3 +258,48 @@ def test_a_single_picture_in_a_pipe_is_as_wide_as_columns_says(monkeypatch):
         file = io.StringIO()
         assert show_once(lambda: {'': whole()}, Interrupt(), Console(file=file), timeout=5.0)
         assert max(map(len, file.getvalue().splitlines())) == width
+
+
+def test_a_single_picture_waits_until_all_has_come_and_no_longer_than_it_may(monkeypatch):
+    """`watch --once` printed half a picture while map and battery were on their way."""
+    now = [0.0]
+    monkeypatch.setattr(view.time, 'monotonic', lambda: now[0])
+
+    class Passing(Interrupt):
+        def wait(self, timeout: float | None = None) -> bool:
+            assert timeout
+            now[0] += timeout
+            return self.is_set()
+
+    def shown(come_at: float, *, timeout: float = 1.0) -> str:
+        now[0] = 0.0
+        late = replace(whole(), battery=None)
+        file = io.StringIO()
+        console = Console(file=file)
+        told = show_once(
+            lambda: {'': whole() if now[0] >= come_at else late}, Passing(), console, timeout
+        )
+        assert told
+        return file.getvalue()
+
+    assert '80 %' in shown(0.0)
+    assert now[0] == 0.0, 'what is complete is drawn at once'
+    assert '80 %' in shown(1.5)
+    assert '80 %' not in shown(9.0)
+    assert 2.0 <= now[0] < 2.2
+    now[0] = 0.0
+    nothing = Console(file=io.StringIO())
+    assert not show_once(lambda: {'': Snapshot()}, Passing(), nothing, timeout=3.0)
+    assert 3.0 <= now[0] < 3.2
+
+
+def test_a_node_that_reports_nothing_is_up_and_each_start_again_is_counted() -> None:
+    def running(process: str, before: Snapshot) -> Snapshot:
+        new = replace(before, nodes={'robot_behavior': frozenset({process})})
+        return follow(before, new, 0.0)[0]
+
+    snapshot = running('1', Snapshot())
+    assert [line.plain for line in node_page(snapshot)] == ['● up    robot_behavior']
+    snapshot = running('3', running('2', snapshot))
+    (line,) = node_page(snapshot)
+    assert line.plain == '● up    robot_behavior, started again 2 times'

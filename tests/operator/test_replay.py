@@ -10,7 +10,7 @@ import re
 import resource
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -245,3 +245,153 @@ def test_a_long_recording_is_ready_and_jumps_at_once(
     assert line.at(1e9 + 5_432)[2]['pose'] == [5_432, 0, 0]
     # From the last line that holds everything on, which comes once in sixty.
     assert len(parsed) == 5_432 % 60 + 1
+
+
+class Lidar:
+    """Says when it was asked what was seen."""
+
+    def __init__(self) -> None:
+        self.asked: list[float] = []
+
+    def scan(self, time: float) -> list[Any]:
+        self.asked.append(time)
+        return [[1.0, time]]
+
+    def jpeg(self, time: float) -> bytes:
+        return b'picture of %d' % time
+
+
+class Steps:
+    """Passes a replay's time step by step, instead of its clock and its event.
+
+    Args:
+        player: Whose steps.
+        before: Called one before each step; after the last the replay ends.
+    """
+
+    def __init__(self, player: Player, *before: Callable[[], object]) -> None:
+        self._before = list(before)
+        self._now = 0.0
+        player._ended = self  # type: ignore[assignment]
+
+    def monotonic(self) -> float:
+        return self._now
+
+    def wait(self, period: float) -> bool:
+        self._now += period
+        if not self._before:
+            return True
+        self._before.pop(0)()
+        return False
+
+
+def test_a_replay_goes_on_with_time_until_it_is_paused_or_over(
+    run: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    lidar, hub, places = Lidar(), Hub(), []
+    track = Track(Timeline(run / 'timeline.jsonl'), lidar)  # type: ignore[arg-type]
+    player = Player({'': track}, hub)
+    do = player.actions()
+
+    def look() -> None:
+        places.append(json.loads(hub._of_all['replay'][1])['at'])
+
+    monkeypatch.setattr(
+        replay,
+        'time',
+        Steps(
+            player,
+            lambda: do['speed'](100),
+            look,  # a step of 0.05 s
+            look,
+            lambda: do['pause'](),
+            look,
+            *[look] * 6,
+            lambda: do['speed'](0.1),
+            lambda: do['play'](),
+            look,
+            lambda: (do['seek'](198), do['speed'](100)),
+            look,
+            look,
+        ),
+    )
+    player.run()
+    assert places[:3] == [5.0, 10.0, 15.0]
+    assert places[3:-3] == [15.0] * 6, 'paused'
+    assert places[-3:] == [15.0, 199.0, 199.0], 'no farther than the end'
+    assert lidar.asked == sorted(set(lidar.asked)), 'nothing is read again while it stands'
+    assert 2 <= len(lidar.asked) <= 4, 'a look each 0.2 s'
+    assert player.jpeg('') == b'picture of 1199'
+    assert player.jpeg('nobody') is None
+    assert [do['seek'](-5), json.loads(hub._of_all['replay'][1])['at']] == ['moved', 0.0]
+
+
+@pytest.mark.parametrize('speed', [0.1, 100.0])
+def test_the_slowest_and_the_fastest_speed_are_taken(run: Path, speed: float) -> None:
+    player = Player({'': Track(Timeline(run / 'timeline.jsonl'))}, Hub())
+    assert player.actions()['speed'](speed) == f'speed {speed:g}'
+    for wrong in (speed / 1.01, speed * 1.01):
+        if not 0.1 <= wrong <= 100.0:
+            with pytest.raises(ValueError, match=r'expected 0\.1 to 100'):
+                player.actions()['speed'](wrong)
+
+
+def test_a_replay_of_a_recording_that_grows_grows_with_it(
+    run: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path, hub = run / 'timeline.jsonl', Hub()
+    read = [0.5]
+    player = Player({'': Track(Timeline(path), read=lambda: read[0])}, hub)
+
+    def lengths() -> tuple[float, float]:
+        shown = json.loads(hub._of_all['replay'][1])
+        return shown['length'], shown['read']
+
+    def add(at: float) -> None:
+        with open(path, 'a') as file:
+            file.write(f'{{"t":{at},"k":0,"e":"recharge","now":1,"p":{{}}}}\n')
+
+    seen = []
+    monkeypatch.setattr(
+        replay,
+        'time',
+        Steps(
+            player,
+            lambda: add(1300.0),
+            *[lambda: None] * 4,
+            lambda: seen.append(lengths()),
+            lambda: (add(1400.0), read.insert(0, 1.0)),
+            *[lambda: None] * 4,
+            lambda: (seen.append(lengths()), add(1500.0)),
+            *[lambda: None] * 9,
+            lambda: seen.append(lengths()),
+        ),
+    )
+    player.run()
+    assert seen == [(300.0, 0.5), (400.0, 1.0), (400.0, 1.0)]
+    assert player.actions()['jump']('recharge') == 'at the recharge'
+    with pytest.raises(ValueError, match=r"'recharg': expected .*recharge"):
+        player.actions()['jump']('recharg')
+
+
+def test_a_replay_that_falls_far_behind_jumps(tmp_path: Path) -> None:
+    """A page that was asleep for an hour does not get each line of it."""
+    path = tmp_path / 'timeline.jsonl'
+    with open(path, 'w') as file:
+        for tick in range(1000):
+            head = f'{{"t":{1e9 + tick},"k":{int(tick % 60 == 0)},"e":"",'
+            whole = f'"battery":{{"level":{tick}}},' if tick % 60 == 0 else ''
+            file.write(head + f'"now":{tick},"p":{{{whole}"pose":[{tick},0,0]}}}}\n')
+    hub, line = Hub(), Timeline(path)
+    player = Player({'': Track(line)}, hub)
+    read = []
+    plain = line.line
+    line.line = lambda number: read.append(number) or plain(number)  # type: ignore[method-assign]
+    player._forward(400.0)
+    assert read == list(range(1, 401))
+    player._forward(500.0)
+    # As many as a step takes, then those since the last whole one.
+    assert len(read) == 400 + 400 + 1
+    assert json.loads(hub._robots[''].texts['pose'][1]) == [900, 0, 0]
+    player._forward(1.0)
+    assert read[-1] == 901
