@@ -8,7 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from armor_service.client import ArmorClient, InProcessTransport
+from armor_service.client import ArmorClient, ArmorServiceInternalError, InProcessTransport
+from armor_service.protocol import DirectiveRequest, ListResponse
 from armor_service.service import ArmorService
 from libs.armor_service.tests.seven_rooms import IRI
 from surveillance_ontology.event_facts import MOST_EVENTS, EventFact, EventOntology, Sighting
@@ -71,6 +72,52 @@ def test_an_alert_is_proved_from_its_observations(armor: ArmorClient):
         ask(armor, 'QUERY CLASS IND', 'Event3Last')
     )
     assert ask(armor, 'QUERY EXPLAIN', 'URGENT(R3)')
+
+
+def test_each_sighting_says_when_where_how_surely_and_by_whom(armor: ArmorClient):
+    later = Sighting(150, 0.5, compared_with='empty.jpg', by='tb2')
+    EventOntology(armor).tell([replace(DOOR, subject='', last=later)])
+    expected = {
+        'observedAt': ('130', '150'),
+        'confidence': ('0.98', '0.5'),
+        'atPosition': ('10.00 14.50', None),
+        'evidence': ('3_130_door-D3-closed.jpg', None),
+        'comparedWith': (None, 'empty.jpg'),
+        'by': ('Robot1', 'tb2'),
+        'subject': (None, None),
+    }
+    for prop, values in expected.items():
+        for part, value in zip(('First', 'Last'), values, strict=True):
+            told = ask(armor, 'QUERY DATAPROP IND', prop, f'Event3{part}')
+            assert (told == []) if value is None else (f'"{value}' in told[0]), (prop, part)
+    assert '"130"' in ask(armor, 'QUERY DATAPROP IND', 'beganAt', 'Event3')[0]
+    assert '"150"' in ask(armor, 'QUERY DATAPROP IND', 'observedAt', 'Event3')[0]
+
+
+def test_only_what_has_changed_is_told_again(armor: ArmorClient, monkeypatch: pytest.MonkeyPatch):
+    events = EventOntology(armor)
+    other = replace(DOOR, number=4, place='R1')
+    events.tell([DOOR, other])
+    sent: list[str] = []
+    carry_out = armor.batch
+
+    def listened(requests: list[DirectiveRequest]) -> ListResponse:
+        sent.extend(' '.join((each.words, *each.args)) for each in requests)
+        return carry_out(requests)
+
+    monkeypatch.setattr(armor, 'batch', listened)
+    events.tell([DOOR, replace(other, state='Over')])
+    assert any(line.startswith('REMOVE IND') and 'Event4Last' in line for line in sent)
+    assert not any('Event3' in line for line in sent)
+    sent.clear()
+    events.tell([DOOR, replace(other, state='Over')])
+    assert {line.split()[0] for line in sent} == {'QUERY'}
+
+
+def test_what_the_server_refuses_is_told_with_the_directive(armor: ArmorClient):
+    armor.utils.drop_ref()
+    with pytest.raises(ArmorServiceInternalError, match=r'QUERY RULES.*: unknown reference'):
+        EventOntology(armor).tell([DOOR])
 
 
 def test_what_is_over_leaves_and_their_number_is_bounded(armor: ArmorClient):

@@ -167,10 +167,38 @@ def test_a_server_that_is_replaced_behind_the_load_is_loaded_again() -> None:
     assert (keeper.is_built, built, said['failed']) == (True, [1], [])
     assert len(said['warn']) == 2
     assert "unknown reference 'map'" in said['warn'][0]
-    never_keeps = PatrolOntology(ArmorClient('test', 'map', Replaced(1000)))
-    keeper, said = keeper_of(never_keeps, ONTOLOGY, built)
-    keeper.ensure_built()
-    assert 'unknown reference' in said['failed'][0], 'it ends'
+    for times, warned, failed in ((9, 9, 0), (1000, 9, 1)):
+        replaced = PatrolOntology(ArmorClient('test', 'map', Replaced(times)))
+        keeper, said = keeper_of(replaced, ONTOLOGY, built)
+        keeper.ensure_built()
+        assert (len(said['warn']), len(said['failed'])) == (warned, failed), 'it ends after ten'
+        assert keeper.is_built is not bool(failed)
+        assert all('unknown reference' in line for line in said['failed'])
+
+
+def test_places_may_count_as_visited_when_the_map_was_first_built() -> None:
+    """With `urgent_at_start` off nothing is URGENT at once, also after a server was lost."""
+    client = ArmorClient('test', 'map', InProcessTransport(ArmorService(warn=lambda _: None)))
+    ontology, now = PatrolOntology(client), [100]
+    for at_start, visited in ((False, dict.fromkeys(SEVEN_ROOMS, 100.0)), (True, {})):
+        now[0] = 100
+        client.utils.drop_ref()
+        keeper = MapKeeper(
+            ontology,
+            Source(ONTOLOGY, IRI, urgent_at_start=at_start),
+            seven(),
+            lambda: now[0],
+            lambda: False,
+            Reports(*[lambda _: None] * 4),
+            lambda: None,
+        )
+        for now[0] in (100, 150):
+            keeper.ensure_built()
+            ontology.record_place('E', now[0])
+            found = ontology.snapshot(now[0] + 1.0, ('URGENT',), threshold=1000.0)
+            assert found.visited_at == visited
+            assert all(bool(each) is at_start for each in found.classes.values())
+            client.utils.drop_ref()
 
 
 def test_the_keeper_goes_on_until_the_server_is_there(tmp_path: Path) -> None:
