@@ -3,8 +3,8 @@
 The engine's proof says how a fact was derived, but not that no axiom of it could be left out; and
 what cases or unnamed individuals prove has no steps at all. So the axioms are found first, by
 asking what follows without some of them (justifications; Horridge, Parsia and Sattler, "Laconic and
-precise justifications in OWL", ISWC 2008), and the steps are then those of an ontology of these
-alone.
+precise justifications in OWL", ISWC 2008), among those that can matter (`locality`). The steps are
+then those of an ontology of these alone.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ from owl_reasoner.owl.axioms import (
     SubClassOf,
 )
 from owl_reasoner.owl.entities import entities_of, names_anonymous
+from owl_reasoner.owl.locality import locality_module
 from owl_reasoner.reasoner.answers import Unknown
 from owl_reasoner.reasoner.budget import Budget
 from owl_reasoner.reasoner.engine import BY_CASES
@@ -64,6 +65,8 @@ def justify(
     choices = (used, list(dict.fromkeys([*used, *schema])), list(dict.fromkeys(axioms)))
     for choice in choices:
         candidates = [a for a in choice if not isinstance(a, Declaration | Annotation)]
+        if goal is not None and choice is not used:
+            candidates = locality_module(candidates, (goal, *assumed))
         if enough(candidates):
             fixed = list(assumed)
             if not enough(candidates):

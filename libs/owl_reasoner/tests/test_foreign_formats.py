@@ -265,6 +265,26 @@ def test_what_other_tools_write_is_read_right(text, axiom):
             owl_xml('<SubClassOf><Class IRI="#A"/></SubClassOf>'),
             'line 11: SubClassOf is not understood',
         ),
+        (
+            rdf(
+                '<owl:DatatypeProperty rdf:about="#p"><rdf:type'
+                ' rdf:resource="http://www.w3.org/2002/07/owl#InverseFunctionalProperty"/>'
+                '</owl:DatatypeProperty>'
+            ),
+            'about p is left out: a data property cannot be of type InverseFunctionalProperty',
+        ),
+        (
+            rdf('<owl:Class rdf:about="#A"><owl:sameAs rdf:resource="#i"/></owl:Class>'),
+            'owl:sameAs says nothing of A as class',
+        ),
+        (
+            rdf(
+                '<rdf:Description'
+                ' rdf:about="http://www.w3.org/1999/02/22-rdf-syntax-ns#type">'
+                '<rdfs:domain rdf:resource="#A"/></rdf:Description>'
+            ),
+            'domain of type, a word of OWL, has no effect',
+        ),
         (owl_xml('<Nonsense><Class IRI="#A"/></Nonsense>'), 'line 11: Nonsense is not understood'),
     ],
 )
@@ -304,3 +324,25 @@ def test_what_cannot_be_read_is_refused_in_one_line(text, complaint):
         read_ontology(text if isinstance(text, bytes) else text.encode(), IRI)
     assert complaint in str(error.value)
     assert len(str(error.value).splitlines()) == 1
+
+
+def test_a_data_property_of_another_type_is_a_data_property_all_the_same():
+    """FOAF has properties of values that are inverse functional, which OWL 2 DL does not have."""
+    document = read_ontology(
+        rdf(
+            '<owl:InverseFunctionalProperty rdf:about="#p">'
+            '<rdf:type rdf:resource="http://www.w3.org/2002/07/owl#DatatypeProperty"/>'
+            '<rdfs:domain rdf:resource="#A"/><rdfs:subPropertyOf rdf:resource="#q"/>'
+            '<rdf:type rdf:resource="http://www.w3.org/2002/07/owl#FunctionalProperty"/>'
+            '</owl:InverseFunctionalProperty>'
+        ).encode(),
+        IRI,
+    )
+    p, q = f'{IRI}#p', f'{IRI}#q'
+    for axiom in (
+        ax.DataPropertyDomain(p, A),
+        ax.SubDataPropertyOf(p, q),
+        ax.FunctionalDataProperty(p),
+    ):
+        assert axiom in document.axioms
+    assert ax.Declaration('object_property', p) not in document.axioms

@@ -18,12 +18,16 @@ from owl_reasoner.owl import expressions as ex
 from owl_reasoner.owl.axioms import Axiom
 from owl_reasoner.owl.expressions import Literal
 from owl_reasoner.owl.vocabulary import (
+    BOTTOM,
+    BOTTOM_DATA,
     NOTHING,
     OWL,
     RDF,
     RDFS,
     SWRL,
     THING,
+    TOP,
+    TOP_DATA,
     XSD,
     local_name,
 )
@@ -51,6 +55,9 @@ CHARACTERISTICS: dict[str, Callable[[ex.PropertyExpression], Axiom]] = {
     OWL + 'AsymmetricProperty': ax.AsymmetricObjectProperty,
     OWL + 'TransitiveProperty': ax.TransitiveObjectProperty,
 }
+_FUNCTIONAL = OWL + 'FunctionalProperty'
+_WITH_AXIOMS = {THING, NOTHING, TOP, BOTTOM, TOP_DATA, BOTTOM_DATA}
+"""What is OWL's own and may have axioms."""
 ANNOTATIONS = {
     *(RDFS + name for name in ('label', 'comment', 'seeAlso', 'isDefinedBy')),
     *(OWL + name for name in ('versionInfo', 'versionIRI', 'deprecated', 'priorVersion')),
@@ -127,6 +134,7 @@ class _Statements:
         self.variables: set[str] = set()
         self.subject_read = ''
         self._places = graph.places
+        characterised: list[str] = []
         for subject, predicate, value in graph.triples:
             self.nodes.setdefault(subject, {}).setdefault(predicate, []).append(value)
             if predicate == _TYPE and isinstance(value, str):
@@ -136,9 +144,13 @@ class _Statements:
                 elif value == OWL + 'Ontology' and not self.header:
                     self.header = subject
                 elif value in CHARACTERISTICS:
-                    self.kinds.setdefault(subject, set()).add('object_property')
+                    characterised.append(subject)
                 elif value == SWRL + 'Variable':
                     self.variables.add(subject)
+        for subject in characterised:
+            kinds = self.kinds.setdefault(subject, set())
+            if 'data_property' not in kinds:
+                kinds.add('object_property')
 
     def where(self, node: str) -> str:
         """Return a node's line for the beginning of a message."""
@@ -493,6 +505,8 @@ class Mapping:
             self._attempt(subject, self._type, subject, value)
         if OWL + 'onProperty' in properties and not subject.startswith('_:'):
             self._attempt(subject, self._named_restriction, subject, properties)
+        if subject.startswith(BUILT_IN[:3]) and subject not in _WITH_AXIOMS:
+            self._attempt(subject, self._reserved, subject, properties)
         for predicate, values in properties.items():
             if predicate == _TYPE or predicate in _STRUCTURE:
                 continue
@@ -502,6 +516,14 @@ class Mapping:
                     self.axioms[record(predicate, subject, value)] = None
                 else:
                     self._attempt(subject, self._triple, subject, predicate, value)
+
+    def _reserved(self, subject: str, properties: dict[str, list[Node]]) -> None:
+        """Report what is said of a word of OWL's own, which means what OWL says."""
+        types = {value for value in properties.get(_TYPE, ()) if isinstance(value, str)}
+        said = properties.keys() & _OF_PROPERTIES or types & {*CHARACTERISTICS, _FUNCTIONAL}
+        if said and self._graph.kinds.get(subject) != {'annotation_property'}:
+            told = ', '.join(sorted(map(local_name, said)))
+            self._report(subject, f'{told} of {local_name(subject)}, a word of OWL, has no effect')
 
     def _named_restriction(self, subject: str, properties: dict[str, list[Node]]) -> None:
         self._add(ax.EquivalentClasses((subject, self._terms.restriction(subject, properties))))
@@ -539,10 +561,14 @@ class Mapping:
             if not subject.startswith('_:'):
                 self._add(ax.Declaration(kind, subject))
         elif name in CHARACTERISTICS:
+            if self._graph.is_data(subject):
+                raise self._graph.ill_formed(
+                    subject, f'a data property cannot be of type {local_name(name)}'
+                )
             if not subject.startswith('_:'):
                 self._add(ax.Declaration('object_property', subject))
             self._add(CHARACTERISTICS[name](self._terms.property(subject)))
-        elif name == OWL + 'FunctionalProperty':
+        elif name == _FUNCTIONAL:
             if self._graph.is_data(subject):
                 self._add(ax.FunctionalDataProperty(subject))
             else:
@@ -652,8 +678,10 @@ class Mapping:
         if not self._used:
             self._used = {name for properties in self._graph.nodes.values() for name in properties}
         for name in (subject, value):
-            if name in self._used:
-                self._report(subject, f'owl:sameAs says nothing of {local_name(name)} as property')
+            kinds = self._graph.kinds.get(name, set())
+            known = [kind for kind in ('class', 'datatype') if kind in kinds]
+            for kind in ['property'] * (name in self._used) + known:
+                self._report(subject, f'owl:sameAs says nothing of {local_name(name)} as {kind}')
         return ax.SameIndividual(frozenset((subject, value)))
 
     def _key(self, subject: str, value: str) -> Axiom:
