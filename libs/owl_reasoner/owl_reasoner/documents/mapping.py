@@ -56,6 +56,8 @@ CHARACTERISTICS: dict[str, Callable[[ex.PropertyExpression], Axiom]] = {
     OWL + 'TransitiveProperty': ax.TransitiveObjectProperty,
 }
 _FUNCTIONAL = OWL + 'FunctionalProperty'
+_CHAIN = OWL + 'propertyChain'
+"""The chain below a property, of a node without a name: a draft of OWL 2 had it so."""
 _WITH_AXIOMS = {THING, NOTHING, TOP, BOTTOM, TOP_DATA, BOTTOM_DATA}
 """What is OWL's own and may have axioms."""
 ANNOTATIONS = {
@@ -298,9 +300,11 @@ class _Terms:
         self._open: set[str] = set()
 
     def property(self, node: str) -> ex.PropertyExpression:
-        inverse = self._graph.one(node, OWL + 'inverseOf') if node.startswith('_:') else None
-        if not isinstance(inverse, str):
+        if not node.startswith('_:'):
             return node
+        inverse = self._graph.one(node, OWL + 'inverseOf')
+        if not isinstance(inverse, str):
+            raise self._graph.ill_formed(node, 'expected a property, got a node without a name')
         inner = self._inside(node, lambda _: self.property(inverse))
         return inner.prop if isinstance(inner, ex.ObjectInverseOf) else ex.ObjectInverseOf(inner)
 
@@ -380,9 +384,14 @@ class _Terms:
         if predicate == OWL + 'complementOf':
             return ex.ObjectComplementOf(self.expression(value))
         if predicate == OWL + 'oneOf':
-            return ex.ObjectOneOf(tuple(self._graph.resources(value)))
-        record = ex.ObjectUnionOf if predicate == OWL + 'unionOf' else ex.ObjectIntersectionOf
-        return record(tuple(map(self.expression, self._graph.list_of(value))))
+            individuals = tuple(self._graph.resources(value))
+            return ex.ObjectOneOf(individuals) if individuals else NOTHING
+        # Of none and of one, as OWL 1 has them (OWL 2 mapping to RDF, table 14).
+        is_union = predicate == OWL + 'unionOf'
+        operands = tuple(map(self.expression, self._graph.list_of(value)))
+        if len(operands) < 2:
+            return operands[0] if operands else NOTHING if is_union else THING
+        return (ex.ObjectUnionOf if is_union else ex.ObjectIntersectionOf)(operands)
 
     def restriction(self, node: str, properties: dict[str, list[Node]]) -> ex.ClassExpression:
         on = self._graph.resource(node, OWL + 'onProperty')
@@ -627,9 +636,20 @@ class Mapping:
 
     def _equivalent_class(self, subject: str, value: str) -> Axiom:
         if self._graph.is_data_range(subject):
+            self._check_named(subject)
             return ax.DatatypeDefinition(subject, self._terms.data_range(value))
         return ax.EquivalentClasses(
             (self._terms.expression(subject), self._terms.expression(value))
+        )
+
+    def _check_named(self, subject: str) -> None:
+        if subject.startswith('_:'):
+            raise self._graph.ill_formed(subject, 'a node without a name cannot be defined')
+
+    def _disjoint_union(self, subject: str, value: str) -> Axiom:
+        self._check_named(subject)
+        return ax.DisjointUnion(
+            subject, tuple(map(self._terms.expression, self._graph.list_of(value)))
         )
 
     def _defined(self, subject: str, value: str, predicate: str) -> Axiom | None:
@@ -644,6 +664,9 @@ class Mapping:
     def _between(self, subject: str, value: str, predicate: str) -> Axiom:
         """Read a relation of two properties."""
         of_objects, of_data = _BETWEEN[predicate]
+        chain = self._graph.one(subject, _CHAIN) if subject.startswith('_:') else None
+        if chain is not None and predicate == RDFS + 'subPropertyOf':
+            return self._chain(value, chain)
         kinds, others = self._graph.value_kinds(subject), self._graph.value_kinds(value)
         if kinds and others and kinds.isdisjoint(others):
             raise self._graph.ill_formed(
@@ -652,10 +675,12 @@ class Mapping:
                 f' {local_name(subject)} and {local_name(value)}',
             )
         if self._graph.is_data(subject) or self._graph.is_data(value):
+            if subject.startswith('_:') or value.startswith('_:'):
+                raise self._graph.ill_formed(subject, 'expected the name of a data property')
             return of_data(subject, value)
         return of_objects(self._terms.property(subject), self._terms.property(value))
 
-    def _chain(self, subject: str, value: str) -> Axiom:
+    def _chain(self, subject: str, value: Node) -> Axiom:
         chain = tuple(self._terms.property(item) for item in self._graph.resources(value))
         return ax.SubPropertyChainOf(chain, self._terms.property(subject))
 
@@ -841,9 +866,7 @@ _PREDICATES: dict[str, Callable[[Mapping, str, str], Axiom | None]] = {
     OWL + 'disjointWith': lambda m, s, v: ax.DisjointClasses(
         (m._terms.expression(s), m._terms.expression(v))
     ),
-    OWL + 'disjointUnionOf': lambda m, s, v: ax.DisjointUnion(
-        s, tuple(map(m._terms.expression, m._graph.list_of(v)))
-    ),
+    OWL + 'disjointUnionOf': Mapping._disjoint_union,
     OWL + 'propertyChainAxiom': Mapping._chain,
     OWL + 'inverseOf': Mapping._inverse,
     RDFS + 'domain': Mapping._domain,
@@ -852,6 +875,7 @@ _PREDICATES: dict[str, Callable[[Mapping, str, str], Axiom | None]] = {
     OWL + 'differentFrom': lambda m, s, v: ax.DifferentIndividuals(frozenset((s, v))),
     OWL + 'hasKey': Mapping._key,
     OWL + 'datatypeComplementOf': lambda *_: None,
+    _CHAIN: lambda *_: None,
     **{name: partial(Mapping._between, predicate=name) for name in _BETWEEN},
     **{name: partial(Mapping._defined, predicate=name) for name in _CONSTRUCTED},
 }
