@@ -6,6 +6,7 @@ import itertools
 import math
 import random
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from hypothesis import strategies as st
 from patrol_policy.fleet import (
     ChargeNeed,
     DockSlot,
+    FleetChoice,
     FleetError,
     FleetRobot,
     FleetSettings,
@@ -33,6 +35,7 @@ from patrol_policy.fleet.partition import (
     group_of,
     lengths_of_sets,
 )
+from patrol_policy.graph import PatrolGraph
 from patrol_policy.tour import shortest_tour, tour_length
 
 from .test_fleet import fleet, random_map, ring
@@ -288,8 +291,9 @@ def test_facts_that_leave_a_robot_without_a_share_are_told() -> None:
     def absent(robot: FleetRobot, now: float = 100.0) -> str:
         return assign(graph, [one, robot], now, settings).absent.get(robot.name, '')
 
-    def changed(**facts: object) -> FleetRobot:
-        return FleetRobot(**{'name': 'robot2', 'place': 'P04', 'heard_at': 100.0, **facts})  # type: ignore[arg-type]
+    def changed(**facts: Any) -> FleetRobot:
+        known: dict[str, Any] = {'name': 'robot2', 'place': 'P04', 'heard_at': 100.0, **facts}
+        return FleetRobot(**known)
 
     assert absent(two) == ''
     assert absent(changed(taken_out=True)) == 'robot2 is taken out'
@@ -324,3 +328,126 @@ def test_groups_in_force_are_given_up_for_what_is_clearly_better_alone() -> None
         found = assign(graph, robots, 0.0, FleetSettings(worth_changing=part)).plan
         assert found is not None
         assert ({group.stops for group in found.groups} == set(worse)) == keeps
+
+
+RING = ring(12)
+TOUR = fleet_plan(RING, 1).groups[0].stops
+
+
+def robot_at(
+    number: int, stop: int | None = None, name: str = 'robot1', **facts: Any
+) -> FleetRobot:
+    share = Share(TOUR, TOUR[number if stop is None else stop])
+    return FleetRobot(name, TOUR[number], share=share, **facts)
+
+
+def chosen(me: FleetRobot, *others: FleetRobot, now: float = 0.0, **settings: Any) -> FleetChoice:
+    return choose(RING, [me, *others], me.name, now, FleetSettings(**settings))
+
+
+def test_a_robot_stays_until_the_one_ahead_is_an_equal_distance_away() -> None:
+    # Two on a tour of 120 s: 60 s are between them.
+    for ahead in range(1, 12):
+        choice = chosen(robot_at(0), robot_at(ahead, name='robot2'))
+        gap = 10.0 * ahead
+        assert choice.until == (60.0 - gap if gap < 60.0 else None), ahead
+        assert choice.place == TOUR[0 if gap < 60.0 else 1]
+        if gap < 60.0:
+            assert choice.reason == (
+                f'staying in {TOUR[0]} for {60.0 - gap:.0f} s: robot2 is less than 60 s ahead on '
+                'the tour of 120 s'
+            )
+            assert not choice.overstays
+    # Of two at one stop the one that came first is ahead, then the first by name.
+    later = robot_at(0, since=5.0)
+    assert chosen(later, robot_at(0, name='robot2', since=4.0)).until == 60.0
+    assert chosen(later, robot_at(0, name='robot2', since=6.0)).until is None
+    assert chosen(later, robot_at(0, name='robot2', since=5.0)).until is None
+    assert chosen(later, robot_at(0, name='robot0', since=5.0)).until == 60.0
+    # One that drives is as far as its way says: 4 s of 10 are left.
+    driving = robot_at(3, 4, name='robot2', since=-6.0)
+    assert chosen(robot_at(0), driving, now=0.0).until == pytest.approx(60.0 - 36.0)
+    overtime = robot_at(3, 4, name='robot2', since=-9.0)
+    assert chosen(robot_at(0), overtime, now=9.0).until == pytest.approx(9.0 + 60.0 - 40.0)
+    # Who has been here for longer than the distance overstays.
+    assert chosen(robot_at(0, since=-60.0), robot_at(1, name='robot2')).overstays is False
+    assert chosen(robot_at(0, since=-60.1), robot_at(1, name='robot2')).overstays is True
+    # A hundredth of the distance is not worth a stop.
+    near = robot_at(5, 6, name='robot2', since=-9.45)
+    assert chosen(robot_at(0), near).until is None
+    near = robot_at(5, 6, name='robot2', since=-9.3)
+    assert chosen(robot_at(0), near).until == pytest.approx(0.7)
+
+
+def test_stops_are_a_robots_own_up_to_that_of_the_next_one() -> None:
+    choice = chosen(robot_at(11), robot_at(4, name='robot2'), robot_at(8, name='robot3'))
+    assert choice.place == TOUR[0]
+    assert choice.mine == set(TOUR[:4])
+    # Of two at one stop it is that of the one that waits longer.
+    first = chosen(robot_at(2, 5, since=1.0), robot_at(5, name='robot2', since=2.0))
+    assert first.mine == set(TOUR)
+    second = chosen(robot_at(2, 5, since=3.0), robot_at(5, name='robot2', since=2.0))
+    assert second.mine == set()
+
+
+def charging(number: int, seconds: float, **facts: Any) -> FleetRobot:
+    return robot_at(number, runs_until=900.0, charge_seconds=seconds, **facts)
+
+
+def test_a_robot_charges_in_passing_as_long_as_planned() -> None:
+    dock = TOUR[3]
+    usual: dict[str, Any] = {'docks': (dock,), 'charge_ratio': 0.25, 'silent_after': 1000.0}
+    # A round of 120 s costs 30 s at the dock; 2 % more make up for what is missing.
+    for needs, stays in ((10.0, 10.0), (30.0, 30.0), (30.5, 30.5), (40.0, 30.6)):
+        choice = chosen(charging(3, needs), now=100.0, **usual)
+        assert choice.slot is not None
+        assert (choice.slot.begin, choice.slot.end) == (100.0, pytest.approx(100.0 + stays))
+        assert choice.share == Share(TOUR, TOUR[4])
+        assert choice.reason == (
+            f'charging in passing at {dock} until 00:0{(100 + stays) // 60:.0f}: a stop of the '
+            'tour of 150 s'
+        )
+    # What is hardly worth a stop is left out, and what is not needed or not free.
+    assert chosen(charging(3, 5.0), **usual).slot is not None
+    assert chosen(charging(3, 4.9), **usual).slot is None
+    assert chosen(charging(3, 4.9), **usual, least_charge=4.0).slot is not None
+    assert chosen(robot_at(3, charge_seconds=30.0), **usual).slot is None
+    assert chosen(charging(2, 30.0), **usual).slot is None
+    other = FleetRobot('robot2', dock, dock=dock, charging_until=20.0, runs_until=500.0)
+    assert 'in passing' not in chosen(charging(3, 30.0), other, **usual).reason
+    # On its way to another stop it only makes up for charges that it missed.
+    for needs, charges in ((45.0, True), (44.9, False)):
+        passing = chosen(charging(3, needs, stop=6), **usual)
+        assert (passing.slot is not None) == charges
+        assert not charges or passing.share == Share(TOUR, TOUR[6])
+    # It has been there just now.
+    assert chosen(charging(3, 60.0, stop=4), **usual).slot is None
+
+
+def test_a_robot_leaves_for_its_slot_in_time() -> None:
+    dock = TOUR[0]
+    me = robot_at(5, 6, runs_until=100.0, charge_seconds=30.0)
+    # From stop 6 it is 60 s to the dock, and 10 s to stop 6.
+    for now, goes in ((29.9, False), (30.0, True)):
+        choice = chosen(me, now=now, docks=(dock,), silent_after=1000.0)
+        assert (choice.slot is not None) == goes
+        assert (choice.place == dock) == goes
+    assert choice.reason == f'charging at {dock} from 00:01 to 00:02: that is my slot'
+    # Where another one charges until later it waits at the dock from when it has to be there.
+    busy = FleetRobot(
+        'robot2', dock, dock=dock, charging_until=150.0, runs_until=300.0, heard_at=0.0
+    )
+    late = chosen(me, busy, now=35.0, docks=(dock,), silent_after=1000.0)
+    assert late.slot is not None
+    assert (late.slot.begin, late.slot.late) == (150.0, 50.0)
+    assert late.reason.endswith('that is my slot, 50 s late: the docks are too few')
+
+
+def test_a_lone_robot_of_one_place_looks_anew_soon() -> None:
+    only = PatrolGraph({'A': {}})
+    robot = FleetRobot('robot1', 'A')
+    choice = choose(only, [robot], 'robot1', 100.0, FleetSettings(silent_after=1000.0))
+    assert (choice.place, choice.until) == ('A', 105.0)
+    assert choice.reason == (
+        'A is mine: it is the next of 1 places on a tour of 0 s, each every 0 s'
+    )
