@@ -50,6 +50,95 @@ def test_a_robot_without_an_intention_is_named() -> None:
         right_of_way([Intention('a', 'R1')], 'c', STAR, Layout())
 
 
+WIDE_DOORS = Layout.of(['C1', 'C2'], ['C1 R1', 'C1 C2'])
+
+
+def test_into_a_narrow_place_goes_one_at_a_time() -> None:
+    me = Intention('a', 'C1', 'R1', 5.0)
+
+    def why(other: Intention) -> str:
+        told = right_of_way([me, other], 'a', STAR, WIDE_DOORS)
+        assert told.go == (not told.because)
+        assert told.place == 'R1'
+        assert told.other == ('' if told.go else 'b')
+        return told.because
+
+    assert why(Intention('b', 'R1')) == 'R1 is narrow, and b is in R1'
+    moving = Intention('b', 'C1', 'R1', 9.0, is_moving=True)
+    assert why(moving) == 'R1 is narrow, and b is on its way to R1'
+    first = 'b goes first to R1, where there is room for one'
+    assert why(Intention('b', 'C1', 'R1', 4.0)) == first
+    assert why(Intention('b', 'C1', 'R1', 6.0)) == ''
+    # Of two that have wished for as long the first by name goes.
+    assert why(Intention('b', 'C1', 'R1', 5.0)) == ''
+    swapped = right_of_way([me, Intention('A', 'C1', 'R1', 5.0)], 'a', STAR, WIDE_DOORS)
+    assert swapped.other == 'A'
+    assert why(Intention('b', 'C1', 'R1', 4.0, is_fixed=True)) == ''
+    assert why(Intention('b', 'C1', 'R2', 4.0, is_moving=True)) == ''
+    # Where it is wide there is room for all.
+    into_wide = [Intention('a', 'C1', 'C2', 5.0), Intention('b', 'C2', 'C1', 4.0)]
+    assert right_of_way(into_wide, 'a', STAR, WIDE_DOORS).go
+
+
+SIDING = {'W': ['N1'], 'N1': ['W', 'N2'], 'N2': ['N1', 'N3'], 'N3': ['N2']}
+"""A wide place, and three narrow ones in a row behind it."""
+
+
+def test_two_that_begin_in_one_block_leave_it_one_after_the_other() -> None:
+    layout = Layout.of(['W'], ['W N1', 'N1 N2', 'N2 N3'])
+    behind, ahead = Intention('a', 'N2', 'N1', 5.0), Intention('b', 'N1', 'W', 9.0)
+    told = right_of_way([behind, ahead], 'a', SIDING, layout)
+    assert (told.go, told.because) == (False, 'b leaves N1 first')
+    assert right_of_way([behind, ahead], 'b', SIDING, layout).go
+    farther = Intention('b', 'N3', 'N2', 1.0)
+    assert right_of_way([behind, farther], 'a', SIDING, layout).go
+    driving = Intention('b', 'N3', 'N2', 9.0, is_moving=True)
+    assert right_of_way([behind, driving], 'a', SIDING, layout).because == 'b leaves N3 first'
+    fixed = Intention('b', 'N1', '', 1.0, is_fixed=True)
+    assert right_of_way([behind, fixed], 'a', SIDING, layout).go
+    beside = Intention('b', 'N2', 'N1', 4.0)
+    assert right_of_way([behind, beside], 'a', SIDING, layout).other == 'b'
+    assert right_of_way([behind, Intention('b', 'N2', 'N1', 6.0)], 'a', SIDING, layout).go
+
+
+def test_who_leaves_a_block_goes_before_who_wants_in() -> None:
+    layout = Layout.of(['W'], ())
+    out, into = Intention('a', 'N1', 'W', 9.0), Intention('b', 'W', 'N1', 1.0)
+    assert right_of_way([out, into], 'a', SIDING, layout).go
+    told = right_of_way([out, into], 'b', SIDING, layout)
+    assert told.because == 'a goes first on the way W - N1'
+    # Who stays inside gives way to the first that wants in, by the way to the wide place.
+    stays = Intention('c', 'N3')
+    told = right_of_way([stays, into, Intention('a', 'W', 'N1', 0.5)], 'c', SIDING, layout)
+    assert (told.go, told.place, told.other) == (True, 'N2', 'a')
+    assert told.because == 'a wants to N1, and N3 is narrow'
+    assert right_of_way([stays, Intention('b', 'N2', 'N1', 1.0)], 'c', SIDING, layout).place == 'N3'
+    # Where there is no wide place nobody can give way.
+    told = right_of_way([stays, into], 'c', SIDING, Layout())
+    assert (told.place, told.because) == ('N3', '')
+
+
+def test_what_may_be_contested_is_a_narrow_way_or_block_that_another_robot_is_beside() -> None:
+    def contested(me: Intention, other: Intention, layout: Layout) -> bool:
+        return may_be_contested([me, other], me.robot, STAR, layout)
+
+    wide = Layout.of(['C1', 'C2', 'R3'], ['C1 R1', 'C1 C2'])
+    me = Intention('a', 'C1', 'R1')
+    assert contested(me, Intention('b', 'C1'), wide)
+    assert contested(me, Intention('b', 'R1'), wide)
+    assert contested(me, Intention('b', 'C2', 'C1'), wide)
+    assert not contested(me, Intention('b', 'C2'), wide)
+    assert not contested(me, Intention('b', 'R2'), wide)
+    through = Intention('a', 'C1', 'C2')
+    assert not contested(through, Intention('b', 'C2'), wide)
+    narrow = Layout.of(['C1', 'C2', 'R3'], ())
+    assert contested(through, Intention('b', 'C2'), narrow)
+    assert contested(through, Intention('b', 'R3', 'C2'), narrow)
+    assert not contested(through, Intention('b', 'R3'), narrow)
+    assert not contested(Intention('a', 'C1'), Intention('b', 'C1'), narrow)
+    assert not may_be_contested([Intention('b', 'C1')], 'a', STAR, narrow)
+
+
 def tree(rng: random.Random, count: int) -> dict[str, list[str]]:
     neighbours: dict[str, list[str]] = {'p0': []}
     for number in range(1, count):
