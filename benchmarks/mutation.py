@@ -9,10 +9,10 @@ reach its line, found by coverage; a mutant that none of them notices is a survi
 assertion, or a change that makes no difference.
 
 A PART is a library, or a package of the robot: its modules without ROS, tried by the tests marked
-`unit` alone, of the files that name the module's folder. A process collects the tests once. A fault
-within a function is put into a fork of it, which therefore costs its tests alone; a fault in what
-runs at import costs the imports as well. Limits are in processor time, since the machine may be
-busy. No file is changed.
+`unit` alone, of the files that name the module. A process collects the tests once. A fault within a
+function is put into a fork of it, which therefore costs its tests alone; a fault in what runs at
+import costs the imports as well. Limits are in processor time, since the machine may be busy. No
+file is changed.
 
 `equivalent_mutants.toml` names changes that make no difference to a user, each with its reason;
 they are left out. `--report FILE` keeps the survivors, `--again FILE` tries those alone.
@@ -429,10 +429,11 @@ def collected(root: Path, mutants: Sequence[Mutant]) -> tuple[Reach, dict[Mutant
 
 
 def test_files(root: Path, mutants: Sequence[Mutant]) -> list[str]:
-    """Return the test files to collect: of the robot's those that name a module's folder.
+    """Return the test files to collect: of the robot's those that name a mutant's module.
 
-    What a file takes from the helpers beside it counts as its own. A folder that none names is
-    tried by the files that name its package. Tests in processes of their own meet no fault.
+    What a file takes from the helpers beside it counts as its own. A module that none names is
+    tried by the files that name its folder, or else its package. Tests in processes of their own
+    meet no fault.
     """
     if root != CHECKOUT:
         return []
@@ -446,11 +447,14 @@ def test_files(root: Path, mutants: Sequence[Mutant]) -> list[str]:
                 text += helper.read_text(encoding='utf-8')
         texts[str(path.relative_to(root))] = text
     chosen: set[str] = set()
-    for part, inner in {(each.part, Path(each.module).parts[2:]) for each in mutants}:
-        name = inner[0].removesuffix('.py')
-        near = re.compile(rf'\b{part}(?:\.| import (?:.*, )?){name}\b')
-        found = {file for file, text in texts.items() if near.search(text)}
-        chosen |= found or {file for file, text in texts.items() if part in text}
+    for module in {each.module for each in mutants}:
+        name = list(Path(module).with_suffix('').parts[1:])
+        found: set[str] = set()
+        while name and not found:
+            near = re.compile(rf'\b{".".join(name[:-1])}(?:\.| import (?:.*, )?){name[-1]}\b')
+            found = {file for file, text in texts.items() if near.search(text)}
+            name.pop()
+        chosen |= found
     return sorted(chosen)
 
 
