@@ -333,13 +333,12 @@ class WorldModel:
             for place, at in visits.items():
                 if place in last.connections:
                     seen[place] = max(at, seen.get(place, -1.0))
-        since = now if self._since is None else self._since
         limits = {**self._rules.thresholds, **last.thresholds}
         late = {
             place
             for place in last.connections
             if place not in seen
-            or now - seen.get(place, since) > limits.get(place, threshold)
+            or now - seen[place] > limits.get(place, threshold)
             # Something was noticed there, and nobody came since.
             or (
                 {ALERT, URGENT} <= last.classes[place] and seen[place] == last.visited_at.get(place)

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from types import MappingProxyType
 
 import pytest
 
@@ -16,8 +18,9 @@ from state_machines.exceptions import CallError, UnavailableError
 from surveillance_behaviour.fleet import FleetFacts, FleetKnowledge
 from surveillance_behaviour.ros_adapters.fleet_topic import facts_of, message_of, without_future
 from surveillance_behaviour.world_model import WorldModel
+from surveillance_runtime.place.stations import Station
 
-from .scripted_world import World
+from .scripted_world import POSITIONS, World
 
 NOBODY = Interrupt()
 WIDE = Layout.of(['R1', 'R2', 'R3', 'R4', 'C1', 'C2', 'E'], ())
@@ -64,7 +67,14 @@ class CutWorld(World):
 class Robot:
     """One robot: it decides, and drives each leg in its straight time."""
 
-    def __init__(self, air: Air, name: str, start: str, rules: tuple[str, ...] = ()) -> None:
+    def __init__(
+        self,
+        air: Air,
+        name: str,
+        start: str,
+        rules: tuple[str, ...] = (),
+        stations: Mapping[str, Station] = MappingProxyType({}),
+    ) -> None:
         self.world = CutWorld(start_place=start)
         self.world.is_in = start
         if air.robots:  # One ontology.
@@ -86,6 +96,7 @@ class Robot:
             announce=self.decisions.append,
             tell=self.said.append,
             fleet=self.fleet,
+            stations=stations,
         )
         self.due = 0.0
         self.going = ''
@@ -329,7 +340,11 @@ def test_visits_that_no_clock_has_reached_are_not_believed() -> None:
 
 
 def test_a_charge_in_passing_keeps_the_share_and_has_its_time() -> None:
-    air, (first, second) = patrol(2)
+    air = Air()
+    stations = {'E': Station((POSITIONS['E'][0] + 6.0, POSITIONS['E'][1], 0.0))}
+    first, second = (
+        Robot(air, name, at, stations=stations) for name, at in (('a', 'E'), ('b', 'C1'))
+    )
     for robot in (first, second):
         robot.fleet.settings = FleetSettings(docks=('E',))
     air.run(40.0)
@@ -351,11 +366,14 @@ def test_a_charge_in_passing_keeps_the_share_and_has_its_time() -> None:
     assert decision.slot is not None
     own = second.fleet.outlook(model.graph, now).robots[0]
     assert own.dock == 'E'
-    assert own.charging_until == pytest.approx(decision.slot.end, abs=5.0)
+    ends = decision.slot.end + 6.0 / model.settings.speed  # it drives to its dock first
+    assert own.charging_until == pytest.approx(ends, abs=1.5)
+    assert own.runs_until is not None
+    assert 15.0 < 60.0 - 0.1 * (own.runs_until - now) < 25.0, 'until it must charge'
     model.learn_draw(lambda: now + 1.0)
     first.world.set_level(61.0)
     own = second.fleet.outlook(model.graph, now).robots[0]
-    assert own.charging_until == pytest.approx(decision.slot.end, abs=5.0)
+    assert own.charging_until == pytest.approx(ends, abs=1.5)
     assert own.share == Share(tour, tour[(tour.index('E') + 1) % len(tour)])
     assert not model.charge_is_over(now + 2.0)
     assert model.why_charge()

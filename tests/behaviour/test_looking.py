@@ -297,6 +297,14 @@ def test_where_time_is_short_the_viewpoint_that_shows_most_comes_first():
     assert run.looking.driven[0][1] == far
 
 
+@pytest.mark.parametrize(('speed', 'driven'), [(0.5, True), (0.1, False)])
+def test_a_slow_robot_begins_no_way_that_its_time_does_not_allow(speed: float, driven: bool):
+    run = Watched('surveillance', exploration_seconds=17.5, speed=speed)
+    run.looking.points = {'C1': [(11.5, 8.0, 0.0)]}
+    run.until(200.0)
+    assert bool(run.looking.driven) is driven
+
+
 def test_the_robot_stays_at_its_station():
     run = Watched('surveillance', exploration_seconds=40.0)
     run.looking.points = {'E': [(4.0, 9.0, 0.0)]}

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Iterator
+from types import SimpleNamespace
 
 import pytest
 
 import state_machines as fsm
 from state_machines.exceptions import CallError
 from surveillance_behaviour.machines import MACHINES
+from surveillance_behaviour.machines.patrol_machine import Recharge
 
-from .machine_runs import CALLS, Run
+from .machine_runs import CALLS, Run, settings
 from .scripted_world import World, fails, started_again
 
 WAYS = {
@@ -187,3 +189,15 @@ def on_entry(container: fsm.Container, label: str, action: Callable[[], None]) -
 
     container.register_start_cb(entered)
     container.register_transition_cb(entered)
+
+
+@pytest.mark.parametrize(('level', 'outcome'), [(60.0, 'not_at_dock'), (100.0, 'battery_full')])
+def test_a_charge_that_was_left_half_way_is_gone_on_with(level: float, outcome: str):
+    """Whoever pushes the robot from its dock at 60 % has not charged it."""
+    world = World(start_place='R1')
+    mission = world.mission(settings(), machine='patrol')
+    mission.place = world.is_in = 'R1'
+    world.set_level(level)
+    ud = SimpleNamespace(target='')
+    assert Recharge(mission).work(ud, fsm.Interrupt()) == outcome
+    assert (ud.target == 'E') is (outcome == 'not_at_dock')

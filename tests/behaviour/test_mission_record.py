@@ -125,6 +125,14 @@ def test_the_summary_counts_everything(path: Path) -> None:
     assert summary.distance == 15.5
     text = str(summary)
     assert '1 min 40 s, 2 of 3 places visited, 3 visits, 15.5 m' in text
+    rows = [line.split() for line in text.splitlines()[1:5]]
+    assert rows == [
+        ['place', 'visits', 'longest', 'unvisited'],
+        ['C1', '2', '50.0', 's'],
+        ['E', '1', '70.0', 's'],
+        ['R1', '0', '100.0', 's'],
+    ]
+    assert len({len(line) for line in text.splitlines()[1:5]}) == 1, 'a table'
     assert 'recharges: 1 (0 min 20 s)' in text
     assert 'decisions by rule: CORRIDOR 1, recharge 1' in text
     assert 'failures: MOVE_TO_NEXT_ROOM 1' in text

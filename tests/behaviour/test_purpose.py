@@ -39,6 +39,17 @@ def test_a_robot_that_creeps_moves() -> None:
     assert not told
 
 
+def test_where_the_robot_is_may_become_known_or_unknown_but_stay_so_only_for_a_while() -> None:
+    watchdog, told = watch()
+    for second in range(40):
+        pose = None if second // 8 % 2 else MOVING.pose
+        watchdog.look(replace(MOVING, now=float(second), pose=pose))
+    assert not told
+    for second in range(40, 60):
+        watchdog.look(replace(MOVING, now=float(second), pose=None))
+    assert len(told) == 1
+
+
 def test_a_word_a_charge_and_a_pause_are_no_silence() -> None:
     watchdog, told = watch()
     still = replace(MOVING, state='RECHARGE_TASK')
