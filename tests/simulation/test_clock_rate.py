@@ -115,6 +115,17 @@ def test_a_drive_takes_time_and_a_plan_takes_none() -> None:
     assert rate.due(1.1, 0.03, moving=False) == 0.0
 
 
+def test_a_drive_whose_goal_is_told_again_still_waits_for_its_command() -> None:
+    """The status of an action's goals comes once more with each new goal."""
+    rate = ClockRate(ClockRateModel(speed=0.0), 0.0)
+    rate.robots[0].goals('follow_path', 0.0, executed=True)
+    assert rate.due(0.0, 0.01, moving=False) > 0.0
+    rate.robots[0].goals('follow_path', 0.1, executed=True)
+    rate.robots[0].goals('compute_path', 0.1, executed=True)
+    rate.robots[0].goals('compute_path', 0.1, executed=False)
+    assert rate.due(0.1, 0.02, moving=False) == 0.0
+
+
 def test_a_drive_has_its_command_at_every_step_also_while_the_robot_stands() -> None:
     rate = ClockRate(ClockRateModel(speed=0.0), 0.0)
     rate.robots[0].goals('follow_path', 0.0, executed=True)

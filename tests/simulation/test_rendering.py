@@ -15,7 +15,9 @@ from surveillance_runtime.place.floor_plan import Marker
 from surveillance_simulation.camera.model import LIGHTINGS, Camera, Conditions, expose, lit
 from surveillance_simulation.camera.mujoco_rendering import MujocoRenderer
 from surveillance_simulation.camera.rendering import Renderer
+from surveillance_simulation.camera.scene import thing_faces
 from surveillance_simulation.world import textures
+from surveillance_simulation.world.things import barrel, box
 from surveillance_simulation.world.world import World, read_world
 
 from .places import CONFIG, camera_pose, changed, two_rooms
@@ -168,11 +170,50 @@ def test_a_marker_that_does_not_exist_is_refused(
 
 @pytest.mark.parametrize(
     ('arguments', 'message'),
-    [((0, 480, 1.0), 'a picture of 0x480'), ((640, 480, 4.0), 'field of view 4 rad')],
+    [
+        ((0, 480, 1.0), 'a picture of 0x480'),
+        ((640, 0, 1.0), 'a picture of 640x0'),
+        ((640, -1, 1.0), 'a picture of 640x-1'),
+        ((640, 480, 4.0), 'field of view 4 rad'),
+        ((640, 480, 0.0), 'field of view 0 rad'),
+    ],
 )
 def test_a_camera_that_cannot_be_is_refused(arguments: tuple, message: str) -> None:
     with pytest.raises(ValueError, match=message):
         Camera.from_field_of_view(*arguments)
+    assert Camera.from_field_of_view(1, 1, math.pi / 2).focal == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize('yaw', [0.0, 0.7])
+def test_lids_lie_flat_on_what_they_close_and_faces_stand_upright(yaw: float) -> None:
+    """Seen from above a box ends at its sides, and what is round does not reach beyond."""
+    for thing, reach in (
+        (box('b', 1.0, 2.0, yaw, 0.6, 0.4, 0.3), math.hypot(0.3, 0.2)),
+        (barrel('b', 1.0, 2.0, 0.3), 0.3),
+    ):
+        top = thing.parts[0].top
+        lids = sides = 0
+        for face in thing_faces(thing):
+            corners = np.array(
+                [
+                    face.corner + a * face.across + d * face.down
+                    for a in (0.0, 1.0)
+                    for d in (0.0, 1.0)
+                ]
+            )
+            heights = np.unique(np.round(corners[:, 2], 9))
+            away = np.hypot(corners[:, 0] - 1.0, corners[:, 1] - 2.0)
+            if len(heights) == 1:
+                lids += 1
+                assert heights[0] in (0.0, top)
+                assert np.allclose(corners[:, :2].mean(axis=0), (1.0, 2.0))
+                assert away == pytest.approx([reach] * 4, rel=0.01)
+            else:
+                sides += 1
+                assert heights == pytest.approx([0.0, top])
+                assert np.all(away <= reach * 1.1)
+        assert lids == 2
+        assert sides >= 4
 
 
 def test_lighting_changes_the_brightness_as_its_name_says() -> None:

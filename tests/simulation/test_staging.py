@@ -15,8 +15,8 @@ from surveillance_runtime.place import PlaceError
 from surveillance_simulation.camera.model import Camera, covered
 from surveillance_simulation.camera.mujoco_rendering import MujocoRenderer
 from surveillance_simulation.camera.rendering import Renderer
-from surveillance_simulation.robot.robot import Robot
-from surveillance_simulation.staging import Stage, check_script, read_script
+from surveillance_simulation.robot.robot import PHYSICS_STEP, Robot
+from surveillance_simulation.staging import Stage, Times, check_script, read_script
 
 from .places import camera_pose, two_rooms
 
@@ -134,6 +134,67 @@ def test_who_walks_goes_there_and_back_and_stops_before_the_robot() -> None:
     for _ in range(30):
         robot.advance(0.1)
     assert abs(robot.world.people[0].x - 4.5) >= 0.7
+
+
+def test_a_way_may_pass_its_last_point_before_its_end() -> None:
+    """Who was sent to and fro stood still for ever where the way ends."""
+    robot = staged('walk p 3.5 1.0 4.5 1.0 4.5 1.5 4.5 1.0')
+    robot.advance(0.25)
+    seen = []
+    for _ in range(8):
+        (person,) = robot.world.people
+        seen.append((round(person.x, 3), round(person.y, 3), round(math.degrees(person.yaw)) % 360))
+        robot.advance(0.5)  # half a metre
+    assert seen == [
+        (3.75, 1.0, 0),
+        (4.25, 1.0, 0),
+        (4.5, 1.25, 90),
+        (4.5, 1.25, 270),
+        (4.5, 1.25, 90),  # back, as it came
+        (4.5, 1.25, 270),
+        (4.25, 1.0, 180),
+        (3.75, 1.0, 180),
+    ]
+
+
+def test_a_weekday_is_the_next_one_of_that_name_and_again_a_week_later() -> None:
+    times, monday = Times.parse('wed 21:30'), at(2, 8)
+    assert times.first(monday) == at(4, 21, 30)
+    assert times.after(at(4, 21, 30), monday) == at(11, 21, 30)
+    assert times.before(at(4, 21, 29), monday) is None
+    assert times.before(at(6, 0), monday) == at(4, 21, 30)
+    daily = Times.parse('daily 21:30')
+    assert daily.first(monday) == at(2, 21, 30)
+    assert daily.after(at(2, 21, 30), monday) == at(3, 21, 30)
+    assert daily.before(at(2, 21, 29), monday) is None
+    third = Times.parse('day 3 21:30')
+    assert third.first(monday) == at(4, 21, 30)
+    assert third.after(at(4, 21, 30), monday) == math.inf
+    assert third.before(at(9, 8), monday) == at(4, 21, 30)
+    assert third.before(at(3, 8), monday) is None
+    soon = Times.parse('90 s')
+    assert (soon.first(monday), soon.before(monday + 89.0, monday)) == (monday + 90.0, None)
+    assert soon.before(monday + 90.0, monday) == monday + 90.0
+    assert soon.after(monday + 90.0, monday) == math.inf
+    assert Times.parse('0.5 h').first(monday) == monday + 1800.0
+    for wrong in ('wed 24:00', 'wed 21:60', 'someday 21:30', ''):
+        with pytest.raises(ValueError, match='expected such as'):
+            Times.parse(wrong)
+    assert Times.parse('sun 23:59').first(monday) == at(8, 23, 59)
+
+
+def test_no_step_of_time_is_so_long_that_something_is_driven_through(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    robot = Robot(two_rooms())
+    steps: list[float] = []
+    monkeypatch.setattr(robot.base, 'step', steps.append)
+    for seconds, count in ((PHYSICS_STEP, 1), (0.3, round(0.3 / PHYSICS_STEP)), (0.001, 1)):
+        steps.clear()
+        robot.advance(seconds)
+        assert (len(steps), sum(steps)) == (count, pytest.approx(seconds))
+        assert max(steps) <= PHYSICS_STEP + 1e-9
+    assert robot.time == pytest.approx(PHYSICS_STEP + 0.301)
 
 
 @pytest.mark.parametrize(

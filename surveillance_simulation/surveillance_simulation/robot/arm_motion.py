@@ -45,7 +45,7 @@ class ArmMotion:
         column = [self.arm.names.index(name) for name in names]
         times, positions, velocities = [now], [start], [velocity]
         for point in points:
-            row = positions[-1].copy()
+            row = start.copy()
             row[column] = point.positions
             speed = np.zeros_like(row)
             speed[column] = point.velocities or 0.0

@@ -7,6 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
+import numpy as np
+
 from surveillance_runtime.place import PlaceError
 from surveillance_runtime.place.floor_plan import Point
 from surveillance_simulation.world.figures import person
@@ -28,18 +30,16 @@ class _Walk:
 
     def at(self) -> tuple[float, float, float]:
         """Return where the person is, metres, and the direction of the way, rad."""
-        total = sum(math.dist(a, b) for a, b in pairwise(self.points))
+        points = np.array(self.points)
+        legs = np.diff(points, axis=0)
+        passed = np.concatenate([[0.0], np.cumsum(np.hypot(*legs.T))])
+        total = float(passed[-1])
         # There and back again.
         phase = self.done % (2.0 * total)
         left, turn = (phase, 0.0) if phase <= total else (2.0 * total - phase, math.pi)
-        for (x1, y1), (x2, y2) in pairwise(self.points):
-            length = math.dist((x1, y1), (x2, y2))
-            if left <= length or (x2, y2) == self.points[-1]:
-                part = min(1.0, left / length)
-                yaw = math.atan2(y2 - y1, x2 - x1) + turn
-                return x1 + part * (x2 - x1), y1 + part * (y2 - y1), yaw
-            left -= length
-        return *self.points[-1], turn
+        x, y = (float(np.interp(left, passed, each)) for each in points.T)
+        dx, dy = legs[int(np.searchsorted(passed[1:-1], left))]
+        return x, y, math.atan2(dy, dx) + turn
 
 
 class Walks:
