@@ -58,7 +58,9 @@ TYPES = {
 
 
 def render_entity(iri: str) -> str:
-    """``<iri>``, or the abbreviated name of a built-in such as ``owl:Thing``."""
+    """``<iri>``, the abbreviated name of a built-in such as ``owl:Thing``, or ``_:label``."""
+    if iri.startswith('_:'):
+        return iri
     if iri.startswith(OWL):
         return 'owl:' + iri[len(OWL) :]
     return f'<{iri}>'
@@ -103,7 +105,7 @@ def short_facts(axiom: Axiom) -> Sequence[ShortFact]:
 
 @lru_cache(maxsize=65536)
 def parse_entity(text: str, base: str) -> str:
-    """Read an entity argument: a local name, ``<iri>``, a full IRI or ``owl:Thing``.
+    """Read an entity argument: a local name, ``<iri>``, a full IRI, ``owl:Thing`` or ``_:label``.
 
     Args:
         text: The argument.
@@ -127,6 +129,8 @@ def parse_entity(text: str, base: str) -> str:
             f'{shown(text)} has the character {found.group()!r}, not allowed in an IRI'
         )
     prefix, colon, rest = name.partition(':')
+    if prefix == '_' and rest:
+        return name
     if not full and colon and prefix in PREFIXES and rest:
         return PREFIXES[prefix] + rest
     if full or '://' in name or prefix == 'urn':

@@ -54,8 +54,7 @@ def test_what_is_shown_is_taken_back_as_it_stands(rooms: Ask, axiom: str) -> Non
 def test_an_axiom_comes_and_goes_with_what_is_said_of_it(rooms: Ask) -> None:
     axiom = 'Class: Hall SubClassOf: Annotations: rdfs:comment "large" ROOM'
     assert rooms('ADD AXIOM', axiom).error_description == ''
-    saved = rooms('QUERY AXIOMS', 'Hall').queried_objects
-    assert 'Class: Hall SubClassOf: ROOM' in saved
+    assert rooms('QUERY AXIOMS', 'Hall').queried_objects == ['Class: Hall', axiom]
     assert rooms('REMOVE AXIOM', axiom).error_description == ''
     assert rooms('QUERY AXIOMS', 'Hall').queried_objects == ['Class: Hall']
 
@@ -71,6 +70,19 @@ def test_a_frame_declares_what_is_new_and_nothing_else(rooms: Ask) -> None:
     assert rooms('QUERY AXIOMS', 'Cellar').queried_objects
     assert rooms('REMOVE AXIOM', 'Class: Cellar').success
     assert rooms('QUERY AXIOMS', 'Cellar').queried_objects == []
+
+
+def test_what_is_said_of_a_class_is_shown_of_a_class(rooms: Ask) -> None:
+    axiom = 'Class: ROOM Annotations: rdfs:comment "a place"'
+    assert rooms('ADD AXIOM', axiom).error_description == ''
+    assert axiom in rooms('QUERY AXIOMS', 'ROOM').queried_objects
+    assert names(rooms('QUERY IND', 'R1')) == ['LOCATION', 'ROOM']
+
+
+def test_no_axiom_is_about_somebody_without_a_name(rooms: Ask) -> None:
+    answer = rooms('ADD AXIOM', 'Individual: _:b Types: ROOM')
+    assert not answer.success
+    assert 'it is an individual without a name' in answer.error_description
 
 
 def test_a_name_whose_prefix_nobody_declared_is_an_iri(rooms: Ask) -> None:

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
-from .seven_rooms import IRI, Ask, iri
+from pathlib import Path
+
+from armor_service.service import ArmorService
+
+from .seven_rooms import IRI, Ask, asker, iri
 
 
 def test_restrictions_have_armors_form(ask: Ask) -> None:
@@ -122,3 +126,23 @@ def test_names_that_a_fact_could_be_misread_by_stand_in_brackets(ask: Ask) -> No
     for fact in found:
         assert ask('QUERY FACT', fact).queried_objects == [fact]
         assert ask('QUERY EXPLAIN', fact).success
+
+
+def test_individuals_without_a_name(service: ArmorService, tmp_path: Path) -> None:
+    """Clients of ARMOR look for ``#name>`` in each answer; reasoners answer with names alone."""
+    path = tmp_path / 'blank.ttl'
+    path.write_text(
+        '@prefix : <urn:o#> . @prefix owl: <http://www.w3.org/2002/07/owl#> .'
+        ' :p a owl:ObjectProperty . :i :p _:b , :j . _:b a :A . :j a :A . :A a owl:Class .'
+    )
+    ask = asker(service, 'blank')
+    assert ask('LOAD FILE', str(path), 'urn:o', 'false', '', 'false').success
+    for answer in (ask('QUERY IND CLASS', 'A'), ask('QUERY OBJECTPROP IND', 'p', 'i')):
+        assert answer.queried_objects == ['<urn:o#j>']
+        assert answer.error_description == '1 without a name left out; QUERY FACT shows them'
+    assert 'A(_:b)' in ask('QUERY FACT', 'A(?)').queried_objects
+    assert ask('QUERY IND', '_:b').queried_objects == ['<urn:o#A>']
+    assert ask('QUERY EXPLAIN', 'A(_:b)').queried_objects[0] == '_:b is A because it is asserted'
+    refused = ask('ADD IND CLASS', '_:b', 'A').error_description
+    assert 'is an individual without a name: only queries take it' in refused
+    assert not ask('QUERY IND CLASS', '_:b').success

@@ -10,15 +10,17 @@ from dataclasses import replace
 from typing import Any
 
 from armor_service.changes import AddAxiom, Change, RemoveAxiom
+from armor_service.directives.queries import named_individuals
 from armor_service.directives.table import manipulation, query, text
 from armor_service.protocol import DirectiveError, DirectiveResponse
 from armor_service.reference import Reference, knowledge_base
-from armor_service.rendering import parse_entity, render_entity
+from armor_service.rendering import parse_entity
 from armor_service.workspace import Workspace
 from owl_reasoner.documents.manchester import ManchesterParser, ManchesterWriter
 from owl_reasoner.documents.structural import PREFIXES
 from owl_reasoner.documents.xml_reading import OntologyFileError
 from owl_reasoner.owl.axioms import (
+    KINDS,
     Axiom,
     AxiomAnnotation,
     Declaration,
@@ -35,6 +37,8 @@ _FRAMES = 'such as `Class: DeadEnd EquivalentTo: LOCATION and (hasDoor exactly 1
 
 def _parser(ref: Reference, written: str) -> ManchesterParser:
     def named(name: str) -> str:
+        if name.startswith('_:'):
+            raise ValueError('it is an individual without a name')
         prefix, colon, local = name.partition(':')
         if colon and prefix in PREFIXES and not local.startswith('//'):
             return PREFIXES[prefix] + local
@@ -160,7 +164,7 @@ def _individuals(workspace: Workspace, ref: Reference, written: str) -> Directiv
     asked.reason(workspace.limits.of(base, len(axioms)), memory=workspace.limits.memory)
     if not asked.consistent:
         return DirectiveResponse(error_description=f'{ref.name} is inconsistent')
-    return DirectiveResponse(queried_objects=sorted(map(render_entity, asked.instances(ASKED))))
+    return named_individuals(asked.instances(ASKED))
 
 
 @query(
@@ -195,5 +199,19 @@ def _entities(axiom: Axiom) -> set[str]:
 
 def _written(ref: Reference, axioms: Any) -> list[str]:
     writer = ManchesterWriter({'': f'{ref.kb.iri}#'}, bare=True)
-    kept = (axiom for axiom in axioms if not isinstance(axiom, AxiomAnnotation | Import))
-    return [writer.axiom(axiom) for axiom in kept]
+    notes: dict[Axiom, list[AxiomAnnotation]] = {}
+    plain: list[Axiom] = []
+    for axiom in axioms:
+        if isinstance(axiom, AxiomAnnotation):
+            notes.setdefault(axiom.axiom, []).append(axiom)
+        elif not isinstance(axiom, Import):
+            plain.append(axiom)
+
+    def kind_of(iri: str) -> str:
+        return next((kind for kind in KINDS if ref.kb.is_known(kind, iri)), 'individual')
+
+    def said_of(axiom: Axiom) -> list[AxiomAnnotation]:
+        # Manchester syntax has no place for what is said of a declaration.
+        return [] if isinstance(axiom, Declaration) else notes.get(axiom, [])
+
+    return [writer.axiom(axiom, kind_of, said_of(axiom)) for axiom in plain]

@@ -90,6 +90,22 @@ def _unknown(ref: Reference, *asked: tuple[str, str]) -> str:
     return f'{ref.name} has no {" and no ".join(unknown)}' if unknown else ''
 
 
+def named_individuals(iris: Iterable[str]) -> DirectiveResponse:
+    """Answer with individuals; those without a name, of whom no client can speak, are told."""
+    iris = list(iris)
+    named = [iri for iri in iris if not iri.startswith('_:')]
+    count = len(iris) - len(named)
+    more = f'{count} without a name left out; QUERY FACT shows them' if count else ''
+    return DirectiveResponse(queried_objects=_entities(named), error_description=more)
+
+
+def _individuals(iris: Iterable[str], ref: Reference, *asked: tuple[str, str]) -> DirectiveResponse:
+    response = named_individuals(iris)
+    if not response.queried_objects and not response.error_description:
+        response.error_description = _unknown(ref, *asked)
+    return response
+
+
 @query(
     'QUERY IND',
     IND,
@@ -108,10 +124,11 @@ def _types(ref: Reference, ind: str) -> DirectiveResponse:
     'QUERY IND CLASS',
     CLS,
     gathers=True,
-    summary='All individuals of a class, asserted and derived.',
+    summary='All individuals of a class, asserted and derived; those without a name are counted '
+    'in the description.',
 )
 def _instances(ref: Reference, cls: str) -> DirectiveResponse:
-    return _answer(_entities(ref.kb.instances(cls)), ref, ('class', cls))
+    return _individuals(ref.kb.instances(cls), ref, ('class', cls))
 
 
 @query('QUERY DATAPROP IND', DAT, IND, summary='The values of a data property of an individual.')
@@ -120,10 +137,15 @@ def _data_values(ref: Reference, prop: str, ind: str) -> DirectiveResponse:
     return _answer(values, ref, ('data_property', prop), ('individual', ind))
 
 
-@query('QUERY OBJECTPROP IND', OBJ, IND, summary='What an individual is related to by a property.')
+@query(
+    'QUERY OBJECTPROP IND',
+    *(OBJ, IND),
+    summary='What an individual is related to by a property; individuals without a name are '
+    'counted in the description.',
+)
 def _object_values(ref: Reference, prop: str, ind: str) -> DirectiveResponse:
-    values = _entities(ref.kb.object_values(prop, ind))
-    return _answer(values, ref, ('object_property', prop), ('individual', ind))
+    values = ref.kb.object_values(prop, ind)
+    return _individuals(values, ref, ('object_property', prop), ('individual', ind))
 
 
 @query(

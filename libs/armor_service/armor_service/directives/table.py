@@ -203,6 +203,8 @@ class Directive:
 
     def _entity(self, read: Read, text: str, base: str) -> str:
         iri = parse_entity(text, base)
+        if iri.startswith('_:') and (self.kind is not Kind.QUERY or read is not Read.INDIVIDUAL):
+            raise ValueError(f'{shown(text)} is an individual without a name: only queries take it')
         if not iri.startswith(_RESERVED) or iri in _BUILT_IN.get(read, ()):
             return iri
         # It may be asked about and retracted: a document may hold anything.

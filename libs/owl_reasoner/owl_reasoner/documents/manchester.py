@@ -779,27 +779,26 @@ class ManchesterWriter:
         axioms = list(axioms)
         lines += ['', f'Ontology: <{iri}>']
         lines += [f'Import: <{axiom.iri}>' for axiom in axioms if isinstance(axiom, ax.Import)]
-        notes: dict[Axiom, _Notes] = {}
+        notes: dict[Axiom, list[ax.AxiomAnnotation]] = {}
         for axiom in axioms:
             if isinstance(axiom, ax.AxiomAnnotation):
-                notes[axiom.axiom] = (*notes.get(axiom.axiom, ()), *axiom.annotations)
+                notes.setdefault(axiom.axiom, []).append(axiom)
         left = [a for a in axioms if not isinstance(a, ax.Import | ax.AxiomAnnotation)]
         kinds: dict[str, list[str]] = {}
         for axiom in left:
             if isinstance(axiom, ax.Declaration):
                 kinds.setdefault(axiom.iri, []).append(axiom.kind)
+
+        def kind_of(iri: str) -> str:
+            return kinds.get(iri, ['individual'])[0]
+
         frames = []
         for axiom in left:
-            said = self._said(notes.get(axiom, ()))
+            frame = self.axiom(axiom, kind_of, notes.get(axiom, ()))
             if isinstance(axiom, ax.AnnotationAssertion) and axiom.subject == iri:
-                lines.append(f'Annotations: {said}{self._note(axiom.prop, axiom.value)}')
-            elif said and isinstance(axiom, ax.Declaration):
-                raise OntologyFileError(
-                    f'Manchester syntax cannot annotate the declaration of {self.name(axiom.iri)};'
-                    ' save it as RDF/XML or N-Triples (.nt)'
-                )
+                lines.append(frame[frame.index('Annotations: ') :])
             else:
-                frames.append(self.axiom(axiom, kinds, said))
+                frames.append(frame)
         return '\n'.join((*lines, *self._used(left, kinds), *frames)) + '\n'
 
     def _used(
@@ -882,15 +881,27 @@ class ManchesterWriter:
         return f'{prop} {"some" if "Some" in kind else "only"} {filler}'
 
     def axiom(
-        self, axiom: Axiom, kinds: Mapping[str, list[str]] | None = None, said: str = ''
+        self,
+        axiom: Axiom,
+        kind_of: Callable[[str], str] = lambda _: 'individual',
+        notes: Iterable[ax.AxiomAnnotation] = (),
     ) -> str:
         """Return an axiom as a frame of its own.
 
         Args:
             axiom: Any but an import.
-            kinds: What each name is declared as, for annotations.
-            said: The annotations of the axiom, as they are written in front.
+            kind_of: What kind of entity a name is that is annotated.
+            notes: What is said of the axiom.
+
+        Raises:
+            OntologyFileError: It is a declaration, of which nothing can be said.
         """
+        said = self._said(tuple(pair for note in notes for pair in note.annotations))
+        if said and isinstance(axiom, ax.Declaration):
+            raise OntologyFileError(
+                f'Manchester syntax cannot annotate the declaration of {self.name(axiom.iri)};'
+                ' save it as RDF/XML or N-Triples (.nt)'
+            )
         kind = type(axiom).__name__
         say = self.expression
         plain = kind.replace('Object', '').replace('Data', '')
@@ -900,7 +911,7 @@ class ManchesterWriter:
             word = next(word for word, one in _FRAMES.items() if one == axiom.kind)
             return f'{word}: {self.name(axiom.iri)}'
         if isinstance(axiom, ax.AnnotationAssertion):
-            found = (kinds or {}).get(axiom.subject, ['individual'])[0]
+            found = kind_of(axiom.subject)
             word = next(word for word, one in _FRAMES.items() if one == found)
             note = self._note(axiom.prop, axiom.value)
             return f'{word}: {self.name(axiom.subject)} Annotations: {said}{note}'
