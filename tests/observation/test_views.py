@@ -137,6 +137,24 @@ def test_darkness_and_a_covered_lens_are_told():
         assert sight_of(np.clip(cloth, 0, 255).astype(np.uint8)) == Sight.BLOCKED
 
 
+@pytest.mark.parametrize(('grey_level', 'noise'), [(20.0, 2.0), (22.5, 2.0), (27, 4.0), (60, 8.0)])
+def test_a_noisy_camera_that_is_covered_sees_nothing_in_each_picture(grey_level, noise):
+    generator = np.random.default_rng(2)
+    for _ in range(10):
+        picture = generator.normal(grey_level, noise, (480, 640))
+        assert sight_of(np.clip(picture, 0, 255).astype(np.uint8)) == Sight.BLOCKED
+
+
+@pytest.mark.parametrize('light', [1.0, 0.3, 0.15])
+def test_a_plain_wall_above_a_plain_floor_is_a_view_in_any_light(light):
+    generator = np.random.default_rng(3)
+    wall = np.full((480, 640), 150.0)
+    wall[300:] = 120.0
+    for _ in range(10):
+        picture = cv2.GaussianBlur(wall, (0, 0), 1.0) * light + generator.normal(0, 2, wall.shape)
+        assert sight_of(np.clip(picture, 0, 255).astype(np.uint8)) == Sight.CLEAR
+
+
 def coloured(path: Path) -> np.ndarray:
     picture = cv2.imread(str(path), cv2.IMREAD_COLOR)
     assert picture is not None
