@@ -511,6 +511,21 @@ def test_the_light_of_each_room_is_its_own():
     ]
 
 
+def test_stays_of_one_picture_each_tell_of_a_dark_room_in_the_third_one():
+    watch = Round()
+    dark, lit = np.full((240, 320), 3, np.uint8), texture()
+    doorway = dark.copy()
+    doorway[40:, 130:190] = lit[40:240, 130:190]
+    for pictures in ([dark], [dark, doorway], [dark], [dark]):
+        for place, seen in (('R1', pictures), ('R2', [lit])):
+            watch.watcher.arrive(place, watch.time)
+            for picture in seen:
+                watch.time += 2.0
+                watch.watcher.picture(picture, None, watch.time, None)
+    lights = [(each.place, each.state) for each in watch.told if each.kind == Kind.LIGHT]
+    assert lights == [('R1', 'off'), ('R2', 'on')] * 2, 'in the third stay and the fourth one'
+
+
 def test_a_lit_doorway_does_not_make_a_dark_room_lit():
     watch = Round()
     dark = np.full((240, 320), 3, np.uint8)

@@ -76,6 +76,8 @@ OTHER_SIDES = 0.6
 """What is hidden so near to a new thing may be its other sides, metres."""
 SEEN_AGAIN = 10.0
 """What goes on is told again after this time, seconds."""
+MOST_LIT = 500
+"""Of so many places it is kept how light they were."""
 AGREED_PICTURES = 3
 """A dark or covered view, and an unknown marker, must be seen in so many pictures."""
 ONE_LOOK, SEEN_TWICE = 0.5, 0.9
@@ -229,7 +231,7 @@ class Watcher:
         self._strange: dict[int, int] = {}
         self._sights: deque[Sight] = deque(maxlen=AGREED_PICTURES)
         self._sight: Sight | None = None
-        self._lights: deque[str] = deque(maxlen=AGREED_PICTURES)
+        self._lights: dict[str, deque[str]] = {}
         self._light = ''
 
     # --- the floor and its doors ---
@@ -257,10 +259,8 @@ class Watcher:
         self._began, self._pictures, self._persons = stamp, 0, 0
         self._person_by = {}
         self._walks.clear()
-        # The light is that of the place.
-        self._sights.clear()
+        # Told anew in each place, of which a short stay may give one picture alone.
         self._sight = None
-        self._lights.clear()
         self._light = ''
         self._look += 1
         self._visit = None
@@ -547,9 +547,7 @@ class Watcher:
         settled = len(self._sights) == AGREED_PICTURES and len(set(self._sights)) == 1
         sight = self._sights[-1]
         light = light_of(grey, sight)
-        self._lights.append(light)
-        agree = len(self._lights) == AGREED_PICTURES and len(set(self._lights)) == 1
-        if agree and light and light != self._light:
+        if light and self._lit(light) and light != self._light:
             self._light = light
             self._take(Observation(Kind.LIGHT, light, self._place, stamp=stamp), grey)
         if settled and sight != self._sight:
@@ -603,6 +601,18 @@ class Watcher:
             )
             if self._is_due(observation):
                 self._take(observation, picture, known.picture)
+
+    def _lit(self, light: str) -> bool:
+        """Take how light a picture of this place is; tell whether the last ones of it agree.
+
+        A short stay has one or two pictures: those of earlier stays count, too.
+        """
+        lights = self._lights.pop(self._place, None) or deque(maxlen=AGREED_PICTURES)
+        lights.append(light)
+        self._lights[self._place] = lights
+        for oldest in list(self._lights)[:-MOST_LIT]:
+            del self._lights[oldest]
+        return len(lights) == AGREED_PICTURES and len(set(lights)) == 1
 
     def _doors_near(self, point: tuple[float, float]) -> dict[str, str]:
         """Return the states of the doors near a point, of those whose state is known."""
