@@ -42,9 +42,11 @@ from surveillance_perception.observation.evidence import EvidenceStore
 from surveillance_perception.observation.marker_views import SeenMarker
 from surveillance_perception.observation.observations import Kind, Observation
 from surveillance_perception.observation.persons import load_finder
+from surveillance_perception.observation.viewpoints import Viewpoints
 from surveillance_perception.observation.views import view_changes
 from surveillance_perception.observation.watch_rules import rule_from
 from surveillance_perception.observation.watcher import Watcher
+from surveillance_perception.observation.ways import Ways
 from surveillance_runtime.incidents import Cause, Severity, Told
 from surveillance_runtime.place.occupancy_grid import Grid
 from surveillance_runtime.place.plan_grid import draw
@@ -58,6 +60,8 @@ from surveillance_simulation.world.world import World, read_world
 PLACE = ROOT / 'config' / 'seven_rooms.yaml'
 POSE_ERROR = (0.02, math.radians(0.6))
 """Deviation of the pose that localisation tells, metres and rad."""
+RADIUS = 0.22
+"""Of the robot, metres."""
 STEP = 0.25
 """A sweep is compared each so many metres of the way."""
 HEIGHT = 0.9
@@ -109,7 +113,15 @@ class Rounds:
     grid: Any = None
     rooms: Any = None
 
-    def __init__(self, seed: int, *, camera: bool = False, persons: Any = None) -> None:
+    def __init__(
+        self,
+        seed: int,
+        *,
+        camera: bool = False,
+        persons: Any = None,
+        rules: Sequence[dict[str, str]] = RULES,
+        verify_seconds: float = 0.0,
+    ) -> None:
         self.rng = np.random.default_rng(seed)
         world = read_world(PLACE)
         self.robot = Robot(world)
@@ -124,22 +136,35 @@ class Rounds:
         self.book = EventBook()
         self.told: list[Observation] = []
         self.alerts: list[Event] = []
+        self.alerted: list[float] = []
         self.place, self.at = '', world.plan.start[:2]
         self.camera = Camera.from_field_of_view(320, 240) if camera else None
         self.renderer = Renderer(world, self.camera) if self.camera else None
         self.cpu_view: list[float] = []
         self.watcher = Watcher(
-            [rule_from(each) for each in RULES],
+            [rule_from(each) for each in rules],
             self.book,
             local=lambda stamp: datetime.fromtimestamp(stamp, UTC),
             robot='Robot1',
             tell=self.told.append,
-            alert=self.alerts.append,
+            alert=self._on_alert,
             doors={name: door.segment for name, door in world.plan.doors.items()},
             rooms=Rounds.rooms,
+            ways_of=self._ways,
             find_persons=persons,
+            verify_seconds=verify_seconds,
         )
         self.watcher.use_map(Rounds.grid)
+
+    def _ways(self, grid: Grid) -> Ways:
+        plan = self.world.plan
+        doors = {name: door.segment for name, door in plan.doors.items()}
+        points = {name: (at[0], at[1]) for name, at in plan.place.positions.items()}
+        return Ways(grid, RADIUS, doors, points)
+
+    def _on_alert(self, event: Event) -> None:
+        self.alerts.append(event)
+        self.alerted.append(self.time)
 
     def sweep(self, pose: tuple[float, float, float]) -> None:
         """Compare one sweep from a true pose."""
@@ -1002,6 +1027,126 @@ def told_of(event: Event) -> str:
 # --- telling, and a month ---
 
 
+TELLING_RULES = (
+    {'door': 'all', 'is': 'open'},
+    {'object': 'none'},
+    {'way': 'free'},
+    {'light': 'on'},
+    {'view': 'clear'},
+    {'person': 'nobody'},
+)
+
+
+def _stage_one(rounds: Rounds, kind: str, place: str) -> None:
+    """Let happen in a place what makes an alert of a kind."""
+    doors = rounds.world.plan.place.rooms[place]
+    if kind == Kind.DOOR:
+        lines = [f'door {doors[0]} closed']
+    elif kind == Kind.OBJECT:
+        x, y = free_point(rounds, place, 0.5)
+        lines = [f'box it {x} {y} {rounds.rng.uniform(0.2, 0.4)} 0.5']
+    elif kind == Kind.WAY:
+        door = rounds.world.plan.doors[doors[-1]]
+        along = (0.3 * math.cos(door.yaw), 0.3 * math.sin(door.yaw))
+        lines = [
+            f'box {name} {door.x + sign * along[0]} {door.y + sign * along[1]} 0.5 0.5'
+            for name, sign in (('a', 1), ('b', -1))
+        ]
+    else:
+        lines = [f'lamp {place} off'] if kind == Kind.LIGHT else []
+        lines += ['lens covered'] if kind == Kind.VIEW else []
+    for line in lines:
+        rounds.stage.do(line, rounds.time)
+    if kind == Kind.PERSON:
+        let_walk(rounds, place)
+
+
+def _look_and_verify(rounds: Rounds, place: str, kind: str, pictures: bool) -> tuple[float, float]:
+    """Look at a place and again at what is in doubt, as a mission does.
+
+    Returns:
+        When it was seen first, and when the look was over; nan: it was not seen.
+    """
+    viewpoints = Viewpoints(rounds.grid, RADIUS)
+    looked_again: set[int] = set()
+    seen_from = len(rounds.told)
+
+    def verify() -> None:
+        for doubt in rounds.watcher.doubts(rounds.time):
+            floor = rounds.rooms.cells_of(doubt.place)
+            if doubt.number in looked_again or floor is None or doubt.place != place:
+                continue
+            looked_again.add(doubt.number)
+            if doubt.position and doubt.seen_from:
+                spot = viewpoints.aside(floor, doubt.position, doubt.seen_from)
+                if spot is not None and math.dist(spot, rounds.at) < 10.0:
+                    rounds.drive([spot])
+            stand(4.0)
+
+    def stand(seconds: float) -> None:
+        end = rounds.time + seconds
+        while rounds.time < end:
+            rounds.advance(0.5)
+            rounds.sweep((*rounds.at, 0.0))
+            if round(2.0 * rounds.time) % 4 == 0:
+                if pictures:
+                    rounds.look(LIGHTS[0], yaw=0.6)
+                rounds.watcher.assess(rounds.time)
+                rounds.watcher.doubts(rounds.time)
+
+    rounds.drive(rounds._way(place))
+    for _ in range(3):
+        stand(6.5)
+        verify()
+    ended = rounds.time
+    stand(30.0)
+    bad = {'closed', 'appeared', 'blocked', 'off', 'seen'}
+    first = [e.stamp for e in rounds.told[seen_from:] if e.kind == kind and e.state in bad]
+    return min(first, default=math.nan), ended
+
+
+def telling_by_kind(trials: int) -> list[list[str]]:
+    """Measure from the first sighting, and from the end of the look, to the alert."""
+    rows = [
+        [
+            'alerts, verify_seconds 20',
+            'told',
+            'from the first sighting, s: median, worst',
+            'after the look, s: worst',
+            'told within 5 s of its end',
+        ]
+    ]
+    kinds = (Kind.DOOR, Kind.OBJECT, Kind.WAY, Kind.LIGHT, Kind.VIEW, Kind.PERSON)
+    for kind in kinds:
+        waits, late = [], []
+        for trial in range(trials):
+            pictures = kind in (Kind.LIGHT, Kind.VIEW)
+            rounds = Rounds(3000 + trial, camera=pictures, rules=TELLING_RULES, verify_seconds=20.0)
+            place = ('R1', 'R2', 'R3', 'R4')[trial % 4]
+            rounds.at = rounds.world.plan.place.positions[place][:2]
+            for _ in range(2):
+                rounds.visit(place, pictures=3 * pictures)
+                rounds.watcher.arrive('elsewhere', rounds.time)
+                rounds.place = ''
+                rounds.time += 600.0
+            _stage_one(rounds, kind, place)
+            first, ended = _look_and_verify(rounds, place, kind, pictures)
+            told = [
+                at for at, e in zip(rounds.alerted, rounds.alerts, strict=True) if e.kind == kind
+            ]
+            if told and math.isfinite(first):
+                waits.append(told[0] - first)
+                late.append(told[0] - ended)
+        if waits:
+            shown = f'{float(np.median(waits)):.1f}, {max(waits):.1f}'
+            after = f'{max(0.0, *late):.1f}' if len(late) > 1 else f'{max(0.0, late[0]):.1f}'
+            soon = part(sum(each <= 5.0 for each in late), len(late))
+            rows.append([str(kind), part(len(waits), trials), shown, after, soon])
+        else:
+            rows.append([str(kind), part(0, trials), '', '', ''])
+    return rows
+
+
 def measure_telling(times: int) -> list[list[str]]:
     """Measure from the incident's line in the log to the webhook, with a picture."""
     came = threading.Event()
@@ -1147,6 +1292,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         'real',
         'cpu',
         'telling',
+        'alerts',
         'month',
         'week',
     )
@@ -1163,6 +1309,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         'real': lambda: measure_real(shared, 40 if quick else 1000),
         'cpu': measure_cpu,
         'telling': lambda: measure_telling(3 if quick else 20),
+        'alerts': lambda: telling_by_kind(2 if quick else 20),
         'month': lambda: measure_month(2 if quick else 30),
         'week': lambda: measure_week(0.1 if quick else options.days, 3600.0),
     }

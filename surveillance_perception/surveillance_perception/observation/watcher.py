@@ -80,8 +80,9 @@ MOST_LIT = 500
 """Of so many places it is kept how light they were."""
 AGREED_PICTURES = 3
 """A dark or covered view, and an unknown marker, must be seen in so many pictures."""
-ONE_LOOK, SEEN_TWICE = 0.5, 0.9
-"""Confidence in a changed view after one look, at most, and after two, at least."""
+ONE_LOOK, SEEN_TWICE = 0.5, 0.95
+"""Confidence in a changed view after one look, at most, and after two, at least: a third is not
+waited for."""
 WALKING = 0.8
 """Confidence that what walks is a person."""
 BOTH = 5.0
