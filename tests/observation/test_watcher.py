@@ -515,7 +515,7 @@ def test_stays_of_one_picture_each_tell_of_a_dark_room_in_the_third_one():
     watch = Round()
     dark, lit = np.full((240, 320), 3, np.uint8), texture()
     doorway = dark.copy()
-    doorway[40:, 130:190] = lit[40:240, 130:190]
+    doorway[40:, 100:240] = lit[40:240, 100:240]
     for pictures in ([dark], [dark, doorway], [dark], [dark]):
         for place, seen in (('R1', pictures), ('R2', [lit])):
             watch.watcher.arrive(place, watch.time)
@@ -531,6 +531,8 @@ def test_a_lit_doorway_does_not_make_a_dark_room_lit():
     dark = np.full((240, 320), 3, np.uint8)
     doorway = dark.copy()
     doorway[40:, 130:190] = texture()[40:240, 130:190]
+    wide = dark.copy()
+    wide[40:, 100:240] = texture()[40:240, 100:240]
 
     def look(picture: np.ndarray) -> None:
         for _ in range(3):
@@ -540,11 +542,14 @@ def test_a_lit_doorway_does_not_make_a_dark_room_lit():
     watch.watcher.arrive('R1', watch.time)
     look(dark)
     look(doorway)
+    look(wide)
     look(texture())
     assert [each.state for each in watch.told if each.kind == Kind.LIGHT] == ['off', 'on']
     watch.watcher.arrive('R2', watch.time)
-    look(doorway)
+    look(wide)
     assert len([each for each in watch.told if each.kind == Kind.LIGHT]) == 2, 'nothing is said'
+    look(doorway)
+    assert [each.state for each in watch.told if each.kind == Kind.LIGHT] == ['off', 'on', 'off']
 
 
 def test_no_marker_hangs_off_the_map():

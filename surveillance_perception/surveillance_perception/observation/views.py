@@ -75,6 +75,9 @@ LEAST_AREA = 0.004
 """Of the picture, below which a difference is not told."""
 DARK = 18.0
 """Mean grey below which no picture can be compared."""
+MOSTLY = 0.7
+"""A room of which so much of a picture is dark has no light: a doorway shows so much of another
+room only from a metre before it."""
 BLIND = 0.0013
 """Where the strongest edges of a smoothed picture are weaker, as a part of its mean grey, there is
 nothing to see: a covered lens in a lit room has up to 0.0009 at a noise of four grey levels, the
@@ -129,8 +132,8 @@ def sight_of(picture: Picture) -> Sight:
 def light_of(picture: Picture, sight: Sight) -> str:
     """Return whether the light of the room is 'on' or 'off'; empty: the picture does not tell.
 
-    Through an open door a dark room shows a lit one: its own light is on only where half of the
-    picture is not dark.
+    Through open doors a dark room shows lit ones, and a lit room dark ones: its own light is on
+    only where half of the picture is not dark, and off where nearly all of it is.
 
     Args:
         picture: The view.
@@ -138,9 +141,10 @@ def light_of(picture: Picture, sight: Sight) -> str:
     """
     if sight == Sight.DARK:
         return 'off'
-    if sight == Sight.CLEAR and float(np.median(_scaled(grey_of(picture)))) > DARK:
-        return 'on'
-    return ''
+    if sight != Sight.CLEAR:
+        return ''
+    is_dark = float((_scaled(grey_of(picture)) <= DARK).mean())
+    return 'on' if is_dark < 0.5 else 'off' if is_dark >= MOSTLY else ''
 
 
 def view_changes(reference: Picture, picture: Picture) -> list[ViewChange] | None:
