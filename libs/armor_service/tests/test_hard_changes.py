@@ -102,6 +102,7 @@ def test_the_change_that_is_too_hard_is_refused_with_its_reason(served: Served) 
     assert [note for note in served.notes if note.startswith('hard: taken back: ')]
     ask = served.restart()
     assert ask('QUERY IND CLASS', 'M').queried_objects == [f'<{T}#other>']
+    assert ask('QUERY IND CLASS', 'T').queried_objects == []
     assert ask('QUERY TAKEN BACK').queried_objects == [line]
 
 
@@ -125,7 +126,9 @@ def test_of_several_changes_only_the_hard_one_is_taken_back(served: Served) -> N
     assert ask('QUERY IND CLASS', 'T').queried_objects == []
     served.service.close()
     served.start()
-    assert asker(served.service, 'hard')('QUERY IND CLASS', 'M').queried_objects == [f'<{T}#x>']
+    ask = asker(served.service, 'hard')
+    assert ask('QUERY IND CLASS', 'M').queried_objects == [f'<{T}#x>']
+    assert ask('QUERY IND CLASS', 'T').queried_objects == []
 
 
 def test_what_was_not_reasoned_over_before_a_restart_is_taken_back_after_it(

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import pytest
 
+from armor_service.service import ArmorService
+
 from .seven_rooms import IRI, ONTOLOGY, Ask, iri, names
 
 
@@ -208,3 +210,18 @@ def test_the_classes_and_properties_that_owl_has_can_be_named(ask: Ask) -> None:
     assert ask('ADD CLASS CLASS', 'K', 'owl:Nothing').success
     assert ask('ADD OBJECTPROP IND', 'owl:topObjectProperty', 'R1', 'R2').success
     assert ask('REMOVE DATAPROP IND', 'rdfs:label', 'R1', 'STRING', 'x').success
+
+
+def test_fewer_than_two_are_not_stated_to_be_apart(service: ArmorService, ask: Ask) -> None:
+    kb = service.workspace.references.find('map').kb
+    before = list(kb.axioms())
+    for directive in (
+        ('DISJOINT CLASS CLASS', 'DOOR'),
+        ('DISJOINT CLASS', 'DOOR', 'DOOR'),
+        ('DISJOINT IND CLASS', 'DOOR'),
+        ('DISJOINT IND', 'D1', 'D1'),
+    ):
+        assert ask(*directive).success
+        assert list(kb.axioms()) == before, directive
+    assert ask('DISJOINT CLASS CLASS', 'LOCATION').success
+    assert len(list(kb.axioms())) == len(before) + 1

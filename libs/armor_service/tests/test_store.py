@@ -105,6 +105,24 @@ def test_what_waits_in_the_buffer_waits_again(tmp_path: Path) -> None:
     assert names(server.ask('QUERY IND CLASS', 'DOOR')) == ['X', 'Y', 'Z']
 
 
+def test_what_waits_is_applied_where_the_buffer_was_switched_off(tmp_path: Path) -> None:
+    server = Server(tmp_path / 'store')
+    server.ask(*LOAD, 'true', '', 'false')
+    server.ask('ADD IND CLASS', 'X', 'DOOR')
+    server.ask(*LOAD, 'false', '', 'false')
+    assert names(server.ask('QUERY IND CLASS', 'DOOR')) == ['X']
+    server.restart()
+    assert names(server.ask('QUERY IND CLASS', 'DOOR')) == ['X']
+    # Switched on again, what comes waits, now and after the next restart.
+    server.ask(*LOAD, 'true', '', 'false')
+    server.ask('ADD IND CLASS', 'Y', 'DOOR')
+    server.restart()
+    assert names(server.ask('QUERY IND CLASS', 'DOOR')) == ['X']
+    server.ask('APPLY')
+    server.restart()
+    assert names(server.ask('QUERY IND CLASS', 'DOOR')) == ['X', 'Y']
+
+
 def test_an_inconsistent_ontology_comes_back_as_such(server: Server) -> None:
     for value in '12':
         server.ask('ADD DATAPROP IND', 'visitedAt', 'R1', 'LONG', value)
