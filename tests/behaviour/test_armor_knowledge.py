@@ -89,7 +89,7 @@ def test_the_answer_knows_where_the_robot_was_heard_of_last(
 
 def test_a_lost_robot_is_named(knowledge: ArmorKnowledge, armor: ArmorClient) -> None:
     armor.manipulation.remove_objectprop_from_ind('isIn', 'Robot1', 'E')
-    with pytest.raises(CallError, match='Robot1 in no place'):
+    with pytest.raises(CallError, match='Robot1 in no place; nobody tells its place on'):
         ask(knowledge, 110.0)
 
 

@@ -221,3 +221,18 @@ def test_an_ontology_that_lost_the_robot_is_waited_for(machine: str) -> None:
     Run(machine, world).until(600.0)
     assert any('in no place' in text for text in world.said)
     assert visited(world, since=200.0) == set(SEVEN_ROOMS)
+
+
+def test_whoever_helps_a_robot_that_does_not_know_where_it_is_is_told_how(machine: str) -> None:
+    world = World()
+    cries: list[str] = []
+
+    def snapshot(*_args: object) -> object:
+        raise CallError('armor: ontology map has Robot1 in no place')
+
+    world.snapshot = snapshot  # type: ignore[method-assign, assignment]
+    world.waiting_for_help = cries.append  # type: ignore[method-assign]
+    Run(machine, world).until(60.0)
+    assert any('in an unknown place' in cry for cry in cries)
+    assert any('or tell its pose on initialpose; next try' in cry for cry in cries)
+    assert not any('open a door' in cry for cry in cries)

@@ -21,7 +21,7 @@ from surveillance_controllers.geometry import Mount, Scan, composed
 from surveillance_controllers.motion.arrival import MotionFailedError
 from surveillance_controllers.motion.driving import Drive, Spin
 from surveillance_controllers.motion.localisation import Localiser
-from surveillance_controllers.motion.navigation_motion import NavigationMotion
+from surveillance_controllers.motion.navigation_motion import POSE, UNSURE_FOR, NavigationMotion
 from surveillance_controllers.motion.navigator import Navigator
 from surveillance_controllers.motion.path_following import Velocity
 from surveillance_controllers.motion.transforms import ScanReader
@@ -41,6 +41,7 @@ class Steersman:
         self.lost, self.jumps, self.obstacles_changed = False, 0, False
         self.ambiguous = False
         self.awaits = ()
+        self.may_be_in: tuple[str, ...] = ()
 
     def see(self, scan: Scan, now: float, _lidar: str = '') -> Velocity:
         self.seen.append(scan)
@@ -151,6 +152,41 @@ def test_a_robot_that_does_not_know_where_it_is_tells_no_place(
     navigator.see = lambda *_: setattr(navigator, doubt, False)
     graph.until(lambda: last('R2'))
     assert told == ['R1', None, 'R2']
+
+
+@pytest.mark.parametrize(
+    ('doubt', 'words'),
+    [
+        ('ambiguous', 'it may be in R1, R2 or R3, at poses that look alike; drive it about'),
+        ('lost', 'what it sees is nowhere on the map; drive it about, or tell its pose'),
+    ],
+)
+def test_a_robot_that_stands_and_does_not_know_where_it_is_calls_somebody(
+    graph: Any, steersman: Steersman, doubt: str, words: str
+) -> None:
+    said = graph.said()
+    navigator: Any = steersman
+    motion = motion_of(graph.node, navigator)
+    navigator.pose, navigator.may_be_in = (0.0, 0.0, 0.0), ('R1', 'R2', 'R3')
+    setattr(navigator, doubt, True)
+
+    def see() -> None:
+        motion._see(Scan(np.zeros(9), np.ones(9), 8.0), Time(sec=1))
+
+    see()
+    assert motion._unsure_since is not None
+    assert not graph.node.incidents.open()
+    motion._unsure_since -= UNSURE_FOR
+    navigator.task = Spin()  # who drives may yet find out
+    see()
+    assert not graph.node.incidents.open()
+    navigator.task = None
+    see()
+    graph.until(lambda: any(words in line for line in said))
+    assert POSE in graph.node.incidents.open()
+    setattr(navigator, doubt, False)
+    see()
+    assert POSE not in graph.node.incidents.open()
 
 
 def test_a_pose_that_somebody_tells_makes_the_place_known(graph: Any, steersman: Steersman) -> None:

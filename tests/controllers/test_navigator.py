@@ -11,6 +11,7 @@ import pytest
 
 from surveillance_controllers.geometry import Scan, composed
 from surveillance_controllers.motion.driving import Drive, State
+from surveillance_controllers.motion.localisation import _Rival
 from surveillance_controllers.motion.navigator import Navigator
 from surveillance_controllers.motion.obstacle_memory import ObstacleMemory
 from surveillance_controllers.motion.path_following import Velocity
@@ -69,6 +70,19 @@ def test_a_pose_that_is_told_is_taken(flat: Any, navigator: Navigator) -> None:
     navigator.see(flat.scan((5.5, 1.0, 1.0)), 0.0)
     assert navigator.pose == pytest.approx((5.5, 1.0, 1.0), abs=0.05)
     assert navigator.place == 'B'
+
+
+def test_the_places_in_which_a_robot_may_be_are_named(flat: Any, navigator: Navigator) -> None:
+    assert navigator.may_be_in == ()
+    true = (5.5, 1.0, 1.0)
+    navigator.believe(true)
+    navigator.move(true)
+    navigator.see(flat.scan(true), 0.0)
+    assert navigator.may_be_in == ('B',)
+    assert navigator._localiser is not None
+    navigator._localiser._rivals.append(_Rival((2.0, 1.0, 0.0)))
+    assert navigator.ambiguous
+    assert navigator.may_be_in == ('A', 'B')
 
 
 def test_a_robot_whose_odometry_begins_at_zero_is_taken_to_be_at_the_station(flat: Any) -> None:

@@ -112,12 +112,19 @@ WAY_PERIOD = 1.0
 """Seconds between two questions to the ontology whether a way has opened."""
 
 
-def _what_helps(failure: Failure | None) -> str:
-    """Return what ends the pause, and what a person can do."""
+def _what_helps(failure: Failure | None, place: str) -> str:
+    """Return what ends the pause, and what a person can do.
+
+    Args:
+        failure: What did not work.
+        place: Where the robot is; empty: that is not known.
+    """
     if failure is not None and failure.is_over is not None:
         return 'continues as soon as it answers'
     if failure is not None and failure.charging:
         return 'check the charging station'
+    if not place:
+        return 'drive the robot about until it knows where it is, or tell its pose on initialpose'
     return 'open a door or remove the obstacle'
 
 
@@ -138,7 +145,7 @@ class WaitForHelp(MissionState):
         seconds = mission.recovery.pause()
         mission.ports.announcer.waiting_for_help(
             f'{reason} (in {mission.place or "an unknown place"}, {mission.battery.level_text()}); '
-            f'{_what_helps(failure)}; next try in {seconds:g} s'
+            f'{_what_helps(failure, mission.place)}; next try in {seconds:g} s'
         )
         is_over, period = mission.watch_ways(interrupt), WAY_PERIOD
         if failure is not None and failure.is_over is not None:

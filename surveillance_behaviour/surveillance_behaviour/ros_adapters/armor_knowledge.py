@@ -193,7 +193,9 @@ class ArmorKnowledge:
                 if self._look_for_answer is not None:
                     self._answers = self._look_for_answer()
                 raise UnavailableError(f'armor: {error}', self._is_back) from None
-            raise CallError(f'armor: {error}') from None
+            told = self._whereabouts.place or not isinstance(error, OntologyNotReadyError)
+            hint = '' if told else '; nobody tells its place on robot_place'
+            raise CallError(f'armor: {error}{hint}') from None
         finally:
             forget()
             self._wake.clear()

@@ -210,7 +210,13 @@ class Localiser:
     @property
     def ambiguous(self) -> bool:
         """Whether the robot may as well be elsewhere: a rival explains about as much."""
-        return any(rival.lead > -self.parameters.rival_loses / 2 for rival in self._rivals)
+        return bool(self.alike)
+
+    @property
+    def alike(self) -> list[Pose]:
+        """The other poses that explain about as much as the estimate."""
+        least = -self.parameters.rival_loses / 2
+        return [rival.pose for rival in self._rivals if rival.lead > least]
 
     def believe(self, pose: Pose) -> None:
         """Take a pose that somebody gave as the estimate."""

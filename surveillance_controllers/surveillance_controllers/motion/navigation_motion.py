@@ -8,6 +8,7 @@ have (`obstacles`). Asks `compute_path` for another path when a drive does not g
 from __future__ import annotations
 
 import threading
+import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
@@ -51,6 +52,7 @@ from surveillance_runtime.conversions import (
     seconds_of,
     stamp_from,
 )
+from surveillance_runtime.incidents import Severity
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.place.zones import zones_from
 from surveillance_runtime.place_changes import follow_place
@@ -60,6 +62,11 @@ from surveillance_runtime.turning_path import bearing_of
 
 POSE_PERIOD = 0.19
 """Least time between two messages on amcl_pose, seconds: with every second scan at 10 Hz."""
+UNSURE_FOR = 10.0
+"""A robot that stands and does not know where it is calls somebody after this, seconds of real
+time."""
+POSE = ('robot', 'pose')
+"""The cause of that incident."""
 
 
 class NavigationMotion:
@@ -106,6 +113,7 @@ class NavigationMotion:
         self._on_step: Callable[[Pose], None] = lambda _pose: None
         self._pose_sent = float('-inf')
         self._place_told: str | None = None
+        self._unsure_since: float | None = None
         self._was_lost = self._was_ambiguous = False
         self._jumps = 0
         self._planner = GoalCaller(node, ComputePath, 'compute_path')
@@ -382,6 +390,7 @@ class NavigationMotion:
         navigator = self._navigator
         if navigator.pose is None:
             return
+        self._tell_of_doubt()
         if navigator.lost != self._was_lost:
             self._was_lost = navigator.lost
             if navigator.lost:
@@ -405,3 +414,26 @@ class NavigationMotion:
         if navigator.odometry is not None:
             offset = self._odometry.stream.offset
             self._map_frame.publish(navigator.pose, navigator.odometry, stamp, offset)
+
+    def _tell_of_doubt(self) -> None:
+        """Call somebody for a robot that stands and does not know where it is."""
+        if self._is_sure:
+            self._unsure_since = None
+            self._node.incidents.end(POSE, 'the robot knows where it is')
+            return
+        now = time.monotonic()
+        if self._unsure_since is None:
+            self._unsure_since = now
+        if now - self._unsure_since < UNSURE_FOR or self._navigator.task is not None:
+            return
+        why = 'what it sees is nowhere on the map'
+        if not self._navigator.lost:
+            *others, last = self._navigator.may_be_in or ('a place without a name',)
+            here = f'{", ".join(others)} or {last}' if others else last
+            why = f'it may be in {here}, at poses that look alike'
+        self._node.incidents.begin(
+            POSE,
+            f'the robot does not know where it is: {why}; drive it about, or tell its pose on '
+            'initialpose (2D Pose Estimate in RViz)',
+            Severity.ALARM,
+        )

@@ -134,6 +134,15 @@ class Navigator:
         return self._localiser is not None and self._localiser.ambiguous
 
     @property
+    def may_be_in(self) -> tuple[str, ...]:
+        """The places in which the robot may be: that of its pose, and of those that look alike."""
+        if self._localiser is None:
+            return ()
+        poses = [self._localiser.pose, *self._localiser.alike]
+        places = (self._places.place_at(pose[:2]) for pose in poses)
+        return tuple(sorted({place for place in places if place is not None}))
+
+    @property
     def obstacles(self) -> Points:
         """Obstacles that the map does not have, shape (n, 2), metres, map frame."""
         return np.zeros((0, 2)) if self._memory is None else self._memory.points
