@@ -101,6 +101,8 @@ def scan_to_ros(
     frame: str,
     stamp: Time,
     duration: float = 0.0,
+    *,
+    upside_down: bool = False,
 ) -> LaserScan:
     """Convert distances (rays,) in metres to a message.
 
@@ -110,13 +112,15 @@ def scan_to_ros(
         frame: Where that sits.
         stamp: The time of the first ray.
         duration: From the first ray to the first of the next turn, seconds.
+        upside_down: Whether the lidar hangs: in its own frame it turns the other way round.
     """
     increment = 2.0 * math.pi / lidar.rays
+    way = -1.0 if upside_down else 1.0
     message = LaserScan(
         header=Header(frame_id=frame, stamp=stamp),
-        angle_min=-math.pi,
-        angle_max=math.pi - increment,
-        angle_increment=increment,
+        angle_min=way * -math.pi,
+        angle_max=way * (math.pi - increment),
+        angle_increment=way * increment,
         range_min=lidar.range_min,
         range_max=lidar.range_max,
         time_increment=duration / lidar.rays,

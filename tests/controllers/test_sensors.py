@@ -8,7 +8,6 @@ import pytest
 from builtin_interfaces.msg import Time
 from geometry_msgs.msg import PoseWithCovarianceStamped, TransformStamped
 from sensor_msgs.msg import LaserScan
-from tf2_msgs.msg import TFMessage
 
 from surveillance_controllers.geometry import Pose
 from surveillance_controllers.motion.navigator import Navigator
@@ -18,6 +17,9 @@ from surveillance_runtime.conversions import seconds_of, stamp_from
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.qos import SENSOR_QOS
 from tests.controllers.test_navigation_topics import motion_of
+
+
+tf2 = pytest.importorskip('tf2_msgs.msg')
 
 
 def now_of(node: Any) -> float:
@@ -65,7 +67,7 @@ def test_the_pose_of_a_robot_whose_clock_is_ahead_is_of_now(graph: Any, flat: An
     navigator.move(true)
     seen = flat.scan(true)
     poses = graph.listen(PoseWithCovarianceStamped, 'amcl_pose', 10)
-    frames = graph.listen(TFMessage, 'tf', 10)
+    frames = graph.listen(tf2.TFMessage, 'tf', 10)
     scans = graph.node.create_publisher(LaserScan, 'scan', SENSOR_QOS)
 
     def told() -> bool:
@@ -100,7 +102,7 @@ def test_a_scan_waits_a_while_for_where_its_frame_is(graph: Any, monkeypatch: An
     step = TransformStamped(child_frame_id='laser')
     step.header.frame_id = 'base_link'
     step.transform.translation.x = 0.3
-    lidar._on_static(TFMessage(transforms=[step]))
+    lidar._on_static(tf2.TFMessage(transforms=[step]))
     come()
     assert mounts == [pytest.approx((0.3, 0.0, 0.0))]
     # Where nobody tells, it is taken for the centre after a while, and that is said.

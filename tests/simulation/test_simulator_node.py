@@ -20,6 +20,7 @@ from std_msgs.msg import Float32, String, UInt32
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from surveillance_controllers import conversions as received
+from surveillance_controllers.geometry import Mount
 from surveillance_interfaces.msg import DoorStates
 from surveillance_interfaces.srv import (
     DrainBattery,
@@ -150,6 +151,25 @@ def test_a_scan_is_measured_while_somebody_listens(graph: Any) -> None:
     scans = graph.listen(LaserScan, 'scan', SENSOR_QOS)
     graph.until(lambda: scans)
     assert received.scan_from(scans[0]).ranges[0] == pytest.approx(0.95, abs=0.06)
+
+
+def test_a_lidar_that_hangs_upside_down_tells_the_same_as_one_that_stands(graph: Any) -> None:
+    mount = (0.1, -0.05, 0.5)
+    node = simulator(graph, **{'lidar.noise': 0.0, 'lidar_mounts': [*mount, math.pi]})
+    scans = graph.listen(LaserScan, 'scan', SENSOR_QOS)
+    tf2 = pytest.importorskip('tf2_msgs.msg')
+    frames = graph.listen(tf2.TFMessage, 'tf_static', STATE_QOS)
+    graph.until(lambda: scans and frames)
+    told = received.scan_from(scans[-1], Mount(mount, upside_down=True))
+    assert told.points[:, 0].max() == pytest.approx(4.95, abs=0.03), 'through the door ahead'
+    stands = node.robot.scan(mount)
+    angles = node.robot.lidar.angles + mount[2]
+    expected = np.stack([stands * np.cos(angles), stands * np.sin(angles)], 1) + mount[:2]
+    away = np.linalg.norm(expected[:, None] - told.points, axis=2).min(axis=0)
+    assert away.max() < 1e-3
+    (lidar,) = (each for each in frames[-1].transforms if each.child_frame_id == 'base_scan')
+    turned = lidar.transform.rotation
+    assert abs(1.0 - 2.0 * (turned.x**2 + turned.y**2) + 1.0) < 1e-6, 'its z axis looks down'
 
 
 def test_the_camera_sees_and_the_arm_turns_it(graph: Any) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -67,13 +68,14 @@ class SensorSetup:
 
     Attributes:
         frames: The names of the frames.
-        lidars: Topic, frame and mount of each lidar; one that tf_static knows is at the centre.
+        lidars: Topic, frame and mount of each lidar, and whether it hangs upside down; one that
+            tf_static knows is at the centre.
         published: How it is published.
         physics: The robots' bodies.
     """
 
     frames: Frames
-    lidars: tuple[tuple[str, str, Pose], ...]
+    lidars: tuple[tuple[str, str, Pose, bool], ...]
     published: PublishedOptions
     physics: PhysicsModel
 
@@ -88,18 +90,22 @@ class SensorSetup:
     def profile(self, radius: float) -> RobotProfile:
         """Return what is known of a robot of this radius, metres, as its profile."""
         physics = self.physics
-        mounts = [value for _, _, mount in self.lidars for value in (*mount, 0.0)]
+        mounts = [
+            value
+            for _, _, mount, upside_down in self.lidars
+            for value in (*mount, math.pi if upside_down else 0.0)
+        ]
         wheels = replace(Wheels(), separation=physics.wheel_separation, radius=physics.wheel_radius)
         return replace(
             RobotProfile(),
-            frames=replace(self.frames, scans=tuple(frame for _, frame, _ in self.lidars)),
+            frames=replace(self.frames, scans=tuple(frame for _, frame, *_ in self.lidars)),
             body=Body(radius, physics.footprint, physics.height),
             lidars=Lidars(tuple(mounts), height=physics.lidar_height),
             wheels=wheels,
         )
 
 
-def _lidars_of(lidars: LidarSettings, frames: Frames) -> list[tuple[str, str, Pose]]:
+def _lidars_of(lidars: LidarSettings, frames: Frames) -> list[tuple[str, str, Pose, bool]]:
     names = list(frames.scans)
     rows = np.array(lidars.mounts or [0.0] * 4 * len(lidars.scans)).reshape(-1, 4).tolist()
     return [
@@ -107,6 +113,7 @@ def _lidars_of(lidars: LidarSettings, frames: Frames) -> list[tuple[str, str, Po
             topic,
             names[i] if i < len(names) else f'{topic}_frame',
             (rows[i][0], rows[i][1], rows[i][2]),
+            math.cos(rows[i][3]) < 0.0,
         )
         for i, topic in enumerate(lidars.scans)
     ]
@@ -156,8 +163,8 @@ class SensorFeed:
         self._frames = setup.frames
         self._told_odometry = conversions.odometry_message(self._frames.odom, self._frames.base)
         self._scans = [
-            (node.create_publisher(LaserScan, topic(name), SENSOR_DEPTH), frame, mount)
-            for name, frame, mount in setup.lidars
+            (node.create_publisher(LaserScan, topic(name), SENSOR_DEPTH), *lidar)
+            for name, *lidar in setup.lidars
         ]
         self._joints = node.create_publisher(JointState, topic('joint_states'), SENSOR_DEPTH)
         self._truth = node.create_publisher(PoseStamped, topic('ground_truth'), SENSOR_DEPTH)
@@ -182,14 +189,19 @@ class SensorFeed:
                 base.odometry, self._frames.odom, self._frames.base, stamp
             )
             self._tf.publish(TFMessage(transforms=[transform, self._camera_frame(stamp)]))
-        for publisher, frame, mount in self._scans:
+        for publisher, frame, mount, upside_down in self._scans:
             if publisher.get_subscription_count():
                 sweep = self._robot.measure(mount)
                 if sweep is not None:
                     begun = _earlier(stamp, sweep.age)
                     publisher.publish(
                         conversions.scan_to_ros(
-                            sweep.ranges, self._robot.lidar, frame, begun, sweep.duration
+                            sweep.ranges,
+                            self._robot.lidar,
+                            frame,
+                            begun,
+                            sweep.duration,
+                            upside_down=upside_down,
                         )
                     )
         if self._joints.get_subscription_count():
