@@ -18,7 +18,6 @@ from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.qos import SENSOR_QOS
 from tests.controllers.test_navigation_topics import motion_of
 
-
 tf2 = pytest.importorskip('tf2_msgs.msg')
 
 
