@@ -163,8 +163,8 @@ class SensorFeed:
         self._frames = setup.frames
         self._told_odometry = conversions.odometry_message(self._frames.odom, self._frames.base)
         self._scans = [
-            (node.create_publisher(LaserScan, topic(name), SENSOR_DEPTH), *lidar)
-            for name, *lidar in setup.lidars
+            (node.create_publisher(LaserScan, topic(name), SENSOR_DEPTH), frame, mount, upside_down)
+            for name, frame, mount, upside_down in setup.lidars
         ]
         self._joints = node.create_publisher(JointState, topic('joint_states'), SENSOR_DEPTH)
         self._truth = node.create_publisher(PoseStamped, topic('ground_truth'), SENSOR_DEPTH)
