@@ -26,7 +26,7 @@ from trajectory_msgs.msg import JointTrajectory
 from state_machines.ros import ClockWait
 from surveillance_controllers import conversions, stimuli
 from surveillance_controllers.battery import Battery, BatteryInUse
-from surveillance_controllers.battery_driver import DrivenBattery
+from surveillance_controllers.battery_driver import DrivenBattery, doubt
 from surveillance_controllers.controller_parameters import (
     STATION_NOT_GIVEN,
     BatterySettings,
@@ -219,7 +219,7 @@ class RobotBattery:
         if settings.execution_mode != 'ROBOT':
             self._states = OwnedTopic(node, BatteryState, 'battery_state', repeat=None)
         elif settings.driver.source == 'topic':
-            self._driver = DrivenBattery(settings.driver)
+            self._driver, self._settings = DrivenBattery(settings.driver), settings.driver
             self._timeout = settings.driver.timeout
             self._topic = str(node.resolve_topic_name('battery_state'))
             # As a driver publishes: its messages are not kept, and may get lost.
@@ -270,6 +270,8 @@ class RobotBattery:
         with conversions.refusing(self._node, self._topic):
             charging = charging_from(message)
             driver.hear(message.percentage, message.voltage, charging, now, present=message.present)
+            if hint := doubt(message.percentage, self._settings):
+                self._node.get_logger().warn(f'{self._topic}: {hint}', once=True)
             self._take_driver(driver, now)
 
     def _take_driver(self, driver: DrivenBattery, now: float) -> bool:

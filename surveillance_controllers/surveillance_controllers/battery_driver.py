@@ -87,6 +87,17 @@ def level_from(
     return round(min(100.0, 100.0 * share), 3)
 
 
+def doubt(percentage: float, settings: DriverSettings) -> str:
+    """Return what speaks against how a percentage is taken; empty: nothing does."""
+    if settings.voltages or settings.full <= 1.0 or not 0.0 < percentage <= 1.0:
+        return ''
+    return (
+        f'percentage {percentage:.3g} is taken for {100.0 * percentage / settings.full:.3g} %, for '
+        f'battery.full is {settings.full:g} in the profile: expected 1 there where the driver '
+        'tells a share from 0 to 1'
+    )
+
+
 class DrivenBattery:
     """What a driver said last, and whether it still speaks.
 

@@ -61,10 +61,10 @@ def array_from_points(points: Iterable[Point]) -> Points:
     return np.array([(p.x, p.y, p.z) for p in points], dtype=float).reshape(-1, 3)
 
 
-def path_from_array(array: Points, stamp: Any) -> PathMessage:
+def path_from_array(array: Points, stamp: Any, frame: str = 'map') -> PathMessage:
     """Return the rows of an array of shape (n, 2) or (n, 3), metres, as a path in the map frame."""
     message = PathMessage()
-    message.header.frame_id, message.header.stamp = 'map', stamp
+    message.header.frame_id, message.header.stamp = frame, stamp
     for row in array:
         pose = PoseStamped(header=message.header)
         pose.pose.position = point_message(row)

@@ -28,6 +28,7 @@ from surveillance_runtime.conversions import point_messages
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.place.stations import AT_STATION
 from surveillance_runtime.process import run_node
+from surveillance_runtime.profile.parameters import declared_frames
 from surveillance_runtime.state_topics import OwnedTopic
 
 if TYPE_CHECKING:
@@ -57,6 +58,7 @@ class PlannerController(PatrolNode):
 
             timeout = self._settings.peer_timeout
             self._simulated = NavigationPlanning(self, self._knowledge, timeout)
+        self._frames = declared_frames(self, 'map')
         self._shown = OwnedTopic(self, Path, 'plan')
         GoalServer(self, ComputePath, 'compute_path', self._compute_path)
         GoalServer(self, Plan, 'motion/planner', self._plan)
@@ -104,7 +106,7 @@ class PlannerController(PatrolNode):
 
     def _show(self, path: Points) -> None:
         stamp = self.get_clock().now().to_msg()
-        self._shown.publish(conversions.path_from_array(path, stamp))
+        self._shown.publish(conversions.path_from_array(path, stamp, self._frames.map))
 
     def _start(self, target: str, run: GoalRun) -> Points:
         if self._simulated is not None:

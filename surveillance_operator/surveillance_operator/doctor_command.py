@@ -14,7 +14,7 @@ from rclpy.node import Node
 from surveillance_operator.watch_command import mission_parser, ros_arguments
 from surveillance_runtime.graph_check import Listener
 from surveillance_runtime.profile import find_profile, read_profile
-from surveillance_runtime.profile.check_up import awaited, findings, table
+from surveillance_runtime.profile.check_up import awaited, findings, table, unplaced
 from surveillance_runtime.run_options import BUILT_IN_ROBOT, OPTIONS
 
 _IN_CHECKOUT = Path(__file__).resolve().parents[2] / 'config'
@@ -66,7 +66,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         node.destroy_node()
         rclpy.try_shutdown()
     print(f'robot {profile.name}, listened for {options.seconds:g} s')
-    for line in table(wanted, seen, options.seconds):
+    lines = table(wanted, seen, options.seconds)
+    for line in (*lines, *unplaced(profile, seen, options.namespace)):
         print(line)
     lacking = any(each.is_needed and any(findings(each, seen, 0.0)) for each in wanted)
     return 1 if lacking else 0

@@ -274,16 +274,19 @@ _FLOATS = {PointField.FLOAT32: 'f4', PointField.FLOAT64: 'f8'}
 
 
 def cloud_from_points(
-    points: NDArray[np.float64], **values: NDArray[np.float64] | NDArray[np.bool_]
+    points: NDArray[np.float64],
+    frame: str = 'map',
+    **values: NDArray[np.float64] | NDArray[np.bool_],
 ) -> PointCloud2:
     """Return points as a cloud in the map's frame; the caller stamps it.
 
     Args:
         points: Shape (n, 2), metres.
+        frame: The name of the map's frame.
         values: Further fields by name, each of shape (n,).
     """
     message = PointCloud2()
-    message.header.frame_id = 'map'
+    message.header.frame_id = frame
     message.height, message.width = 1, len(points)
     # What a float of 32 bits leaves of a coordinate is up to 1 m in UTM.
     near = points.astype(np.float32)

@@ -19,6 +19,11 @@ from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.profile.check_up import Awaited, Endpoint, Heard, Seen, findings
 from surveillance_runtime.qos import SENSOR_QOS
 
+try:
+    from tf2_msgs.msg import TFMessage
+except ImportError:
+    TFMessage = None
+
 
 def endpoints_of(node: Node) -> Seen:
     """Return who publishes and who subscribes what, without what the node itself does."""
@@ -59,6 +64,10 @@ class Listener:
         self._subscriptions: dict[str, Subscription] = {}
         self._times: dict[str, list[float]] = {}
         self._last: dict[str, tuple[str, float | None]] = {}
+        self._parents: dict[str, str] = {}
+        if TFMessage is not None:
+            latched = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+            node.create_subscription(TFMessage, 'tf_static', self._on_static, latched)
 
     def look(self) -> Seen:
         """Subscribe what is published by now; return what is there and what came so far."""
@@ -75,7 +84,12 @@ class Listener:
                 self._subscriptions[each.topic] = self._node.create_subscription(
                     kind, each.topic, partial(self._hear, each.topic), quality
                 )
-        return Seen(seen.publishers, seen.subscribers, self._heard())
+        return Seen(seen.publishers, seen.subscribers, self._heard(), self._parents)
+
+    def _on_static(self, message: Any) -> None:
+        for each in message.transforms:
+            child, parent = each.child_frame_id, each.header.frame_id
+            self._parents[child.removeprefix('/')] = parent.removeprefix('/')
 
     def _hear(self, topic: str, message: Any) -> None:
         self._times.setdefault(topic, []).append(time.monotonic())

@@ -231,7 +231,7 @@ def test_whoever_helps_a_robot_that_does_not_know_where_it_is_is_told_how(machin
         raise CallError('armor: ontology map has Robot1 in no place')
 
     world.snapshot = snapshot  # type: ignore[method-assign, assignment]
-    world.waiting_for_help = cries.append  # type: ignore[method-assign]
+    world.waiting_for_help = cries.append  # type: ignore[method-assign, assignment]
     Run(machine, world).until(60.0)
     assert any('in an unknown place' in cry for cry in cries)
     assert any('or tell its pose on initialpose; next try' in cry for cry in cries)

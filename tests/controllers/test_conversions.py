@@ -61,7 +61,8 @@ def test_poses_come_back(x: float, y: float, yaw: float) -> None:
 def test_clouds_come_back(points: list[tuple[float, float]]) -> None:
     array = np.array(points).reshape(-1, 2)
     stays = array[:, 0] > 0
-    cloud = cloud_from_points(array, stays=stays)
+    cloud = cloud_from_points(array, 'office', stays=stays)
+    assert cloud.header.frame_id == 'office'
     assert cloud.width == len(points)
     assert points_from_cloud(cloud) == pytest.approx(array, abs=1e-4)
     assert np.array_equal(values_from_cloud(cloud, 'stays'), stays)  # type: ignore[arg-type]

@@ -7,6 +7,7 @@ as drivers do; the controllers know it by its profile alone.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -18,12 +19,21 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import BatteryState, LaserScan
 
 from surveillance_controllers.battery_controller_node import BatteryController
-from surveillance_controllers.battery_driver import DriverSettings, level_from
+from surveillance_controllers.battery_driver import DriverSettings, doubt, level_from
 from surveillance_controllers.collision_monitor_node import CollisionMonitor
 from surveillance_controllers.motion_controller_node import MotionController
 from surveillance_runtime.configuration import Configuration
 from surveillance_runtime.profile import ProfileFile, profile_layer, read_profile
-from surveillance_runtime.profile.check_up import Awaited, Endpoint, Heard, Seen, awaited, findings
+from surveillance_runtime.profile.check_up import (
+    Awaited,
+    Endpoint,
+    Heard,
+    Seen,
+    awaited,
+    findings,
+    unplaced,
+)
+from surveillance_runtime.profile.record import Frames, Lidars, RobotProfile
 
 LOSSY = QoSProfile(
     depth=5,
@@ -100,6 +110,13 @@ def test_drivers_of_several_habits_tell_a_charge_or_why_not(
             level_from(percentage, voltage, settings)
     else:
         assert level_from(percentage, voltage, settings) == pytest.approx(level)
+
+
+def test_a_share_that_is_taken_for_percent_is_doubted() -> None:
+    percent = DriverSettings(full=100.0)
+    assert 'battery.full is 100 in the profile: expected 1 there' in doubt(0.8, percent)
+    assert not any(doubt(each, percent) for each in (0.0, 1.5, 80.0, math.nan))
+    assert doubt(0.8, DriverSettings()) == ''
 
 
 def scan(frame: str, ranges: float, stamp: Any) -> LaserScan:
@@ -208,6 +225,29 @@ def test_what_is_not_as_awaited_is_said_with_what_is_there(
     lines = list(findings(wanted, seen, 4.0))
     assert said in '\n'.join(lines)
     assert bool(lines) == bool(said)
+
+
+@pytest.mark.parametrize(
+    ('parents', 'mounts', 'is_told'),
+    [
+        ({}, (), True),
+        ({'laser': 'mast'}, (), True),
+        ({'laser': 'mast', 'mast': 'laser'}, (), True),
+        ({'laser': 'mast', 'mast': 'base_link'}, (), False),
+        ({'laser': 'mast', 'mast': 'chassis'}, (), False),
+        ({}, (0.1, 0.0, 0.0, 0.0), False),
+    ],
+)
+def test_a_lidar_of_which_nobody_says_where_it_is_is_named(
+    parents: dict[str, str], mounts: tuple[float, ...], is_told: bool
+) -> None:
+    robot = replace(
+        RobotProfile(), frames=replace(Frames(), base='chassis'), lidars=Lidars(mounts=mounts)
+    )
+    seen = Seen(heard={'/r/scan': Heard(9, 10.0, '/laser', 0.1)}, parents=parents)
+    lines = list(unplaced(robot, seen, 'r'))
+    assert len(lines) == is_told
+    assert not lines or "/r/scan: where its frame 'laser' is on the robot is not known" in lines[0]
 
 
 def test_a_namespace_leads_to_the_topics_of_its_robot(profile: ProfileFile) -> None:

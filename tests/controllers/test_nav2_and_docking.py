@@ -100,18 +100,26 @@ class Knowledge:
         take(self._positions)
 
 
-def nav2(graph: Any, recorder: Any = None, flat: Any = None) -> nav2_motion.Nav2Motion:
+def nav2(graph: Any, recorder: Any = None, flat: Any = None, **more: Any) -> nav2_motion.Nav2Motion:
     settings: Any = SimpleNamespace(peer_timeout=1.0)
     knowledge: Any = Knowledge({} if flat is None else flat.POSITIONS)
     doors = {} if flat is None else {'doors.D': [4.05, 1.5, np.pi / 2, 1.0]}
     taken: Any = recorder or Recorder()
-    node = graph.add(PatrolNode, doors, name='motion_controller')
+    node = graph.add(PatrolNode, doors | more, name='motion_controller')
     return nav2_motion.Nav2Motion(node, knowledge, taken, settings)
 
 
 def at(x: float, y: float) -> Any:
     position = SimpleNamespace(x=x, y=y, z=0.0)
     return SimpleNamespace(current_pose=SimpleNamespace(pose=SimpleNamespace(position=position)))
+
+
+def test_nav2_is_told_in_the_frame_that_the_profile_names(
+    graph: Any, servers: Servers, run: Any
+) -> None:
+    nav2(graph, **{'robot.frames.map': 'office'}).follow(PATH, run, lambda _at: None)
+    ((_, goal),) = servers.asked
+    assert {pose.header.frame_id for pose in goal.poses} == {'office'}
 
 
 def test_nav2_is_led_along_the_path(graph: Any, servers: Servers, run: Any) -> None:

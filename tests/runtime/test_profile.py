@@ -62,6 +62,7 @@ def test_another_robot_s_topics_types_frames_and_lidars_reach_the_nodes(tmp_path
             frames: {odom: odom_combined, base: base_footprint, scans: [front_laser, rear_laser]}
             body: {footprint: [[0.3, 0.2], [-0.3, 0.2], [-0.3, -0.2], [0.3, -0.2]]}
             lidars: {mounts: [[0.25, 0, 0], [-0.25, 0, 3.14, 3.1416]]}
+            drive: {speed: 0.2, turn: 1.0, acceleration: 0.4, turn_acceleration: 2.0}
             """,
         )
     )
@@ -72,6 +73,11 @@ def test_another_robot_s_topics_types_frames_and_lidars_reach_the_nodes(tmp_path
     assert told['robot.scans'] == ['front', 'rear']
     assert told['lidar_mounts'] == pytest.approx([0.25, 0, 0, 0, -0.25, 0, 3.14, 3.1416])
     assert told['robot_radius'] == pytest.approx(0.3606, abs=1e-4)
+    for node in ('motion_controller', 'explorer'):
+        given = merged.resolve(node)
+        assert [given[f'drive.{each}'].value for each in ('speed', 'turn')] == [0.2, 1.0]
+        assert given['drive.acceleration'].value == 0.4
+        assert given['drive.turn_acceleration'].value == 2.0
     origin = merged.resolve('motion_controller')['robot.frames.odom'].origin
     assert origin == f'{file.path}:4'
     renamed = dict(remappings(file.profile, DRIVING, 'ROBOT'))

@@ -30,6 +30,10 @@ class Motion(Protocol):
     def look_around(self, run: GoalRun) -> None:
         """Look around in the place."""
 
+    @property
+    def map_frame(self) -> str:
+        """The name of the map's frame."""
+
 
 class MotionFailedError(Exception):
     """The robot did not get where it should; the text says why.

@@ -51,6 +51,7 @@ from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.parameters import ParameterError
 from surveillance_runtime.place.stations import station_at, stations_in
 from surveillance_runtime.place_changes import follow_place
+from surveillance_runtime.profile.parameters import declared_frames
 from surveillance_runtime.state_topics import StateSubscription
 from surveillance_runtime.turning_path import bearing_of
 
@@ -112,6 +113,7 @@ class Nav2Motion:
             'navigator', 'nav2', 'own', 'NavigateThroughPoses', 'Spin'
         )
         self._timeout = settings.peer_timeout
+        self._frames = declared_frames(node, 'map')
         self._navigator = GoalCaller(node, self._type, 'navigate_through_poses')
         self._spinner = GoalCaller(node, self._spin, 'spin')
         self._hold = Hold(node)
@@ -219,7 +221,7 @@ class Nav2Motion:
         poses = []
         for before, at in pairwise(points):
             pose = PoseStamped()
-            pose.header.frame_id, pose.header.stamp = 'map', stamp
+            pose.header.frame_id, pose.header.stamp = self.map_frame, stamp
             yaw = math.atan2(at[1] - before[1], at[0] - before[0])
             pose.pose = pose_message((float(at[0]), float(at[1]), yaw))
             poses.append(pose)
@@ -259,6 +261,11 @@ class Nav2Motion:
         with self._lock:
             place, wanted = self._places.place_at(end), self._places.place_at(goal)
         return expect_place(place, wanted, end)
+
+    @property
+    def map_frame(self) -> str:
+        """The name of the map's frame."""
+        return self._frames.map
 
     def look_around(self, _run: GoalRun) -> None:
         """Nothing: Nav2's own behaviours turn the robot where that is wanted."""
@@ -313,7 +320,7 @@ class DockingMotion:
         if station is None or run.interrupt.is_set():
             return end
         pose = PoseStamped()
-        pose.header.frame_id = 'map'
+        pose.header.frame_id = self.map_frame
         pose.header.stamp = self._node.get_clock().now().to_msg()
         pose.pose = pose_message(station.pose)
         goal = self._dock.Goal(
@@ -330,6 +337,11 @@ class DockingMotion:
     def place_reached(self, goal: Points, end: Points) -> str:
         """As the motion that drives."""
         return self._inner.place_reached(goal, end)
+
+    @property
+    def map_frame(self) -> str:
+        """As the motion that drives."""
+        return self._inner.map_frame
 
     def look_around(self, run: GoalRun) -> None:
         """As the motion that drives; a docked robot stays as it is."""

@@ -199,6 +199,11 @@ class NavigationMotion:
             raise MotionFailedError('the robot does not know in which of several places it is', end)
         return expect_place(self._navigator.place_at(end), self._navigator.place_at(goal), end)
 
+    @property
+    def map_frame(self) -> str:
+        """The name of the map's frame."""
+        return self._frames.map
+
     def look_around(self, run: GoalRun) -> None:
         """Turn once on the spot, as the place's exploration asks for.
 
@@ -408,7 +413,9 @@ class NavigationMotion:
             self._node.get_logger().info(f'pose found at ({x:.2f}, {y:.2f})')
         if navigator.obstacles_changed:
             navigator.obstacles_changed = False
-            cloud = cloud_from_points(navigator.obstacles, stays=navigator.obstacles_stay)
+            cloud = cloud_from_points(
+                navigator.obstacles, self._frames.map, stays=navigator.obstacles_stay
+            )
             cloud.header.stamp = stamp
             self._obstacles.publish(cloud)
         if navigator.odometry is not None:

@@ -23,6 +23,7 @@ from surveillance_controllers.motion.sensors import SensorStream
 from surveillance_runtime import parameter_checks
 from surveillance_runtime.conversions import nanoseconds_of, pose_message, seconds_of, stamp_from
 from surveillance_runtime.node import PatrolNode
+from surveillance_runtime.profile.check_up import BASE_FRAMES
 from surveillance_runtime.profile.parameters import LidarSettings
 from surveillance_runtime.profile.record import Frames
 from surveillance_runtime.qos import SENSOR_QOS
@@ -33,8 +34,6 @@ try:
 except ImportError:
     TFMessage = None
 
-BASE_FRAMES = ('base_link', 'base_footprint', '')
-"""Frames at the robot's centre, beside the one that the profile names."""
 TELL_WITHIN = 3.0
 """A scan is left out for so long, seconds, while nobody says where its frame is."""
 

@@ -15,6 +15,8 @@ from surveillance_runtime.suggestions import like
 
 MOST_AGE = 2.0
 """A stamp that is older or younger than this beside this machine's clock is told, seconds."""
+BASE_FRAMES = ('base_link', 'base_footprint', '')
+"""Frames at the robot's centre, beside the one that the profile names."""
 OWN_NODES = frozenset(('motion_controller', 'collision_monitor'))
 """They listen to commands as well, and are no base."""
 
@@ -85,11 +87,13 @@ class Seen:
         publishers: By topic.
         subscribers: By topic.
         heard: By topic.
+        parents: On `tf_static`: of each frame the one that it is fixed to.
     """
 
     publishers: Mapping[str, Sequence[Endpoint]] = field(default_factory=dict)
     subscribers: Mapping[str, Sequence[Endpoint]] = field(default_factory=dict)
     heard: Mapping[str, Heard] = field(default_factory=dict)
+    parents: Mapping[str, str] = field(default_factory=dict)
 
 
 def named(topic: str, namespace: str = '') -> str:
@@ -211,6 +215,33 @@ def findings(wanted: Awaited, seen: Seen, seconds: float) -> Iterator[str]:
             f'{wanted.topic}: its stamps are {abs(heard.age):.1f} s {when} the clock: are the '
             'clocks of the robot and of this machine the same?'
         )
+
+
+def unplaced(profile: RobotProfile, seen: Seen, namespace: str = '') -> Iterator[str]:
+    """Yield which lidars nobody says the place of, one line each.
+
+    Args:
+        profile: The robot.
+        seen: What is there.
+        namespace: That its names are in.
+    """
+    if profile.lidars.mounts:
+        return
+    for scan in profile.topics.scans:
+        topic = named(scan, namespace)
+        if topic not in seen.heard:
+            continue
+        frame = at = seen.heard[topic].frame.removeprefix('/')
+        passed = 0
+        while at != profile.frames.base and at.rpartition('/')[2] not in BASE_FRAMES:
+            if at not in seen.parents or passed > len(seen.parents):
+                yield (
+                    f'{topic}: where its frame {frame!r} is on the robot is not known: expected it '
+                    f'on tf_static below {profile.frames.base}, or lidars.mounts in the robot '
+                    "profile; it is taken for the robot's centre"
+                )
+                break
+            at, passed = seen.parents[at], passed + 1
 
 
 def _wrong_type(wanted: Awaited, end: Endpoint) -> str:
