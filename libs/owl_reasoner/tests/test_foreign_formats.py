@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 from owl_reasoner.documents.reading import FORMATS, read_ontology
+from owl_reasoner.documents.writing import ontology_bytes
 from owl_reasoner.documents.xml_reading import OntologyFileError
 from owl_reasoner.owl import axioms as ax
 from owl_reasoner.owl import expressions as ex
@@ -397,3 +398,23 @@ def test_what_older_documents_say_is_read(text, axiom):
     document = read_ontology(rdf(text).encode(), IRI)
     assert axiom in document.axioms
     assert document.unsupported == []
+
+
+@pytest.mark.parametrize(
+    'text',
+    [
+        'Ontology(Annotation(<urn:n> "x"))',
+        '<Ontology xmlns="http://www.w3.org/2002/07/owl#"><Annotation>'
+        '<AnnotationProperty IRI="urn:n"/><Literal>x</Literal></Annotation></Ontology>',
+        'Ontology: Annotations: <urn:n> "x"',
+        '@prefix owl: <http://www.w3.org/2002/07/owl#> . [] a owl:Ontology ; <urn:n> "x" .',
+    ],
+)
+@pytest.mark.parametrize('form', ['rdfxml', 'ntriples', 'manchester'])
+def test_what_is_said_of_an_ontology_without_a_name_stays_said_of_it(text, form):
+    said = ax.AnnotationAssertion('urn:n', IRI, ex.Literal('x'))
+    document = read_ontology(text.encode(), IRI)
+    assert (document.iri, said in document.axioms) == ('', True)
+    again = read_ontology(ontology_bytes(document.axioms, IRI, form), 'urn:base')
+    assert (again.iri, again.unsupported) == (IRI, [])
+    assert [axiom for axiom in again.axioms if not isinstance(axiom, ax.Declaration)] == [said]

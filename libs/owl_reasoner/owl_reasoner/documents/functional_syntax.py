@@ -48,7 +48,7 @@ class _Parser:
         self._text, self._base = text, base
         self._iris: dict[str, str] = {}
         self._tokens = self._read_tokens()
-        self.stated = Axioms(self._line)
+        self.stated = Axioms(self._line, base)
         self._ended = False
         self._next = next(self._tokens)
         while self._next[0] != 'end':

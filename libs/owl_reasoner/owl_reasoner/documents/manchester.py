@@ -712,8 +712,8 @@ class ManchesterDocument(Axioms):
     """A document, whose frames are read once it is known what its imports declare."""
 
     def __init__(self, text: str, iri: str) -> None:
-        super().__init__(lambda place: text.count('\n', 0, place) + 1)
-        self._body, self._base = text, iri
+        super().__init__(lambda place: text.count('\n', 0, place) + 1, iri)
+        self._body = text
         place = 0
         while (match := _HEADER.match(text, place)) is not None and match.end() > place:
             if match['prefix'] is not None:
@@ -741,7 +741,7 @@ class ManchesterDocument(Axioms):
         """Read the frames."""
         known = [*declared, *self.declared]
         parser = ManchesterParser(self._body, self._full, known)
-        self.axioms.update(dict.fromkeys(parser.header(self.iri)))
+        self.axioms.update(dict.fromkeys(parser.header(self.called)))
         self.axioms.update(dict.fromkeys(parser.axioms()))
         self.unsupported += parser.unsupported
 

@@ -439,14 +439,19 @@ class _Terms:
 class Mapping:
     """Turns one graph into axioms.
 
+    Args:
+        graph: The graph.
+        base: What the ontology is called where its header has no name; '': nothing is kept then.
+
     Attributes:
         axioms: In document order; there after `read`.
         unsupported: One sentence for each statement that was not understood.
         prefixes: The prefixes that the document declares.
     """
 
-    def __init__(self, graph: Graph) -> None:
+    def __init__(self, graph: Graph, base: str = '') -> None:
         self.axioms: dict[Axiom, None] = {}
+        self._base = base
         self.unsupported = graph.unsupported.copy()
         self.prefixes = graph.prefixes
         self._graph = _Statements(graph)
@@ -598,7 +603,10 @@ class Mapping:
         kinds = self._graph.kinds.get(predicate, set())
         fitting = 'data_property' if isinstance(value, Literal) else 'object_property'
         annotates = 'annotation_property' in kinds or predicate in ANNOTATIONS
-        if annotates or (subject == self._graph.header and fitting not in kinds):
+        is_header = subject == self._graph.header
+        if annotates or (is_header and fitting not in kinds):
+            if is_header and subject.startswith('_:'):
+                subject = self._base or subject
             if subject.startswith('_:') and self._is_construct(subject):
                 self._report(subject, f'{local_name(predicate)} of what has no name is not kept')
             else:

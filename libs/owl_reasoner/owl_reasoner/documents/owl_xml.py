@@ -54,7 +54,7 @@ class _Element:
 class _Reader(XmlReader):
     def __init__(self, data: bytes, base: str) -> None:
         super().__init__(data)
-        self.stated = Axioms(lambda line: line)
+        self.stated = Axioms(lambda line: line, base)
         self.stated.unsupported = self.unsupported
         self._stack = [_Element('', {}, 0, base, '')]
 

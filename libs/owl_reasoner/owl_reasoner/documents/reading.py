@@ -232,21 +232,21 @@ def _parsed(data: bytes, iri: str) -> tuple[str, Mapping | Axioms]:
         return 'functional', parse_functional(_text(data), iri)
     if _TRIPLE.match(data, place):
         try:
-            return 'ntriples', Mapping(_rdf_text(data, iri, 'ntriples'))
+            return 'ntriples', Mapping(_rdf_text(data, iri, 'ntriples'), iri)
         except OntologyFileError as error:
             # Turtle can begin so as well.
             try:
-                return 'turtle', Mapping(_rdf_text(data, iri, 'turtle'))
+                return 'turtle', Mapping(_rdf_text(data, iri, 'turtle'), iri)
             except OntologyFileError as other:
                 raise max(error, other, key=lambda e: e.line) from None
     if _XML.match(data, place):
         if is_owl_xml(data):
             return 'owlxml', parse_owl_xml(data, iri)
-        return 'rdfxml', Mapping(parse_rdf_xml(data, iri))
+        return 'rdfxml', Mapping(parse_rdf_xml(data, iri), iri)
     if _JSON.match(data, place):
-        return 'jsonld', Mapping(_rdf_text(data, iri, 'jsonld'))
+        return 'jsonld', Mapping(_rdf_text(data, iri, 'jsonld'), iri)
     if _TURTLE.match(data, place):
-        return 'turtle', Mapping(_rdf_text(data, iri, 'turtle'))
+        return 'turtle', Mapping(_rdf_text(data, iri, 'turtle'), iri)
     if _MANCHESTER.match(data, place):
         return 'manchester', ManchesterDocument(_text(data), iri)
     shown = data[place : place + 40].decode('latin-1')

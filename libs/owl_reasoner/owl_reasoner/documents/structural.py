@@ -60,6 +60,7 @@ class Axioms:
 
     Args:
         line_of: Gives the line of a place.
+        base: What the ontology is called where it has no name.
 
     Attributes:
         axioms: In document order.
@@ -68,8 +69,8 @@ class Axioms:
         prefixes: The prefixes that the document declares.
     """
 
-    def __init__(self, line_of: Callable[[int], int]) -> None:
-        self._line_of = line_of
+    def __init__(self, line_of: Callable[[int], int], base: str) -> None:
+        self._line_of, self._base = line_of, base
         self.axioms: dict[Axiom, None] = {}
         self.unsupported: list[str] = []
         self.iri = ''
@@ -88,9 +89,14 @@ class Axioms:
     def read(self, declared: Iterable[tuple[str, str]] = ()) -> None:
         """Nothing is left to read: each axiom says of what kind its names are."""
 
+    @property
+    def called(self) -> str:
+        """The ontology's IRI, or what stands for it."""
+        return self.iri or self._base
+
     def version(self, iri: str) -> None:
         """Take in the IRI of the ontology's version, which RDF has as an annotation."""
-        self.axioms[ax.AnnotationAssertion(OWL + 'versionIRI', self.iri, iri)] = None
+        self.axioms[ax.AnnotationAssertion(OWL + 'versionIRI', self.called, iri)] = None
 
     def named(self, name: str) -> str | None:
         """Return the IRI of a prefixed name; None where its prefix is not declared."""
@@ -105,7 +111,7 @@ class Axioms:
         try:
             if call.name == 'Annotation':
                 prop, value = call.parts[-2:]
-                axiom: Axiom = ax.AnnotationAssertion(prop, self.iri, value)
+                axiom: Axiom = ax.AnnotationAssertion(prop, self.called, value)
             else:
                 axiom = _AXIOMS[call.name](parts)
             hash(axiom)
