@@ -30,7 +30,6 @@ from statistics import median
 from types import SimpleNamespace
 from typing import Any
 
-import networkx
 import numpy as np
 import numpy.typing as npt
 import yaml
@@ -165,6 +164,8 @@ def planning(*, quick: bool) -> None:
 
 
 def _networkx(free: Mask, first: tuple[int, int], last: tuple[int, int]) -> float:
+    import networkx  # takes its time, and tests that use this module do without
+
     graph = networkx.Graph()
     for offset, length in (((0, 1), 1.0), ((1, 0), 1.0), ((1, 1), 2**0.5), ((1, -1), 2**0.5)):
         both, there = _pairs(free, offset)

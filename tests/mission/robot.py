@@ -155,11 +155,15 @@ class Robot:
 
     def until_visited(self, places: set[str], since: float, latest: float) -> None:
         """Run the mission until all places were visited since then, or until ``latest``."""
+        self.until_true(lambda: self.visited(since) == places, since, latest)
+        assert self.visited(since) == places
+
+    def until_true(self, condition: Callable[[], bool], since: float, latest: float) -> None:
+        """Run the mission until the condition holds, or until ``latest``."""
         now = since
-        while now < latest and self.visited(since) != places:
+        while now < latest and not condition():
             now = min(now + 20.0, latest)
             self.until(now)
-        assert self.visited(since) == places
 
     def summary(self) -> Summary:
         """Return what the record says."""

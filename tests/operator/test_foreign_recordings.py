@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import io
 import os
 import shutil
@@ -184,10 +185,13 @@ def test_a_file_alone_and_a_folder_without_metadata_show_the_same(
         sights.close()
 
 
-SERIALISED = [
-    (int((START + at) * 1e9), topic, message, serialize_message(message))
-    for at, topic, message in said()
-]
+@functools.cache
+def serialised() -> list[tuple[int, str, Any, bytes]]:
+    """Return what is recorded with its bytes: time in ns, topic, message, bytes."""
+    return [
+        (int((START + at) * 1e9), topic, message, serialize_message(message))
+        for at, topic, message in said()
+    ]
 
 
 def mission_file(path: Path, **options: Any) -> bytes:
@@ -196,7 +200,7 @@ def mission_file(path: Path, **options: Any) -> bytes:
         writer = McapWriter(file, chunk_size=2000, **options)
         writer.start(profile='ros2', library='another')
         channels: dict[str, int] = {}
-        for at, topic, message, data in SERIALISED:
+        for at, topic, message, data in serialised():
             kind = f'{type(message).__module__.split(".")[0]}/msg/{type(message).__name__}'
             if topic not in channels:
                 schema = writer.register_schema(kind, 'ros2msg', definition(kind).encode())
@@ -222,7 +226,7 @@ def test_what_other_programs_write_is_read_whole_or_torn(
     path = tmp_path / 'other.mcap'
     content = mission_file(path, **options)
     every = list(Messages(path).in_order())
-    assert every == [(topic, at, data) for at, topic, _, data in SERIALISED]
+    assert every == [(topic, at, data) for at, topic, _, data in serialised()]
     # As a writer leaves it that was killed: no index, and the last record is torn.
     path.write_bytes(content[: int(len(content) * 0.6)])
     torn = Messages(path)
@@ -243,7 +247,7 @@ def test_no_damaged_byte_ends_the_reader(tmp_path: Path) -> None:
     for place in range(8, len(content), len(content) // 60):
         path.write_bytes(content[:place] + b'\xff' * 8 + content[place + 8 :])
         messages = Messages(path)
-        assert len(list(messages.in_order())) <= len(SERIALISED)
+        assert len(list(messages.in_order())) <= len(serialised())
         messages.close()
 
 
