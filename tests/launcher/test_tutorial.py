@@ -23,6 +23,9 @@ PROCESS = ROOT / 'tests' / 'launcher' / 'mission_process.py'
 ELSEWHERE = ('git clone', 'python3 launch.py\n', 'benchmarks/')
 """Commands that other tests run: a clone, a mission without end, a benchmark."""
 
+AS_FAST_AS_NODES = ('-p', 'speed:=0.0', '--domain')
+"""Time waits for the nodes: ten times as fast as real time, a busy machine is too slow for them."""
+
 
 def blocks(page: str) -> list[tuple[str, str]]:
     """Return the language and text of each block of a page of the docs."""
@@ -84,7 +87,7 @@ def test_the_page_does_what_it_says(
         elif language == 'sh' and not any(word in text for word in ELSEWHERE):
             for line in text.splitlines():
                 if '--for' in line:
-                    mission = start(*words_of(line, tmp_path), '--domain', str(ros_domain))
+                    mission = start(*words_of(line, tmp_path), *AS_FAST_AS_NODES, str(ros_domain))
                     mission.until('arrived in (Lab|Kitchen)')
                     assert mission.end(signal.SIGINT)[0] == 0
                 elif not line.startswith('.venv/bin/python'):
@@ -121,8 +124,8 @@ def test_the_page_about_your_building_does_what_it_says(
                 shown += 1
             elif '--for' in line:
                 # The tutorial's mission has a process for each node.
-                words = [*words_of(line, tmp_path), '--composed', '--domain', str(ros_domain)]
-                mission = start(*words)
+                words = [*words_of(line, tmp_path), '--composed']
+                mission = start(*words, *AS_FAST_AS_NODES, str(ros_domain))
                 mission.until('arrived in R')
                 assert mission.end(signal.SIGINT)[0] == 0
                 driven += 1
