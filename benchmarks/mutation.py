@@ -12,7 +12,7 @@ A PART is a library, or a package of the robot: its modules without ROS, tried b
 `unit` alone, of the files that name the module. A process collects the tests once. A fault within a
 function is put into a fork of it, which therefore costs its tests alone; a fault in what runs at
 import costs the imports as well. Limits are in processor time, since the machine may be busy. No
-file is changed.
+file is changed. What needs an extra that is not installed (MuJoCo) counts as not reached.
 
 `equivalent_mutants.toml` names changes that make no difference to a user, each with its reason;
 they are left out. `--report FILE` keeps the survivors, `--again FILE` tries those alone.
