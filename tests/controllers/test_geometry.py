@@ -53,3 +53,40 @@ def test_a_point_of_a_path_is_found_on_it(
 def test_points_passed_are_counted_from_the_start() -> None:
     path = [(0, 0), (1, 0), (1, 2)]
     assert [geometry.points_passed(path, d) for d in (0, 0.9, 1, 2.9, 3, 9)] == [1, 1, 2, 2, 3, 3]
+
+
+POSES = st.tuples(st.floats(-50, 50), st.floats(-50, 50), st.floats(-3.1, 3.1))
+
+
+@given(POSES, POSES)
+@settings(max_examples=50)
+def test_the_step_between_two_poses_leads_from_one_to_the_other(
+    first: geometry.Pose, second: geometry.Pose
+) -> None:
+    step = geometry.relative(first, second)
+    assert geometry.composed(first, step) == pytest.approx(second, abs=1e-9)
+    x, y = geometry.in_map(first, np.array([step[:2]]))[0]
+    assert (x, y) == pytest.approx(second[:2], abs=1e-9)
+
+
+def test_a_step_is_told_in_the_own_frame_of_the_first_pose() -> None:
+    north = (2.0, 1.0, np.pi / 2)
+    assert geometry.relative(north, (2.0, 4.0, np.pi)) == pytest.approx((3.0, 0.0, np.pi / 2))
+    assert geometry.relative(north, (1.0, 1.0, 0.0)) == pytest.approx((0.0, 1.0, -np.pi / 2))
+
+
+def test_what_a_lidar_met_is_told_in_the_robots_frame() -> None:
+    """The lidar sits 0.3 m ahead and 0.1 m to the left, and looks to the left."""
+    mount = (0.3, 0.1, np.pi / 2)
+    angles = np.array([0.0, np.pi / 2, np.pi, 0.1, 0.2])
+    ranges = np.array([2.0, 1.0, 8.0, np.inf, np.nan])
+    scan = geometry.Scan(angles, ranges, 8.0, mount, np.arange(5.0))
+    assert scan.points == pytest.approx(np.array([[0.3, 2.1], [-0.7, 0.1]]))
+    thin = scan.thinned(2)
+    assert thin.angles.tolist() == angles[::2].tolist()
+    assert thin.ranges[0] == 2.0
+    assert (thin.range_max, thin.mount) == (8.0, mount)
+    assert thin.times is not None
+    assert thin.times.tolist() == [0.0, 2.0, 4.0]
+    assert scan.thinned(100).angles.tolist() == angles.tolist()
+    assert geometry.Scan(angles, ranges, 8.0).thinned(1).times is None

@@ -176,7 +176,8 @@ def test_a_weekday_is_the_next_one_of_that_name_and_again_a_week_later() -> None
     assert (soon.first(monday), soon.before(monday + 89.0, monday)) == (monday + 90.0, None)
     assert soon.before(monday + 90.0, monday) == monday + 90.0
     assert soon.after(monday + 90.0, monday) == math.inf
-    assert Times.parse('0.5 h').first(monday) == monday + 1800.0
+    for text, seconds in (('0.5 h', 1800.0), ('2 min', 120.0), ('1 d', 86400.0)):
+        assert Times.parse(text).first(monday) == monday + seconds
     for wrong in ('wed 24:00', 'wed 21:60', 'someday 21:30', ''):
         with pytest.raises(ValueError, match='expected such as'):
             Times.parse(wrong)
