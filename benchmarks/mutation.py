@@ -350,13 +350,16 @@ def without_effect(tree: ast.Module) -> set[int]:
 
 
 def own_checks(tree: ast.Module) -> set[tuple[int, int]]:
-    """Return where `strict=True` has its value: by it a module checks what it knows to hold."""
+    """Return where `strict=True` and `frozen=True` have their values.
+
+    By those a module has Python check what it knows to hold.
+    """
     return {
         (keyword.value.lineno, keyword.value.col_offset)
         for node in ast.walk(tree)
         if isinstance(node, ast.Call)
         for keyword in node.keywords
-        if keyword.arg == 'strict'
+        if keyword.arg in ('strict', 'frozen')
     }
 
 

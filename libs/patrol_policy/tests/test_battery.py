@@ -266,23 +266,22 @@ DEAD_ENDS = {'A': {'B': 8.0, 'C': 9.0}, 'B': {'A': 8.0}, 'C': {'A': 9.0}}
 
 
 @pytest.mark.parametrize(
-    ('legs', 'reach', 'factor'),
+    ('legs', 'ranks', 'reach', 'factor'),
     [
-        (TRIANGLE, 200.0, 0.5),
-        (TRIANGLE, 90.0, 0.5),
-        (TRIANGLE, 140.0, 1.0),
-        # Places that are entered only when they are URGENT.
-        (DEAD_ENDS, 300.0, 1.5),
-        (DEAD_ENDS, 110.0, 0.9),
+        (TRIANGLE, [1, 1, 1], 200.0, 0.5),
+        (TRIANGLE, [1, 1, 1], 90.0, 0.5),
+        (TRIANGLE, [1, 1, 1], 140.0, 1.0),
+        # C is entered only when it is URGENT.
+        (DEAD_ENDS, [1, 1, 2], 300.0, 1.05),
     ],
 )
 def test_the_bound_is_that_of_trying_all_walks(
-    legs: dict[str, dict[str, float]], reach: float, factor: float
+    legs: dict[str, dict[str, float]], ranks: list[int], reach: float, factor: float
 ) -> None:
     graph = PatrolGraph(legs, 6.0)
     station = Station('A', ChargeCurve.even(2.0))
     energy = Energy(graph, [station], Draw(100.0 / reach), 0.0, BatteryLimits())
-    rules = RuleMap(graph, factor * graph.tour.length, default_ranks(graph), 0, energy=energy)
+    rules = RuleMap(graph, factor * graph.tour.length, ranks, 0, energy=energy)
     bound = charge_bound(rules)
     shortest = shortest_lawful_wait(rules, 6)
     assert bound.low <= shortest + 0.01
