@@ -34,12 +34,14 @@ if str(ROOT) not in sys.path:
     sys.path.insert(0, str(ROOT))
 
 from launcher.alarm import Alarm
+from marker_detection.camera_model import CameraModel
 from marker_detection.detector import DetectorSettings, MarkerDetector
+from marker_detection.pose import pose_of
 from surveillance_operator.notify.pipeline import notifier
 from surveillance_perception.observation.day_book import DayBook
 from surveillance_perception.observation.events import Event, EventBook
 from surveillance_perception.observation.evidence import EvidenceStore
-from surveillance_perception.observation.marker_views import SeenMarker
+from surveillance_perception.observation.hung_markers import CameraView, SeenMarker
 from surveillance_perception.observation.observations import Kind, Observation
 from surveillance_perception.observation.persons import load_finder
 from surveillance_perception.observation.viewpoints import Viewpoints
@@ -62,6 +64,8 @@ POSE_ERROR = (0.02, math.radians(0.6))
 """Deviation of the pose that localisation tells, metres and rad."""
 RADIUS = 0.22
 """Of the robot, metres."""
+DOUBT = (0.03, 0.02)
+"""And the deviation that it says it has: that of the robot's own localisation."""
 STEP = 0.25
 """A sweep is compared each so many metres of the way."""
 HEIGHT = 0.9
@@ -663,6 +667,7 @@ def measure_markers(trials: int) -> list[list[str]]:
     world, rng = rounds.world, rounds.rng
     camera = Camera.from_field_of_view(640, 480)
     renderer = Renderer(world, camera)
+    lens = CameraModel(camera.width, camera.height, camera.matrix)
     detector = MarkerDetector(DetectorSettings(dictionary=world.plan.marker_dictionary))
     places = {name: world.place_at(*_before(p.marker, 0.4)) for name, p in world.panels.items()}
     names = sorted(name for name, place in places.items() if place is not None)
@@ -691,7 +696,6 @@ def measure_markers(trials: int) -> list[list[str]]:
             watcher = watcher_of({'marker': 'all'}, told)
             watcher.arrive(str(place), rounds.time)
             yaw = math.atan2(home.y - at[1], home.x - at[0]) + float(rng.uniform(-0.2, 0.2))
-            away = math.dist(at, (home.x, home.y))
 
             def look(
                 light: Conditions,
@@ -699,23 +703,22 @@ def measure_markers(trials: int) -> list[list[str]]:
                 yaw: float = yaw,
                 watcher: Watcher = watcher,
                 home: Any = home,
-                away: float = away,
-            ) -> list[SeenMarker]:
+            ) -> list[Any]:
                 rounds.time += 2.0
                 x, y = at + rng.normal(0.0, 0.02, 2)
                 turned = yaw + float(rng.normal(0.0, math.radians(0.7)))
                 renderer.refresh()
                 ideal = renderer.ideal(camera_pose(x, y, HEIGHT, turned, 0.0))
                 picture = np.ascontiguousarray(expose(ideal, light, rng)[..., ::-1])
-                seen = [
-                    SeenMarker(each.marker_id, np.asarray(each.corners, float), home.size, away)
-                    for each in detector.detect(picture)
-                ]
-                watcher.picture(picture, (*at, yaw), rounds.time, seen)
-                return seen
+                read = detector.detect(picture)
+                told = CameraView(camera_pose(*at, HEIGHT, yaw, 0.0), camera.matrix, *DOUBT)
+                seen = [seen_marker(each, home.size, lens) for each in read]
+                watcher.picture(picture, (*at, yaw), rounds.time, seen, told)
+                return read
 
-            first = [each for each in look(lights[0]) if each.number == home.id]
-            if len(first) != 1 or first[0].pixels < 12:
+            for _ in range(3):
+                first = [each for each in look(lights[0]) if each.marker_id == home.id]
+            if len(first) != 1 or pixels_of(first[0]) < 12:
                 continue  # it is not in view, or so small that nobody would look from here
             watcher.arrive('elsewhere', rounds.time)
             rounds.time += 600.0
@@ -725,7 +728,7 @@ def measure_markers(trials: int) -> list[list[str]]:
             light = lights[int(rng.integers(len(lights)))]
             before = len(told)
             for _ in range(4):
-                now = [each for each in look(light) if each.number == home.id]
+                now = [each for each in look(light) if each.marker_id == home.id]
             if 'person' in world.things:
                 rounds.stage.do('remove person', 0.0)
             if f'{name} copy' in world.panels:
@@ -734,9 +737,10 @@ def measure_markers(trials: int) -> list[list[str]]:
                 continue  # where it hangs now is not in view
             states = [e.state for e in told[before:] if e.subject == str(home.id)]
             said.append({states[-1]} if states else set())
-            pixels = [float(np.hypot(*(each.middle - first[0].middle))) for each in now]
+            begin = first[0].corners.mean(axis=0)
+            pixels = [float(np.hypot(*(each.corners.mean(axis=0) - begin))) for each in now]
             guess = 'missing' if not now else 'double' if len(now) > 1 else ''
-            if not guess and pixels[0] > first[0].pixels:
+            if not guess and pixels[0] > pixels_of(first[0]):
                 guess = 'moved'
             peer += guess == wanted
         right = sum(each == ({wanted} if wanted else set()) for each in said)
@@ -746,6 +750,21 @@ def measure_markers(trials: int) -> list[list[str]]:
         counts = [str(quiet), str(wrong), str(gone), part(peer, trials)]
         rows.append([kind, aim, part(right, trials), *counts])
     return rows
+
+
+def seen_marker(read: Any, side: float, lens: CameraModel) -> SeenMarker:
+    """Return a marker as the detector's node tells it."""
+    pose = pose_of(read.corners, side, lens)
+    if pose is None:
+        return SeenMarker(read.marker_id)
+    covariance = pose.covariance[:3, :3]
+    return SeenMarker(read.marker_id, side, pose.position, pose.rotation, covariance)
+
+
+def pixels_of(read: Any) -> float:
+    """Return the mean side of a marker in a picture, pixels."""
+    steps = read.corners - np.roll(read.corners, 1, axis=0)
+    return float(np.hypot(steps[:, 0], steps[:, 1]).mean())
 
 
 def _before(marker: Any, away: float) -> tuple[float, float]:

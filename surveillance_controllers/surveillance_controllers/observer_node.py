@@ -1,6 +1,6 @@
 """The `observer` node: what the robot notices as it goes about.
 
-Reads the lidars, `amcl_pose`, `robot_place`, `map`, the camera, `arm/markers` and
+Reads the lidars, `amcl_pose`, `robot_place`, `map`, the camera with its arm, and
 `aruco_detector/detections`; publishes each observation on `observations` and all events on
 `events`, both as JSON; takes a person's answers on the service `observer/command`.
 """
@@ -25,9 +25,10 @@ from geometry_msgs.msg import PoseWithCovarianceStamped
 from nav_msgs.msg import OccupancyGrid, Odometry
 from rclpy.qos import QoSProfile
 from rclpy.serialization import deserialize_message
-from sensor_msgs.msg import Image, JointState, LaserScan
+from sensor_msgs.msg import CameraInfo, Image, JointState, LaserScan
 from std_msgs.msg import Bool, String
 
+from marker_detection.camera_model import CameraModel
 from state_machines import Interrupt
 from state_machines.ros import CallError, ServiceCaller
 from state_machines.ros.waiting import reported
@@ -47,13 +48,17 @@ from surveillance_ontology.armor_client import (
 )
 from surveillance_ontology.event_facts import EventFact, EventOntology, Sighting
 from surveillance_ontology.patrol_ontology import LONGEST_THRESHOLD, ROBOT
-from surveillance_perception.conversions import image_from_ros
+from surveillance_perception.conversions import (
+    camera_from_ros,
+    image_from_ros,
+    seen_marker_from_ros,
+)
 from surveillance_perception.marker_registry import read_registry
 from surveillance_perception.observation.answers import answered
 from surveillance_perception.observation.day_book import DayBook
 from surveillance_perception.observation.events import Event, EventBook, EventState
 from surveillance_perception.observation.evidence import EvidenceStore
-from surveillance_perception.observation.marker_views import SeenMarker
+from surveillance_perception.observation.hung_markers import CameraView, SeenMarker
 from surveillance_perception.observation.observations import Kind, Observation
 from surveillance_perception.observation.other_robots import OtherRobots
 from surveillance_perception.observation.persons import Person, load_finder
@@ -78,6 +83,7 @@ from surveillance_runtime.place.occupancy_grid import Grid
 from surveillance_runtime.process import run_node
 from surveillance_runtime.profile.parameters import declared_frames
 from surveillance_runtime.qos import SENSOR_QOS
+from surveillance_runtime.robot_arm import ARM
 from surveillance_runtime.robot_base import robot_radius
 from surveillance_runtime.stamp_offset import StampOffset
 from surveillance_runtime.stamped_readings import StampedReadings
@@ -101,6 +107,8 @@ STILL = 0.02
 """The camera stands where neither metres nor radians change by more."""
 SETTLED = 0.5
 """It has to stand for so long before a picture that is compared, seconds."""
+LEAST_DOUBT = 0.01, 0.005
+"""Standard deviation of a pose at least, metres and rad: some localisations tell none."""
 MOST_HELD = 8
 """So many pictures, and what the detector says of so many, wait for each other."""
 FACTS_PERIOD = 10.0
@@ -178,6 +186,30 @@ class _HeldImage:
     last: float
 
 
+@dataclass(frozen=True, eq=False)
+class _CameraAt:
+    """Where the arm held the camera.
+
+    Attributes:
+        pose: (4, 4), from its optical frame to the map, metres.
+        lens: What it is like.
+        deviation, turn: Standard deviations of the pose, metres and rad.
+    """
+
+    pose: np.ndarray
+    lens: CameraModel
+    deviation: float
+    turn: float
+
+    def view_of(self, picture: np.ndarray) -> CameraView | None:
+        """Return from where a picture was taken; None: it has another shape than the camera's."""
+        rows, columns = picture.shape[:2]
+        lens = self.lens.scaled_to(columns, rows)
+        if lens is None:
+            return None
+        return CameraView(self.pose, lens.matrix, self.deviation, self.turn)
+
+
 class Observer(PatrolNode):
     """Notices; all work is done on one thread of its own.
 
@@ -252,6 +284,9 @@ class Observer(PatrolNode):
         # Where base and arm stood, by stamps: on the map, by the odometry, and the joints.
         self._standing, self._odometry_standing = (StampedReadings(STILL, [2]) for _ in range(2))
         self._joints = StampedReadings(STILL)
+        self._joint_names: tuple[str, ...] = ()
+        self._lens: CameraModel | None = None
+        self._estimate = b''
         self._image_stamps = StampOffset('camera/rgb/image_raw')
         self._images: deque[_HeldImage] = deque(maxlen=MOST_HELD)
         self._detected: deque[tuple[float, tuple[SeenMarker, ...]]] = deque(maxlen=MOST_HELD)
@@ -264,13 +299,15 @@ class Observer(PatrolNode):
         StateSubscription(
             self, PoseWithCovarianceStamped, 'amcl_pose', self._on_pose, raw=True, owner=owner
         )
-        self.create_subscription(MarkerDetectionArray, 'arm/markers', self._on_markers, 10)
         self.create_subscription(Odometry, 'odom', self._on_odometry, SENSOR_QOS, raw=True)
         if self._settings.camera:
             self._detections = self.create_subscription(
                 MarkerDetectionArray, 'aruco_detector/detections', self._on_detections, 10
             )
             self.create_subscription(JointState, 'joint_states', self._on_joints, SENSOR_QOS)
+            self.create_subscription(
+                CameraInfo, 'camera/rgb/camera_info', self._on_camera_info, SENSOR_QOS
+            )
             # Raw: most pictures are not looked at.
             self.create_subscription(
                 Image, 'camera/rgb/image_raw', self._on_image, SENSOR_QOS, raw=True
@@ -380,6 +417,7 @@ class Observer(PatrolNode):
             pose = pose_of_serialized(serialized)
             stamp = stamp_of_serialized(serialized)
             self._poses.append((stamp, pose))
+            self._estimate = serialized
             self._standing.add(stamp or self._now(), pose)
             for measured, odometry in self._odometry:
                 if abs(measured - stamp) <= SAME_TIME:
@@ -459,31 +497,18 @@ class Observer(PatrolNode):
 
         self._later(compare)
 
+    def _on_camera_info(self, message: CameraInfo) -> None:
+        with conversions.refusing(self, 'camera_info'):
+            self._lens = camera_from_ros(message)
+
     def _on_joints(self, message: JointState) -> None:
+        self._joint_names = tuple(message.name)
         self._joints.add(seconds_of(message.header.stamp) or self._now(), message.position)
 
     def _on_detections(self, message: MarkerDetectionArray) -> None:
-        found = []
-        for each in message.detections:
-            corners = np.asarray(each.corners, float).reshape(4, 2)
-            if each.confirmed and np.isfinite(corners).all():
-                side, ahead = float(each.size), float(each.pose.position.z)
-                side, ahead = (e if math.isfinite(e) and e > 0 else 0.0 for e in (side, ahead))
-                found.append(SeenMarker(int(each.id), corners, side, ahead))
+        found = [seen_marker_from_ros(each) for each in message.detections if each.confirmed]
         self._detected.append((seconds_of(message.header.stamp), tuple(found)))
         self._look_at_next()
-
-    def _on_markers(self, message: MarkerDetectionArray) -> None:
-        stamp, frame = self._now(), message.header.frame_id.removeprefix('/')
-        # They are told in the frame of the odometry, which drifts against the map.
-        to_map = (0.0, 0.0, 0.0) if frame == self._map_frame else self._odom_in_map
-        for each in message.detections:
-            at = each.pose.position
-            if to_map is not None and all(map(math.isfinite, (at.x, at.y, at.z))):
-                x, y, _ = composed(to_map, (float(at.x), float(at.y), 0.0))
-                where = float(x), float(y), float(at.z)
-                number = int(each.id)
-                self._later(partial(self._watcher.marker, number, where, stamp))
 
     def _on_image(self, serialized: bytes) -> None:
         stamp, now = stamp_of_serialized(serialized), time.monotonic()
@@ -514,10 +539,11 @@ class Observer(PatrolNode):
         ):
             return
         viewpoint = self._viewpoint(image.first, image.last)
+        camera = None if viewpoint is None else self._camera_at(viewpoint)
         self._images.clear()
         self._next_picture = time.monotonic() + PICTURE_PERIOD
         data, taken = image.data, image.last
-        self._later(lambda: self._look(data, viewpoint, taken, markers))
+        self._later(lambda: self._look(data, viewpoint, taken, markers, camera))
 
     def _viewpoint(self, first: float, last: float) -> Viewpoint | None:
         """Return where the camera stood between two stamps and shortly before; None: unknown."""
@@ -532,6 +558,25 @@ class Observer(PatrolNode):
             x, y, yaw = odometry
             pose = composed(self._odom_in_map, (x, y, yaw))
         return None if joints is None or pose is None else (*pose, *joints)
+
+    def _camera_at(self, viewpoint: Viewpoint) -> _CameraAt | None:
+        """Return where the arm holds the camera; None: nobody says, or there is no such arm."""
+        where = {name: index for index, name in enumerate(self._joint_names)}
+        if self._lens is None or not self._estimate or any(e not in where for e in ARM.names):
+            return None
+        x, y, yaw, *joints = viewpoint
+        base = np.eye(4)
+        cosine, sine = math.cos(yaw), math.sin(yaw)
+        base[:2, :2] = [[cosine, -sine], [sine, cosine]]
+        base[:2, 3] = x, y
+        pose = base @ ARM.camera_frame([joints[where[name]] for name in ARM.names])
+        estimate = deserialize_message(self._estimate, PoseWithCovarianceStamped)
+        covariance = estimate.pose.covariance.reshape(6, 6)
+        along, turn = (
+            math.sqrt(max(float(covariance[each, each]), least**2))
+            for each, least in ((0, LEAST_DOUBT[0]), (5, LEAST_DOUBT[1]))
+        )
+        return _CameraAt(pose, self._lens, along, turn)
 
     async def _on_command(self, request: Any, response: Any) -> Any:
         def take() -> str:
@@ -567,9 +612,12 @@ class Observer(PatrolNode):
         viewpoint: Viewpoint | None,
         stamp: float,
         markers: tuple[SeenMarker, ...] | None,
+        camera: _CameraAt | None,
     ) -> None:
         image = image_from_ros(deserialize_message(serialized, Image), MOST_PIXELS)
-        self._watcher.picture(np.asarray(image, np.uint8), viewpoint, stamp, markers)
+        picture = np.asarray(image, np.uint8)
+        view = None if camera is None else camera.view_of(picture)
+        self._watcher.picture(picture, viewpoint, stamp, markers, view)
 
     def _tell_viewpoints(self, grid: Grid) -> None:
         """Tell from where each place is to be looked at."""

@@ -24,6 +24,7 @@ from surveillance_interfaces.srv import RoomInformation
 from surveillance_perception.arm.scan import ScanOutcome, ScanPlan, View
 from surveillance_perception.arm.trajectory import ArmTrajectory
 from surveillance_perception.marker_registry import MarkedPlace
+from surveillance_perception.observation.hung_markers import SeenMarker
 from surveillance_perception.stream.encodings import image_of_pixels, printable
 from surveillance_perception.stream.image_files import ImageArray, decode_image
 
@@ -188,6 +189,20 @@ def fused_from_ros(message: MarkerDetection) -> FusedPosition | None:
     position = np.array([place.x, place.y, place.z])
     covariance = np.array(message.pose_covariance).reshape(6, 6)[:3, :3]
     return FusedPosition(position, covariance, 1) if is_measured(position, covariance) else None
+
+
+def seen_marker_from_ros(message: MarkerDetection) -> SeenMarker:
+    """Return a marker of a picture; without a position where its numbers are no measurement."""
+    place, turn = message.pose.position, message.pose.orientation
+    position = np.array([place.x, place.y, place.z])
+    covariance = np.array(message.pose_covariance).reshape(6, 6)[:3, :3]
+    quaternion = np.array([turn.x, turn.y, turn.z, turn.w])
+    length, side = float(np.linalg.norm(quaternion)), float(message.size)
+    measured = is_measured(position, covariance) and math.isfinite(length) and length > 0.5
+    if not measured or not (math.isfinite(side) and side > 0.0):
+        return SeenMarker(int(message.id))
+    rotation = Rotation.from_quat(quaternion).as_matrix()
+    return SeenMarker(int(message.id), side, position, rotation, covariance)
 
 
 def poses_to_ros(header: Header, sightings: Iterable[Sighting]) -> PoseArray:

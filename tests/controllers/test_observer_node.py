@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from builtin_interfaces.msg import Time
 from geometry_msgs.msg import PoseWithCovarianceStamped
 from nav_msgs.msg import OccupancyGrid, Odometry
 from rclpy.serialization import serialize_message
-from sensor_msgs.msg import Image, LaserScan
+from sensor_msgs.msg import CameraInfo, Image, JointState, LaserScan
 from std_msgs.msg import Bool, String
 
 from state_machines import Interrupt
@@ -29,6 +30,7 @@ from surveillance_interfaces.srv import ConsoleCommand
 from surveillance_runtime.incidents import Cause
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
+from surveillance_runtime.robot_arm import ARM
 
 WATCH = 'rules:\n  nothing new:\n    object: none\n    places: [R1]\n'
 HERE = (3.0, 2.5)
@@ -167,19 +169,22 @@ class Eyes:
     Attributes:
         node: The observer.
         looked: Of each picture where it was taken from, and the ids of the markers in it.
+        camera: Where the camera was on the map in the last one.
     """
 
     def __init__(self, graph, monkeypatch):
         self.node = graph.add(Observer, {'facts': False})
         monkeypatch.setattr(observer_node, 'PICTURE_PERIOD', 0.0)
         self.now = 1e-9 * graph.node.get_clock().now().nanoseconds
+        self.camera: Any = None
         self.looked: list[tuple[tuple[float, ...] | None, list[int] | None]] = []
         monkeypatch.setattr(self.node, '_look', self._look)
         monkeypatch.setattr(self.node, '_later', lambda work: work())
 
-    def _look(self, _data, viewpoint, _stamp, markers):
+    def _look(self, _data, viewpoint, _stamp, markers, camera):
         numbers = None if markers is None else [each.number for each in markers]
         self.looked.append((viewpoint, numbers))
+        self.camera = camera
 
     def stamp(self, since: float) -> Time:
         nanoseconds = round(1e9 * (self.now + since))
@@ -234,6 +239,27 @@ def test_a_scan_counts_from_where_the_robot_was_when_it_was_made(graph, monkeypa
     assert seen == [pytest.approx((0.375, 5.0), abs=0.01)]
     scan(-1.7)
     assert len(seen) == 1
+
+
+def test_a_picture_tells_where_on_the_map_its_camera_is_and_how_sure_that_is(graph, monkeypatch):
+    eyes = Eyes(graph, monkeypatch)
+    for tick in range(-20, 1):
+        eyes.carry(1.0, tick / 10)
+        joints = JointState(name=['wheel', *ARM.names], position=[7.0, *ARM.home])
+        joints.header.stamp = eyes.stamp(tick / 10)
+        eyes.node._on_joints(joints)
+    eyes.show(-0.1)
+    assert eyes.camera is None, 'the lens is not known'
+    info = CameraInfo(
+        width=320, height=240, k=[300.0, 0.0, 160.0, 0.0, 300.0, 120.0, 0.0, 0.0, 1.0]
+    )
+    eyes.node._on_camera_info(info)
+    eyes.show(0.0)
+    view = eyes.camera.view_of(np.zeros((480, 640), np.uint8))
+    assert view.at == pytest.approx(ARM.camera_frame(ARM.home)[:3, 3] + [1.0, 5.0, 0.0])
+    assert view.matrix[0, 0] == pytest.approx(600.0)
+    assert (view.deviation, view.turn) == (0.01, 0.005), 'no localisation is exact'
+    assert eyes.camera.view_of(np.zeros((480, 480), np.uint8)) is None
 
 
 def test_markers_count_for_the_picture_that_they_were_read_in(graph, monkeypatch):

@@ -23,7 +23,7 @@ from surveillance_perception.observation.watcher import Look, Watcher
 from surveillance_perception.observation.ways import Ways
 from surveillance_runtime.place.occupancy_grid import Grid
 
-from .marked_walls import hang, wall
+from .marked_walls import camera, hang, seen_at, wall
 
 RULES = """
 - object: none
@@ -286,91 +286,92 @@ def test_who_walks_through_a_view_in_two_looks_changes_nothing_in_it():
 def test_a_view_is_compared_with_the_one_with_the_doors_as_they_are_now():
     views = ReferenceViews()
     at = (1.0, 1.0, 0.5)
-    shut = views.add(at, texture(), 1.0, (), {'D1': 'closed'})
+    shut = views.add(at, texture(), 1.0, {'D1': 'closed'})
     assert views.at(at, {'D1': 'open'}) is None
-    ajar = views.add(at, texture(), 2.0, (), {'D1': 'open'})
+    ajar = views.add(at, texture(), 2.0, {'D1': 'open'})
     assert views.at(at, {'D1': 'closed'}) is shut
     assert views.at(at, {'D1': 'open', 'D2': 'closed'}) is ajar
 
 
-def test_a_marker_that_no_file_knows_is_unknown():
-    watch = Round(markers={14: None})
-    watch.watcher.marker(14, (2.0, 0.0, 1.0), 1.0)
-    watch.watcher.marker(77, (8.0, 0.0, 1.0), 2.0)
-    assert [(each.subject, each.seen, each.place) for each in watch.book.events] == [
-        ('77', 'unknown', 'R2')
+def of_markers(watch: Round) -> list[tuple[str, str, str, EventState]]:
+    """Return id, state, place and state of each event of a marker."""
+    return [
+        (each.subject, each.seen, each.place, each.state)
+        for each in watch.book.events
+        if each.kind == Kind.MARKER
     ]
 
 
 def test_markers_move_and_go_missing_only_where_their_spot_was_in_view():
     watch = Round()
-    empty = wall()
-    picture = empty.copy()
-    hung = hang(picture, 14, 120, 100)
-    view, other = (1.0, 1.0, 0.5), (1.0, 1.0, 2.5)
-    watch.watcher.marker(14, (2.0, 0.0, 1.0), 1.0)
-    watch.watcher.picture(picture, view, 1.0, [hung])
-    for number in range(5):
-        watch.watcher.picture(wall(2), other, 10.0 + number, [])
-    assert not watch.book.events
+    empty, picture, moved = wall(), wall(), wall()
+    hung, there = hang(picture, 14, 140, 100), hang(moved, 14, 200, 100)
+    other, at = wall(2), (1.0, 1.0, 0.5)
+    watch.watcher.arrive('R1', 1.0)
+    watch.watcher.sweep((0.0, 0.0), *beams(room(), (0.1, 0.1)), 1.0)
     for number in range(3):
-        watch.watcher.picture(picture, view, 15.0 + number, [])  # it was not read, and is there
-    assert not watch.book.events
+        watch.watcher.picture(picture, at, 1.0 + number, [hung], camera(y=1.0))
+        watch.watcher.picture(other, at, 1.0 + number, [], camera(y=1.0, yaw=math.pi))
+        watch.watcher.picture(empty, None, 1.0 + number, [])  # nobody knows from where
     for number in range(3):
-        watch.watcher.picture(empty, view, 20.0 + number, [])
-    markers = [each for each in watch.book.events if each.kind == Kind.MARKER]
-    assert [(each.subject, each.seen, each.position) for each in markers] == [
-        ('14', 'missing', (2.0, 0.0))
-    ]
-    watch.watcher.marker(14, (2.0, 0.5, 1.0), 60.0)
-    going_on = [each for each in watch.book.events if each.state == EventState.OPEN]
-    assert {each.seen for each in going_on if each.kind == Kind.MARKER} == {'moved'}
+        watch.watcher.picture(picture, at, 15.0 + number, [], camera(y=1.0))  # it is there, unread
+    assert not of_markers(watch)
+    for number in range(3):
+        watch.watcher.picture(empty, at, 20.0 + number, [], camera(y=1.0))
+    assert of_markers(watch) == [('14', 'missing', 'R1', EventState.OPEN)]
+    (event,) = [each for each in watch.book.events if each.kind == Kind.MARKER]
+    assert event.position == pytest.approx((2.0, 1.05), abs=0.05)
+    for number in range(3):
+        watch.watcher.picture(moved, at, 60.0 + number, [there], camera(y=1.0))
+    assert ('14', 'moved', 'R1', EventState.OPEN) in of_markers(watch)
+    assert ('14', 'missing', 'R1', EventState.OPEN) not in of_markers(watch)
 
 
 def test_a_second_marker_with_an_id_is_double_until_it_is_gone():
-    watch = Round(markers={14: (2.0, 0.0, 1.0)})
+    watch = Round()
     picture = wall()
-    hung = hang(picture, 14, 120, 100)
+    hung = hang(picture, 14, 140, 100)
     both = picture.copy()
     second = hang(both, 14, 220, 60)
-    view = (1.0, 1.0, 0.5)
-    watch.watcher.picture(picture, view, 1.0, [hung])
     for number in range(3):
-        watch.watcher.picture(both, view, 10.0 + number, [hung, second])
-    watch.watcher.marker(14, (2.0, 0.0, 1.0), 14.0)
-    open_ = [each for each in watch.book.events if each.kind == Kind.MARKER]
-    assert [(each.seen, each.state) for each in open_] == [('double', EventState.OPEN)]
+        watch.watcher.picture(picture, None, 1.0 + number, [hung], camera(y=1.0))
+    for number in range(3):
+        watch.watcher.picture(both, None, 10.0 + number, [hung, second], camera(y=1.0))
+    assert [each[1::2] for each in of_markers(watch)] == [('double', EventState.OPEN)]
     for number in range(4):
-        watch.watcher.picture(picture, view, 60.0 + number, [hung])
-    assert {each.state for each in watch.book.events if each.kind == Kind.MARKER} == {
-        EventState.OVER
-    }
+        watch.watcher.picture(picture, None, 60.0 + number, [hung], camera(y=1.0))
+    assert {each[-1] for each in of_markers(watch)} == {EventState.OVER}
 
 
-def test_a_view_that_is_learned_anew_keeps_no_marker_double():
+def test_nobody_who_stands_before_a_marker_takes_it_away():
     watch = Round()
-    first, second = wall(), wall(2)
-    hung = hang(first, 14, 120, 100)
-    changed = second.copy()
-    changed[40:200, 150:300] = wall(3)[40:200, 150:300]
-    copied = hang(changed, 14, 60, 60)
-    view, other = (1.0, 1.0, 0.5), (1.0, 1.0, 2.5)
-    watch.watcher.picture(first, view, 1.0, [hung])
-    watch.watcher.picture(second, other, 2.0, [])
-    for stamp in (10.0, 40.0):
-        watch.watcher.arrive('', stamp)
-        watch.watcher.arrive('R1', stamp)
-        for number in range(3):
-            watch.watcher.picture(changed, other, stamp + number, [copied])
-    watch.watcher.picture(first, view, 50.0, [hung])
-    (double,) = [each for each in watch.book.current if each.kind == Kind.MARKER]
-    assert double.seen == 'double'
-    (event,) = [each for each in watch.book.current if each.kind == Kind.VIEW]
-    watch.watcher.answer(event.number, EventState.NORMAL)
-    # The copy is taken down before the other wall is looked at again.
+    picture = wall()
+    hung = hang(picture, 14, 140, 100)
     for number in range(3):
-        watch.watcher.picture(first, view, 70.0 + number, [hung])
-    assert watch.book.find(double.number).state == EventState.OVER
+        watch.watcher.picture(picture, None, 1.0 + number, [hung], camera(y=1.0))
+    met = np.array([[1.0, 1.0 + each] for each in (-0.1, 0.0, 0.1)])
+    watch.watcher.sweep((0.0, 1.0), met, np.ones(3, np.bool_), 9.0)
+    for number in range(3):
+        watch.watcher.picture(wall(), None, 10.0 + number, [], camera(y=1.0))
+    assert not of_markers(watch)
+
+
+def test_a_marker_that_a_person_calls_normal_hangs_there_from_now_on_also_after_a_restart():
+    watch = Round()
+    picture, moved = wall(), wall()
+    hung, there = hang(picture, 14, 140, 100), hang(moved, 14, 200, 100)
+    for number in range(3):
+        watch.watcher.picture(picture, None, 1.0 + number, [hung], camera(y=1.0))
+    for number in range(3):
+        watch.watcher.picture(moved, None, 20.0 + number, [there], camera(y=1.0))
+    (event,) = watch.book.events
+    watch.watcher.answer(event.number, EventState.NORMAL)
+    watch.watcher.picture(moved, None, 30.0, [there], camera(y=1.0))
+    again = Round()
+    again.watcher.restore(json.loads(json.dumps(watch.watcher.state())))
+    for number in range(3):
+        again.watcher.picture(wall(), None, 60.0 + number, [], camera(y=1.0))
+    assert ('14', 'missing', 'R1', EventState.OPEN) in of_markers(again)
 
 
 def test_a_marker_in_pictures_that_no_file_knows_is_unknown():
@@ -553,12 +554,14 @@ def test_a_lit_doorway_does_not_make_a_dark_room_lit():
 
 
 def test_no_marker_hangs_off_the_map():
-    watch = Round(markers={14: (2.0, 0.0, 1.0)})
-    watch.watcher.marker(14, (-3.0, 0.0, 1.0), 1.0)
-    watch.watcher.marker(77, (-3.0, 1.0, 1.0), 2.0)
+    watch = Round(markers={14: (2.0, 1.0, 1.0)})
+    for number in range(3):
+        behind = camera(y=1.0, yaw=math.pi)
+        watch.watcher.picture(wall(), None, number, [seen_at(14, 140, 100)], behind)
     assert not watch.book.events
-    watch.watcher.marker(14, (5.0, 0.0, 1.0), 3.0)
-    assert [(each.subject, each.seen) for each in watch.book.events] == [('14', 'moved')]
+    for number in range(3):
+        watch.watcher.picture(wall(), None, number, [seen_at(14, 140, 100)], camera(y=3.0))
+    assert [each[:3] for each in of_markers(watch)] == [('14', 'moved', 'R1')]
 
 
 def test_boxes_across_a_doorway_block_the_way_until_they_are_gone():

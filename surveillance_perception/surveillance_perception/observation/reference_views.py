@@ -7,7 +7,7 @@ picture for each state in which the doors nearby were found.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -15,7 +15,6 @@ from typing import Any
 import cv2
 import numpy as np
 
-from surveillance_perception.observation.marker_views import SeenMarker
 from surveillance_perception.observation.views import WIDTH, Picture
 
 Box = tuple[int, int, int, int]
@@ -37,7 +36,6 @@ class ReferenceView:
         viewpoint: Where the camera was.
         picture: What it showed, at most `WIDTH` wide.
         stamp: When, seconds since 1970.
-        markers: The markers in it by id, in its pixels. Of one that hangs twice, none.
         doors: The states of the doors nearby.
         differed: The parts that differed in all pictures of a look, for the last two looks: the
             number of the look, and the boxes in the reference (left, top, width, height), pixels.
@@ -47,7 +45,6 @@ class ReferenceView:
     viewpoint: Viewpoint
     picture: Picture
     stamp: float
-    markers: dict[int, SeenMarker] = field(default_factory=dict)
     doors: Mapping[str, str] = field(default_factory=dict)
     differed: list[tuple[int, list[Box]]] = field(default_factory=list)
 
@@ -93,11 +90,6 @@ class ReferenceViews:
         self._views: list[ReferenceView] = []
         self._next = 1
 
-    @property
-    def names(self) -> frozenset[str]:
-        """The names of all views."""
-        return frozenset(each.name for each in self._views)
-
     def at(
         self, viewpoint: Viewpoint, doors: Mapping[str, str] | None = None
     ) -> ReferenceView | None:
@@ -123,7 +115,6 @@ class ReferenceViews:
         viewpoint: Viewpoint,
         picture: Picture,
         stamp: float,
-        markers: Iterable[SeenMarker] = (),
         doors: Mapping[str, str] | None = None,
     ) -> ReferenceView:
         """Take a picture as how this viewpoint looks normally."""
@@ -132,7 +123,6 @@ class ReferenceViews:
             size = WIDTH, max(1, round(picture.shape[0] * WIDTH / picture.shape[1]))
             picture = np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_AREA), np.uint8)
         view = ReferenceView(f'v{self._next}', viewpoint, picture, stamp)
-        view.markers = _once(each.scaled(factor) for each in markers)
         view.doors = dict(doors or {})
         self._next += 1
         for old in self._views[: len(self._views) + 1 - MOST_VIEWS]:
@@ -160,7 +150,6 @@ class ReferenceViews:
                 'name': each.name,
                 'viewpoint': list(each.viewpoint),
                 'stamp': each.stamp,
-                'markers': [seen.to_json() for _, seen in sorted(each.markers.items())],
                 'doors': dict(each.doors),
             }
             for each in self._views
@@ -182,7 +171,6 @@ class ReferenceViews:
             if picture is not None:
                 viewpoint = tuple(map(float, each['viewpoint']))
                 view = ReferenceView(name, viewpoint, picture, float(each['stamp']))
-                view.markers = _once(map(SeenMarker.from_json, each['markers']))
                 view.doors = {
                     str(door): str(is_) for door, is_ in dict(each.get('doors', ())).items()
                 }
@@ -207,12 +195,6 @@ def _same(one: Viewpoint, other: Viewpoint) -> bool:
     near = math.dist(one[:2], other[:2]) <= SAME_VIEW[0]
     turned = (abs(math.remainder(a - b, math.tau)) for a, b in zip(one[2:], other[2:], strict=True))
     return near and all(each <= SAME_VIEW[1] for each in turned)
-
-
-def _once(markers: Iterable[SeenMarker]) -> dict[int, SeenMarker]:
-    some = list(markers)
-    numbers = [each.number for each in some]
-    return {each.number: each for each in some if numbers.count(each.number) == 1}
 
 
 def _overlap(one: Box, other: Box) -> float:

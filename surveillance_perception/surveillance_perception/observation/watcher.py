@@ -33,20 +33,12 @@ from surveillance_perception.observation.floor import (
     is_leaf,
 )
 from surveillance_perception.observation.habits import Habits
-from surveillance_perception.observation.marker_views import (
-    MarkerMemory,
-    SeenMarker,
-    compare_markers,
-)
+from surveillance_perception.observation.hung_markers import CameraView, HungMarkers, SeenMarker
 from surveillance_perception.observation.motion import WalkFinder
 from surveillance_perception.observation.observations import Kind, Observation
 from surveillance_perception.observation.other_robots import OtherRobots
 from surveillance_perception.observation.persons import Person, Picture
-from surveillance_perception.observation.reference_views import (
-    ReferenceView,
-    ReferenceViews,
-    Viewpoint,
-)
+from surveillance_perception.observation.reference_views import ReferenceViews, Viewpoint
 from surveillance_perception.observation.views import (
     Grey,
     Sight,
@@ -91,12 +83,10 @@ LOOKED = 0.6
 """Share of a place's floor that must have been in view before nobody is said to be there."""
 LOOKED_SECONDS = 5.0
 """And for so long."""
-BESIDE_DOOR = 0.3
-"""A point so far from a door is in the place on its side, metres."""
-MARKER_MOVED = 0.3
-"""A marker whose place was measured so far from where it hung hangs elsewhere, metres."""
-STANDS = 0.06
-"""The camera stands where it stood within this, metres and, for its joints, radians."""
+BESIDE = 0.3
+"""A point so far from a door, or a marker, is in the place on its side, metres."""
+BEFORE_MARKER, ASIDE = 0.4, 0.25
+"""What the lidar meets so far before a marker and so near to the line of sight hides it, metres."""
 BEHIND = 0.3
 """Depth of what stands in a way, metres."""
 
@@ -199,9 +189,9 @@ class Watcher:
         self._local, self._tell, self._alert = local, tell, alert
         self._doors = {name: _Door(segment) for name, segment in (doors or {}).items()}
         self._known_markers = frozenset(markers or ())
-        self._markers = {
-            number: where for number, where in (markers or {}).items() if where is not None
-        }
+        self._markers = HungMarkers(
+            {number: where for number, where in (markers or {}).items() if where is not None}
+        )
         self._rooms, self._ways_of = rooms, ways_of
         self._find_persons, self._looked = find_persons, looked
         self._ways: Ways | None = None
@@ -228,7 +218,6 @@ class Watcher:
         self._last: tuple[tuple[float, float], Points] = ((0.0, 0.0), np.zeros((0, 2)))
         self._at: tuple[float, float] | None = None
         self._views = views or ReferenceViews()
-        self._marker_memory = MarkerMemory()
         self._strange: dict[int, int] = {}
         self._sights: deque[Sight] = deque(maxlen=AGREED_PICTURES)
         self._sight: Sight | None = None
@@ -377,7 +366,7 @@ class Watcher:
             return self._place
         if not door.place:
             x1, y1, x2, y2 = door.segment
-            scale = BESIDE_DOOR / max(math.dist(door.segment[:2], door.segment[2:]), 1e-9)
+            scale = BESIDE / max(math.dist(door.segment[:2], door.segment[2:]), 1e-9)
             across = (y1 - y2) * scale, (x2 - x1) * scale
             sizes = {}
             for sign in (1.0, -1.0):
@@ -532,6 +521,7 @@ class Watcher:
         viewpoint: Viewpoint | None,
         stamp: float,
         markers: Sequence[SeenMarker] | None,
+        camera: CameraView | None = None,
     ) -> None:
         """Take a picture.
 
@@ -541,6 +531,8 @@ class Watcher:
                 moves.
             stamp: Seconds since 1970.
             markers: The markers in it; None: nobody looked for markers.
+            camera: From where on the map it was taken; None: that is not known, and nothing is said
+                of markers.
         """
         grey = grey_of(picture)
         self._pictures += 1
@@ -560,21 +552,22 @@ class Watcher:
             return
         self._look_for_persons(picture, stamp)
         self._look_for_strange(markers or (), stamp, grey)
+        if camera is not None and markers is not None:
+            normal = None if viewpoint is None else self._views.at(viewpoint)
+            before = None if normal is None else normal.picture
+            self._judge_markers(picture, before, camera, markers, stamp)
         if viewpoint is None:
             return
-        camera = viewpoint[0], viewpoint[1]
-        if self._others is not None and self._others.may_be_seen(camera, stamp):
+        at = viewpoint[0], viewpoint[1]
+        if self._others is not None and self._others.may_be_seen(at, stamp):
             return
-        doors = self._doors_near(camera)
+        doors = self._doors_near(at)
         known = self._views.at(viewpoint, doors)
         if known is None:
             # Who walks about here is no part of how it looks normally.
             if not self._persons:
-                self._views.add(viewpoint, picture, stamp, markers or (), doors)
-                self._marker_memory.keep(self._views.names)
+                self._views.add(viewpoint, picture, stamp, doors)
             return
-        if markers is not None and not self._persons:
-            self._compare_markers(known, markers, picture, viewpoint, stamp)
         if self._persons:
             return  # it is they who change the view
         differences = view_changes(known.picture, picture)
@@ -651,68 +644,55 @@ class Watcher:
                 if self._is_due(strange):
                     self._take(strange, grey)
 
-    def _compare_markers(
+    def _judge_markers(
         self,
-        view: ReferenceView,
-        seen: Sequence[SeenMarker],
         picture: Picture,
-        viewpoint: Viewpoint,
+        before: Picture | None,
+        camera: CameraView,
+        seen: Sequence[SeenMarker],
         stamp: float,
     ) -> None:
-        """Tell of the markers of a view that hang no longer as in its reference."""
-        if not view.markers and not seen:
-            return
+        """Tell of the markers that hang no longer where they hung."""
+        others = self._others
+        hidden = bool(self._persons) or (
+            others is not None
+            and others.may_be_seen((float(camera.at[0]), float(camera.at[1])), stamp)
+        )
+
+        def is_clear(point: Points) -> bool:
+            return not hidden and not self._stands_before(camera, point)
+
         known = [
             each for each in seen if not self._known_markers or each.number in self._known_markers
         ]
-        before = view.viewpoint
-        stands = math.dist(before[:2], viewpoint[:2]) <= STANDS and all(
-            abs(a - b) <= STANDS for a, b in zip(before[3:], viewpoint[3:], strict=True)
-        )
-        turned = math.remainder(viewpoint[2] - before[2], math.tau) if stands else math.nan
-        found = compare_markers(view.picture, view.markers, picture, known, turned)
-        if found is None:
-            return
-        for each in found:
-            if each.state == 'here' and each.number not in view.markers and each.at is not None:
-                view.markers[each.number] = each.at  # it was there, and was not read then
-        current = {e.subject: e for e in self.book.current if e.kind == Kind.MARKER}
-        memory = self._marker_memory
-        for each in memory.take(view.name, found, view.markers, self._look):
-            event = current.get(str(each.number))
-            if each.state == 'new' or (each.state == 'here' and event is None):
+        current = {e.subject for e in self.book.current if e.kind == Kind.MARKER}
+        for each in self._markers.take(picture, camera, known, self._look, is_clear):
+            if each.state == 'here' and str(each.number) not in current:
                 continue
-            hung = self._markers.get(each.number)
-            where = hung[:2] if hung is not None else (viewpoint[0], viewpoint[1])
-            told = Observation(
-                Kind.MARKER, each.state, self._place, str(each.number), where, 0.9, stamp
-            )
+            x, y, _ = each.position
+            # It hangs on a wall, which belongs to the place before it.
+            away = math.dist((x, y), camera.at[:2])
+            part = min(1.0, BESIDE / max(away, 1e-9))
+            front = x + part * (camera.at[0] - x), y + part * (camera.at[1] - y)
+            if self._rooms is not None and self._rooms.place_at(front) is None:
+                continue  # nothing hangs off the map: it was measured wrongly
+            place, number = self._place_of(front), str(each.number)
+            told = Observation(Kind.MARKER, each.state, place, number, (x, y), SEEN_TWICE, stamp)
             if self._is_due(told):
-                self._take(told, picture, view.picture)
+                self._take(told, picture, before)
 
-    def marker(self, number: int, position: tuple[float, float, float], stamp: float) -> None:
-        """Take where a marker hangs, from several pictures; map frame, metres."""
-        hung = self._markers.get(number)
-        where = position[0], position[1]
-        if hung is None:
-            if not self._known_markers or number in self._known_markers:
-                self._markers[number] = position
-                return
-            state = 'unknown'
-        else:
-            state = 'moved' if math.dist(hung, position) > MARKER_MOVED else 'here'
-            hangs_twice = number in self._marker_memory.elsewhere and any(
-                each.kind == Kind.MARKER and each.subject == str(number) and each.seen == 'double'
-                for each in self.book.current
-            )
-            if hangs_twice:
-                return  # either panel is where it was
-        if state != 'here' and self._rooms is not None and self._rooms.place_at(where) is None:
-            return  # nothing hangs off the map: it was measured wrongly
-        place = self._place_of(where)
-        seen = Observation(Kind.MARKER, state, place, str(number), where, 0.95, stamp)
-        if self._is_due(seen):
-            self._take(seen)
+    def _stands_before(self, camera: CameraView, point: Points) -> bool:
+        """Tell whether the lidar met something between a camera and a marker."""
+        _, met = self._last
+        if not len(met):
+            return False
+        start = camera.at[:2]
+        sight = point[:2] - start
+        length = float(np.hypot(*sight))
+        ahead = sight / max(length, 1e-9)
+        along = (met - start) @ ahead
+        aside = np.abs((met - start) @ np.array([-ahead[1], ahead[0]]))
+        return bool(((along > 0.0) & (along < length - BEFORE_MARKER) & (aside < ASIDE)).any())
 
     def answer(self, number: int, state: EventState) -> Event:
         """Take a person's word about an event; a view that is normal now is learned anew.
@@ -723,7 +703,8 @@ class Watcher:
         event = self.book.answer(number, state)
         if state == EventState.NORMAL and event.kind == Kind.VIEW and event.subject:
             self._views.forget(event.subject)
-            self._marker_memory.keep(self._views.names)
+        if state == EventState.NORMAL and event.kind == Kind.MARKER:
+            self._markers.accept(int(event.subject))
         return event
 
     # --- what is made of it ---
@@ -805,12 +786,11 @@ class Watcher:
         """Return what must not be forgotten, for `restore`: events, and what is normal."""
         self._learn()
         normal = self._kept if self._normal is None else _packed(self._normal)
-        hung = {str(number): list(each) for number, each in self._markers.items()}
         return {
             'book': self.book.to_json(),
             'normal': normal,
             'look': self._look,
-            'markers': hung,
+            'hung': self._markers.to_json(),
             'views': self._views.to_json(),
             'habits': self._habits.to_json(),
         }
@@ -822,19 +802,13 @@ class Watcher:
             ValueError, KeyError, TypeError: It is something else.
         """
         look, normal = int(kept['look']), dict(kept['normal'])
-        hung = {int(number): _point(each) for number, each in kept['markers'].items()}
+        self._markers.restore(kept.get('hung', {}))
         self._views.restore(kept.get('views', {'views': [], 'next': 1}))
         self._habits.restore(kept.get('habits', {}))
         self.book.restore(kept['book'])
         self._look, self._kept = look, normal
-        self._markers = {**hung, **self._markers} if self._known_markers else hung
         if self._grid is not None and normal:
             self._normal = _unpacked(normal, self._grid)
-
-
-def _point(values: Sequence[float]) -> tuple[float, float, float]:
-    x, y, z = values
-    return float(x), float(y), float(z)
 
 
 def same_map(one: Grid, other: Grid) -> bool:

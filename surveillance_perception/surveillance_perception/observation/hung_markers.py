@@ -1,0 +1,670 @@
+"""Where markers hang on the map, and whether each hangs there still: there, moved, gone, or twice.
+
+A marker's size is known, so one picture tells where it is before the camera (perspective-n-point),
+and the camera's pose tells where that is on the map. The first pictures decide where it hangs. Read
+elsewhere, by more than the errors of both, it has moved.
+
+One that is not read is gone only where its spot was in view: the map tells where in the picture
+that is. Its surroundings have to look as they did when it was read last, as far as the camera's
+pose is unsure, so that nobody stands before it; and its own picture is to be found nowhere about,
+so that the reading did not just fail. In any other case nothing is known. What is found counts
+after several pictures in a row.
+"""
+
+from __future__ import annotations
+
+import base64
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from surveillance_perception.observation.views import Picture, grey_of
+
+Array = npt.NDArray[np.float64]
+Mask = npt.NDArray[np.bool_]
+
+MOVED = 0.2
+"""A marker seen so far from where it hung hangs elsewhere, metres."""
+SURE = 3.0
+"""If that is also so many standard deviations; and a spot is in view with so many around it."""
+LEAST_SIDE = 9.0
+"""Smaller spots show too little to be judged, pixels."""
+STEEPEST = 1.2
+"""So far from straight ahead a spot is judged, rad."""
+SCALE = 16
+"""Surroundings are compared at so many pixels to the side of a marker."""
+SHEET, AROUND = 1.8, 2.8
+"""What surrounds a spot lies outside of its sheet and within this, in sides of the marker."""
+FARTHEST = 1.5
+"""Where the camera's pose leaves more open than this, nothing is called gone, sides."""
+SEARCHED = 1.0
+"""So much farther around a marker is looked for by its picture, sides."""
+SAME_ASPECT, SAME_DISTANCE = 0.35, 1.6
+"""Surroundings are compared with those seen from nearly the same side, rad, and distance, times."""
+ASPECTS = 4
+"""Of each marker the surroundings are kept from so many sides."""
+FOREIGN = 0.3
+"""What looks otherwise around a spot may have so much area, square sides of the marker."""
+OF_LIGHT = (0.6, 1.6)
+"""The surroundings may be so much lighter or darker than the picture as a whole."""
+STILL_THERE = 0.5
+"""Correlation with the marker's own picture from which it may hang there unread."""
+LAID = 0.5
+"""Surroundings that correlate less have no features to be laid by."""
+AGREED, READ = 3, 2
+"""So many pictures in a row must agree that it is gone, and so many that it is read elsewhere."""
+LEVEL = (0.01, 0.007)
+"""Standard deviations of a camera's height, metres, and of its pitch, rad: the floor is even."""
+ENOUGH = 20
+"""So many pictures decide where a marker hangs."""
+MOST = 100
+"""So many markers are kept."""
+
+
+@dataclass(frozen=True)
+class CameraView:
+    """From where a picture was taken.
+
+    Attributes:
+        pose: (4, 4), from the camera's optical frame to the map, metres.
+        matrix: (3, 3), from the optical frame to pixels of the picture.
+        deviation: Standard deviation of the position, metres.
+        turn: And of the direction, rad.
+    """
+
+    pose: Array
+    matrix: Array
+    deviation: float
+    turn: float
+
+    @property
+    def at(self) -> Array:
+        """Return where the camera is, (3,), metres."""
+        return np.asarray(self.pose[:3, 3])
+
+    def doubt(self, point: Array) -> float:
+        """Return the standard deviation of a point's place across the line of sight, metres."""
+        return math.hypot(self.deviation, self.turn * float(np.linalg.norm(point - self.at)))
+
+    def onto_wall(self, position: Array, rotation: Array) -> Array:
+        """Return the homography (3, 3) from metres on a marker's plane to pixels."""
+        turn = self.pose[:3, :3].T
+        plane = np.column_stack(
+            [turn @ rotation[:, 0], turn @ rotation[:, 1], turn @ (position - self.at)]
+        )
+        return np.asarray(self.matrix @ plane)
+
+    def pixels(self, points: Array) -> Array:
+        """Return where points (n, 3) of the map are in the picture, (n, 2); nan: behind it."""
+        seen = (points - self.at) @ self.pose[:3, :3]
+        ahead = np.where(seen[:, 2:] > 0.05, seen[:, 2:], np.nan)
+        return np.asarray(seen @ self.matrix.T)[:, :2] / ahead
+
+
+@dataclass(frozen=True)
+class SeenMarker:
+    """A marker in a picture.
+
+    Attributes:
+        number: Its id.
+        side: Of its black square, metres; 0: not known.
+        position: (3,) of its middle in the camera's optical frame, metres; None: not measured.
+        rotation: (3, 3) from its own frame, x right, y up, z out of it, to the optical one.
+        covariance: (3, 3) of the position, square metres.
+    """
+
+    number: int
+    side: float = 0.0
+    position: Array | None = None
+    rotation: Array = field(default_factory=lambda: np.eye(3))
+    covariance: Array = field(default_factory=lambda: np.zeros((3, 3)))
+
+
+@dataclass(frozen=True)
+class MarkerFinding:
+    """What pictures say of one marker.
+
+    Attributes:
+        number: Its id.
+        state: here, moved, missing or double.
+        position: Where that is, map frame, metres.
+    """
+
+    number: int
+    state: str
+    position: tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class _Aspect:
+    """How a marker and what surrounds it look from one side.
+
+    Attributes:
+        camera: From where, map frame, (3,), metres.
+        position, rotation: Of the marker, as measured in that picture, map frame.
+        picture: Its plane from ahead, `SCALE` pixels a side of the marker.
+        shown: Which of these the picture showed.
+        light: Median of the whole picture, grey levels.
+    """
+
+    camera: Array
+    position: Array
+    rotation: Array
+    picture: Picture
+    shown: Mask
+    light: float
+
+    def to_json(self) -> dict[str, Any]:
+        """Return it as plain values."""
+        good, data = cv2.imencode('.jpg', self.picture, [cv2.IMWRITE_JPEG_QUALITY, 92])
+        return {
+            'camera': self.camera.tolist(),
+            'position': self.position.tolist(),
+            'rotation': self.rotation.tolist(),
+            'picture': base64.b64encode(data.tobytes() if good else b'').decode(),
+            'shown': base64.b64encode(np.packbits(self.shown).tobytes()).decode(),
+            'light': self.light,
+        }
+
+    @classmethod
+    def from_json(cls, values: Mapping[str, Any]) -> _Aspect:
+        """Return what `to_json` gave.
+
+        Raises:
+            ValueError, KeyError, TypeError: It is something else.
+        """
+        data = np.frombuffer(base64.b64decode(values['picture']), np.uint8)
+        picture = cv2.imdecode(data, cv2.IMREAD_UNCHANGED) if len(data) else None
+        size = 2 * round((AROUND / 2 + FARTHEST) * SCALE)
+        if picture is None or picture.shape[:2] != (size, size):
+            raise ValueError(f"a marker's surroundings: expected {size} by {size} pixels")
+        bits = np.frombuffer(base64.b64decode(values['shown']), np.uint8)
+        shown = np.unpackbits(bits, count=size * size).reshape(size, size).astype(np.bool_)
+        return cls(
+            _array(values['camera'], 3),
+            _array(values['position'], 3),
+            _array(values['rotation'], 3, 3),
+            np.asarray(picture, np.uint8),
+            shown,
+            float(values['light']),
+        )
+
+
+@dataclass
+class _Spot:
+    """Where a marker hangs.
+
+    Attributes:
+        side: Of its black square, metres.
+        position: (3,), map frame, metres.
+        covariance: (3, 3), square metres.
+        pictures: How many decided that.
+        is_given: Whether that is known from elsewhere.
+        aspects: How it looked, the newest last.
+    """
+
+    side: float
+    position: Array
+    covariance: Array
+    pictures: int = 1
+    is_given: bool = False
+    aspects: list[_Aspect] = field(default_factory=list)
+
+
+@dataclass
+class _Away:
+    """Where else a marker was read.
+
+    Attributes:
+        position: (3,), map frame, metres.
+        rotation: (3, 3), from its own frame to the map.
+        read: In how many pictures it was read there.
+        unread: In how many in a row it was in view there and not read.
+    """
+
+    position: Array
+    rotation: Array
+    read: int = 1
+    unread: int = 0
+
+
+class HungMarkers:
+    """Where each marker hangs, and what the last pictures said of it.
+
+    Args:
+        given: Where markers hang by their file, map frame, metres, and their sides are not known.
+    """
+
+    def __init__(self, given: Mapping[int, tuple[float, float, float]] | None = None) -> None:
+        exact = np.eye(3) * 1e-4
+        self._spots = {
+            number: _Spot(0.0, np.asarray(where, float), exact, is_given=True)
+            for number, where in (given or {}).items()
+        }
+        # In how many pictures in a row each was found so.
+        self._in_a_row: dict[int, tuple[str, int]] = {}
+        self._away: dict[int, _Away] = {}
+        self._gone: set[int] = set()
+        self._read_at: dict[int, int] = {}
+
+    def position_of(self, number: int) -> tuple[float, float, float] | None:
+        """Return where a marker hangs, map frame, metres; None: it was never read."""
+        spot = self._spots.get(number)
+        return None if spot is None else _plain(spot.position)
+
+    def accept(self, number: int) -> None:
+        """Take that a marker hangs rightly where it was read last, or nowhere."""
+        away = self._away.pop(number, None)
+        spot = self._spots.pop(number, None)
+        self._gone.discard(number)
+        self._in_a_row.pop(number, None)
+        if away is not None and spot is not None:
+            covariance = spot.covariance + np.eye(3) * 1e-3
+            self._spots[number] = _Spot(spot.side, away.position, covariance)
+
+    def take(
+        self,
+        picture: Picture,
+        view: CameraView,
+        seen: Sequence[SeenMarker],
+        look: int,
+        is_clear: Callable[[Array], bool] = lambda _: True,
+    ) -> list[MarkerFinding]:
+        """Take what a picture shows of the markers, and return what is settled by it.
+
+        Args:
+            picture: The picture.
+            view: From where it was taken.
+            seen: The markers in it.
+            look: The number of the stay at a place.
+            is_clear: Tells of a point of the map, (3,), whether nothing is known to stand before.
+
+        Returns:
+            Of each marker that is settled what is the case.
+        """
+        shown = _Shown(picture, view)
+        by_id: dict[int, list[SeenMarker]] = {}
+        for each in seen:
+            by_id.setdefault(each.number, []).append(each)
+        settled = []
+        for number in sorted({*by_id, *self._spots}):
+            some = [each for each in by_id.get(number, ()) if each.position is not None]
+            if number in by_id and not some:
+                continue  # it is read, and nobody knows where
+            found = self._judge(number, some, shown, look, is_clear)
+            if found is not None:
+                settled.append(found)
+        return settled
+
+    def _judge(
+        self,
+        number: int,
+        some: Sequence[SeenMarker],
+        shown: _Shown,
+        look: int,
+        is_clear: Callable[[Array], bool],
+    ) -> MarkerFinding | None:
+        spot = self._spots.get(number)
+        if spot is None:
+            if len(some) == 1 and len(self._spots) < MOST:
+                position, covariance = shown.placed(some[0])
+                self._spots[number] = spot = _Spot(some[0].side, position, covariance)
+                spot.aspects.append(shown.aspect(some[0]))
+                self._read_at[number] = look
+            return None
+        here, away = self._sorted(spot, some, shown)
+        if here is not None:
+            self._learn(spot, here, shown)
+        self._note_away(number, spot, away, shown)
+        if here is not None:
+            state = 'double' if away is not None else 'here'
+        elif away is not None:
+            state = 'moved' if shown.shows(spot, 0.0) else 'elsewhere'
+        elif some or not shown.shows(spot):
+            return None  # it is read too far away to tell, or not in view: as before
+        elif is_clear(spot.position) and (number in self._away or shown.is_gone(spot)):
+            state = 'moved' if number in self._away else 'missing'
+        else:
+            if self._in_a_row.get(number, ('', 0))[0] == 'missing':
+                del self._in_a_row[number]
+            return None
+        before, count = self._in_a_row.get(number, ('', 0))
+        count = count + 1 if before == state else 1
+        self._in_a_row[number] = state, count
+        if state == 'missing':
+            agreed = count >= AGREED
+        else:
+            known = self._away.get(number)
+            agreed = count >= READ and (known is None or known.read >= READ)
+        return self._settled(number, spot, state, agreed, look)
+
+    def _sorted(
+        self, spot: _Spot, some: Sequence[SeenMarker], shown: _Shown
+    ) -> tuple[SeenMarker | None, SeenMarker | None]:
+        """Return the one that hangs at its spot, and one that does not."""
+        here: SeenMarker | None = None
+        away: SeenMarker | None = None
+        for each in some:
+            position, covariance = shown.placed(each)
+            apart = position - spot.position
+            distance = float(np.linalg.norm(apart))
+            errors = math.sqrt(apart @ np.linalg.solve(covariance + spot.covariance, apart))
+            if distance < MOVED:
+                here = each
+            elif errors >= SURE:
+                away = each
+        return here, away
+
+    def _learn(self, spot: _Spot, seen: SeenMarker, shown: _Shown) -> None:
+        position, _ = shown.placed(seen)
+        if spot.pictures < ENOUGH and not spot.is_given:
+            # The mean. What all pictures of a stay have in common does not get less.
+            spot.pictures += 1
+            spot.position = spot.position + (position - spot.position) / spot.pictures
+        spot.side = spot.side or seen.side
+        fresh = shown.aspect(seen)
+        others = [each for each in spot.aspects if not _is_seen_alike(each, fresh.camera, 0.5)]
+        spot.aspects = [*others, fresh][-ASPECTS:]
+
+    def _note_away(self, number: int, spot: _Spot, away: SeenMarker | None, shown: _Shown) -> None:
+        known = self._away.get(number)
+        if away is not None:
+            position, _ = shown.placed(away)
+            near = known is not None and np.linalg.norm(position - known.position) < MOVED
+            read = known.read + 1 if known is not None and near else 1
+            self._away[number] = _Away(position, shown.view.pose[:3, :3] @ away.rotation, read)
+        elif known is not None:
+            there = shown.shows_at(known.position, known.rotation, spot.side)
+            known.unread = known.unread + 1 if there else 0
+            if known.unread >= AGREED:
+                del self._away[number]
+
+    def _settled(
+        self, number: int, spot: _Spot, state: str, agreed: bool, look: int
+    ) -> MarkerFinding | None:
+        away = self._away.get(number)
+        at = spot.position if away is None else away.position
+        if state == 'here':
+            self._read_at[number] = look
+            if number in self._gone:
+                # It was gone, and has come back.
+                self._gone.discard(number)
+                away = self._away.pop(number, None)
+            elif away is not None:
+                # Read at its spot after it was read elsewhere, and nothing shows that it left.
+                return MarkerFinding(number, 'double', _plain(at)) if agreed else None
+            return MarkerFinding(number, 'here', _plain(spot.position))
+        if not agreed:
+            return None
+        if state in ('moved', 'missing'):
+            self._gone.add(number)
+        elif state == 'elsewhere':
+            if number in self._gone or (spot.is_given and number not in self._read_at):
+                state = 'moved'
+            elif self._read_at.get(number) == look:
+                state = 'double'
+            else:
+                return None  # nothing shows whether it hangs there instead or as well
+        return MarkerFinding(number, state, _plain(at))
+
+    def to_json(self) -> dict[str, Any]:
+        """Return where they hang and how that looks as plain values, for `restore`."""
+        return {
+            str(number): {
+                'side': spot.side,
+                'position': spot.position.tolist(),
+                'covariance': spot.covariance.tolist(),
+                'pictures': spot.pictures,
+                'aspects': [each.to_json() for each in spot.aspects],
+            }
+            for number, spot in self._spots.items()
+            if not spot.is_given
+        }
+
+    def restore(self, values: Mapping[str, Any]) -> None:
+        """Take what `to_json` gave; where a marker hangs by its file stays.
+
+        Raises:
+            ValueError, KeyError, TypeError: It is something else; nothing is changed then.
+        """
+        found = {}
+        for number, each in values.items():
+            found[int(number)] = _Spot(
+                float(each['side']),
+                _array(each['position'], 3),
+                _array(each['covariance'], 3, 3),
+                int(each['pictures']),
+                aspects=[_Aspect.from_json(some) for some in each['aspects']],
+            )
+        self._spots = {**found, **self._spots}
+
+
+class _Shown:
+    """A picture with its camera's pose."""
+
+    def __init__(self, picture: Picture, view: CameraView) -> None:
+        self.view = view
+        self._picture = picture
+        self._light = float(np.median(grey_of(picture)[::4, ::4]))
+
+    def placed(self, seen: SeenMarker) -> tuple[Array, Array]:
+        """Return where a marker is on the map, (3,), metres, and its covariance, (3, 3)."""
+        assert seen.position is not None
+        turn = self.view.pose[:3, :3]
+        position = np.asarray(turn @ seen.position + self.view.at)
+        doubt = np.eye(3) * self.view.doubt(position) ** 2
+        return position, np.asarray(turn @ seen.covariance @ turn.T + doubt)
+
+    def aspect(self, seen: SeenMarker) -> _Aspect:
+        """Return how a marker that is read, and what surrounds it, look."""
+        position, _ = self.placed(seen)
+        rotation = np.asarray(self.view.pose[:3, :3] @ seen.rotation)
+        plain, shown = self._flat(position, rotation, seen.side, AROUND / 2 + FARTHEST)
+        return _Aspect(self.view.at, position, rotation, plain, shown, self._light)
+
+    def shows(self, spot: _Spot, doubted: float = SURE) -> bool:
+        """Tell whether a spot is in the picture, also if the pose is off, and large enough."""
+        aspect = self._aspect_of(spot)
+        if aspect is None:
+            return False
+        return self.shows_at(spot.position, aspect.rotation, spot.side, doubted)
+
+    def shows_at(
+        self, position: Array, rotation: Array, side: float, doubted: float = SURE
+    ) -> bool:
+        """Tell that of a place on the map, (3,), and how a marker is turned there, (3, 3)."""
+        sight = self.view.at - position
+        distance = float(np.linalg.norm(sight))
+        if side <= 0.0 or rotation[:, 2] @ sight < distance * math.cos(STEEPEST):
+            return False
+        corners = np.array([[-0.5, 0.5], [0.5, 0.5], [0.5, -0.5], [-0.5, -0.5]]) * side
+        edges = np.linalg.norm(
+            np.diff(self._on_wall(position, rotation, corners), axis=0, append=np.nan)[:3], axis=1
+        )
+        if not edges.min() >= LEAST_SIDE:
+            return False
+        # The pose is off on the floor by much, and in height by little.
+        across = np.cross([0.0, 0.0, 1.0], sight)
+        across *= self.view.doubt(position) / max(float(np.linalg.norm(across)), 1e-9)
+        upwards = np.array([0.0, 0.0, math.hypot(LEVEL[0], LEVEL[1] * distance)])
+        panel = position + corners @ rotation[:, :2].T
+        found = np.concatenate(
+            [
+                self.view.pixels(panel + doubted * (right * across + up * upwards))
+                for right in (-1, 1)
+                for up in (-1, 1)
+            ]
+        )
+        rows, columns = self._picture.shape[:2]
+        return bool(((found >= 0) & (found < (columns, rows))).all())
+
+    def _on_wall(self, position: Array, rotation: Array, points: Array) -> Array:
+        """Return where points (n, 2) of a marker's plane, metres, are in the picture, (n, 2)."""
+        return self.view.pixels(position + points @ rotation[:, :2].T)
+
+    def is_gone(self, spot: _Spot) -> bool:
+        """Tell whether a spot that is in view shows something else than its marker."""
+        aspect = self._aspect_of(spot)
+        if aspect is None:
+            return False
+        doubt = SURE * math.hypot(
+            self.view.doubt(spot.position), math.sqrt(float(np.trace(spot.covariance)) / 3)
+        )
+        open_ = doubt / spot.side
+        if open_ > FARTHEST:
+            return False
+        half = AROUND / 2 + open_
+        before, there = _cut(aspect.picture, half), _cut(aspect.shown, half)
+        now, covered = self._flat(
+            spot.position, aspect.rotation, spot.side, half + open_ + SEARCHED
+        )
+        if _is_found(_cut(aspect.picture, SHEET / 3), now):
+            return False
+        reach = half + open_
+        now, covered = _cut(now, reach), _cut(covered, reach)
+        judged = there & ~_box(len(before), SHEET / 2)
+        row, column = _laid(before, judged, now)
+        place = slice(row, row + len(before)), slice(column, column + len(before))
+        judged &= covered[place]
+        near = judged & _box(len(before), AROUND / 2)
+        if near.sum() < 0.5 * SCALE**2 * (AROUND**2 - SHEET**2):
+            return False
+        gain = (self._light + 4.0) / (aspect.light + 4.0)
+        foreign = _foreign(before, now[place], judged, gain)
+        return foreign <= FOREIGN * SCALE**2
+
+    def _aspect_of(self, spot: _Spot) -> _Aspect | None:
+        """Return how a spot looked from nearly here; None: it was never seen from here."""
+        here = self.view.at
+        near = (each for each in reversed(spot.aspects) if _is_seen_alike(each, here, 1.0))
+        return next(near, None)
+
+    def _flat(
+        self, position: Array, rotation: Array, side: float, half: float
+    ) -> tuple[Picture, Mask]:
+        """Return a marker's plane from ahead, so many sides to each side, and what is shown."""
+        onto = self.view.onto_wall(position, rotation)
+        corners = self._on_wall(position, rotation, np.array([[0.0, 0.0], [side, 0.0]]))
+        finer = float(np.linalg.norm(corners[1] - corners[0])) / SCALE
+        times = int(np.clip(math.ceil(finer), 1, 6)) if math.isfinite(finer) else 1
+        count = 2 * round(half * SCALE)
+        metres = side / (SCALE * times)
+        middle = (count * times - 1) / 2
+        from_pixels = np.array(
+            [[metres, 0, -metres * middle], [0, -metres, metres * middle], [0, 0, 1]]
+        )
+        size = count * times, count * times
+        flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
+        matrix = onto @ from_pixels
+        plain = cv2.warpPerspective(self._picture, matrix, size, flags=flags)
+        white = np.full(self._picture.shape[:2], 255, np.uint8)
+        shown = cv2.warpPerspective(white, matrix, size, flags=flags)
+        if times > 1:
+            plain, shown = (
+                cv2.resize(each, (count, count), interpolation=cv2.INTER_AREA)
+                for each in (plain, shown)
+            )
+        return np.asarray(plain, np.uint8), np.asarray(shown == 255, np.bool_)
+
+
+def _cut(values: Any, half: float) -> Any:
+    """Return the middle of a square picture, so many sides of the marker to each side."""
+    middle, reach = len(values) // 2, round(half * SCALE)
+    return values[middle - reach : middle + reach, middle - reach : middle + reach]
+
+
+def _box(size: int, half: float) -> Mask:
+    """Return the middle of a square of pixels."""
+    mask = np.zeros((size, size), np.bool_)
+    _cut(mask, half)[:] = True
+    return mask
+
+
+def _is_found(marker: Picture, now: Picture) -> bool:
+    """Tell whether the marker's own picture is to be found, read or not."""
+    alike = cv2.matchTemplate(grey_of(now), grey_of(marker), cv2.TM_CCOEFF_NORMED)
+    return float(np.nan_to_num(alike, posinf=0.0).max()) >= STILL_THERE
+
+
+def _laid(before: Picture, judged: Mask, now: Picture) -> tuple[int, int]:
+    """Return row and column at which the surroundings lie in a larger picture.
+
+    Where they have no features, in the middle.
+    """
+    spare = len(now) - len(before)
+    if spare <= 0:
+        return 0, 0
+    mask = judged.astype(np.float32)
+    first, second = (grey_of(each).astype(np.float32) for each in (before, now))
+    alike = np.nan_to_num(
+        cv2.matchTemplate(second, first, cv2.TM_CCOEFF_NORMED, mask=mask), posinf=0.0, neginf=0.0
+    )
+    row, column = np.unravel_index(int(alike.argmax()), alike.shape)
+    if alike[row, column] < LAID:
+        return spare // 2, spare // 2
+    return int(row), int(column)
+
+
+def _foreign(before: Picture, now: Picture, judged: Mask, gain: float) -> float:
+    """Return how many pixels of the surroundings look otherwise than before.
+
+    Args:
+        before, now: The surroundings, laid over each other.
+        judged: Which of their pixels count.
+        gain: How much lighter the whole picture is now.
+    """
+    first, second = (
+        cv2.blur(each, (3, 3)).astype(np.float32).reshape(*each.shape[:2], -1)
+        for each in (before, now)
+    )
+    before_, now_ = first + 4.0, second / gain + 4.0
+    # The light changes evenly over so little of a wall, and in all colours alike.
+    rows, columns = np.indices(judged.shape) / len(judged) - 0.5
+    terms = np.stack([np.ones_like(rows), rows, columns], axis=2)
+    light = np.log(now_ / before_).mean(axis=2)
+    alike = judged
+    smooth = np.zeros_like(light)
+    for allowed in (0.5, 0.2, 0.08):
+        some = alike[::2, ::2]
+        if some.sum() < 50:
+            return float(judged.sum())
+        fitted, *_ = np.linalg.lstsq(terms[::2, ::2][some], light[::2, ::2][some], rcond=None)
+        smooth = terms @ fitted
+        alike = judged & (np.abs(light - smooth) <= allowed)
+    factor = np.exp(smooth)[..., None]
+    dark = (factor[..., 0] < OF_LIGHT[0]) | (factor[..., 0] > OF_LIGHT[1])
+    # Texture is a pixel or two off.
+    around = np.ones((5, 5), np.uint8)
+    lowest, highest = (
+        each(before_, around).reshape(before_.shape) for each in (cv2.erode, cv2.dilate)
+    )
+    even, spare = now_ / factor, 6.0 + 0.05 * before_
+    apart = ((even < lowest - spare) | (even > highest + spare)).any(axis=2)
+    foreign = ((apart | dark) & judged).astype(np.uint8)
+    return float(cv2.morphologyEx(foreign, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8)).sum())
+
+
+def _is_seen_alike(aspect: _Aspect, camera: Array, share: float) -> bool:
+    """Tell whether a marker is seen from nearly the same side and distance."""
+    one, other = aspect.camera - aspect.position, camera - aspect.position
+    lengths = float(np.linalg.norm(one)), float(np.linalg.norm(other))
+    cosine = float(one @ other) / max(lengths[0] * lengths[1], 1e-9)
+    times = max(lengths) / max(min(lengths), 1e-9)
+    return cosine >= math.cos(SAME_ASPECT * share) and times <= SAME_DISTANCE**share
+
+
+def _plain(position: Array) -> tuple[float, float, float]:
+    x, y, z = position.tolist()
+    return float(x), float(y), float(z)
+
+
+def _array(values: Any, *shape: int) -> Array:
+    found = np.asarray(values, float)
+    if found.shape != shape or not np.isfinite(found).all():
+        raise ValueError(f'expected {shape} finite numbers')
+    return found
