@@ -50,6 +50,7 @@ from surveillance_perception.observation.watch_rules import rule_from
 from surveillance_perception.observation.watcher import Watcher
 from surveillance_perception.observation.ways import Ways
 from surveillance_runtime.incidents import Cause, Severity, Told
+from surveillance_runtime.place.floor_plan import Marker
 from surveillance_runtime.place.occupancy_grid import Grid
 from surveillance_runtime.place.plan_grid import draw
 from surveillance_simulation.camera.model import Camera, Conditions, covered, expose
@@ -70,6 +71,12 @@ STEP = 0.25
 """A sweep is compared each so many metres of the way."""
 HEIGHT = 0.9
 """Of the camera, metres."""
+ASIDE = 1.3
+"""A look at markers begins and ends with a picture so far aside, rad."""
+AHEAD = 0.6
+"""Where it looks in each place, rad."""
+SIDE = 0.2
+"""Of a marker, metres."""
 RULES = (
     {'object': 'none'},
     {'door': 'all', 'is': 'open'},
@@ -145,6 +152,8 @@ class Rounds:
         self.camera = Camera.from_field_of_view(320, 240) if camera else None
         self.renderer = Renderer(world, self.camera) if self.camera else None
         self.cpu_view: list[float] = []
+        self.markers_read = 0
+        self.detector = MarkerDetector(DetectorSettings(dictionary=world.plan.marker_dictionary))
         self.watcher = Watcher(
             [rule_from(each) for each in rules],
             self.book,
@@ -206,7 +215,7 @@ class Rounds:
         light = self.light()
         for _ in range(pictures):
             self.advance(2.0)
-            self.look(light, yaw=0.6)
+            self.look(light, yaw=AHEAD)
         self.watcher.assess(self.time)
         return self.told[before:]
 
@@ -233,9 +242,21 @@ class Rounds:
             here = there
         self.at = here
 
+    def hang_markers(self, yaw: float) -> None:
+        """Hang a marker into what is seen of each place from its point in a direction."""
+        for number, (name, place) in enumerate(self.world.plan.place.positions.items(), 1):
+            x, y = place[:2]
+            dx, dy = 0.02 * math.cos(yaw), 0.02 * math.sin(yaw)
+            while self.world.clearance(x + dx, y + dy) > 0.02:
+                x, y = x + dx, y + dy
+            across = self.world.clearance(x + 3 * dx, y) < self.world.clearance(x, y + 3 * dy)
+            faces = math.atan2(0.0, -dx) if across else math.atan2(-dy, 0.0)
+            self.world.hang_marker(Marker(f'm{name}', number, x, y, HEIGHT, faces, SIDE))
+
     def look(self, conditions: Conditions, yaw: float, standing: bool = True) -> None:
         """Take a picture from where the robot is, nearly as the last time."""
         assert self.renderer is not None
+        assert self.camera is not None
         x, y = self.at + self.rng.normal(0.0, 0.02, 2)
         turned = yaw + float(self.rng.normal(0.0, math.radians(0.7)))
         self.renderer.refresh()
@@ -243,9 +264,16 @@ class Rounds:
         if self.robot.lens_covered:
             ideal = covered(ideal)
         picture = expose(ideal, conditions, self.rng)[..., ::-1]
-        begun = time.process_time()
+        picture = np.ascontiguousarray(picture)
         viewpoint = (*self.at, yaw) if standing else None
-        self.watcher.picture(np.ascontiguousarray(picture), viewpoint, self.time, None)
+        seen = camera = None
+        if self.world.panels:
+            lens = CameraModel(self.camera.width, self.camera.height, self.camera.matrix)
+            seen = [seen_marker(each, SIDE, lens) for each in self.detector.detect(picture)]
+            self.markers_read += len(seen)
+            camera = CameraView(camera_pose(*self.at, HEIGHT, yaw, -0.12), lens.matrix, *DOUBT)
+        begun = time.process_time()
+        self.watcher.picture(picture, viewpoint, self.time, seen, camera)
         self.cpu_view.append(time.process_time() - begun)
 
     def advance(self, seconds: float) -> None:
@@ -660,6 +688,8 @@ class Marked:
 def measure_markers(trials: int) -> list[list[str]]:
     """Move, remove, double or hide a marker between two looks from one viewpoint.
 
+    A look takes four pictures towards the marker, and one aside before and after them.
+
     The peer calls a marker gone that it does not read, and moved whose picture has moved by its
     side. A trial counts where the spot, and where it hangs then, is in view.
     """
@@ -699,11 +729,13 @@ def measure_markers(trials: int) -> list[list[str]]:
 
             def look(
                 light: Conditions,
+                aside: float = 0.0,
                 at: tuple[float, float] = at,
-                yaw: float = yaw,
+                ahead: float = yaw,
                 watcher: Watcher = watcher,
                 home: Any = home,
             ) -> list[Any]:
+                yaw = ahead + aside
                 rounds.time += 2.0
                 x, y = at + rng.normal(0.0, 0.02, 2)
                 turned = yaw + float(rng.normal(0.0, math.radians(0.7)))
@@ -716,6 +748,7 @@ def measure_markers(trials: int) -> list[list[str]]:
                 watcher.picture(picture, (*at, yaw), rounds.time, seen, told)
                 return read
 
+            look(lights[0], aside=ASIDE)
             for _ in range(3):
                 first = [each for each in look(lights[0]) if each.marker_id == home.id]
             if len(first) != 1 or pixels_of(first[0]) < 12:
@@ -727,8 +760,10 @@ def measure_markers(trials: int) -> list[list[str]]:
                 continue
             light = lights[int(rng.integers(len(lights)))]
             before = len(told)
+            look(light, aside=ASIDE)
             for _ in range(4):
                 now = [each for each in look(light) if each.marker_id == home.id]
+            look(light, aside=ASIDE)
             if 'person' in world.things:
                 rounds.stage.do('remove person', 0.0)
             if f'{name} copy' in world.panels:
@@ -990,13 +1025,17 @@ def _cast(grid: Any, at: tuple[float, float], angles: Any) -> Any:
 # --- the week ---
 
 
-def measure_week(days: float, round_every: float) -> list[list[str]]:
-    """Let nothing happen: lamps go on and off, people walk in their hours, doors stand open."""
+def measure_week(days: float, round_every: float, seed: int) -> list[list[str]]:
+    """Let nothing happen: lamps go on and off, people walk in their hours, doors stand open.
+
+    A marker hangs in what is seen of each place.
+    """
     try:
         finder: Any = load_finder().find
     except ValueError:
         finder = None
-    rounds = Rounds(21, camera=True, persons=finder)
+    rounds = Rounds(seed, camera=True, persons=finder)
+    rounds.hang_markers(AHEAD)
     begin = rounds.time
     visits = 0
     tour = ('E', 'C1', 'R1', 'C1', 'R2', 'C1', 'C2', 'R3', 'C2', 'R4', 'C2')
@@ -1025,6 +1064,7 @@ def measure_week(days: float, round_every: float) -> list[list[str]]:
     count = sum(kinds.values())
     rows.append(['simulated days', '7', f'{days:g}'])
     rows.append(['visits', '', str(visits)])
+    rows.append(['markers read, in pictures', '', f'{rounds.markers_read}, {len(rounds.cpu_view)}'])
     rows.append(
         ['false alarms a week', 'fewer than 1', f'{count * 7 / days:.1f} ({kinds or "none"})']
     )
@@ -1301,6 +1341,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=(__doc__ or '').splitlines()[0])
     parser.add_argument('--quick', action='store_true', help='fewer trials, below 50 s')
     parser.add_argument('--days', type=float, default=7.0, help='of the week (default: 7)')
+    parser.add_argument('--seed', type=int, default=21, help='of the week (default: 21)')
+    parser.add_argument('--trials', type=int, default=100, help='of markers (default: 100)')
     parser.add_argument('--shared', type=Path, help='folder with photos/ and maps/')
     names = (
         'doors',
@@ -1322,7 +1364,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     measures: dict[str, Callable[[], list[list[str]]]] = {
         'doors': lambda: measure_doors(12 if quick else 420),
         'things': lambda: measure_things(4 if quick else 70),
-        'markers': lambda: measure_markers(4 if quick else 100),
+        'markers': lambda: measure_markers(4 if quick else options.trials),
         'persons': lambda: measure_persons(6 if quick else 60),
         'views': lambda: measure_views(8 if quick else 60),
         'real': lambda: measure_real(shared, 40 if quick else 1000),
@@ -1330,7 +1372,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         'telling': lambda: measure_telling(3 if quick else 20),
         'alerts': lambda: telling_by_kind(2 if quick else 20),
         'month': lambda: measure_month(2 if quick else 30),
-        'week': lambda: measure_week(0.1 if quick else options.days, 3600.0),
+        'week': lambda: measure_week(0.1 if quick else options.days, 3600.0, options.seed),
     }
     chosen = options.only or [name for name in names if quick or name != 'week']
     for name in chosen:

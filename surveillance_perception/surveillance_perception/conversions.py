@@ -201,7 +201,7 @@ def seen_marker_from_ros(message: MarkerDetection) -> SeenMarker:
     measured = is_measured(position, covariance) and math.isfinite(length) and length > 0.5
     if not measured or not (math.isfinite(side) and side > 0.0):
         return SeenMarker(int(message.id))
-    rotation = Rotation.from_quat(quaternion).as_matrix()
+    rotation = rotation_of(quaternion / length)
     return SeenMarker(int(message.id), side, position, rotation, covariance)
 
 

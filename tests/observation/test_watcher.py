@@ -646,3 +646,22 @@ def test_an_event_of_another_map_costs_no_look(spot: tuple[float, float]):
     again.visit('R1', HERE)
     assert again.looks
     assert [each.state for each in again.book.events] == [EventState.OPEN]
+
+
+def test_a_bare_wall_may_be_a_covered_lens_until_the_stay_shows_that_it_is_not():
+    watch = Round()
+    empty = np.full((240, 320, 3), 150, np.uint8)
+    picture, aside = empty.copy(), camera(y=1.0, yaw=math.pi)
+    hung = hang(picture, 14, 140, 100)
+    for number in range(3):
+        watch.watcher.picture(picture, None, 1.0 + number, [hung], camera(y=1.0))
+    watch.watcher.arrive('R1', 5.0)
+    for number in range(3):
+        watch.watcher.picture(empty, None, 10.0 + number, [], camera(y=1.0))
+    watch.watcher.picture(wall(), None, 20.0, [], aside)
+    assert not of_markers(watch), 'the lens may have been covered until now'
+    for number in range(3):
+        watch.watcher.picture(empty, None, 30.0 + number, [], camera(y=1.0))
+    assert not of_markers(watch), 'and from now on'
+    watch.watcher.picture(wall(), None, 40.0, [], aside)
+    assert of_markers(watch) == [('14', 'missing', 'R1', EventState.OPEN)]

@@ -26,6 +26,7 @@ from marker_detection.testing.marker_scene import (
     corners_in_camera,
     corners_in_image,
 )
+from surveillance_interfaces.msg import MarkerDetection
 from surveillance_perception import conversions
 from surveillance_perception.arm.trajectory import ArmState, motion_to
 from surveillance_perception.stream.image_files import ImageError, decode_image
@@ -219,3 +220,17 @@ def test_trajectory_keeps_names_times_and_values():
     assert np.allclose(times, motion.times, atol=1e-6)
     assert np.allclose([p.positions for p in message.points], motion.positions)
     assert np.allclose([p.velocities for p in message.points], motion.speeds)
+
+
+def test_a_detection_without_a_measurement_is_a_marker_without_a_position():
+    told = MarkerDetection(id=7, size=0.15)
+    told.pose.position.z = 2.0
+    assert conversions.seen_marker_from_ros(told).position is None
+    told.pose_covariance = (np.eye(6) * 1e-4).ravel()
+    told.pose.orientation.x, told.pose.orientation.w = 2.0, 0.0  # turned half around x
+    seen = conversions.seen_marker_from_ros(told)
+    assert seen.position is not None
+    assert (seen.number, seen.side, seen.position.tolist()) == (7, 0.15, [0.0, 0.0, 2.0])
+    assert np.allclose(seen.rotation, np.diag([1.0, -1.0, -1.0]))
+    told.size = math.nan
+    assert conversions.seen_marker_from_ros(told).position is None

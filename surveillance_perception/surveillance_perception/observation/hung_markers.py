@@ -58,6 +58,8 @@ LAID = 0.5
 """Surroundings that correlate less have no features to be laid by."""
 AGREED, READ = 3, 2
 """So many pictures in a row must agree that it is gone, and so many that it is read elsewhere."""
+MOSTLY = 0.6
+"""Where so much of a spot is in view it is not there that a marker hangs that is read elsewhere."""
 LEVEL = (0.01, 0.007)
 """Standard deviations of a camera's height, metres, and of its pitch, rad: the floor is even."""
 ENOUGH = 20
@@ -324,7 +326,7 @@ class HungMarkers:
         if here is not None:
             state = 'double' if away is not None else 'here'
         elif away is not None:
-            state = 'moved' if shown.shows(spot, 0.0) else 'elsewhere'
+            state = 'moved' if shown.shows(spot, 0.0, MOSTLY) else 'elsewhere'
         elif some or not shown.shows(spot):
             return None  # it is read too far away to tell, or not in view: as before
         elif is_clear(spot.position) and (number in self._away or shown.is_gone(spot)):
@@ -467,15 +469,26 @@ class _Shown:
         plain, shown = self._flat(position, rotation, seen.side, AROUND / 2 + FARTHEST)
         return _Aspect(self.view.at, position, rotation, plain, shown, self._light)
 
-    def shows(self, spot: _Spot, doubted: float = SURE) -> bool:
-        """Tell whether a spot is in the picture, also if the pose is off, and large enough."""
+    def shows(self, spot: _Spot, doubted: float = SURE, part: float = 1.0) -> bool:
+        """Tell whether a spot is in the picture and large enough.
+
+        Args:
+            spot: The spot.
+            doubted: Also if the pose is off by so many standard deviations.
+            part: So much of it, of its side from its middle on.
+        """
         aspect = self._aspect_of(spot)
         if aspect is None:
             return False
-        return self.shows_at(spot.position, aspect.rotation, spot.side, doubted)
+        return self.shows_at(spot.position, aspect.rotation, spot.side, doubted, part)
 
     def shows_at(
-        self, position: Array, rotation: Array, side: float, doubted: float = SURE
+        self,
+        position: Array,
+        rotation: Array,
+        side: float,
+        doubted: float = SURE,
+        part: float = 1.0,
     ) -> bool:
         """Tell that of a place on the map, (3,), and how a marker is turned there, (3, 3)."""
         sight = self.view.at - position
@@ -492,7 +505,7 @@ class _Shown:
         across = np.cross([0.0, 0.0, 1.0], sight)
         across *= self.view.doubt(position) / max(float(np.linalg.norm(across)), 1e-9)
         upwards = np.array([0.0, 0.0, math.hypot(LEVEL[0], LEVEL[1] * distance)])
-        panel = position + corners @ rotation[:, :2].T
+        panel = position + part * corners @ rotation[:, :2].T
         found = np.concatenate(
             [
                 self.view.pixels(panel + doubted * (right * across + up * upwards))

@@ -87,8 +87,14 @@ BESIDE = 0.3
 """A point so far from a door, or a marker, is in the place on its side, metres."""
 BEFORE_MARKER, ASIDE = 0.4, 0.25
 """What the lidar meets so far before a marker and so near to the line of sight hides it, metres."""
+MOST_HELD = 8
+"""So many pictures wait until it is known whether the lens is covered."""
 BEHIND = 0.3
 """Depth of what stands in a way, metres."""
+
+
+_MarkerPicture = tuple[Picture, Viewpoint | None, float, Sequence[SeenMarker], CameraView]
+"""A picture, from where it was taken, when, the markers in it, and where on the map that was."""
 
 
 @dataclass
@@ -218,6 +224,9 @@ class Watcher:
         self._last: tuple[tuple[float, float], Points] = ((0.0, 0.0), np.zeros((0, 2)))
         self._at: tuple[float, float] | None = None
         self._views = views or ReferenceViews()
+        # Pictures of this stay whose markers are judged once it is clear what else they show.
+        self._held: list[_MarkerPicture] = []
+        self._saw_clearly = False
         self._strange: dict[int, int] = {}
         self._sights: deque[Sight] = deque(maxlen=AGREED_PICTURES)
         self._sight: Sight | None = None
@@ -252,6 +261,7 @@ class Watcher:
         # Told anew in each place, of which a short stay may give one picture alone.
         self._sight = None
         self._light = ''
+        self._held, self._saw_clearly = [], False
         self._look += 1
         self._visit = None
         self._candidates = []
@@ -548,14 +558,20 @@ class Watcher:
             if sight != Sight.DARK:
                 view = 'blocked' if sight == Sight.BLOCKED else 'clear'
                 self._take(Observation(Kind.VIEW, view, self._place, stamp=stamp), grey)
+        told = None
+        if camera is not None and markers is not None:
+            told = picture, viewpoint, stamp, markers, camera
+        self._saw_clearly |= sight == Sight.CLEAR
+        if told is not None and sight == Sight.BLOCKED and self._saw_clearly:
+            # A bare wall, or a covered lens: what the stay shows before and after tells which.
+            self._held = [*self._held, told][-MOST_HELD:]
         if sight != Sight.CLEAR:
             return
         self._look_for_persons(picture, stamp)
         self._look_for_strange(markers or (), stamp, grey)
-        if camera is not None and markers is not None:
-            normal = None if viewpoint is None else self._views.at(viewpoint)
-            before = None if normal is None else normal.picture
-            self._judge_markers(picture, before, camera, markers, stamp)
+        held, self._held = self._held, []
+        for each in (*held, *([] if told is None else [told])):
+            self._judge_markers(*each)
         if viewpoint is None:
             return
         at = viewpoint[0], viewpoint[1]
@@ -647,12 +663,14 @@ class Watcher:
     def _judge_markers(
         self,
         picture: Picture,
-        before: Picture | None,
-        camera: CameraView,
-        seen: Sequence[SeenMarker],
+        viewpoint: Viewpoint | None,
         stamp: float,
+        seen: Sequence[SeenMarker],
+        camera: CameraView,
     ) -> None:
         """Tell of the markers that hang no longer where they hung."""
+        normal = None if viewpoint is None else self._views.at(viewpoint)
+        before = None if normal is None else normal.picture
         others = self._others
         hidden = bool(self._persons) or (
             others is not None
