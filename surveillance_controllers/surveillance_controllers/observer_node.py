@@ -458,6 +458,7 @@ class Observer(PatrolNode):
             self._readings.add(measured, pose)
             # `amcl_pose` has the node's clock, or the driver's, as who localises likes it.
             self._odometry += [(each, pose) for each in {stamp, measured}]
+            self._pair()
 
     def _pair(self) -> None:
         """Look at the scans whose pose is known; either may come first."""
@@ -478,7 +479,11 @@ class Observer(PatrolNode):
         if abs(stamp - measured) <= SAME_TIME:
             return pose
         first, last = min(stamp, measured), max(stamp, measured)
-        if last - first > NEAR_TIME or not self._readings.covers(first, last):
+        latest = self._readings.latest
+        # Not ahead of the odometry: who begins to turn went otherwise than until then.
+        if latest is None or last > latest[0] or last - first > NEAR_TIME:
+            return None
+        if not self._readings.covers(first, last):
             return None
         (x, y, yaw), then = (
             (float(x), float(y), float(yaw))

@@ -239,6 +239,10 @@ def test_a_scan_counts_from_where_the_robot_was_when_it_was_made(graph, monkeypa
     assert seen == [pytest.approx((0.375, 5.0), abs=0.01)]
     scan(-1.7)
     assert len(seen) == 1
+    scan(0.1)
+    assert len(seen) == 1, 'nobody knows yet how the robot goes on'
+    eyes.carry(0.5, 0.15)  # it stopped at once
+    assert seen[1:] == [pytest.approx((0.5, 5.0), abs=0.01)]
 
 
 def test_a_picture_tells_where_on_the_map_its_camera_is_and_how_sure_that_is(graph, monkeypatch):
