@@ -1,8 +1,8 @@
 """Where markers hang on the map, and whether each hangs there still: there, moved, gone, or twice.
 
 A marker's size is known, so one picture tells where it is before the camera (perspective-n-point),
-and the camera's pose tells where that is on the map. The first pictures decide where it hangs. Read
-elsewhere, by more than the errors of both, it has moved.
+and the camera's pose tells where that is on the map. The first pictures that agree decide where it
+hangs. Read elsewhere, by more than the errors of both, it has moved.
 
 One that is not read is gone only where its spot was in view: the map tells where in the picture
 that is. Its surroundings have to look as they did when it was read last, as far as the camera's
@@ -54,6 +54,8 @@ OF_LIGHT = (0.6, 1.6)
 """The surroundings may be so much lighter or darker than the picture as a whole."""
 STILL_THERE = 0.5
 """Correlation with the marker's own picture from which it may hang there unread."""
+COMMON = 0.01
+"""Standard deviation that no number of pictures takes away, metres."""
 LAID = 0.5
 """Surroundings that correlate less have no features to be laid by."""
 AGREED, READ = 3, 2
@@ -267,7 +269,7 @@ class HungMarkers:
         self._in_a_row.pop(number, None)
         if away is not None and spot is not None:
             covariance = spot.covariance + np.eye(3) * 1e-3
-            self._spots[number] = _Spot(spot.side, away.position, covariance)
+            self._spots[number] = _Spot(spot.side, away.position, covariance, away.read)
 
     def take(
         self,
@@ -312,12 +314,8 @@ class HungMarkers:
         is_clear: Callable[[Array], bool],
     ) -> MarkerFinding | None:
         spot = self._spots.get(number)
-        if spot is None:
-            if len(some) == 1 and len(self._spots) < MOST:
-                position, covariance = shown.placed(some[0])
-                self._spots[number] = spot = _Spot(some[0].side, position, covariance)
-                spot.aspects.append(shown.aspect(some[0]))
-                self._read_at[number] = look
+        if spot is None or not (spot.is_given or spot.pictures >= AGREED):
+            self._begin(number, spot, some, shown, look)
             return None
         here, away = self._sorted(spot, some, shown)
         if here is not None:
@@ -345,6 +343,22 @@ class HungMarkers:
             agreed = count >= READ and (known is None or known.read >= READ)
         return self._settled(number, spot, state, agreed, look)
 
+    def _begin(
+        self, number: int, spot: _Spot | None, some: Sequence[SeenMarker], shown: _Shown, look: int
+    ) -> None:
+        """Learn where a marker hangs; one picture alone may be off by far."""
+        if len(some) != 1 or (spot is None and len(self._spots) >= MOST):
+            return
+        if spot is not None:
+            here, _ = self._sorted(spot, some, shown)
+            if here is not None:
+                self._learn(spot, here, shown)
+                self._read_at[number] = look
+                return
+        position, covariance = shown.placed(some[0])
+        self._spots[number] = _Spot(some[0].side, position, covariance)
+        self._spots[number].aspects.append(shown.aspect(some[0]))
+
     def _sorted(
         self, spot: _Spot, some: Sequence[SeenMarker], shown: _Shown
     ) -> tuple[SeenMarker | None, SeenMarker | None]:
@@ -363,11 +377,13 @@ class HungMarkers:
         return here, away
 
     def _learn(self, spot: _Spot, seen: SeenMarker, shown: _Shown) -> None:
-        position, _ = shown.placed(seen)
+        position, covariance = shown.placed(seen)
         if spot.pictures < ENOUGH and not spot.is_given:
-            # The mean. What all pictures of a stay have in common does not get less.
             spot.pictures += 1
-            spot.position = spot.position + (position - spot.position) / spot.pictures
+            # Nearer pictures count for more (Kalman's update of a thing that stands).
+            gain = spot.covariance @ np.linalg.inv(spot.covariance + covariance)
+            spot.position = spot.position + gain @ (position - spot.position)
+            spot.covariance = (np.eye(3) - gain) @ spot.covariance + np.eye(3) * COMMON**2
         spot.side = spot.side or seen.side
         fresh = shown.aspect(seen)
         others = [each for each in spot.aspects if not _is_seen_alike(each, fresh.camera, 0.5)]
