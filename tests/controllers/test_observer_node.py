@@ -253,7 +253,7 @@ def test_a_picture_tells_where_on_the_map_its_camera_is_and_how_sure_that_is(gra
         joints.header.stamp = eyes.stamp(tick / 10)
         eyes.node._on_joints(joints)
     eyes.show(-0.1)
-    assert eyes.camera is None, 'the lens is not known'
+    assert not eyes.camera, 'the lens is not known'
     info = CameraInfo(
         width=320, height=240, k=[300.0, 0.0, 160.0, 0.0, 300.0, 120.0, 0.0, 0.0, 1.0]
     )
