@@ -37,7 +37,7 @@ def test_a_battery_that_falls_during_any_call_is_charged_next(name: str, call: s
             world.set_level(12.0)
 
     world.faults = fall
-    run = Run(name, world).until(900.0)
+    run = Run(name, world).until(300.0)
     if not seen:
         return  # A call of the start only.
     after = [decision for decision in world.decisions if decision.time >= seen[0]]
