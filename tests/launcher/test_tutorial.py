@@ -24,8 +24,8 @@ ELSEWHERE = ('git clone', 'python3 launch.py\n', 'benchmarks/')
 """Commands that other tests run: a clone, a mission without end, a benchmark."""
 
 AS_FAST_AS_NODES = ('--for', '600', '-p', 'speed:=0.0', '--domain')
-"""Time waits for the nodes: ten times as fast as real time, a busy machine is too slow for them; and
-the mission ends when the test has seen enough, not when a minute is over."""
+"""Time waits for the nodes, for which ten times real time may be too fast on a busy machine; and a
+mission ends when the test has seen enough, not when a minute is over."""
 
 
 def blocks(page: str) -> list[tuple[str, str]]:
