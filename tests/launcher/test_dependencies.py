@@ -33,7 +33,6 @@ OPTIONAL = {
     'mujoco',
     'launch',
     'launch_ros',
-    'ai_edge_litert',
 }
 # Known to type checkers alone.
 TYPES = {'_typeshed'}

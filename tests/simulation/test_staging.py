@@ -44,7 +44,7 @@ def distance_ahead(robot: Robot, yaw: float = 0.0) -> float:
         ('box b 2.0 1.0 0.4 0.3', 0.8),
         ('box low 2.0 1.0 0.4 0.1', 4.95),
         ('door D closed', 1.95),
-        ('person p 2.0 1.1 0', 0.94),
+        ('person p 2.0 1.1 0', 0.79),
         ('chair c 2.0 1.19 0', 0.785),
     ],
 )

@@ -2,7 +2,8 @@
 
 A detector of persons that was trained on photographs has to see a person in it: so it has the
 proportions of a grown-up (Drillis and Contini 1966: lengths as parts of the stature), rounded
-limbs, hair, shoes and a face. It is 1.75 m tall and looks along x.
+limbs, hair, shoes and a face, and stands in mid-step: from the side, legs side by side look like a
+post. It is 1.75 m tall and looks along x.
 """
 
 from __future__ import annotations
@@ -18,6 +19,11 @@ _TROUSERS, _SHIRT, _SKIN, _HAIR = (58, 68, 104), (150, 62, 60), (214, 168, 138),
 _SHOE, _EYE, _LIP = (44, 38, 36), (46, 36, 32), (160, 92, 84)
 _Ring = tuple[float, float, float, float, float]
 """Height, x and y of the middle, length and width, metres."""
+
+_STEP, _SWING = 0.2, 0.22
+"""How far a foot stands before the body's middle, or behind it, and a hand hangs, metres."""
+_HIP, _SHOULDER, _ARM_LENGTH = 0.88, 1.42, 0.7
+"""Heights that legs and arms hang from, and how far the arms reach down, metres."""
 
 _LEG: tuple[_Ring, ...] = (
     (0.06, 0.0, 0.11, 0.095, 0.085),
@@ -77,22 +83,30 @@ def person(name: str, x: float, y: float, yaw: float) -> Thing:
 def _standing() -> tuple[Part, ...]:
     found: list[Part] = []
     for side in (-1.0, 1.0):
-        found += _stack(_LEG, 0.07, _TROUSERS, side)
-        found.append(Part(Shape.BOX, 0.05, 0.11 * side, 0.27, 0.095, 0.0, 0.08, _SHOE))
-        found += _stack(_SLEEVE, 0.06, _SHIRT, side)
-        found += _stack(_ARM, 0.06, _SKIN, side)
+        found += _stack(_swung(_LEG, _HIP, _STEP * side / _HIP), 0.035, _TROUSERS, side)
+        shoe = 0.05 + _STEP * side
+        found.append(Part(Shape.BOX, shoe, 0.11 * side, 0.27, 0.095, 0.0, 0.08, _SHOE))
+        # The arm goes back where the leg goes ahead.
+        swing = -_SWING * side / _ARM_LENGTH
+        found += _stack(_swung(_SLEEVE, _SHOULDER, swing), 0.03, _SHIRT, side)
+        found += _stack(_swung(_ARM, _SHOULDER, swing), 0.03, _SKIN, side)
         # Eye and brow, a little before the face.
         for bottom, top, wide in ((1.632, 1.644, 0.026), (1.658, 1.665, 0.036)):
             found.append(Part(Shape.BOX, 0.092, 0.032 * side, 0.02, wide, bottom, top, _EYE))
-    found += _stack(_TRUNK[:2], 0.05, _TROUSERS)
-    found += _stack(_TRUNK[1:], 0.05, _SHIRT)
-    found += _stack(_NECK, 0.1, _SKIN)
-    found += _stack(_HEAD, 0.025, _SKIN)
-    found += _stack(_BACK_OF_HEAD, 0.045, _HAIR)
+    found += _stack(_TRUNK[:2], 0.025, _TROUSERS)
+    found += _stack(_TRUNK[1:], 0.025, _SHIRT)
+    found += _stack(_NECK, 0.05, _SKIN)
+    found += _stack(_HEAD, 0.0125, _SKIN)
+    found += _stack(_BACK_OF_HEAD, 0.0225, _HAIR)
     found += _stack(_CROWN, 0.02, _HAIR)
     found.append(Part(Shape.BOX, 0.112, 0.0, 0.025, 0.026, 1.585, 1.635, _SKIN))
     found.append(Part(Shape.BOX, 0.098, 0.0, 0.016, 0.05, 1.56, 1.57, _LIP))
     return tuple(found)
+
+
+def _swung(rings: tuple[_Ring, ...], top: float, slope: float) -> tuple[_Ring, ...]:
+    """Return rings of a limb that hangs from a height and swings ahead by so much a metre."""
+    return tuple((each[0], each[1] + slope * max(0.0, top - each[0]), *each[2:]) for each in rings)
 
 
 def _stack(
