@@ -14,6 +14,7 @@ import yaml
 
 from surveillance_perception.observation.events import EventBook, EventState
 from surveillance_perception.observation.evidence import EvidenceStore
+from surveillance_perception.observation.motion import WalkFinder
 from surveillance_perception.observation.observations import Kind, Observation
 from surveillance_perception.observation.other_robots import OtherRobots
 from surveillance_perception.observation.persons import Person
@@ -665,3 +666,16 @@ def test_a_bare_wall_may_be_a_covered_lens_until_the_stay_shows_that_it_is_not()
     assert not of_markers(watch), 'and from now on'
     watch.watcher.picture(wall(), None, 40.0, [], aside)
     assert of_markers(watch) == [('14', 'missing', 'R1', EventState.OPEN)]
+
+
+@pytest.mark.parametrize('alone', [True, False])
+def test_the_end_of_a_wall_that_comes_into_view_bit_by_bit_does_not_walk(alone: bool):
+    """As in the log of an office (Freiburg 079), where the map was off by 0.3 m."""
+    finder, walks = WalkFinder(), []
+    for number in range(12):
+        end = 1.0 + 0.25 * number
+        fresh = np.array([(end + step, 2.0) for step in (0.0, 0.1, 0.2)])
+        wall = np.array([(x, 2.0) for x in np.arange(0.0, end, 0.1)])
+        met = fresh if alone else np.concatenate([wall, fresh])
+        walks += finder.add((2.0, 0.0), fresh, met, 360, 10.0 + 0.3 * number)
+    assert bool(walks) is alone

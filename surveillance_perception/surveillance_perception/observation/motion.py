@@ -28,6 +28,9 @@ TOGETHER = 0.45
 """Points so near to each other are of one thing, metres: two legs."""
 LARGEST = 1.0
 """Extent of a person as a lidar sees one, metres."""
+ATTACHED = 0.25
+"""What a sweep meets so near to a thing belongs to it, metres: the end of a wall that comes
+into view bit by bit goes on in the wall; who walks stands alone."""
 FASTEST = 2.5
 """Metres per second."""
 SPAN = 3.0
@@ -98,13 +101,19 @@ class WalkFinder:
         self._tracks = []
 
     def add(
-        self, sensor: tuple[float, float], fresh: Points, beams: int, stamp: float
+        self,
+        sensor: tuple[float, float],
+        fresh: Points,
+        met: Points,
+        beams: int,
+        stamp: float,
     ) -> list[Walk]:
         """Take the ends of one sweep that lie where all was free before; return what walks.
 
         Args:
             sensor: Where the lidar was, map frame, metres.
             fresh: (n, 2), map frame, metres; without walls and known things.
+            met: All ends of the sweep where something was met, (m, 2), likewise.
             beams: How many beams the sweep has.
             stamp: Seconds; a later one than before.
         """
@@ -112,7 +121,7 @@ class WalkFinder:
         if not len(fresh) or len(fresh) > MOST_SHARE * beams:
             return []
         found = []
-        for spot in _things(fresh):
+        for spot in _things(fresh, met):
             track = self._nearest(spot, stamp)
             if track is None:
                 track = _Track()
@@ -141,8 +150,9 @@ class WalkFinder:
         return self._tracks[min(near)[1]] if near else None
 
 
-def _things(points: Points) -> list[tuple[float, float]]:
-    """Return the middles of groups of points that are as large as a person at most."""
+def _things(points: Points, met: Points) -> list[tuple[float, float]]:
+    """Return the middles of groups of points that are as large as a person at most, and stand
+    alone in all that was met."""
     if len(points) < 2:
         return []
     groups = fcluster(linkage(points, 'single'), TOGETHER, 'distance')
@@ -151,9 +161,22 @@ def _things(points: Points) -> list[tuple[float, float]]:
         members = points[groups == number]
         if len(members) < 2 or float(np.ptp(members, axis=0).max()) > LARGEST:
             continue
+        if _reach(members, met) > LARGEST:
+            continue
         x, y = members.mean(axis=0).tolist()
         found.append((float(x), float(y)))
     return found
+
+
+def _reach(members: Points, met: Points) -> float:
+    """Return the extent of a group with all that hangs together with it, metres."""
+    near = met[(np.abs(met - members.mean(axis=0)) <= 2 * LARGEST).all(axis=1)]
+    if len(near) < 2:
+        return 0.0
+    groups = fcluster(linkage(near, 'single'), ATTACHED, 'distance')
+    apart = np.linalg.norm(near[:, None] - members[None], axis=2).min(axis=1)
+    joined = np.isin(groups, groups[apart < ATTACHED])
+    return float(np.ptp(near[joined], axis=0).max()) if joined.any() else 0.0
 
 
 def _walk(spots: Sequence[_Spot], distance: float) -> Walk | None:

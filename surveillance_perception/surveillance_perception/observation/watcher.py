@@ -307,7 +307,7 @@ class Watcher:
         if self._normal is not None and len(fresh):
             cells = self._normal.grid.cells_of(fresh)
             fresh = fresh[~self._normal.occupied[cells[:, 0], cells[:, 1]]]
-        for walk in self._walks.add(sensor, fresh, len(ends), stamp)[:1]:
+        for walk in self._walks.add(sensor, fresh, ends[met], len(ends), stamp)[:1]:
             place = self._place_of(walk.position)
             seen = Observation(Kind.PERSON, 'seen', place, '', walk.position, WALKING, stamp)
             self._see_person('lidar', seen)
