@@ -102,7 +102,8 @@ class PersonFinder:
             limits = picture.shape[1], picture.shape[0]
             start = np.clip(np.floor([low_x, low_y]), 0, limits).astype(int)
             end = np.clip(np.ceil([high_x, high_y]), 0, limits).astype(int)
-            x, y, wide, high = (*start.tolist(), *(end - start).tolist())
+            x, y = int(start[0]), int(start[1])
+            wide, high = int(end[0]) - x, int(end[1]) - y
             if min(wide, high) > 0:
                 found.append(Person((x, y, wide, high), float(likely)))
         return found

@@ -69,7 +69,7 @@ def read_network(path: Path) -> Network:
         small = cv2.resize(picture, (SIDE, SIDE))
         mean = (127.5, 127.5, 127.5)
         network.setInput(cv2.dnn.blobFromImage(small, 1 / 127.5, (SIDE, SIDE), mean, swapRB=True))
-        found = network.forward(outputs)
+        found = [np.asarray(each, float) for each in network.forward(outputs)]
         codes, classes = (
             np.concatenate([_rows(each, width) for each in some])
             for some, width in ((found[: len(CELLS)], 4), (found[len(CELLS) :], 2))
@@ -79,9 +79,9 @@ def read_network(path: Path) -> Network:
     return look
 
 
-def _rows(grid: NDArray[np.float32], width: int) -> Boxes:
+def _rows(grid: Boxes, width: int) -> Boxes:
     """Return what one grid tells (1, anchors * width, rows, columns) as a row for each anchor."""
-    return grid[0].transpose(1, 2, 0).reshape(-1, width).astype(float)
+    return np.asarray(grid[0].transpose(1, 2, 0).reshape(-1, width))
 
 
 def _decoded(codes: Boxes, logits: Boxes, anchors: Boxes) -> Boxes:
