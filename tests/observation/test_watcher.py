@@ -294,6 +294,32 @@ def test_a_view_is_compared_with_the_one_with_the_doors_as_they_are_now():
     assert views.at(at, {'D1': 'open', 'D2': 'closed'}) is ajar
 
 
+def test_a_view_waits_until_this_visit_has_seen_its_doors():
+    watch = Round()
+    here, view = (4.0, 2.5), (4.0, 2.5, 0.0)
+    room_view = texture()
+    through = room_view.copy()
+    through[60:200, 120:200] = 200
+
+    def look(picture: np.ndarray, shut: bool, sweeps: int) -> None:
+        watch.watcher.arrive('R1', watch.time)
+        for number in range(sweeps):
+            watch.time += 1.0
+            watch.watcher.sweep(here, *beams(room(), here, (), shut, seed=number), watch.time)
+        for _ in range(4):
+            watch.time += 2.0
+            watch.watcher.picture(picture, view, watch.time, None)
+        watch.watcher.arrive('', watch.time)
+
+    look(room_view, shut=True, sweeps=6)
+    # It is open now, which nobody has seen yet: the closed one's picture is not the one to take.
+    for _ in range(3):
+        look(through, shut=False, sweeps=0)
+    assert not [each for each in watch.told if each.kind == Kind.VIEW and each.state == 'changed']
+    look(through, shut=False, sweeps=6)
+    assert len(watch.watcher.state()['views']['views']) == 2
+
+
 def of_markers(watch: Round) -> list[tuple[str, str, str, EventState]]:
     """Return id, state, place and state of each event of a marker."""
     return [
@@ -617,6 +643,19 @@ def test_a_covered_camera_is_told_once():
     assert [(each.kind, each.state) for each in watch.told if each.kind == Kind.VIEW] == [
         (Kind.VIEW, 'blocked')
     ]
+
+
+@pytest.mark.parametrize(('picture', 'sure'), [(texture(), 0.9), (np.full((240, 320), 90), 0.5)])
+def test_a_camera_that_is_covered_does_not_say_that_nobody_is_there(picture, sure):
+    watch = Round(find_persons=lambda _: [])
+    watch.watcher.arrive('R1', watch.time)
+    for number in range(8):
+        watch.time += 1.0
+        watch.watcher.sweep((3.0, 2.5), *beams(room(), (3.0, 2.5), (), True, number), watch.time)
+        watch.watcher.picture(picture.astype(np.uint8), None, watch.time, None)
+    watch.watcher.arrive('', watch.time)
+    (nobody,) = [each for each in watch.told if each.state == 'nobody']
+    assert abs(nobody.confidence - sure) < 0.11
 
 
 def test_evidence_keeps_the_most_severe_and_newest_within_its_bound(tmp_path: Path):

@@ -110,6 +110,18 @@ class ReferenceViews:
             None,
         )
 
+    def awaits(self, viewpoint: Viewpoint, doors: Mapping[str, str]) -> bool:
+        """Tell whether pictures from a viewpoint wait until a door's state is known.
+
+        Args:
+            viewpoint: Where the camera is.
+            doors: The states of the doors nearby.
+        """
+        return any(
+            _same(each.viewpoint, viewpoint) and not each.doors.keys() <= doors.keys()
+            for each in self._views
+        )
+
     def add(
         self,
         viewpoint: Viewpoint,

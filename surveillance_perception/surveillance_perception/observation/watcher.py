@@ -103,6 +103,7 @@ class _Door:
     readings: deque[tuple[str, float]] = field(default_factory=lambda: deque(maxlen=READINGS))
     told: str = ''
     told_at: float = -math.inf
+    look: int = -1
     place: str = ''
 
 
@@ -210,7 +211,7 @@ class Watcher:
         # The last person of this stay whom each sensor saw.
         self._person_by: dict[str, Observation] = {}
         self._began = math.nan
-        self._pictures = 0
+        self._pictures = self._clear_pictures = 0
         self._store = store
         self._robot = robot
         self._place = ''
@@ -256,6 +257,7 @@ class Watcher:
         self._learn()
         self._place = place
         self._began, self._pictures, self._persons = stamp, 0, 0
+        self._clear_pictures = 0
         self._person_by = {}
         self._walks.clear()
         # Told anew in each place, of which a short stay may give one picture alone.
@@ -277,7 +279,9 @@ class Watcher:
         self._looked(look)
         long = look.ended - look.began >= LOOKED_SECONDS
         if long and look.share >= LOOKED and not self._persons:
-            sure = look.share if look.pictures and self._find_persons is not None else 0.5
+            # In the dark, and with the lens covered, the camera tells nothing.
+            looked = self._find_persons is not None and self._clear_pictures > 0
+            sure = look.share if looked else 0.5
             self._take(
                 Observation(Kind.PERSON, 'nobody', self._place, confidence=sure, stamp=stamp)
             )
@@ -363,6 +367,7 @@ class Watcher:
         state = max(set(states), key=states.count)
         if states.count(state) < AGREEING:
             return
+        door.look = self._look
         if state == door.told and stamp - door.told_at < SEEN_AGAIN:
             return
         sure = float(np.mean([sure for each, sure in door.readings if each == state]))
@@ -567,6 +572,7 @@ class Watcher:
             self._held = [*self._held, told][-MOST_HELD:]
         if sight != Sight.CLEAR:
             return
+        self._clear_pictures += 1
         self._look_for_persons(picture, stamp)
         self._look_for_strange(markers or (), stamp, grey)
         held, self._held = self._held, []
@@ -578,6 +584,8 @@ class Watcher:
         if self._others is not None and self._others.may_be_seen(at, stamp):
             return
         doors = self._doors_near(at)
+        if self._views.awaits(viewpoint, doors):
+            return  # how a door stood in an earlier visit does not tell how it stands now
         known = self._views.at(viewpoint, doors)
         if known is None:
             # Who walks about here is no part of how it looks normally.
@@ -625,11 +633,15 @@ class Watcher:
         return len(lights) == AGREED_PICTURES and len(set(lights)) == 1
 
     def _doors_near(self, point: tuple[float, float]) -> dict[str, str]:
-        """Return the states of the doors near a point, of those whose state is known."""
+        """Return the states of the doors near a point, of those that this visit has seen."""
         near = {}
         for name, door in self._doors.items():
             x1, y1, x2, y2 = door.segment
-            if door.told and math.dist(((x1 + x2) / 2, (y1 + y2) / 2), point) <= DOOR_RANGE:
+            if (
+                door.told
+                and door.look == self._look
+                and math.dist(((x1 + x2) / 2, (y1 + y2) / 2), point) <= DOOR_RANGE
+            ):
                 near[name] = door.told
         return near
 
