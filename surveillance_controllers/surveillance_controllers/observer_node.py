@@ -288,7 +288,7 @@ class Observer(PatrolNode):
         self._joint_names: tuple[str, ...] = ()
         self._lens: CameraModel | None = None
         self._estimate = b''
-        self._image_stamps = StampOffset('camera/rgb/image_raw')
+        self._image_stamps = StampOffset('camera/rgb/image_raw', self.is_simulated)
         self._images: deque[_HeldImage] = deque(maxlen=MOST_HELD)
         self._detected: deque[tuple[float, tuple[SeenMarker, ...]]] = deque(maxlen=MOST_HELD)
         self._next_picture = self._waits_since = 0.0

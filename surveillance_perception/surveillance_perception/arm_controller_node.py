@@ -127,7 +127,7 @@ class ArmController(PatrolNode):
         group = ReentrantCallbackGroup()
         self._base: tuple[str, np.ndarray] | None = None
         self._bases, self._postures = StampedReadings(), StampedReadings()
-        self._stamps = StampOffset('aruco_detector/detections')
+        self._stamps = StampOffset('aruco_detector/detections', self.is_simulated)
         commands = ArmCommands(self)
         self._at_rest = OwnedTopic(self, Bool, 'arm/at_rest')
         self._driver = ArmDriver(

@@ -132,7 +132,7 @@ class ArucoDetector(PatrolNode):
 
     def _image_taker(self, topic: str) -> Callable[[Image | CompressedImage], None]:
         """Return what takes the images of a topic, whatever clock its camera stamps them by."""
-        stamps = StampOffset(topic)
+        stamps = StampOffset(topic, self.is_simulated)
         self._stamps.append(stamps)
 
         def take(message: Image | CompressedImage) -> None:

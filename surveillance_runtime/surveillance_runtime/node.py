@@ -143,6 +143,11 @@ class PatrolNode(Node):
         self.add_on_set_parameters_callback(self._check_parameters)
         self.add_post_set_parameters_callback(self._tell_parameters)
 
+    @property
+    def is_simulated(self) -> bool:
+        """Whether this node's clock is that of a simulation, which all nodes share."""
+        return bool(self.get_parameter('use_sim_time').value)
+
     def parameter(
         self,
         name: str,

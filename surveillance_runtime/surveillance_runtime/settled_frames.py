@@ -25,7 +25,7 @@ class SettledFrames:
         self._clock = ClockWait(node)
         self._since: float | None = None
         # the detector keeps the camera's stamps, whatever clock they are of
-        self._stamps = StampOffset('aruco_detector/detections')
+        self._stamps = StampOffset('aruco_detector/detections', node.is_simulated)
         self._wanted = 0
         self._changed = Interrupt()
         self._subscription = node.create_subscription(

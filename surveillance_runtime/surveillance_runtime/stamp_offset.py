@@ -29,10 +29,13 @@ class StampOffset:
 
     Args:
         source: What the source is called in a finding, such as its topic.
+        simulated: Whether the node's clock is the one of a simulation, which all share: then what
+            is behind by seconds is late, since a second may pass in a tenth of one.
     """
 
-    def __init__(self, source: str) -> None:
+    def __init__(self, source: str, simulated: bool = False) -> None:
         self._source = source
+        self._late = _LATEST if simulated else _LARGE
         # what each recent message seems to have taken, and when it came
         self._delays: deque[tuple[float, float]] = deque(maxlen=_MOST_SAMPLES)
         self._last: float | None = None
@@ -60,19 +63,19 @@ class StampOffset:
         self._last = stamp
         if last is not None and stamp == last:
             # the same image again, as long as its stamp is not far off; then the clock stands still
-            again = not self._offset and abs(delay) <= _LARGE
+            again = not self._offset and -_LARGE <= delay <= self._late
             self._odd.append('' if again else 'still')
             return stamp if again else now
         jumped = last is not None and stamp < last - _LARGE
         while self._delays and not 0.0 <= now - self._delays[0][1] <= _WINDOW:
             self._delays.popleft()
         # delays only add: what seems to be much faster than all before has another clock
-        jumped |= bool(self._delays) and delay < self._least() - _LARGE
+        jumped |= bool(self._delays) and delay < self._least() - self._late
         if jumped:
             self._delays.clear()
         self._delays.append((delay, now))
         least = self._least()
-        self._offset = least if abs(least) > _LARGE else 0.0
+        self._offset = 0.0 if -_LARGE <= least <= self._late else least
         self._odd.append('jump' if jumped else 'offset' if self._offset else '')
         return stamp + self._offset
 

@@ -110,3 +110,14 @@ def test_another_clock_leaves_two_seconds_and_a_good_one_none() -> None:
     assert taken - 2.1 < first < taken < last < taken + 0.1
     stamps = StampOffset('images')
     assert stamps.span_of(BEGIN, BEGIN + DELAY) == (BEGIN, BEGIN)
+
+
+def test_in_simulated_time_a_message_that_is_seconds_behind_is_late() -> None:
+    """At speed 10 a camera of a busy machine was 2.4 s behind: a quarter of a second."""
+    stamps = StampOffset('images', simulated=True)
+    for index, delay in enumerate((2.4, 9.0, 0.1, 5.0, 2.4) * 4):
+        stamp = 100.0 + index
+        assert stamps.span_of(stamp, stamp + delay) == (stamp, stamp)
+    assert stamps.finding() is None
+    # But no camera of the machine's own clock is believed.
+    assert StampOffset('images', simulated=True).time_of(BEGIN, 100.0) <= 100.0

@@ -39,7 +39,7 @@ class SensorStream:
         self._node = node
         self._name = name
         # Under use_sim_time all have one clock, and its time comes in steps.
-        simulated = bool(node.get_parameter('use_sim_time').value)
+        simulated = node.is_simulated
         self._stamps = None if simulated else StampOffset(self.topic)
         self._last: tuple[float, bytes] = (0.0, b'')
         self._repeats = False
