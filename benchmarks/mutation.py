@@ -646,6 +646,10 @@ class Trials:
                 self._running[child] = (mutant, now_used, now)
             ended, status = os.waitpid(child, os.WNOHANG)
             idle = not ended and now_used == used and now > since + IDLE
+            if idle and wants_processor(child):
+                # On a busy machine it waits for its turn.
+                self._running[child] = (mutant, now_used, now)
+                idle = False
             if not ended and not idle:
                 continue
             with contextlib.suppress(ProcessLookupError):
@@ -665,6 +669,18 @@ def used_by(process: int) -> float:
     except OSError:
         return 0.0
     return sum(map(float, text.rpartition(')')[2].split()[11:15]))
+
+
+def wants_processor(group: int) -> bool:
+    """Tell whether a thread of a group of processes could run if there was a processor for it."""
+    for path in Path('/proc').glob('[0-9]*/task/[0-9]*/stat'):
+        try:
+            state, _, of_group = path.read_text(encoding='utf-8').rpartition(')')[2].split()[:3]
+        except OSError:
+            continue
+        if int(of_group) == group and state in 'RD':
+            return True
+    return False
 
 
 def changed_functions(mutant: Mutant) -> dict[tuple[str, int], CodeType] | None:
