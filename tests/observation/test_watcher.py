@@ -14,6 +14,7 @@ import yaml
 
 from surveillance_perception.observation.events import EventBook, EventState
 from surveillance_perception.observation.evidence import EvidenceStore
+from surveillance_perception.observation.hung_markers import CameraView
 from surveillance_perception.observation.motion import WalkFinder
 from surveillance_perception.observation.observations import Kind, Observation
 from surveillance_perception.observation.other_robots import OtherRobots
@@ -718,3 +719,20 @@ def test_the_end_of_a_wall_that_comes_into_view_bit_by_bit_does_not_walk(alone: 
         met = fresh if alone else np.concatenate([wall, fresh])
         walks += finder.add((2.0, 0.0), fresh, met, 360, 10.0 + 0.3 * number)
     assert bool(walks) is alone
+
+
+def test_who_stands_beyond_an_open_door_is_in_the_room_there_and_where_the_lidar_meets_legs():
+    """Not a table before them, which is too near to be as large, nor in the robot's own room."""
+    found = [Person((130, 30, 60, 210), 0.8)]  # 1.75 m tall at 2.5 m
+    watch, at = Round(find_persons=lambda _: found), (5.0, 2.5)
+    watch.watcher.arrive('R1', watch.time)
+    stands = [(7.5, 2.4, 0.06), (7.5, 2.6, 0.06), (5.5, 2.6, 0.03)]
+    for number in range(3):
+        watch.time += 0.25
+        watch.watcher.sweep(at, *beams(room(), at, stands, False, seed=number), watch.time)
+    pose = np.array([[0, 0, 1, at[0]], [-1, 0, 0, at[1]], [0, -1, 0, 1.0], [0, 0, 0, 1]], float)
+    lens = np.array([[300.0, 0.0, 160.0], [0.0, 300.0, 120.0], [0.0, 0.0, 1.0]])
+    watch.watcher.picture(texture(), None, watch.time, None, CameraView(pose, lens, 0.02, 0.01))
+    (event,) = [each for each in watch.book.events if each.kind == Kind.PERSON]
+    assert event.place == 'R2'
+    assert event.position == pytest.approx((7.45, 2.5), abs=0.1)

@@ -149,7 +149,7 @@ class FloorVisit:
         ended = met & (lengths <= self._farthest)
         hits = origin + rays[ended] * lengths[ended, None]
         hit = self._cells(hits)
-        of_things = self._cells(hits[~self._of_wall(hits, lengths[ended])])
+        of_things = self._cells(hits[~self.of_wall(hits, lengths[ended])])
         # Every half cell along each beam, up to a cell and a half before its end.
         side = self._grid.resolution
         steps = np.arange(side / 2, self._farthest, side / 2)
@@ -167,8 +167,8 @@ class FloorVisit:
         while not 0.0 <= stamp - self._lately[0][0] <= LEAVES:
             self._met_near += self._lately.popleft()[1]
 
-    def _of_wall(self, hits: Points, lengths: NDArray[np.float64]) -> Mask:
-        """Tell of each end whether a wall of the map may be what was met, so far off."""
+    def of_wall(self, hits: Points, lengths: NDArray[np.float64]) -> Mask:
+        """Tell of each end whether a wall of the map may be what was met, so far off, metres."""
         cells = self._grid.cells_of(hits)
         height, width = self._grid.cells.shape
         rows, columns = np.clip(cells[:, 0], 0, height - 1), np.clip(cells[:, 1], 0, width - 1)

@@ -37,6 +37,7 @@ from surveillance_perception.observation.hung_markers import CameraView, HungMar
 from surveillance_perception.observation.motion import WalkFinder
 from surveillance_perception.observation.observations import Kind, Observation
 from surveillance_perception.observation.other_robots import OtherRobots
+from surveillance_perception.observation.person_places import place_of
 from surveillance_perception.observation.persons import Person, Picture
 from surveillance_perception.observation.reference_views import ReferenceViews, Viewpoint
 from surveillance_perception.observation.views import (
@@ -573,7 +574,7 @@ class Watcher:
         if sight != Sight.CLEAR:
             return
         self._clear_pictures += 1
-        self._look_for_persons(picture, stamp)
+        self._look_for_persons(picture, camera, stamp)
         self._look_for_strange(markers or (), stamp, grey)
         held, self._held = self._held, []
         for each in (*held, *([] if told is None else [told])):
@@ -645,17 +646,26 @@ class Watcher:
                 near[name] = door.told
         return near
 
-    def _look_for_persons(self, picture: Picture, stamp: float) -> None:
+    def _look_for_persons(self, picture: Picture, camera: CameraView | None, stamp: float) -> None:
         found = [] if self._find_persons is None else self._find_persons(picture)
         if not found:
             return
-        sure = max(each.confidence for each in found)
-        seen = Observation(Kind.PERSON, 'seen', self._place, confidence=sure, stamp=stamp)
+        surest = found[0]
+        where = None if camera is None else place_of(surest, camera, self._things_met())
+        place = self._place if where is None else self._place_of(where)
+        seen = Observation(Kind.PERSON, 'seen', place, '', where, surest.confidence, stamp)
         shown = picture.copy()
         for each in found:
             left, top, width, height = each.box
             cv2.rectangle(shown, (left, top), (left + width, top + height), (0, 200, 0), 2)
         self._see_person('camera', seen, shown)
+
+    def _things_met(self) -> Points:
+        """Return the ends of the last sweep that no wall of the map explains, (n, 2)."""
+        sensor, met = self._last
+        if self._visit is None or not len(met):
+            return met
+        return met[~self._visit.of_wall(met, np.linalg.norm(met - np.asarray(sensor), axis=1))]
 
     def _look_for_strange(self, seen: Sequence[SeenMarker], stamp: float, grey: Grey) -> None:
         """Tell of markers that no file knows, once several pictures in a row show them."""
