@@ -294,3 +294,22 @@ def test_what_is_not_supported_is_reported(axiom: Axiom, words: str) -> None:
     assert kb.reason()
     assert len(kb.unsupported) == 1
     assert words in kb.unsupported[0]
+
+
+@pytest.mark.parametrize(
+    'further',
+    [
+        SubClassOf(ObjectHasSelf(R), A),
+        SubClassOf(ObjectHasValue(R, k), A),
+        Rule((ObjectPropertyAtom(R, X, Y),), (ClassAtom(A, X),)),
+        ObjectPropertyDomain(Q, A),
+        ObjectPropertyRange(R, A),
+    ],
+)
+def test_what_follows_still_follows_with_a_further_axiom(further: Axiom) -> None:
+    # Of whom no axiom says what they are related to: only cases find them.
+    defined = ObjectIntersectionOf((ObjectAllValuesFrom(P, D), ObjectSomeValuesFrom(R, THING)))
+    none = ObjectMaxCardinality(0, P, THING)
+    facts = [is_a(none, i), is_a(ObjectSomeValuesFrom(R, THING), i)]
+    assert base(SubClassOf(defined, A), *facts).instances(A) == {i}
+    assert i in base(SubClassOf(defined, A), further, *facts).instances(A)

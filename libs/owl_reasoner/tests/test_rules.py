@@ -3,28 +3,38 @@
 
 from __future__ import annotations
 
+import itertools
+import operator
+from fractions import Fraction
+
 import pytest
 
 from owl_reasoner.knowledge_base import KnowledgeBase
 from owl_reasoner.owl.axioms import (
+    Axiom,
     EquivalentClasses,
+    FunctionalObjectProperty,
     HasKey,
     Rule,
     SubClassOf,
 )
 from owl_reasoner.owl.expressions import (
+    Atom,
     BuiltinAtom,
     ClassAtom,
     ClassExpression,
     DataOneOf,
     DataPropertyAtom,
     DataRange,
+    DataRangeAtom,
     DataSomeValuesFrom,
     DatatypeRestriction,
     DifferentIndividualsAtom,
     Literal,
+    ObjectAllValuesFrom,
     ObjectHasSelf,
     ObjectIntersectionOf,
+    ObjectMaxCardinality,
     ObjectPropertyAtom,
     ObjectSomeValuesFrom,
     ObjectUnionOf,
@@ -32,7 +42,11 @@ from owl_reasoner.owl.expressions import (
     Variable,
 )
 from owl_reasoner.owl.vocabulary import THING, XSD
+from owl_reasoner.reasoner.clauses import ComputedAtom, Constant, Term
 from owl_reasoner.reasoner.datatypes import value_of
+from owl_reasoner.reasoner.hypertableau.rule_joins import compared
+from owl_reasoner.reasoner.swrl_builtins import builtin
+from owl_reasoner.reasoner.value_sets import point
 
 from .small_ontologies import (
     A,
@@ -336,3 +350,89 @@ def test_what_one_value_of_several_implies_is_no_consequence() -> None:
     assert kb.instances(A) == set()
     kb = base(is_a(one_of(S, 1, 0), i), is_a(one_of(T, 2, 3), i), Rule(less, (ClassAtom(A, X),)))
     assert kb.instances(A) == {i}
+
+
+@pytest.mark.parametrize('by_cases', [False, True])
+@pytest.mark.parametrize('known', [False, True])
+def test_the_order_of_a_rules_atoms_makes_no_difference(by_cases: bool, known: bool) -> None:
+    minus_one_or_one = DataSomeValuesFrom(S, DataOneOf((num(1), num(-1))))
+    facts = [has(S, i, -1) if known else is_a(minus_one_or_one, i)]
+    facts += [is_a(ObjectUnionOf((C, D)), i)] if by_cases else []
+    atoms: tuple[Atom, ...] = (
+        DataPropertyAtom(S, X, V),
+        computed('abs', W, V),
+        computed('add', U, W, 1),
+        DataRangeAtom(XSD + 'integer', U),
+    )
+    for body in itertools.permutations(atoms):
+        for tested, follows in (
+            (computed('lessThan', W, U), True),
+            (computed('greaterThan', 2, U), False),
+        ):
+            kb = base(Rule((tested, *body), (ClassAtom(A, X),)), *facts)
+            assert kb.instances(A) == ({i} if follows else set())
+
+
+def test_a_rule_hands_on_what_it_computes_from_each_value_that_is_possible() -> None:
+    rule = Rule((DataPropertyAtom(S, X, V), computed('abs', W, V)), (DataPropertyAtom(T, X, W),))
+
+    def one_of(*values: int) -> Axiom:
+        return is_a(DataSomeValuesFrom(S, DataOneOf(tuple(map(num, values)))), i)
+
+    assert base(rule, one_of(3, -3)).data_values(T, i) == {num(3)}
+    assert base(rule, one_of(3, -4)).data_values(T, i) == set()
+
+
+@pytest.mark.parametrize('swapped', [False, True])
+def test_each_individual_that_a_rule_asks_for_has_to_be_recognised(swapped: bool) -> None:
+    only = ObjectAllValuesFrom(P, D)
+    asked = [ClassAtom(only, X), ClassAtom(only, Y)]
+    body: tuple[Atom, ...] = (
+        ObjectPropertyAtom(P, X, Z),
+        ObjectPropertyAtom(R, X, Y),
+        *asked[:: -1 if swapped else 1],
+    )
+    facts = [rel(P, i, k), is_a(D, k), rel(R, i, j), is_a(ObjectMaxCardinality(0, P, THING), j)]
+    kb = base(FunctionalObjectProperty(P), Rule(body, (ClassAtom(A, X),)), *facts)
+    assert kb.instances(A) == {i}
+
+
+_NUMBERS = [
+    num(value, datatype)
+    for datatype in ('decimal', 'float', 'double')
+    for value in ('-1', '-0.0', '0', '0.1', '0.5', '0.50000001', '7', '16777217')
+] + [num(value, datatype) for datatype in ('float', 'double') for value in ('INF', '-INF', 'NaN')]
+
+
+@pytest.mark.parametrize(
+    'name', ['lessThan', 'lessThanOrEqual', 'greaterThan', 'greaterThanOrEqual']
+)
+def test_the_values_that_a_comparison_admits_are_those_of_which_it_holds(name: str) -> None:
+    known = builtin(name, 2)
+    assert known is not None
+    holds, _ = known
+    values = [value_of(one) for one in _NUMBERS]
+    for bound in values:
+        for first in (False, True):
+            terms: tuple[Term, Term] = (0, Constant(bound, True))
+            found = compared(ComputedAtom(name, holds, None, terms[:: -1 if first else 1]), 0)
+            if not isinstance(bound, int | Fraction):
+                assert found is None
+                continue
+            assert found is not None
+            for value in values:
+                pair = (bound, value) if first else (value, bound)
+                assert point(value).within(found) is holds(*pair), (name, pair)
+            assert (found & point('0')).is_empty
+
+
+def test_a_comparison_with_no_number_admits_no_set_of_values() -> None:
+    for name, bound in (('lessThan', 'a'), ('contains', 'a'), ('notEqual', 1)):
+        known = builtin(name, 2)
+        assert known is not None
+        assert compared(ComputedAtom(name, known[0], None, (0, Constant(bound, True))), 0) is None
+    assert compared(ComputedAtom('lessThan', operator.lt, None, (0, 1)), 0) is None
+    assert (
+        compared(ComputedAtom('lessThan', operator.lt, None, (0, Constant(10**400, True))), 0)
+        is None
+    )

@@ -73,7 +73,7 @@ class Classification:
         translation = Translation(tbox, asserted, negated, self._budget)
         program = self.program = translation.program
         classes = [a.iri for a in tbox if isinstance(a, ax.Declaration) and a.kind == 'class']
-        for name in (*classes, THING, NOTHING):
+        for name in classes:
             if name not in (THING, NOTHING):
                 program.cls(name)
         self._budget.look()
@@ -118,8 +118,9 @@ class Classification:
                 program.unsupported.append(sentence)
             for clause in program.clauses:
                 atoms = [atom for atom in clause.body if isinstance(atom, PredicateAtom)]
-                x = next((atom.terms[0] for atom in atoms if atom.predicate is label), None)
-                if x is None or partial.decided_by in self._places(atoms, x):
+                # A rule may ask for it of several: each of them has to be recognised.
+                asked = {atom.terms[0] for atom in atoms if atom.predicate is label}
+                if all(partial.decided_by in self._places(atoms, x) for x in asked):
                     continue
                 head = clause.head
                 if isinstance(head, PredicateAtom) and head.predicate.kind == 'class':
@@ -136,11 +137,14 @@ class Classification:
         found = {a.predicate for a in atoms if a.predicate.kind == 'class' and a.terms[0] == x}
         for clause in program.clauses:
             head = clause.head
-            if len(clause.body) == 1 and isinstance(head, PredicateAtom):
+            if len(clause.body) == 1 and isinstance(head, PredicateAtom) and not clause.named_only:
                 (only,), (y, *_) = clause.body, head.terms
                 if isinstance(only, PredicateAtom) and head.predicate.kind == 'class':
-                    at = only.terms.index(y) if y in only.terms else -1
-                    if (only.predicate, at) in places:
+                    # A domain or range holds of all whom the property relates, not of those alone
+                    # that it relates to themselves or to a certain individual.
+                    apart = {term for term in only.terms if isinstance(term, int)}
+                    at = only.terms.index(y) if y in apart else -1
+                    if len(apart) == len(only.terms) and (only.predicate, at) in places:
                         found.add(head.predicate)
         return found - {program.thing}
 

@@ -54,6 +54,8 @@ from owl_reasoner.reasoner.value_sets import NONE, ValueSet, point, value_set
 
 MOST_TRIED = 300
 """Where so many values are possible, each of them is tried."""
+_LATER = 1000
+"""The cost of a test, or a computation, some of whose terms another atom has to bind first."""
 _MOST_VALUES = 20_000
 """Of more possible values one can be chosen that is no other individual's."""
 _COMPARISONS = {
@@ -409,7 +411,8 @@ class CaseJoins:
         self, atom: ComputedAtom, match: _Match, unknown: list[Term], values: dict[Term, Value]
     ) -> Iterator[_Match]:
         """Let a built-in hold whose arguments are not all known."""
-        if len(unknown) == 1 and len(atom.terms) == 2:
+        # What computes may have a first argument that nothing binds yet, and is no comparison.
+        if atom.solve is None and len(unknown) == 1:
             terms = tuple(
                 term if term in unknown else Constant(values[term], True) for term in atom.terms
             )
@@ -492,10 +495,13 @@ def _ordered(body: Iterable[NamedAtom], given: FactAtom) -> tuple[NamedAtom, ...
     order: list[NamedAtom] = []
 
     def cost(atom: NamedAtom) -> int:
-        free = sum(isinstance(term, int) and term not in bound for term in atom.terms)
+        free = [isinstance(term, int) and term not in bound for term in atom.terms]
         if isinstance(atom, FactAtom):
-            return 10 * free if free < len(atom.terms) else 50
-        return 1 if not free else 100 + 100 * free
+            return 50 if all(free) else 10 * sum(free)
+        if not any(free):
+            return 1
+        computes = isinstance(atom, ComputedAtom) and atom.solve is not None
+        return 100 if computes and not any(free[1:]) else _LATER
 
     while waiting:
         atom = min(waiting, key=cost)
