@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import json
 import math
-import queue
 import re
 import time
 from collections import deque
@@ -55,6 +54,14 @@ from surveillance_perception.conversions import (
 )
 from surveillance_perception.marker_registry import read_registry
 from surveillance_perception.observation.answers import answered
+from surveillance_perception.observation.backlog import (
+    DROPPED,
+    LATE,
+    NO_POSE,
+    UNREAD,
+    Backlog,
+    LostSight,
+)
 from surveillance_perception.observation.day_book import DayBook
 from surveillance_perception.observation.events import Event, EventBook, EventState
 from surveillance_perception.observation.evidence import EvidenceStore
@@ -62,7 +69,7 @@ from surveillance_perception.observation.hung_markers import CameraView, SeenMar
 from surveillance_perception.observation.observations import Kind, Observation
 from surveillance_perception.observation.other_robots import OtherRobots
 from surveillance_perception.observation.persons import Person, load_finder
-from surveillance_perception.observation.reference_views import ReferenceViews, Viewpoint
+from surveillance_perception.observation.reference_views import ReferenceViews, Viewpoint, same_view
 from surveillance_perception.observation.viewpoints import Viewpoints
 from surveillance_perception.observation.watch_rules import DEFAULT_RULES, Level, read_watch_file
 from surveillance_perception.observation.watcher import Look, Watcher, same_map
@@ -97,8 +104,10 @@ ASSESS_PERIOD, PICTURE_PERIOD, KEEP_PERIOD = 2.0, 2.0, 20.0
 """Seconds of real time between two comparisons, pictures, and writings of the state."""
 CAMERA_PATIENCE = 10.0
 """The first picture is waited for so long after the first sweep, seconds of real time."""
-MOST_WAITING = 20
-"""What comes while so much waits for the worker is left out."""
+MOST_WAITING = {'sweeps': 10, 'pictures': 4}
+"""So many wait for the worker; beyond that the oldest of the least worth is left out, and told."""
+MOST_HEARD = 20
+"""Depth of the queue of what the fleet tells."""
 MOST_CELLS = 25_000_000
 MOST_PIXELS = 20_000_000
 SECTORS = 36
@@ -109,8 +118,14 @@ SETTLED = 0.5
 """It has to stand for so long before a picture that is compared, seconds."""
 LEAST_DOUBT = 0.01, 0.005
 """Standard deviation of a pose at least, metres and rad: some localisations tell none."""
-MOST_HELD = 8
-"""So many pictures, and what the detector says of so many, wait for each other."""
+MOST_HELD, MOST_HELD_BYTES = 60, 64_000_000
+"""So many pictures, and what the detector says of so many, wait for each other: it may be seconds
+behind."""
+DETECTOR_PATIENCE, STANDING_PATIENCE = 5.0, 1.0
+"""So long what the detector says is waited for, and a picture of a camera that stands, seconds of
+real time."""
+TOO_LATE = 30.0
+"""What is looked at so long after it was taken is told late, seconds."""
 FACTS_PERIOD = 10.0
 """Seconds after which it is looked whether the ontology still has the events."""
 _GOING_ON = (EventState.OPEN, EventState.ACKNOWLEDGED)
@@ -292,7 +307,9 @@ class Observer(PatrolNode):
         self._images: deque[_HeldImage] = deque(maxlen=MOST_HELD)
         self._detected: deque[tuple[float, tuple[SeenMarker, ...]]] = deque(maxlen=MOST_HELD)
         self._next_picture = self._waits_since = 0.0
-        self._work: queue.Queue[Callable[[], object] | None] = queue.Queue()
+        self._looked_from: Viewpoint | None = None
+        self._lost = LostSight(time.monotonic)
+        self._work = Backlog(MOST_WAITING, lambda kind: self._lost.count(kind, DROPPED))
         self._lidar.subscribe(self._on_scan)
         StateSubscription(self, OccupancyGrid, 'map', self._on_map, owner='simulator')
         owner = 'motion_controller'
@@ -314,10 +331,10 @@ class Observer(PatrolNode):
                 Image, 'camera/rgb/image_raw', self._on_image, SENSOR_QOS, raw=True
             )
         # The names of the fleet's other robots; a robot that is alone hears nothing there.
-        hear_fleet(self, self._on_fleet, MOST_WAITING)
+        hear_fleet(self, self._on_fleet, MOST_HEARD)
         self.create_service(ConsoleCommand, 'observer/command', self._on_command)
-        self.create_timer(ASSESS_PERIOD, lambda: self._later(self._assess))
-        self.create_timer(KEEP_PERIOD, lambda: self._later(self._keep))
+        self.create_timer(ASSESS_PERIOD, lambda: self._work.put_once(self._assess, 'assess'))
+        self.create_timer(KEEP_PERIOD, lambda: self._work.put_once(self._keep, 'keep'))
         self._publish_events()
         self.spawn(self._watch, 'observer')
         if self._settings.facts:
@@ -327,7 +344,7 @@ class Observer(PatrolNode):
     def on_stop(self) -> None:
         """End the worker, which writes the state first."""
         self._work.put(self._keep)
-        self._work.put(None)
+        self._work.end()
 
     def _rules(self, places: Sequence[str]) -> Any:
         if not self._settings.watch_file:
@@ -385,10 +402,6 @@ class Observer(PatrolNode):
     def _now(self) -> float:
         return float(self.get_clock().now().nanoseconds / 1e9)
 
-    def _later(self, work: Callable[[], object]) -> None:
-        if self._work.qsize() < MOST_WAITING:
-            self._work.put(work)
-
     def _on_map(self, message: OccupancyGrid) -> None:
         with conversions.refusing(self, 'map'):
             grid = map_from(message, MOST_CELLS)
@@ -407,6 +420,8 @@ class Observer(PatrolNode):
         self._work.put(lambda: self._watcher.arrive(place, stamp))
 
     def _on_scan(self, _topic: str, scan: Scan, message: LaserScan) -> None:
+        if len(self._scans) == self._scans.maxlen and self._poses:
+            self._lost.count('sweeps', NO_POSE)
         self._scans.append((seconds_of(message.header.stamp), scan))
         self._directions |= sectors_of(scan)
         if self._scanned_since is None:
@@ -498,10 +513,11 @@ class Observer(PatrolNode):
 
         def compare() -> None:
             self._watcher.sweep(sensor, ends, met, stamp)
+            self._lost.count('sweeps')
             self.sweeps += 1
             self.health.figure('sweeps', self.sweeps)
 
-        self._later(compare)
+        self._work.put(compare, 'sweeps')
 
     def _on_camera_info(self, message: CameraInfo) -> None:
         with conversions.refusing(self, 'camera_info'):
@@ -520,36 +536,84 @@ class Observer(PatrolNode):
         stamp, now = stamp_of_serialized(serialized), time.monotonic()
         self._is_pictured = True
         taken_at = self._image_stamps.span_of(stamp, self._now())
-        if now >= self._next_picture:
-            if not self._images:
-                self._waits_since = now
-            self._images.append(_HeldImage(serialized, stamp, *taken_at))
-            self._look_at_next()
+        if now < self._next_picture and not self._is_new_view(taken_at[1]):
+            return
+        if not self._images:
+            self._waits_since = now
+        self._images.append(_HeldImage(serialized, stamp, *taken_at))
+        held = sum(len(each.data) for each in self._images)
+        while held > MOST_HELD_BYTES and len(self._images) > 1:
+            held -= len(self._images.popleft().data)
+        self._look_at_next()
+
+    def _is_new_view(self, taken: float) -> bool:
+        """Tell whether the camera stands where no picture of this stand was looked at.
+
+        In fast simulated time it may stand at a side for less than a `PICTURE_PERIOD`.
+        """
+        viewpoint = self._viewpoint(taken, taken)
+        before = self._looked_from
+        return viewpoint is not None and (before is None or not same_view(viewpoint, before))
 
     def _look_at_next(self) -> None:
         """Look at the newest picture in which the detector has looked for markers.
 
-        Without a detector, or where it says nothing for long, at the newest one.
+        One of a camera that stands is worth more than one that was taken in passing, and is waited
+        for a little. Without a detector, or where it says nothing for long, the newest one counts.
         """
         if not self._images:
             return
-        image, markers = self._images[-1], None
         # A camera that gives all pictures one stamp does not tell which of them was looked at.
         stamps = [each.stamp for each in self._images]
         told = {stamp: seen for stamp, seen in self._detected if stamps.count(stamp) == 1}
-        if found := [each for each in self._images if each.stamp in told]:
-            image, markers = found[-1], told[found[-1].stamp]
-        elif (
-            time.monotonic() < self._waits_since + PICTURE_PERIOD
-            and self._detections.get_publisher_count()
-        ):
+        found = [each for each in self._images if each.stamp in told]
+        waited, is_detected = time.monotonic() - self._waits_since, self._is_detected()
+        if not found and is_detected and waited < DETECTOR_PATIENCE:
             return
-        viewpoint = self._viewpoint(image.first, image.last)
+        chosen: tuple[_HeldImage, Viewpoint | None] | None = None
+        for image in reversed(found or self._images):
+            viewpoint = self._viewpoint(image.first, image.last)
+            if viewpoint is not None or chosen is None:
+                chosen = image, viewpoint
+            if viewpoint is not None:
+                break
+        assert chosen is not None
+        image, viewpoint = chosen
+        if viewpoint is None and waited < STANDING_PATIENCE:
+            return
+        causes = []
+        if viewpoint is None and not self._is_told(image.first - SETTLED, image.last):
+            causes.append(NO_POSE)
+        if is_detected and not found:
+            causes.append(UNREAD)
         camera = None if viewpoint is None else self._camera_at(viewpoint)
+        if viewpoint is not None:
+            self._looked_from = viewpoint
         self._images.clear()
         self._next_picture = time.monotonic() + PICTURE_PERIOD
-        data, taken = image.data, image.last
-        self._later(lambda: self._look(data, viewpoint, taken, markers, camera))
+        data, taken, markers = image.data, image.last, told.get(image.stamp)
+
+        def look() -> None:
+            late = [LATE] if self._now() - taken > TOO_LATE else []
+            self._lost.count('pictures', *causes, *late)
+            self._look(data, viewpoint, taken, markers, camera)
+
+        self._work.put(look, 'pictures', worth=int(viewpoint is not None))
+
+    def _is_detected(self) -> bool:
+        """Tell whether somebody looks for markers in the pictures."""
+        return bool(self._detections.get_publisher_count())
+
+    def _is_told(self, first: float, last: float) -> bool:
+        """Tell whether it is known how base and arm moved between two stamps, or that they stood.
+
+        Before the robot knows where it is, nobody can say.
+        """
+        standing = self._odometry_standing or self._standing
+        return not self._poses or (
+            standing.tell_of(first, last)
+            and (not self._joints or self._joints.tell_of(first, last))
+        )
 
     def _viewpoint(self, first: float, last: float) -> Viewpoint | None:
         """Return where the camera stood between two stamps and shortly before; None: unknown."""
@@ -603,7 +667,7 @@ class Observer(PatrolNode):
     # --- in the worker ---
 
     def _watch(self) -> None:
-        while (work := self._work.get()) is not None:
+        while (work := self._work.take()) is not None:
             try:
                 work()
             except Exception as error:
@@ -675,8 +739,20 @@ class Observer(PatrolNode):
             self._told_around = around
             self._sees_around.publish(Bool(data=around))
 
+    def _say_what_is_lost(self) -> None:
+        """Tell of pictures and sweeps that are of no use, once for each cause, and when it ends."""
+        found = self._lost.findings()
+        for (source, cause), text in found.items():
+            self.incidents.begin(('sight', f'{source} {cause}'), text)
+        for each in self.incidents.open():
+            if each.kind == 'sight' and tuple(each.name.split(' ', 1)) not in found:
+                self.incidents.end(each)
+        for (source, cause), count in self._lost.lost.items():
+            self.health.figure(f'{source}_{cause.replace(" ", "_")}', count)
+
     def _assess(self) -> None:
         self._tell_sees_around()
+        self._say_what_is_lost()
         now = self._now()
         self._watcher.assess(now)
         doubts = [

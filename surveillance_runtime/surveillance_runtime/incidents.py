@@ -32,7 +32,8 @@ class Cause(NamedTuple):
     """What an incident is about.
 
     Attributes:
-        kind: `topic`, `door`, `place`, `station`, `node`, `person`, `event` or `robot`.
+        kind: `topic`, `door`, `place`, `station`, `node`, `person`, `event`, `sight` or
+            `robot`.
         name: Which one.
     """
 

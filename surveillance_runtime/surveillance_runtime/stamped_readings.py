@@ -79,6 +79,20 @@ class StampedReadings:
                 return rest.at if rest.first < rest.last and last <= known else None
         return None
 
+    def tell_of(self, first: float, last: float) -> bool:
+        """Tell whether readings cover a time, from one stamp to another, in motion or at rest."""
+        if not self._rests or last > self._rests[-1].last + AHEAD:
+            return False
+        later: _Rest | None = None
+        for rest in reversed(self._rests):
+            is_gap = later is not None and later.first - rest.last > LONGEST_GAP
+            if is_gap and rest.last < last:
+                return False
+            if rest.first <= first:
+                return True
+            later = rest
+        return False
+
     def _is_near(self, one: Sequence[float], other: Sequence[float]) -> bool:
         if len(one) != len(other):
             return False

@@ -27,6 +27,7 @@ from surveillance_interfaces.msg import (
     RobotPlace,
 )
 from surveillance_interfaces.srv import ConsoleCommand
+from surveillance_perception.observation.backlog import LostSight
 from surveillance_runtime.incidents import Cause
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
@@ -174,12 +175,13 @@ class Eyes:
 
     def __init__(self, graph, monkeypatch):
         self.node = graph.add(Observer, {'facts': False})
-        monkeypatch.setattr(observer_node, 'PICTURE_PERIOD', 0.0)
+        for each in ('PICTURE_PERIOD', 'STANDING_PATIENCE'):
+            monkeypatch.setattr(observer_node, each, 0.0)
         self.now = 1e-9 * graph.node.get_clock().now().nanoseconds
         self.camera: Any = None
         self.looked: list[tuple[tuple[float, ...] | None, list[int] | None]] = []
         monkeypatch.setattr(self.node, '_look', self._look)
-        monkeypatch.setattr(self.node, '_later', lambda work: work())
+        monkeypatch.setattr(self.node._work, 'put', lambda work, *_, **__: work())
 
     def _look(self, _data, viewpoint, _stamp, markers, camera):
         numbers = None if markers is None else [each.number for each in markers]
@@ -278,9 +280,52 @@ def test_markers_count_for_the_picture_that_they_were_read_in(graph, monkeypatch
     # One that is alive is waited for, and what it says of another picture is no answer.
     graph.node.create_publisher(MarkerDetectionArray, 'aruco_detector/detections', 10)
     graph.until(lambda: eyes.node._detections.get_publisher_count())
-    monkeypatch.setattr(observer_node, 'PICTURE_PERIOD', 100.0)
+    monkeypatch.setattr(observer_node, 'DETECTOR_PATIENCE', 100.0)
     eyes.show(-0.1)
     eyes.detect(-0.2, 15)
     assert len(eyes.looked) == 3
     eyes.detect(-0.1, 16)
     assert [numbers for _, numbers in eyes.looked[3:]] == [[16]]
+
+
+def test_pictures_without_a_pose_are_told_once_and_when_that_is_over(graph, monkeypatch):
+    eyes = Eyes(graph, monkeypatch)
+    node, steady = eyes.node, 0.0
+    monkeypatch.setattr(node, '_lost', LostSight(lambda: steady))
+    cause = Cause('sight', 'pictures no pose')
+    for tick in range(-200, -29):
+        eyes.carry(0.0, tick / 20)
+    lines = []
+    monkeypatch.setattr(node.incidents, '_tell', lambda told: lines.append(told.line()))
+
+    def look(first: int, driven: bool) -> None:
+        nonlocal steady
+        for tick in range(first, first + 20):
+            if driven:
+                eyes.carry(0.0, tick / 20)
+            eyes.show(tick / 20)
+            steady += 3.0
+            node._say_what_is_lost()
+
+    look(-29, driven=True)
+    assert not node.incidents.open()
+    look(-4, driven=False)
+    assert node.incidents.open() == (cause,)
+    look(17, driven=True)
+    assert not node.incidents.open()
+    assert [line.split(']')[0] for line in lines] == [
+        'incident [sight pictures no pose, warning',
+        'incident [sight pictures no pose, over',
+    ]
+    assert node.health.figures()['pictures_no_pose'] == '20'
+
+
+def test_who_drives_is_no_reason_to_worry_about_poses(graph, monkeypatch):
+    eyes = Eyes(graph, monkeypatch)
+    for tick in range(-100, 1):
+        eyes.carry(tick / 10, tick / 10)
+    lost = eyes.node._lost
+    for tick in range(-10, 1):
+        eyes.show(tick / 10)
+    assert all(viewpoint is None for viewpoint, _ in eyes.looked)
+    assert not lost.lost

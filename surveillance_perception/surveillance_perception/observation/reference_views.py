@@ -104,7 +104,7 @@ class ReferenceViews:
             (
                 each
                 for each in self._views
-                if _same(each.viewpoint, viewpoint)
+                if same_view(each.viewpoint, viewpoint)
                 and all(states.get(name, state) == state for name, state in each.doors.items())
             ),
             None,
@@ -118,7 +118,7 @@ class ReferenceViews:
             doors: The states of the doors nearby.
         """
         return any(
-            _same(each.viewpoint, viewpoint) and not each.doors.keys() <= doors.keys()
+            same_view(each.viewpoint, viewpoint) and not each.doors.keys() <= doors.keys()
             for each in self._views
         )
 
@@ -201,7 +201,8 @@ class ReferenceViews:
         return folder / f'{name}.png'
 
 
-def _same(one: Viewpoint, other: Viewpoint) -> bool:
+def same_view(one: Viewpoint, other: Viewpoint) -> bool:
+    """Tell whether two viewpoints show the same, within `SAME_VIEW`."""
     if len(one) != len(other):
         return False
     near = math.dist(one[:2], other[:2]) <= SAME_VIEW[0]

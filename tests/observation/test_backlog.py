@@ -1,0 +1,110 @@
+"""What waits for the observer: a flood of one kind costs the others nothing, and is told."""
+
+from __future__ import annotations
+
+import pytest
+
+from surveillance_perception.observation.backlog import (
+    DROPPED,
+    FEWEST,
+    NO_POSE,
+    WINDOW,
+    Backlog,
+    LostSight,
+)
+
+
+class Worker:
+    """Takes work, as the thread would."""
+
+    def __init__(self, most: dict[str, int]) -> None:
+        self.dropped: list[str] = []
+        self.done: list[str] = []
+        self.backlog = Backlog(most, self.dropped.append)
+
+    def put(self, name: str, kind: str = '', worth: int = 0) -> None:
+        self.backlog.put(lambda: self.done.append(name), kind, worth)
+
+    def finish(self) -> list[str]:
+        self.backlog.end()
+        while (work := self.backlog.take()) is not None:
+            work()
+        return self.done
+
+
+def test_a_flood_of_sweeps_leaves_the_pictures_and_what_else_is_to_be_done():
+    worker = Worker({'sweeps': 3, 'pictures': 2})
+    worker.put('arrive')
+    worker.put('picture', 'pictures')
+    for number in range(100):
+        worker.put(f'sweep {number}', 'sweeps')
+    worker.put('answer')
+    expected = ['arrive', 'picture', 'sweep 97', 'sweep 98', 'sweep 99', 'answer']
+    assert worker.finish() == expected
+    assert worker.dropped == ['sweeps'] * 97
+
+
+def test_a_picture_of_a_camera_that_stood_outlives_those_taken_in_passing():
+    worker = Worker({'pictures': 2})
+    worker.put('stood', 'pictures', worth=1)
+    for number in range(3):
+        worker.put(f'passing {number}', 'pictures')
+    worker.put('stood again', 'pictures', worth=1)
+    assert worker.finish() == ['stood', 'stood again']
+
+
+def test_what_is_done_again_and_again_waits_once_and_keeps_its_turn():
+    worker = Worker({})
+    for number in range(3):
+        worker.backlog.put_once(lambda: worker.done.append('assess'), 'assess')
+        worker.put(f'{number}')
+    assert worker.finish() == ['assess', '0', '1', '2']
+    assert not worker.dropped
+
+
+class Clock:
+    time = 100.0
+
+    def __call__(self) -> float:
+        return self.time
+
+
+@pytest.fixture
+def clock() -> Clock:
+    return Clock()
+
+
+def test_it_says_once_what_costs_many_pictures_until_that_is_over(clock):
+    lost = LostSight(clock)
+
+    def come(count: int, *causes: str) -> None:
+        for _ in range(count):
+            clock.time += 2.0
+            lost.count('pictures', *causes)
+
+    come(5, NO_POSE)
+    assert not lost.findings(), 'ten seconds of a start are no reason to worry anybody'
+    come(15, NO_POSE)
+    ((cause, text),) = lost.findings().items()
+    assert cause == ('pictures', NO_POSE)
+    assert 'many pictures count for little' in text
+    assert 'amcl_pose, odom, joint_states' in text
+    come(20)
+    assert lost.findings() == {cause: text}, 'the same words while it goes on'
+    come(12)
+    assert not lost.findings()
+    assert lost.lost == {cause: 20}
+
+
+def test_few_losses_and_those_of_another_source_say_nothing(clock):
+    lost = LostSight(clock)
+    for number in range(60):
+        clock.time += 1.0
+        lost.count('sweeps', *([DROPPED] if number % 3 == 0 else []))
+        if number % 2:
+            lost.count('pictures', DROPPED)
+    assert list(lost.findings()) == [('pictures', DROPPED)]
+    clock.time += WINDOW + 1.0
+    for _ in range(FEWEST - 1):
+        lost.count('sweeps', DROPPED)
+    assert not lost.findings()
