@@ -21,7 +21,7 @@ from typing import Any
 
 import numpy as np
 from geometry_msgs.msg import PoseWithCovarianceStamped
-from nav_msgs.msg import OccupancyGrid, Odometry
+from nav_msgs.msg import OccupancyGrid
 from rclpy.qos import QoSProfile
 from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import CameraInfo, Image, JointState, LaserScan
@@ -36,7 +36,7 @@ from surveillance_controllers.controller_parameters import door_segments, place_
 from surveillance_controllers.geometry import Scan, composed, relative
 from surveillance_controllers.motion.odometry import OdometryBuffer
 from surveillance_controllers.motion.place_locator import PlaceLocator
-from surveillance_controllers.motion.sensors import SensorStream
+from surveillance_controllers.motion.sensors import OdometryReader, SensorStream
 from surveillance_controllers.motion.transforms import ScanReader
 from surveillance_interfaces.msg import FleetRobot, MarkerDetectionArray, RobotPlace
 from surveillance_interfaces.srv import ConsoleCommand, ReferenceName
@@ -118,6 +118,8 @@ SETTLED = 0.5
 """It has to stand for so long before a picture that is compared, seconds."""
 LEAST_DOUBT = 0.01, 0.005
 """Standard deviation of a pose at least, metres and rad: some localisations tell none."""
+MOST_JOINT_GROUPS = 10
+"""Joints are followed of so many drivers, each of which tells its own."""
 MOST_HELD, MOST_HELD_BYTES = 60, 64_000_000
 """So many pictures, and what the detector says of so many, wait for each other: it may be seconds
 behind."""
@@ -130,6 +132,7 @@ FACTS_PERIOD = 10.0
 """Seconds after which it is looked whether the ontology still has the events."""
 _GOING_ON = (EventState.OPEN, EventState.ACKNOWLEDGED)
 MOST_PEERS = 100
+_WHEEL = re.compile('wheel|caster', re.IGNORECASE)
 _NAME = re.compile(r'[A-Za-z][A-Za-z0-9_]*\Z', re.ASCII)
 MOST_TOLD = 200
 """So many events are published, the newest."""
@@ -295,16 +298,19 @@ class Observer(PatrolNode):
         self._scans: deque[tuple[float, Scan]] = deque(maxlen=10)
         self._poses: deque[tuple[float, PlanarPose]] = deque(maxlen=5)
         self._odometry: deque[tuple[float, PlanarPose]] = deque(maxlen=50)
-        self._odometer, self._readings = SensorStream(self, 'odom'), OdometryBuffer()
+        self._readings = OdometryBuffer()
         self._odom_in_map: PlanarPose | None = None
-        # Where base and arm stood, by stamps: on the map, by the odometry, and the joints.
+        # Where base and arm stood, by stamps: on the map, by the odometry, and the joints of each
+        # driver.
         self._standing, self._odometry_standing = (StampedReadings(STILL, [2]) for _ in range(2))
-        self._joints = StampedReadings(STILL)
-        self._joint_names: tuple[str, ...] = ()
+        self._joints: dict[tuple[str, ...], StampedReadings] = {}
+        self._joint_stream = SensorStream(self, 'joint_states')
         self._lens: CameraModel | None = None
         self._estimate = b''
         self._image_stamps = StampOffset('camera/rgb/image_raw', self.is_simulated)
         self._images: deque[_HeldImage] = deque(maxlen=MOST_HELD)
+        self._image_before: tuple[float, bytes] = (math.nan, b'')
+        self._shared_stamp = math.nan
         self._detected: deque[tuple[float, tuple[SeenMarker, ...]]] = deque(maxlen=MOST_HELD)
         self._next_picture = self._waits_since = 0.0
         self._looked_from: Viewpoint | None = None
@@ -317,7 +323,7 @@ class Observer(PatrolNode):
         StateSubscription(
             self, PoseWithCovarianceStamped, 'amcl_pose', self._on_pose, raw=True, owner=owner
         )
-        self.create_subscription(Odometry, 'odom', self._on_odometry, SENSOR_QOS, raw=True)
+        self._odometer = OdometryReader(self, self._on_odometry)
         if self._settings.camera:
             self._detections = self.create_subscription(
                 MarkerDetectionArray, 'aruco_detector/detections', self._on_detections, 10
@@ -463,18 +469,12 @@ class Observer(PatrolNode):
             stamp = stamp_of_serialized(serialized)
             self._work.put(lambda: self.others.hear(name, x, y, stamp))
 
-    def _on_odometry(self, serialized: bytes) -> None:
-        with conversions.refusing(self, 'odom'):
-            pose = pose_of_serialized(serialized, texts=1)
-            stamp = stamp_of_serialized(serialized)
-            measured = self._odometer.come(stamp, serialized)
-            if measured is None:
-                return
-            self._odometry_standing.add(stamp or measured, pose)
-            self._readings.add(measured, pose)
-            # `amcl_pose` has the node's clock, or the driver's, as who localises likes it.
-            self._odometry += [(each, pose) for each in {stamp, measured}]
-            self._pair()
+    def _on_odometry(self, pose: PlanarPose, measured: float) -> None:
+        self._odometry_standing.add(measured, pose)
+        self._readings.add(measured, pose)
+        # `amcl_pose` has the node's clock, or the driver's, as who localises likes it.
+        self._odometry += [(each, pose) for each in {self._odometer.stream.stamp, measured}]
+        self._pair()
 
     def _pair(self) -> None:
         """Look at the scans whose pose is known; either may come first."""
@@ -524,8 +524,21 @@ class Observer(PatrolNode):
             self._lens = camera_from_ros(message)
 
     def _on_joints(self, message: JointState) -> None:
-        self._joint_names = tuple(message.name)
-        self._joints.add(seconds_of(message.header.stamp) or self._now(), message.position)
+        with conversions.refusing(self, 'joint_states'):
+            joints = camera_joints(message.name, message.position)
+            stamp, content = seconds_of(message.header.stamp), message.position.tobytes()
+            measured = self._joint_stream.come(stamp, content)
+            names = tuple(joints)
+            is_new = names not in self._joints
+            if (
+                measured is None
+                or not joints
+                or (is_new and len(self._joints) >= MOST_JOINT_GROUPS)
+            ):
+                return
+            if is_new:
+                self._joints[names] = StampedReadings(STILL)
+            self._joints[names].add(measured, tuple(joints.values()))
 
     def _on_detections(self, message: MarkerDetectionArray) -> None:
         found = [seen_marker_from_ros(each) for each in message.detections if each.confirmed]
@@ -536,6 +549,13 @@ class Observer(PatrolNode):
         stamp, now = stamp_of_serialized(serialized), time.monotonic()
         self._is_pictured = True
         taken_at = self._image_stamps.span_of(stamp, self._now())
+        if (warning := self._image_stamps.warning()) is not None:
+            self.get_logger().warn(warning)
+        before, self._image_before = self._image_before, (stamp, serialized)
+        if stamp == before[0]:
+            if serialized == before[1]:
+                return
+            self._shared_stamp = stamp
         if now < self._next_picture and not self._is_new_view(taken_at[1]):
             return
         if not self._images:
@@ -564,8 +584,7 @@ class Observer(PatrolNode):
         if not self._images:
             return
         # A camera that gives all pictures one stamp does not tell which of them was looked at.
-        stamps = [each.stamp for each in self._images]
-        told = {stamp: seen for stamp, seen in self._detected if stamps.count(stamp) == 1}
+        told = {stamp: seen for stamp, seen in self._detected if stamp != self._shared_stamp}
         found = [each for each in self._images if each.stamp in told]
         waited, is_detected = time.monotonic() - self._waits_since, self._is_detected()
         if not found and is_detected and waited < DETECTOR_PATIENCE:
@@ -612,13 +631,13 @@ class Observer(PatrolNode):
         standing = self._odometry_standing or self._standing
         return not self._poses or (
             standing.tell_of(first, last)
-            and (not self._joints or self._joints.tell_of(first, last))
+            and all(each.tell_of(first, last) for each in self._joints_of_camera())
         )
 
     def _viewpoint(self, first: float, last: float) -> Viewpoint | None:
         """Return where the camera stood between two stamps and shortly before; None: unknown."""
         first -= SETTLED
-        joints = self._joints.stood(first, last) if self._joints else ()
+        stood = [each.stood(first, last) for each in self._joints_of_camera()]
         pose = self._standing.stood(first, last)
         if self._odometry_standing and self._odom_in_map is not None:
             # Who localises by few scans tells a pose now and then; the odometry is always there.
@@ -627,26 +646,36 @@ class Observer(PatrolNode):
                 return None
             x, y, yaw = odometry
             pose = composed(self._odom_in_map, (x, y, yaw))
-        return None if joints is None or pose is None else (*pose, *joints)
+        if pose is None or None in stood:
+            return None
+        return (*pose, *(value for each in stood if each is not None for value in each))
+
+    def _joints_of_camera(self) -> list[StampedReadings]:
+        """Return the joints that tell how the camera is held: those of the arm, if it is there."""
+        if ARM.names in self._joints:
+            return [self._joints[ARM.names]]
+        return [readings for _, readings in sorted(self._joints.items())]
 
     def _camera_at(self, viewpoint: Viewpoint) -> _CameraAt | None:
         """Return where the arm holds the camera; None: nobody says, or there is no such arm."""
-        where = {name: index for index, name in enumerate(self._joint_names)}
-        if self._lens is None or not self._estimate or any(e not in where for e in ARM.names):
+        if self._lens is None or not self._estimate or ARM.names not in self._joints:
             return None
+        estimate = deserialize_message(self._estimate, PoseWithCovarianceStamped)
+        covariance = estimate.pose.covariance.reshape(6, 6)
+        if not np.isfinite(covariance).all():
+            return None  # who localises does not tell how sure it is
         x, y, yaw, *joints = viewpoint
         base = np.eye(4)
         cosine, sine = math.cos(yaw), math.sin(yaw)
         base[:2, :2] = [[cosine, -sine], [sine, cosine]]
         base[:2, 3] = x, y
-        pose = base @ ARM.camera_frame([joints[where[name]] for name in ARM.names])
-        estimate = deserialize_message(self._estimate, PoseWithCovarianceStamped)
-        covariance = estimate.pose.covariance.reshape(6, 6)
-        along, turn = (
-            math.sqrt(max(float(covariance[each, each]), least**2))
-            for each, least in ((0, LEAST_DOUBT[0]), (5, LEAST_DOUBT[1]))
+        pose = base @ ARM.camera_frame(joints)
+        # In the direction in which it is least sure: in a corridor, along it.
+        spread = float(np.linalg.eigvalsh(covariance[:2, :2])[-1]), float(covariance[5, 5])
+        deviation, turn = (
+            math.sqrt(max(each, least**2)) for each, least in zip(spread, LEAST_DOUBT, strict=True)
         )
-        return _CameraAt(pose, self._lens, along, turn)
+        return _CameraAt(pose, self._lens, deviation, turn)
 
     async def _on_command(self, request: Any, response: Any) -> Any:
         def take() -> str:
@@ -872,6 +901,29 @@ def _fact(event: Event, checked_every: int) -> EventFact:
         ),
         checked_every,
     )
+
+
+def camera_joints(names: Sequence[str], positions: Sequence[float]) -> dict[str, float]:
+    """Return the joints that may turn the camera, and where they are, rad.
+
+    Those are the arm's where the message has them, else all but wheels: without its arm's names it
+    is not known which joint carries the camera, but that no wheel does.
+
+    Raises:
+        ValueError: There are fewer positions than names, or one is not finite.
+    """
+    if not len(positions):
+        return {}  # of speeds, or forces, alone
+    if len(positions) < len(names):
+        raise ValueError(f'{len(positions)} positions: expected one for each of {len(names)} names')
+    told = dict(zip(names, map(float, positions), strict=False))
+    if told.keys() >= set(ARM.names):
+        told = {name: told[name] for name in ARM.names}
+    else:
+        told = {name: at for name, at in told.items() if not _WHEEL.search(name)}
+    if not all(map(math.isfinite, told.values())):
+        raise ValueError('a position that is not finite: expected finite numbers')
+    return told
 
 
 def sectors_of(scan: Scan) -> np.ndarray:

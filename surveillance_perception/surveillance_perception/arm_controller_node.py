@@ -127,7 +127,10 @@ class ArmController(PatrolNode):
         group = ReentrantCallbackGroup()
         self._base: tuple[str, np.ndarray] | None = None
         self._bases, self._postures = StampedReadings(), StampedReadings()
-        self._stamps = StampOffset('aruco_detector/detections', self.is_simulated)
+        self._stamps, self._base_stamps, self._joint_stamps = (
+            StampOffset(topic, self.is_simulated)
+            for topic in ('aruco_detector/detections', 'odom', 'joint_states')
+        )
         commands = ArmCommands(self)
         self._at_rest = OwnedTopic(self, Bool, 'arm/at_rest')
         self._driver = ArmDriver(
@@ -152,8 +155,8 @@ class ArmController(PatrolNode):
 
     def _on_joints(self, message: JointState) -> None:
         if self._driver.report(message.name, message.position, message.velocity):
-            stamp = seconds_of(message.header.stamp)
-            self._postures.add(stamp or self._now(), self._driver.posture.tolist())
+            measured = self._measured(message, self._joint_stamps)
+            self._postures.add(measured, self._driver.posture.tolist())
 
     def _on_odometry(self, message: Odometry) -> None:
         try:
@@ -162,7 +165,15 @@ class ArmController(PatrolNode):
             self.get_logger().warn(str(error), throttle_duration_sec=60.0)
             return
         self._base = frame, base
-        self._bases.add(seconds_of(message.header.stamp) or self._now(), base[:3].ravel().tolist())
+        self._bases.add(self._measured(message, self._base_stamps), base[:3].ravel().tolist())
+
+    def _measured(self, message: JointState | Odometry, stamps: StampOffset) -> float:
+        """Return when a reading was made, seconds of this node's clock."""
+        stamp, now = seconds_of(message.header.stamp), self._now()
+        measured = stamps.time_of(stamp, now) if stamp else now
+        if (warning := stamps.warning()) is not None:
+            self.get_logger().warn(warning)
+        return measured
 
     def _now(self) -> float:
         return float(self.get_clock().now().nanoseconds / 1e9)

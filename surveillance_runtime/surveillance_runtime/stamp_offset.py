@@ -4,8 +4,8 @@ A camera may stamp by a clock of its own: one that runs a minute late, that star
 somebody has set, or none at all. Its stamps still tell which message came after which. So each
 stamp is compared with those of the same source; the offset between its clock and the node's is
 the smallest time that a recent message seems to have taken (the minimum filter of the clock
-synchronisation in NTP, RFC 5905, section 10: delays only ever add). A small offset is taken for
-a delay, and the stamp for right.
+synchronisation in NTP, RFC 5905, section 10: delays only ever add). Where that is small, it is
+taken for a delay, and the stamp for right. No delay has a message come before it was stamped.
 """
 
 from __future__ import annotations
@@ -14,6 +14,9 @@ from collections import Counter, deque
 
 # seconds within which a stamp is believed as it is: a slow driver, or fast simulated time
 _LARGE = 2.0
+# seconds that a stamp of the same clock may be ahead: two machines are in step to less than that; and
+# under simulated time, which each node hears by a topic of its own
+_AHEAD, _AHEAD_SIMULATED = 0.1, 2.0
 # seconds of the node's clock, and messages, from which the offset is estimated
 _WINDOW, _MOST_SAMPLES = 5.0, 50
 # of the last so many messages, how many must be odd before it is said
@@ -36,6 +39,7 @@ class StampOffset:
     def __init__(self, source: str, simulated: bool = False) -> None:
         self._source = source
         self._late = _LATEST if simulated else _LARGE
+        self._ahead = _AHEAD_SIMULATED if simulated else _AHEAD
         # what each recent message seems to have taken, and when it came
         self._delays: deque[tuple[float, float]] = deque(maxlen=_MOST_SAMPLES)
         self._last: float | None = None
@@ -63,7 +67,7 @@ class StampOffset:
         self._last = stamp
         if last is not None and stamp == last:
             # the same image again, as long as its stamp is not far off; then the clock stands still
-            again = not self._offset and -_LARGE <= delay <= self._late
+            again = not self._offset and -self._ahead <= delay <= self._late
             self._odd.append('' if again else 'still')
             return stamp if again else now
         jumped = last is not None and stamp < last - _LARGE
@@ -75,7 +79,7 @@ class StampOffset:
             self._delays.clear()
         self._delays.append((delay, now))
         least = self._least()
-        self._offset = 0.0 if -_LARGE <= least <= self._late else least
+        self._offset = 0.0 if -self._ahead <= least <= self._late else least
         self._odd.append('jump' if jumped else 'offset' if self._offset else '')
         return stamp + self._offset
 

@@ -13,6 +13,9 @@ from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+LATE = 0.5
+"""A reading that is older than the one before by this much, seconds, or less came late; by more,
+the clock was set back, or the one before was stamped by another."""
 AHEAD = 0.2
 """The last reading counts for so much longer, seconds: the next one is still on its way."""
 LONGEST_GAP = 5.0
@@ -48,14 +51,14 @@ class StampedReadings:
         return bool(self._rests)
 
     def add(self, stamp: float, values: Sequence[float]) -> None:
-        """Take a reading; an older one than the last counts for nothing.
+        """Take a reading; one that is a little older than the last counts for nothing.
 
-        Where the clock was set back, all before is forgotten.
+        Where the clock was set back, all before is forgotten: its times come once more.
         """
         if self._rests:
             rest = self._rests[-1]
             step = stamp - rest.last
-            if step < -KEPT:
+            if step < -LATE:
                 self._rests.clear()
             elif step <= 0.0:
                 return

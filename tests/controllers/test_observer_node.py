@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Sequence
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -182,6 +184,10 @@ class Eyes:
         self.looked: list[tuple[tuple[float, ...] | None, list[int] | None]] = []
         monkeypatch.setattr(self.node, '_look', self._look)
         monkeypatch.setattr(self.node._work, 'put', lambda work, *_, **__: work())
+        # What is handed over comes a moment after the last reading of the odometry.
+        self.clock = SimpleNamespace(nanoseconds=0)
+        clock = SimpleNamespace(now=lambda: self.clock)
+        monkeypatch.setattr(self.node, 'get_clock', lambda: clock)
 
     def _look(self, _data, viewpoint, _stamp, markers, camera):
         numbers = None if markers is None else [each.number for each in markers]
@@ -192,17 +198,28 @@ class Eyes:
         nanoseconds = round(1e9 * (self.now + since))
         return Time(sec=nanoseconds // 10**9, nanosec=nanoseconds % 10**9)
 
-    def carry(self, x: float, since: float) -> None:
+    def carry(self, x: float, since: float, off: float = 0.0) -> None:
         pose, odometry = PoseWithCovarianceStamped(), Odometry()
-        for message in (pose, odometry):
-            message.header.stamp = self.stamp(since)
+        self._pass(since)
+        for message, ahead in ((pose, 0.0), (odometry, off)):
+            message.header.stamp = self.stamp(since + ahead)
             message.pose.pose.position.x, message.pose.pose.orientation.w = x, 1.0
         pose.pose.pose.position.y = 5.0  # the odometry began elsewhere
-        self.node._on_odometry(serialize_message(odometry))
+        self.node._odometer._on_odometry(serialize_message(odometry))
         self.node._on_pose(serialize_message(pose))
 
-    def show(self, since: float) -> None:
-        image = Image()
+    def _pass(self, since: float) -> None:
+        now = round(1e9 * (self.now + since + 0.02))
+        self.clock.nanoseconds = max(self.clock.nanoseconds, now)
+
+    def bend(self, since: float, names: Sequence[str], positions: Sequence[float]) -> None:
+        joints = JointState(name=list(names), position=list(positions))
+        joints.header.stamp = self.stamp(since)
+        self.node._on_joints(joints)
+
+    def show(self, since: float, pixels: bytes = b'') -> None:
+        self._pass(since)
+        image = Image(data=pixels)
         image.header.stamp = self.stamp(since)
         self.node._on_image(serialize_message(image))
 
@@ -251,9 +268,7 @@ def test_a_picture_tells_where_on_the_map_its_camera_is_and_how_sure_that_is(gra
     eyes = Eyes(graph, monkeypatch)
     for tick in range(-20, 1):
         eyes.carry(1.0, tick / 10)
-        joints = JointState(name=['wheel', *ARM.names], position=[7.0, *ARM.home])
-        joints.header.stamp = eyes.stamp(tick / 10)
-        eyes.node._on_joints(joints)
+        eyes.bend(tick / 10, ['wheel', *ARM.names], [7.0 + tick, *ARM.home])
     eyes.show(-0.1)
     assert not eyes.camera, 'the lens is not known'
     info = CameraInfo(
@@ -266,6 +281,61 @@ def test_a_picture_tells_where_on_the_map_its_camera_is_and_how_sure_that_is(gra
     assert view.matrix[0, 0] == pytest.approx(600.0)
     assert (view.deviation, view.turn) == (0.01, 0.005), 'no localisation is exact'
     assert eyes.camera.view_of(np.zeros((480, 480), np.uint8)) is None
+    pose = PoseWithCovarianceStamped()
+    pose.header.stamp, pose.pose.pose.orientation.w = eyes.stamp(0.0), 1.0
+    pose.pose.covariance[7] = 0.04
+    eyes.node._on_pose(serialize_message(pose))
+    eyes.show(0.01)
+    assert eyes.camera.view_of(np.zeros((480, 640), np.uint8)).deviation == pytest.approx(0.2)
+    pose.pose.covariance[0] = math.nan
+    eyes.node._on_pose(serialize_message(pose))
+    eyes.show(0.02)
+    assert eyes.camera is None, 'it is not told how sure the pose is'
+    assert eyes.looked[-1][0] is not None
+
+
+def test_joints_come_from_several_drivers_and_wheels_turn_no_camera(graph, monkeypatch):
+    eyes = Eyes(graph, monkeypatch)
+    for tick in range(-20, 1):
+        eyes.carry(1.0, tick / 10)
+        eyes.bend(tick / 10, ['wheel_left_joint', 'front_caster'], [float(tick), 0.1 * tick])
+        eyes.bend(tick / 10, ['pan'], [0.5])
+        eyes.bend(tick / 10, ['tilt', 'pan'], [0.1])  # too few positions
+        eyes.bend(tick / 10, ['tilt'], [math.nan])
+        eyes.bend(tick / 10, ['tilt'], [])
+    eyes.show(-0.1)
+    assert eyes.looked == [((1.0, 5.0, 0.0, 0.5), None)]
+    # An arm that is known tells all; half a message of it is not for it.
+    for tick in range(1, 21):
+        eyes.carry(1.0, tick / 10)
+        eyes.bend(tick / 10, ARM.names, ARM.home)
+        eyes.bend(tick / 10, ARM.names, ARM.home[:2])
+        eyes.bend(tick / 10, ['gripper'], [float(tick)])
+    eyes.show(1.9)
+    assert eyes.looked[-1] == ((1.0, 5.0, 0.0, *ARM.home), None)
+    for number in range(100):
+        eyes.bend(2.0, [f'of_a_stranger_{number}'], [0.0])
+    assert len(eyes.node._joints) <= observer_node.MOST_JOINT_GROUPS
+
+
+@pytest.mark.parametrize('off', [-3600.0, 3600.0, 1.0])
+def test_a_picture_has_a_pose_also_where_the_drivers_have_another_clock(graph, monkeypatch, off):
+    eyes = Eyes(graph, monkeypatch)
+    for tick in range(-60, 1):
+        eyes.carry(1.0, tick / 10, off)
+        eyes.bend(tick / 10 + off, ['pan'], [0.5])
+    eyes.show(0.0)
+    assert eyes.looked == [(pytest.approx((1.0, 5.0, 0.0, 0.5)), None)]
+
+
+def test_what_was_read_in_one_picture_is_not_of_another_one_with_the_same_stamp(graph, monkeypatch):
+    eyes = Eyes(graph, monkeypatch)
+    eyes.show(-1.0, b'1')
+    eyes.detect(-1.0, 14)
+    eyes.show(-1.0, b'1')
+    assert len(eyes.looked) == 1, 'it is the same picture'
+    eyes.show(-1.0, b'2')
+    assert [numbers for _, numbers in eyes.looked] == [None, None]
 
 
 def test_markers_count_for_the_picture_that_they_were_read_in(graph, monkeypatch):

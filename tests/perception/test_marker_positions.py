@@ -152,6 +152,24 @@ def test_a_late_picture_is_paired_with_where_the_camera_was_when_it_was_taken(
     assert told == [] or told == pytest.approx([standing[0]] * len(told), abs=1e-6)
 
 
+def test_drivers_that_have_another_clock_hide_no_marker(
+    graph: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    node = graph.add(ArmController)
+    told: list[Any] = []
+    node._markers = SimpleNamespace(publish=told.append)
+    at = SimpleNamespace(nanoseconds=1_700_000_000_000_000_000)
+    monkeypatch.setattr(node, 'get_clock', lambda: SimpleNamespace(now=lambda: at))
+    for _ in range(20):
+        at.nanoseconds += 100_000_000
+        now = 1e-9 * at.nanoseconds
+        carried(node, 0.0, stamp_of(now - 1.6e9))  # counted since they were switched on
+        message = MarkerDetectionArray(detections=[seen(7, 0.0, 0.0, 3.0)])
+        message.header.stamp = stamp_of(now - 0.05)
+        node._on_detections(message)
+    assert len(told) > 10
+
+
 def test_two_panels_with_one_id_are_a_finding_with_both_positions(
     graph: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:

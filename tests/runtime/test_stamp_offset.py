@@ -26,6 +26,7 @@ CLOCKS: dict[str, Callable[[float], float]] = {
     'all 0': lambda _now: 0.0,
     '60 s behind': lambda now: now - 60.0,
     '60 s ahead': lambda now: now + 60.0,
+    '1 s ahead': lambda now: now + 1.0,
     'since its start': lambda now: now - BEGIN,
     'stands still': lambda _now: BEGIN - 30.0,
     'set back and forth': lambda now: now + (60.0 if int(now) % 2 else -60.0),
@@ -57,6 +58,7 @@ def test_each_image_is_placed_near_when_it_was_taken_and_one_warning_is_given(cl
         ('all 0', 'do not advance (are 1.7e+09 s behind'),
         ('60 s behind', 'are 60.0 s behind this'),
         ('60 s ahead', 'are 60.0 s ahead of this'),
+        ('1 s ahead', 'are 1.0 s ahead of this'),
         ('since its start', 'use_sim_time set on one side only'),
         ('at random', 'jump'),
     ],
@@ -110,6 +112,17 @@ def test_another_clock_leaves_two_seconds_and_a_good_one_none() -> None:
     assert taken - 2.1 < first < taken < last < taken + 0.1
     stamps = StampOffset('images')
     assert stamps.span_of(BEGIN, BEGIN + DELAY) == (BEGIN, BEGIN)
+
+
+def test_no_message_was_stamped_after_it_came():
+    stamps = StampOffset('images')
+    for index in range(20):
+        taken = BEGIN + index * PERIOD
+        first, last = stamps.span_of(taken + 0.7, taken + DELAY)
+        assert first <= taken <= last <= taken + DELAY
+    # Machines that are in step are so to some milliseconds.
+    stamps = StampOffset('images')
+    assert stamps.span_of(BEGIN, BEGIN - 0.005) == (BEGIN, BEGIN)
 
 
 def test_in_simulated_time_a_message_that_is_seconds_behind_is_late() -> None:

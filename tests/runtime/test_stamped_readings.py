@@ -47,6 +47,21 @@ def test_a_silence_and_a_clock_that_is_set_back_leave_nothing_known(driven):
     assert driven.stood(-100.0, -99.8) is not None
 
 
+def test_times_that_come_once_more_tell_nothing_of_before(driven):
+    """A clock that is set back by seconds: it stands at 1 m, and stood at 0 by the same stamps."""
+    for tick in range(10):
+        driven.add(1.0 + tick / 10, (1.0, 0.0, 0.0))
+    assert driven.stood(1.1, 1.8) == (1.0, 0.0, 0.0)
+    assert driven.stood(0.5, 0.9) is None
+
+
+def test_one_stamp_of_the_future_makes_nobody_blind(driven):
+    driven.add(39.0, (1.0, 0.0, 0.0))
+    for tick in range(10):
+        driven.add(9.1 + tick / 10, (1.0, 0.0, 0.0))
+    assert driven.stood(9.2, 10.0) == (1.0, 0.0, 0.0)
+
+
 def test_a_robot_that_faces_backwards_does_not_turn_around_for_a_sign():
     readings = StampedReadings(angles=[2])
     for tick in range(20):

@@ -80,6 +80,11 @@ class SensorStream:
             self._node.get_logger().warn(warning)
         return measured
 
+    @property
+    def stamp(self) -> float:
+        """What the message that came last is stamped, seconds of its clock; 0: nothing."""
+        return self._last[0]
+
     def hear(self) -> None:
         """Take that the message which came is of use."""
         self.heard_at = self.came_at
