@@ -14,8 +14,8 @@ from collections import Counter, deque
 
 # seconds within which a stamp is believed as it is: a slow driver, or fast simulated time
 _LARGE = 2.0
-# seconds that a stamp of the same clock may be ahead: two machines are in step to less than that; and
-# under simulated time, which each node hears by a topic of its own
+# seconds that a stamp of the same clock may be ahead: two machines are in step to less than that;
+# and under simulated time, which each node hears by itself
 _AHEAD, _AHEAD_SIMULATED = 0.1, 2.0
 # seconds of the node's clock, and messages, from which the offset is estimated
 _WINDOW, _MOST_SAMPLES = 5.0, 50

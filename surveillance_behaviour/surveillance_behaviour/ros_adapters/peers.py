@@ -423,6 +423,9 @@ class RosAnnouncer:
         self.text = self.waits = ''
         self.words = 0
         self._status: Callable[[], MissionStatus] = MissionStatus
+        # Where the robot was, and where it went, when that was said.
+        self._whereabouts: Callable[[], tuple[str, str]] = lambda: ('', '')
+        self._said_in = ('', '')
         self._topic = OwnedTopic(node, MissionStatus, 'mission_status')
 
     def attach(self, mission: Mission, machine: fsm.StateMachine) -> None:
@@ -438,11 +441,13 @@ class RosAnnouncer:
                 heading_to=mission.heading_to,
                 battery_level=math.nan if level is None else float(level),
                 waiting_for_help=bool(self.waits),
-                text=self.text,
+                # What was said in another place, or of another way, is no news of this one.
+                text=self.text if self.waits or self._said_in == self._whereabouts() else '',
                 avoided=sorted(mission.recovery.avoided(mission.now())),
             )
 
         self._status = status
+        self._whereabouts = lambda: (mission.place, mission.heading_to)
         for inner in Structure(machine).walk():
             inner.container.register_start_cb(lambda _data, _states: self._publish())
             inner.container.register_transition_cb(lambda _data, _states: self._publish())
@@ -454,19 +459,22 @@ class RosAnnouncer:
             log.warn(text)
         else:
             log.info(text)
-        self.text = text
-        self._publish()
+        self._hold(text)
 
     def waiting_for_help(self, reason: str) -> None:
         """Say that the robot waits, or that it goes on."""
         self.waits = reason
-        self.text = reason or 'trying again'
         if reason:
             said = f'{WAITING_FOR_HELP}: {reason}'
             self._node.get_logger().error(said)
             self._node.health.error('help', said)
         else:
             self._node.health.clear('help')
+        self._hold(reason or 'trying again')
+
+    def _hold(self, text: str) -> None:
+        """Publish what was said last."""
+        self.text, self._said_in = text, self._whereabouts()
         self._publish()
 
     def _publish(self) -> None:
