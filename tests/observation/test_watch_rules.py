@@ -58,6 +58,8 @@ def test_rules_hold_in_their_hours_and_places_and_for_what_is_sure():
     assert level(Observation(Kind.DOOR, 'open', 'C1', 'D2'), NIGHT) == 0
     person = Observation(Kind.PERSON, 'seen', 'R1', confidence=0.9)
     assert (level(person, NIGHT), level(person, DAY)) == (Level.ALERT, 0)
+    for state in ('nobody', 'nobody walks'):
+        assert level(Observation(Kind.PERSON, state, 'R1', confidence=0.9), NIGHT) == 0
     assert level(Observation(Kind.PERSON, 'seen', 'R1', confidence=0.3), NIGHT) == 0
     assert level(Observation(Kind.PERSON, 'seen', 'E', confidence=0.9), NIGHT) == 0
     assert level(Observation(Kind.OBJECT, 'appeared', 'C1'), DAY) == Level.NOTICE

@@ -157,7 +157,7 @@ def test_nothing_happens_and_nothing_is_told():
         watch.visit('R1', HERE)
         watch.visit('R2', (9.0, 2.5))
     told = {(each.kind, each.state) for each in watch.told if each.kind != Kind.DOOR}
-    assert told == {(Kind.PERSON, 'nobody')}
+    assert told == {(Kind.PERSON, 'nobody walks')}, 'there is no camera'
     assert not watch.book.events
     assert not watch.alerts
 
@@ -646,17 +646,81 @@ def test_a_covered_camera_is_told_once():
     ]
 
 
-@pytest.mark.parametrize(('picture', 'sure'), [(texture(), 0.9), (np.full((240, 320), 90), 0.5)])
-def test_a_camera_that_is_covered_does_not_say_that_nobody_is_there(picture, sure):
-    watch = Round(find_persons=lambda _: [])
+def looks_ahead(at: tuple[float, float], yaw: float) -> CameraView:
+    """Return a camera of 80 degrees that looks along the floor."""
+    ahead, right = [math.cos(yaw), math.sin(yaw), 0], [math.sin(yaw), -math.cos(yaw), 0]
+    pose = np.eye(4)
+    pose[:3, :3] = np.stack([right, [0, 0, -1], ahead], axis=1)
+    pose[:3, 3] = *at, 1.0
+    return CameraView(pose, np.array([[190.0, 0, 160], [0, 190.0, 120], [0, 0, 1]]), 0.02, 0.01)
+
+
+def stay(watch: Round, picture: np.ndarray, sides: int, *, is_posed: bool = True) -> None:
+    """Look at a room from its middle with the lidar, and to some sides with the camera."""
     watch.watcher.arrive('R1', watch.time)
     for number in range(8):
         watch.time += 1.0
-        watch.watcher.sweep((3.0, 2.5), *beams(room(), (3.0, 2.5), (), True, number), watch.time)
-        watch.watcher.picture(picture.astype(np.uint8), None, watch.time, None)
+        watch.watcher.sweep(HERE, *beams(room(), HERE, (), True, number), watch.time)
+        view = looks_ahead(HERE, (number % sides) * math.tau / 5)
+        watch.watcher.picture(picture, None, watch.time, None, view if is_posed else None)
     watch.watcher.arrive('', watch.time)
-    (nobody,) = [each for each in watch.told if each.state == 'nobody']
-    assert abs(nobody.confidence - sure) < 0.11
+
+
+DARK_WITH_A_LIT_DOORWAY = np.where(np.arange(320) % 320 < 80, texture()[:240, :320], 3)
+
+
+@pytest.mark.parametrize(
+    ('picture', 'sides', 'is_posed', 'told'),
+    [
+        (texture()[:240, :320], 5, True, 'nobody'),
+        (texture()[:240, :320], 1, True, 'nobody walks'),
+        (texture()[:240, :320], 5, False, 'nobody walks'),
+        (np.full((240, 320), 90), 5, True, 'nobody walks'),
+        (np.full((240, 320), 3), 5, True, 'nobody walks'),
+        (DARK_WITH_A_LIT_DOORWAY, 5, True, 'nobody walks'),
+    ],
+    ids=['all around', 'one side', 'from an unknown pose', 'covered', 'dark', 'lit doorway'],
+)
+def test_that_nobody_is_there_only_pictures_of_the_floor_tell(picture, sides, is_posed, told):
+    """The lidar, which saw all of the floor, tells only that nobody walks."""
+    watch = Round(find_persons=lambda _: [])
+    stay(watch, picture.astype(np.uint8), sides, is_posed=is_posed)
+    (person,) = [each for each in watch.told if each.kind == Kind.PERSON]
+    assert person.state == told
+    assert 0.5 < person.confidence < 0.9 if told == 'nobody' else person.confidence == 0.5
+    (look,) = watch.looks
+    kept = look.to_json()
+    assert kept['share'] > 0.8
+    if is_posed:
+        assert (kept['camera_share'] > 0.6) is (told == 'nobody')
+    else:
+        assert 'camera_share' not in kept, 'nobody knows what those pictures showed'
+
+
+@pytest.mark.parametrize(
+    ('found', 'sides', 'over'), [('walks', 1, True), ('stands', 1, False), ('stands', 5, True)]
+)
+def test_whom_the_camera_saw_is_there_until_the_camera_sees_that_nobody_is(found, sides, over):
+    """Who walked is gone when the lidar sees nobody walk."""
+    seen = [Person((10, 20, 60, 80), 0.9)]
+    watch = Round(find_persons=lambda _: list(seen))
+    if found == 'walks':
+        seen.clear()
+        watch.watcher.arrive('R1', watch.time)
+        walk(watch, (-9.0, -9.0), (0.0, 0.0), 8)
+        walk(watch, (1.0, 1.0), (0.3, 0.0), 12)
+        watch.watcher.arrive('', watch.time)
+    else:
+        stay(watch, texture()[:240, :320], 1)
+        seen.clear()
+    watch.time += 60.0
+    stay(watch, texture()[:240, :320], sides)
+    (event,) = [each for each in watch.book.events if each.kind == Kind.PERSON]
+    assert event.sensors == ('lidar' if found == 'walks' else 'camera',)
+    assert event.state == (EventState.OVER if over else EventState.OPEN)
+    again = EventBook()
+    again.restore(json.loads(json.dumps(watch.book.to_json())))
+    assert again.events == watch.book.events
 
 
 def test_evidence_keeps_the_most_severe_and_newest_within_its_bound(tmp_path: Path):

@@ -56,6 +56,7 @@ class Event:
         seen_from: Where the robot was at the first sighting, map frame, metres; None: not known.
         confirmed: Whether one sighting was sure, or it was seen from elsewhere or in another look,
             too.
+        sensors: What saw it, of a person.
     """
 
     number: int
@@ -77,6 +78,7 @@ class Event:
     compared_with: str = ''
     seen_from: tuple[float, float] | None = None
     confirmed: bool = False
+    sensors: tuple[str, ...] = ()
 
     def words(self) -> str:
         """Return it in words, as '3: door D1 is ajar in C1'."""
@@ -101,7 +103,8 @@ class Event:
         if (origin := given.get('seen_from')) is not None:
             given['seen_from'] = (float(origin[0]), float(origin[1]))
         given['kind'], given['state'] = Kind(given['kind']), EventState(given['state'])
-        given['robots'], given['evidence'] = tuple(given['robots']), tuple(given['evidence'])
+        for name in ('robots', 'evidence', 'sensors'):
+            given[name] = tuple(given.get(name, ()))
         return cls(**given)
 
 
@@ -175,6 +178,7 @@ class EventBook:
                 seen.compared_with,
                 seen.seen_from,
                 seen.confidence >= SURE,
+                (seen.sensor,) if seen.sensor else (),
             )
             self._next += 1
             self._looks[event.number] = look
@@ -201,6 +205,7 @@ class EventBook:
             or seen.confidence >= SURE
             or event.looks + new_look > 1
             or _from_elsewhere(event, seen),
+            sensors=tuple(dict.fromkeys((*event.sensors, *([seen.sensor] if seen.sensor else ())))),
         )
         self._events[event.number] = changed
         if changed.state != EventState.OPEN:
@@ -321,13 +326,13 @@ class EventBook:
 
     def _event_of(self, seen: Observation) -> Event | None:
         # What a person called false is not told again while it is seen.
-        found = [each for each in self._near(seen) if not _contradicts(each, seen)]
+        found = [each for each in self._near(seen) if _agrees(each, seen)]
         return max(found, key=lambda each: each.last, default=None)
 
     def _end_others(self, seen: Observation) -> None:
         """End events of the same thing in another state: a door that is open is closed no more."""
         for each in self._near(seen):
-            if not _contradicts(each, seen) or seen.stamp <= each.last:
+            if not _ends(each, seen) or seen.stamp <= each.last:
                 continue
             if each.state in _GOING_ON:
                 self._keep(replace(each, state=EventState.OVER, last=seen.stamp))
@@ -359,13 +364,23 @@ def _alike(event: Event, seen: Observation) -> bool:
     return math.dist(event.position, seen.position) <= SAME_PLACE
 
 
-def _contradicts(event: Event, seen: Observation) -> bool:
-    """Tell whether what was seen says that an event's thing is in another state now.
+def _agrees(event: Event, seen: Observation) -> bool:
+    """Tell whether what was seen is what an event says.
 
     A thing that has appeared and one that was moved there both stand there.
     """
     there = event.kind == Kind.OBJECT and {event.seen, seen.state} <= {'appeared', 'moved'}
-    return event.seen != seen.state and not there
+    return event.seen == seen.state or there
+
+
+def _ends(event: Event, seen: Observation) -> bool:
+    """Tell whether what was seen says that an event's thing is in another state now.
+
+    Whom a camera saw may stand there still when nobody walks.
+    """
+    if seen.state == 'nobody walks' and (event.seen == 'nobody' or 'camera' in event.sensors):
+        return False
+    return not _agrees(event, seen)
 
 
 def _from_elsewhere(event: Event, seen: Observation) -> bool:

@@ -28,12 +28,15 @@ STATES: Mapping[Kind, tuple[str, ...]] = {
     Kind.DOOR: ('open', 'closed', 'ajar'),
     Kind.OBJECT: ('appeared', 'removed', 'moved'),
     Kind.MARKER: ('here', 'moved', 'missing', 'double', 'unknown'),
-    Kind.PERSON: ('seen', 'nobody'),
+    Kind.PERSON: ('seen', 'nobody', 'nobody walks'),
     Kind.LIGHT: ('on', 'off'),
     Kind.VIEW: ('clear', 'changed', 'blocked'),
     Kind.WAY: ('free', 'blocked'),
 }
-"""The states that each kind knows."""
+"""The states that each kind knows.
+
+Of persons: that nobody is there only pictures tell; the lidar alone tells that nobody walks.
+"""
 
 
 @dataclass(frozen=True)
@@ -51,6 +54,7 @@ class Observation:
         robot: Who saw it.
         evidence: File with the picture or sweep, relative to the evidence's folder; or empty.
         compared_with: What it was compared with: a file, or the stamp of a reference.
+        sensor: What saw a person, or that there is none: camera or lidar; empty: not known.
         usual: How likely this state is at its hour, 0 to 1; None: that is not known.
         seen_from: Where the robot was, map frame, metres; None where that is not known.
 
@@ -70,6 +74,7 @@ class Observation:
     compared_with: str = ''
     seen_from: tuple[float, float] | None = None
     usual: float | None = None
+    sensor: str = ''
 
     def __post_init__(self) -> None:
         if self.state not in STATES[self.kind]:
@@ -104,9 +109,13 @@ class Observation:
 
     def words(self) -> str:
         """Return it in words, as 'door D1 is ajar in C1'."""
+        where = f' in {self.place}' if self.place else ''
+        if self.state == 'nobody':
+            return f'nobody is{where}'
+        if self.state == 'nobody walks':
+            return f'nobody walks{where}'
         subject = f' {self.subject}' if self.subject else ''
         verb = {'seen': 'was', 'appeared': 'has', 'missing': 'is', 'moved': 'was'}.get(
             self.state, 'is'
         )
-        where = f' in {self.place}' if self.place else ''
         return f'{self.kind}{subject} {verb} {self.state}{where}'

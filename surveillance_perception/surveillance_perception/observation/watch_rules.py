@@ -112,6 +112,8 @@ class WatchRule:
             return False
         if self.kind == Kind.OBJECT and seen.state == 'removed' and self.wanted == 'none':
             return False  # that something left is as the rule wants it
+        if self.kind == Kind.PERSON and self.wanted == 'nobody' and seen.state != 'seen':
+            return False
         return self.hours.at(moment) == 'must'
 
     def lasting(self, looks: int, seconds: float) -> bool:

@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from surveillance_perception.observation.camera_floor import CameraFloor
 from surveillance_perception.observation.doors import Segment, read_door
 from surveillance_perception.observation.events import ELSEWHERE, Event, EventBook, EventState
 from surveillance_perception.observation.evidence import EvidenceStore, side_by_side, sweep_picture
@@ -81,9 +82,15 @@ WALKING = 0.8
 BOTH = 5.0
 """Lidar and camera see the same person within this time, seconds."""
 LOOKED = 0.6
-"""Share of a place's floor that must have been in view before nobody is said to be there."""
+"""Share of a place's floor that pictures must have shown before nobody is said to be there, and the
+lidar must have seen before nobody is said to walk there."""
 LOOKED_SECONDS = 5.0
 """And for so long."""
+FOUND = 0.88
+"""Share of the persons in single photographs that are found (docs/watching.md): so sure are
+pictures of a whole floor that nobody is there."""
+UNSURE = 0.5
+"""Confidence of the lidar alone that nobody is there, at most: one who stands still is a thing."""
 BESIDE = 0.3
 """A point so far from a door, or a marker, is in the place on its side, metres."""
 BEFORE_MARKER, ASIDE = 0.4, 0.25
@@ -125,9 +132,11 @@ class Look:
     Attributes:
         place: The place.
         began, ended: Seconds since 1970.
-        share: Part of its floor that was in view, 0 to 1; nan where the map does not show it.
+        share: Part of its floor that the lidar saw, 0 to 1; nan where the map does not show it.
         area: Of that part, square metres.
         pictures: How many were looked at.
+        camera_share: Part of its floor where a person would have been in a picture that was looked
+            at for persons, 0 to 1; nan where that is not known.
     """
 
     place: str
@@ -136,9 +145,10 @@ class Look:
     share: float
     area: float
     pictures: int
+    camera_share: float = math.nan
 
     def to_json(self) -> dict[str, Any]:
-        """Return it as plain values; the share is missing where it is not known."""
+        """Return it as plain values; a share that is not known is missing."""
         values = {
             'place': self.place,
             'began': round(self.began, 3),
@@ -146,7 +156,8 @@ class Look:
             'area': round(self.area, 2),
             'pictures': self.pictures,
         }
-        return values if math.isnan(self.share) else {**values, 'share': round(self.share, 3)}
+        shares = {'share': self.share, 'camera_share': self.camera_share}
+        return values | {k: round(v, 3) for k, v in shares.items() if not math.isnan(v)}
 
 
 class Watcher:
@@ -212,7 +223,11 @@ class Watcher:
         # The last person of this stay whom each sensor saw.
         self._person_by: dict[str, Observation] = {}
         self._began = math.nan
-        self._pictures = self._clear_pictures = 0
+        self._pictures = 0
+        # What the pictures of this stay showed, once persons were looked for in one; and whether in
+        # one of which nobody knows from where it was taken.
+        self._shown: CameraFloor | None = None
+        self._shown_elsewhere = False
         self._store = store
         self._robot = robot
         self._place = ''
@@ -243,6 +258,7 @@ class Watcher:
             return
         self._grid = grid
         self._visit, self._normal, self._candidates = None, None, []
+        self._shown = None
         self._ways = None if self._ways_of is None else self._ways_of(grid)
         for door in self._doors.values():
             door.place = ''
@@ -258,7 +274,7 @@ class Watcher:
         self._learn()
         self._place = place
         self._began, self._pictures, self._persons = stamp, 0, 0
-        self._clear_pictures = 0
+        self._shown, self._shown_elsewhere = None, False
         self._person_by = {}
         self._walks.clear()
         # Told anew in each place, of which a short stay may give one picture alone.
@@ -273,31 +289,41 @@ class Watcher:
             door.readings.clear()
 
     def _end_look(self, stamp: float) -> None:
-        """Tell what was in view, and that nobody was there."""
+        """Tell what was in view, and that nobody was there, by what saw the floor."""
         if not self._place or math.isnan(self._began):
             return
         look = self.look(stamp)
         self._looked(look)
-        long = look.ended - look.began >= LOOKED_SECONDS
-        if long and look.share >= LOOKED and not self._persons:
-            # In the dark, and with the lens covered, the camera tells nothing.
-            looked = self._find_persons is not None and self._clear_pictures > 0
-            sure = look.share if looked else 0.5
-            self._take(
-                Observation(Kind.PERSON, 'nobody', self._place, confidence=sure, stamp=stamp)
+        is_long = look.ended - look.began >= LOOKED_SECONDS
+        if not is_long or not look.share >= LOOKED or self._persons:
+            return
+        # Who walks about between two pictures is seen by the lidar, and who stands in pictures.
+        if look.camera_share >= LOOKED:
+            state, sensor, sure = 'nobody', 'camera', FOUND * look.camera_share
+        else:
+            state, sensor, sure = 'nobody walks', 'lidar', min(UNSURE, look.share)
+        self._take(
+            Observation(
+                Kind.PERSON, state, self._place, confidence=sure, stamp=stamp, sensor=sensor
             )
+        )
 
     def look(self, stamp: float) -> Look:
         """Return what was in view since the robot came here."""
-        share, area = math.nan, 0.0
+        share = shown = math.nan
+        area = 0.0
         floor = None if self._rooms is None else self._rooms.cells_of(self._place)
         if floor is not None and self._grid is not None and floor.shape == self._grid.cells.shape:
-            seen = 0
+            seen, cells = 0, max(1, int(floor.sum()))
             if self._visit is not None and self._visit.sweeps:
                 seen = int((floor & self._visit.view().seen).sum())
-            share = seen / max(1, int(floor.sum()))
+            share = seen / cells
             area = seen * self._grid.resolution**2
-        return Look(self._place, self._began, stamp, share, area, self._pictures)
+            if self._shown is not None:
+                shown = int((floor & self._shown.seen).sum()) / cells
+            elif not self._shown_elsewhere:
+                shown = 0.0
+        return Look(self._place, self._began, stamp, share, area, self._pictures, shown)
 
     def _place_of(self, point: tuple[float, float]) -> str:
         """Return where a thing lies that was seen, perhaps through a doorway."""
@@ -320,6 +346,7 @@ class Watcher:
     def _see_person(self, sensor: str, seen: Observation, picture: Picture | None = None) -> None:
         """Tell of a person, with more confidence where the other sensor saw one there just now."""
         self._persons += 1
+        seen = replace(seen, sensor=sensor)
         other = self._person_by.get('camera' if sensor == 'lidar' else 'lidar')
         if other is not None and abs(seen.stamp - other.stamp) > BOTH:
             other = None
@@ -573,8 +600,7 @@ class Watcher:
             self._held = [*self._held, told][-MOST_HELD:]
         if sight != Sight.CLEAR:
             return
-        self._clear_pictures += 1
-        self._look_for_persons(picture, camera, stamp)
+        self._look_for_persons(picture, camera, stamp, is_lit=light == 'on')
         self._look_for_strange(markers or (), stamp, grey)
         held, self._held = self._held, []
         for each in (*held, *([] if told is None else [told])):
@@ -646,8 +672,15 @@ class Watcher:
                 near[name] = door.told
         return near
 
-    def _look_for_persons(self, picture: Picture, camera: CameraView | None, stamp: float) -> None:
-        found = [] if self._find_persons is None else self._find_persons(picture)
+    def _look_for_persons(
+        self, picture: Picture, camera: CameraView | None, stamp: float, *, is_lit: bool
+    ) -> None:
+        if self._find_persons is None:
+            return
+        found = self._find_persons(picture)
+        if is_lit:
+            # Who stands in a dark room beside a lit doorway is not found.
+            self._note_shown(picture, camera)
         if not found:
             return
         surest = found[0]
@@ -659,6 +692,17 @@ class Watcher:
             left, top, width, height = each.box
             cv2.rectangle(shown, (left, top), (left + width, top + height), (0, 200, 0), 2)
         self._see_person('camera', seen, shown)
+
+    def _note_shown(self, picture: Picture, camera: CameraView | None) -> None:
+        """Note the floor that a picture shows in which persons were looked for."""
+        if camera is None or self._grid is None:
+            self._shown_elsewhere = True
+            return
+        if self._shown is None:
+            self._shown = CameraFloor(self._grid)
+        things = None if self._visit is None else self._visit.view().occupied
+        rows, columns = picture.shape[:2]
+        self._shown.add(camera, (rows, columns), things)
 
     def _things_met(self) -> Points:
         """Return the ends of the last sweep that no wall of the map explains, (n, 2)."""
