@@ -25,6 +25,7 @@ import ast
 import contextlib
 import difflib
 import gc
+import inspect
 import json
 import os
 import pickle
@@ -88,6 +89,7 @@ AT_ONCE = 4
 """Mutants that are tried at the same time."""
 NOT_IN_PLACE = 99
 """Exit code of a process that could not put a fault in place."""
+COMPREHENSIONS = ('<listcomp>', '<setcomp>', '<dictcomp>', '<genexpr>')
 EQUIVALENT = Path(__file__).with_name('equivalent_mutants.toml')
 
 
@@ -689,7 +691,10 @@ def changed_functions(mutant: Mutant) -> dict[tuple[str, int], CodeType] | None:
     codes: dict[tuple[str, int], CodeType] = {}
 
     def compare(old: CodeType, new: CodeType, at_import: bool) -> bool:
-        function = not at_import or bool(old.co_flags & 2)  # CO_NEWLOCALS
+        # A comprehension of the module is done at import, too.
+        function = not at_import or (
+            bool(old.co_flags & inspect.CO_NEWLOCALS) and old.co_name not in COMPREHENSIONS
+        )
         if not function and own(old) != own(new):
             return False
         inner_old, inner_new = (

@@ -18,6 +18,7 @@ from armor_service.client import (
 from armor_service.protocol import (
     DirectiveRequest,
     DirectiveResponse,
+    ExitCode,
     ListResponse,
     name_in,
     value_in,
@@ -124,8 +125,21 @@ def test_every_method_sends_what_armor_expects() -> None:
         'QUERY IND OBJECTPROP': (lambda: ask.objectprops_of_ind('a'), ('a',)),
         'QUERY SPARQL ROWS': (lambda: ask.sparql('SELECT', 5), ('SELECT', '5')),
         'QUERY FACT': (lambda: ask.facts('A(?)'), ('A(?)',)),
+        'QUERY IND EXPRESSION': (lambda: ask.ind_b2_expression('A and B'), ('A and B',)),
+        'QUERY AXIOMS': (lambda: ask.axioms('A'), ('A',)),
+        'QUERY RULES': (lambda: ask.rules(), ()),
+        'QUERY TAKEN BACK': (lambda: ask.taken_back(), ()),
         'QUERY EXPLAIN ABSENCE': (lambda: ask.explain_absence('A(a)'), ('A(a)',)),
         'QUERY EXPLAIN INCONSISTENCY': (lambda: ask.explain_inconsistency(), ()),
+        'ADD AXIOM': (lambda: change.add_axiom('Class: A'), ('Class: A',)),
+        'REMOVE AXIOM': (lambda: change.remove_axiom('Class: A'), ('Class: A',)),
+        'ADD RULE': (lambda: change.add_rule('A(?x) -> B(?x)'), ('A(?x) -> B(?x)',)),
+        'REMOVE RULE': (lambda: change.remove_rule('A(?x) -> B(?x)'), ('A(?x) -> B(?x)',)),
+        'CLOSE OBJECTPROP': (lambda: change.close_objectprop('p'), ('p',)),
+        'CLOSE OBJECTPROP IND': (lambda: change.close_objectprop('p', 'a'), ('p', 'a')),
+        'CLOSE CLASS': (lambda: change.close_class('A'), ('A',)),
+        'CLOSE CLASS IND': (lambda: change.close_class('A', 'a'), ('A', 'a')),
+        'CANCEL': (lambda: use.cancel(), ()),
         'APPLY': (lambda: use.apply_buffered_changes(), ()),
         'REASON': (lambda: use.sync_buffered_reasoner(), ()),
         'SAVE': (lambda: use.save('f'), ('f',)),
@@ -151,6 +165,125 @@ def test_every_method_sends_what_armor_expects() -> None:
         recorder.sent.clear()
         send()
         assert recorder.sent == [(words, args)]
+    for send, sent in (
+        (lambda: ask.bottom_class_of_ind('a'), [('QUERY CLASS IND', ('a', 'true'))]),
+        (lambda: ask.sparql('SELECT'), [('QUERY SPARQL ROWS', ('SELECT', '0'))]),
+        (lambda: use.save('f', inference=True), [('SAVE INFERENCE', ('f',))]),
+        (lambda: use.reason_within(2), [('REASON', ('2.0',))]),
+        (
+            lambda: use.load_ref_from_file('f', 'iri', buffered_reasoner=True),
+            [('LOAD FILE', ('f', 'iri', 'False', 'PELLET', 'True'))],
+        ),
+        (
+            lambda: change.add_batch_dataprop_to_ind('a', [['p', 'INT', '1'], ['q', 'INT', '2']]),
+            [('ADD DATAPROP IND', (p, 'a', 'INT', v)) for p, v in (('p', '1'), ('q', '2'))],
+        ),
+        (
+            lambda: change.remove_batch_dataprop_to_ind('a', [['p', 'INT', '1']]),
+            [('REMOVE DATAPROP IND', ('p', 'a', 'INT', '1'))],
+        ),
+        (lambda: change.add_batch_dataprop_to_ind('a', []), []),
+        (
+            lambda: change.replace_one_objectprop_b2_ind('p', 'a', 'b'),
+            [('QUERY OBJECTPROP IND', ('p', 'a')), ('ADD OBJECTPROP IND', ('p', 'a', 'b'))],
+        ),
+    ):
+        recorder.sent.clear()
+        send()
+        assert recorder.sent == sent
+
+
+ENTITIES = ['<http://x.org/o#A>', 'owl:Nothing', '<http://x.org/o#B>']
+
+
+def test_answers_are_read_as_names_or_left_as_they_are() -> None:
+    recorder = Recorder()
+    client = ArmorClient('me', 'map', recorder)
+    change, ask, use = client.manipulation, client.query, client.utils
+    recorder.answer = DirectiveResponse(is_consistent=True, queried_objects=ENTITIES)
+    for method, args in (
+        (ask.ind_b2_class, ('A',)),
+        (ask.objectprop_b2_ind, ('p', 'a')),
+        (ask.class_of_ind, ('a',)),
+        (ask.dataprops_of_ind, ('a',)),
+        (ask.objectprops_of_ind, ('a',)),
+        (ask.ind_b2_expression, ('A',)),
+    ):
+        assert method(*args) == method(*args, with_URI=False) == ['A', 'owl:Nothing', 'B']
+        assert method(*args, with_URI=True) == ENTITIES
+    assert ask.subclasses('A') == ['A', 'B']
+    assert ask.subclasses('A', with_URI=True) == [ENTITIES[0], ENTITIES[2]]
+    assert ask.bottom_class_of_ind('a') == ENTITIES[0]
+    assert ask.dataprop_b2_ind('p', 'a') == ask.restrictions('A') == ENTITIES
+    assert ask.check_ind_exists('a')
+    assert change.add_batch_dataprop_to_ind('a', [])
+    recorder.answer = DirectiveResponse(queried_objects=['why', 'tree', 'more'])
+    assert ask.explain_inconsistency() == ('why', 'tree')
+    assert not change.add_ind('a')
+    assert not use.sync_buffered_reasoner()
+    assert not use.apply_buffered_changes()
+    assert not use.reason_within(1.0)
+    recorder.answer = DirectiveResponse()
+    assert ask.explain_inconsistency() is None
+    assert ask.bottom_class_of_ind('a') is None
+    assert not ask.check_ind_exists('a')
+    recorder.answer = DirectiveResponse(queried_objects=['{"x": "1"}', '{}'])
+    assert ask.sparql('SELECT') == [{'x': '1'}, {}]
+    recorder.answer = DirectiveResponse(queried_objects=['A(a)', 'A(b)'])
+    every, asserted = ask.facts_by_origin('A(?)')
+    assert [str(fact) for fact in every] == ['A(a)', 'A(b)'] == [str(fact) for fact in asserted]
+    assert recorder.sent[-2:] == [('QUERY FACT', ('A(?)',)), ('QUERY FACT', ('A(?)', 'true'))]
+    recorder.answer = DirectiveResponse(queried_objects=['none'])
+    assert use.get_ref_client() is None
+    assert recorder.sent[-1] == ('GET REF CLIENT', ('map',))
+    recorder.answer = DirectiveResponse(queried_objects=['you'])
+    assert use.get_ref_client('other') == 'you'
+    assert recorder.sent[-1] == ('GET REF CLIENT', ('other',))
+
+
+def test_a_refusal_is_told_from_an_empty_answer() -> None:
+    recorder = Recorder()
+    client = ArmorClient('me', 'map', recorder)
+    # ARMOR says with code 0 that an individual has no class, or a fact does not hold.
+    recorder.answer = DirectiveResponse(success=False, exit_code=0, queried_objects=['x'])
+    assert not client.query.check_ind_exists('a')
+    assert client.query.explain('A(a)') is None
+    recorder.answer = DirectiveResponse(success=False, exit_code=205, error_description='wrong')
+    for call in (
+        lambda: client.query.check_ind_exists('a'),
+        lambda: client.query.explain('A(a)'),
+        lambda: client.query.facts_by_origin('A(?)'),
+        lambda: client.manipulation.add_ind('a'),
+        lambda: client.manipulation.add_batch_dataprop_to_ind('a', [['p', 'INT', '1']]),
+    ):
+        with pytest.raises(ArmorServiceInternalError) as refused:
+            call()
+        assert refused.value.msg == 'wrong'
+        assert refused.value.code is ExitCode.INVALID_COMMAND
+    assert not client.call('ADD', 'IND', '', ['a']).success
+    for wrong in (client.query.facts, client.query.facts_by_origin, client.query.explain):
+        sent = len(recorder.sent)
+        with pytest.raises(ValueError, match='expected CLASS'):
+            wrong('no fact')
+        assert len(recorder.sent) == sent
+    assert ArmorServiceInternalError('later', 999).code == 999
+    assert ArmorServiceInternalError('text', '205').exit_code is ExitCode.INVALID_COMMAND
+    recorder.answer = DirectiveResponse(queried_objects=['1', '2'])
+    with pytest.raises(ArmorServiceInternalError) as several:
+        client.manipulation.replace_one_objectprop_b2_ind('p', 'a', 'b')
+    assert several.value.msg == 'p of a has 2 values, expected one: 1, 2'
+    assert recorder.sent[-1][0] == 'QUERY OBJECTPROP IND', 'nothing was changed'
+
+
+def test_an_operation_is_known_by_its_name_and_its_words() -> None:
+    client = ArmorClient('me', 'map', Recorder())
+    assert vars(client.query.rules)['__name__'] == 'rules'
+    assert (client.query.rules.__doc__ or '').startswith('Yield the rules')
+    assert (type(client.query).rules.__doc__ or '').startswith('Yield the rules')
+    with pytest.raises(TypeError):
+        client.query.rules('too many')  # type: ignore[call-arg]
+    sent = client.request('ADD IND', 'a', 'b')
+    assert sent == DirectiveRequest('me', 'map', 'ADD', 'IND', '', ('a', 'b'))
 
 
 def test_batches_of_values(client: ArmorClient) -> None:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 import resource
+import shutil
+import zlib
 from functools import partial
 from pathlib import Path
 
@@ -256,3 +258,175 @@ def test_a_part_that_is_missing_is_reported(tmp_path: Path, lost: str) -> None:
     assert any('is missing' in note for note in journal.notes)
     assert list(journal.records()) == ([2] if lost.startswith('snapshot') else [1, 3])
     journal.close()
+
+
+def test_folders_are_made_as_deep_as_they_are_named(tmp_path: Path) -> None:
+    Journal(tmp_path / 'deep' / 'er' / 'store').close()
+    Journal(tmp_path / 'deep' / 'er' / 'store').close()
+    assert (tmp_path / 'deep' / 'er' / 'store' / 'journal-0.log').exists()
+
+
+def test_sizes_are_those_of_the_files(tmp_path: Path) -> None:
+    journal = Journal(tmp_path)
+    assert (journal.size, journal.snapshot_size) == (0, 0)
+    journal.append([['a', 1], ['b', 2]])
+    size = (tmp_path / 'journal-0.log').stat().st_size
+    assert journal.size == size > 0
+    journal.close()
+    journal = Journal(tmp_path)
+    assert (journal.size, journal.snapshot_size) == (size, 0)
+    number = journal.begin_snapshot()
+    assert (number, journal.size) == (1, 0)
+    journal.append([['c', 3]])
+    journal.finish_snapshot(number, ['state', 'more'])
+    sizes = [(tmp_path / f'{kind}-1.log').stat().st_size for kind in ('journal', 'snapshot')]
+    assert [journal.size, journal.snapshot_size] == sizes
+    journal.close()
+    journal = Journal(tmp_path)
+    assert [journal.size, journal.snapshot_size] == sizes
+    assert journal.records() == ['state', 'more', ['c', 3]]
+    assert journal.records() == [], 'once'
+    journal.close()
+
+
+def test_a_line_has_its_checksum_its_length_and_whether_the_batch_goes_on(tmp_path: Path) -> None:
+    """Written out, so that a store of today can be read by every later version."""
+    journal = Journal(tmp_path)
+    journal.append([['a', 1], ['b', 'ü']])
+    journal.append([[]])
+    journal.close()
+    bodies = [b'7+ ["a",1]', b'14 ["b","\\u00fc"]', b'2 []']
+    lines = [b'%08x %s\n' % (zlib.crc32(body), body) for body in bodies]
+    assert (tmp_path / 'journal-0.log').read_bytes() == b''.join(lines)
+
+
+@pytest.mark.parametrize(
+    ('end', 'is_cut'),
+    [
+        (b'0', True),
+        (b'0123abcd', True),
+        (b'0123abcd ', True),
+        (b'0123abcd 12', True),
+        (b'0123abcd 12+', True),
+        (b'0123abcd 12+ ["a', True),
+        (b'0123abcd 12 ["a",1', True),
+        # No write that was cut off looks like these.
+        (b'0123abcde', False),
+        (b'xyz', False),
+        (b'0123abcd x', False),
+        (b'0123abcd 12 \x00', False),
+        (b'0123ABCD', False),
+    ],
+)
+def test_what_a_crash_cut_off_is_told_from_damage(tmp_path: Path, end: bytes, is_cut: bool) -> None:
+    journal = Journal(tmp_path)
+    journal.append([1])
+    journal.close()
+    with (tmp_path / 'journal-0.log').open('ab') as file:
+        file.write(end)
+    journal = Journal(tmp_path)
+    assert journal.records() == [1]
+    assert bool(journal.notes) != is_cut
+    assert len(list(tmp_path.glob('damaged-*'))) == (0 if is_cut else 1)
+    journal.append([2])
+    journal.close()
+    assert reopened(tmp_path) == [1, 2]
+
+
+def test_only_the_last_segment_may_be_cut_off(tmp_path: Path) -> None:
+    journal = Journal(tmp_path)
+    journal.append([1])
+    journal.append([2, 3])
+    journal.begin_snapshot()
+    journal.append([4])
+    journal.close()
+    path = tmp_path / 'journal-0.log'
+    path.write_bytes(path.read_bytes()[:-2])
+    journal = Journal(tmp_path)
+    # The first of the batch that was damaged is whole, and kept.
+    assert journal.records() == [1, 2, 4]
+    (note,) = journal.notes
+    assert f'{path}: 1 damaged entry, from byte ' in note
+    assert note.endswith('; 2 whole ones are kept')
+    journal.close()
+
+
+def test_several_damaged_entries_are_counted(tmp_path: Path) -> None:
+    journal = Journal(tmp_path)
+    for number in range(4):
+        journal.append([number])
+    journal.close()
+    path = tmp_path / 'journal-0.log'
+    lines = path.read_bytes().splitlines(keepends=True)
+    lines[1] = lines[3] = b'no record\n'
+    path.write_bytes(b''.join(lines))
+    journal = Journal(tmp_path)
+    assert journal.records() == [0, 2]
+    (note,) = journal.notes
+    assert note.startswith(f'{path}: 2 damaged entries, from byte {len(lines[0])}, put aside in ')
+    journal.close()
+
+
+def test_damage_that_cannot_be_put_aside_is_told_and_costs_no_more(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    journal = Journal(tmp_path)
+    journal.append([1])
+    journal.close()
+    with (tmp_path / 'journal-0.log').open('ab') as file:
+        file.write(b'no record\n')
+
+    def full(*_: object) -> None:
+        raise OSError(28, 'No space left on device')
+
+    with monkeypatch.context() as patch:
+        patch.setattr(shutil, 'copyfile', full)
+        journal = Journal(tmp_path)
+    assert journal.records() == [1]
+    (note,) = journal.notes
+    assert note.endswith('; 1 whole ones are kept; not put aside: No space left on device')
+    journal.append([2])
+    journal.close()
+    assert reopened(tmp_path) == [1, 2]
+
+
+def test_a_part_that_cannot_be_read_ends_the_start_with_its_name(tmp_path: Path) -> None:
+    (tmp_path / 'journal-0.log').mkdir()
+    with pytest.raises(StoreError, match=r'journal-0\.log: Is a directory'):
+        Journal(tmp_path)
+    (tmp_path / 'journal-0.log').rmdir()
+    Journal(tmp_path).close()
+
+
+def test_a_snapshot_that_cannot_be_written_leaves_the_journal(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    journal = Journal(tmp_path)
+    journal.append([1])
+
+    def full(*_: object) -> None:
+        raise OSError(28, 'No space left on device')
+
+    with monkeypatch.context() as patch:
+        patch.setattr(os, 'fsync', full)
+        with pytest.raises(StoreError, match=r': No space left on device$'):
+            journal.begin_snapshot()
+        journal.append([2])
+    number = journal.begin_snapshot()
+    with monkeypatch.context() as patch:
+        patch.setattr(os, 'fsync', full)
+        with pytest.raises(StoreError, match=r': No space left on device$'):
+            journal.finish_snapshot(number, ['state'])
+    assert not list(tmp_path.glob('*.tmp'))
+    journal.append([3])
+    journal.close()
+    assert reopened(tmp_path) == [1, 2, 3]
+
+
+def test_a_closed_journal_takes_nothing(tmp_path: Path) -> None:
+    journal = Journal(tmp_path)
+    journal.close()
+    for use in (partial(journal.append, [1]), journal.begin_snapshot, journal.check_open):
+        with pytest.raises(StoreError, match=r': closed$'):
+            use()
+    assert reopened(tmp_path) == []

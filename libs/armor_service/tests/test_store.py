@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import fcntl
+import json
 import os
 import random
 import signal
@@ -17,10 +19,14 @@ import pytest
 from armor_service import reference as reference_module
 from armor_service import store as store_module
 from armor_service.access import Settings
+from armor_service.changes import AddAxiom, RemoveEntity, RenameEntity
 from armor_service.protocol import DirectiveRequest, StoreError
-from armor_service.reference import Reference
+from armor_service.reference import Origin, Reference, Told
 from armor_service.service import ArmorService
-from armor_service.store import Journal, Store
+from armor_service.store import Journal, Store, decode, encode
+from owl_reasoner.documents.reading import read_ontology
+from owl_reasoner.knowledge_base import KnowledgeBase
+from owl_reasoner.owl.axioms import ClassAssertion
 
 from .seven_rooms import IRI, ONTOLOGY, Ask, asker, names
 
@@ -457,3 +463,199 @@ def test_killed_at_any_moment_it_has_exactly_what_it_answered(server: Server) ->
         assert present in (doors_after(answered), doors_after(answered + 1))
         if present != doors_after(answered):
             answered += 1
+
+
+TERMS = f"""
+Prefix(:=<{IRI}#>) Prefix(xsd:=<http://www.w3.org/2001/XMLSchema#>)
+Ontology(<{IRI}>
+Declaration(Class(:A)) Declaration(ObjectProperty(:p)) Declaration(DataProperty(:d))
+EquivalentClasses(:A ObjectIntersectionOf(:B ObjectMinCardinality(2 :p :C)))
+SubClassOf(:A ObjectAllValuesFrom(ObjectInverseOf(:p) ObjectUnionOf(:B ObjectComplementOf(:C))))
+SubObjectPropertyOf(ObjectPropertyChain(:p :q) :r) TransitiveObjectProperty(:p)
+ObjectPropertyDomain(:p :A) DataPropertyRange(:d xsd:integer)
+DisjointClasses(:A :D) DifferentIndividuals(:a :b :c) SameIndividual(:x :y)
+HasKey(:A (:p) (:d)) ClassAssertion(ObjectHasValue(:p :a) :b)
+DataPropertyAssertion(:d :a "5"^^xsd:long) DataPropertyAssertion(:d :a "Raum"@de)
+DLSafeRule(Body(ClassAtom(:A Variable(<urn:x>)) DataPropertyAtom(:d Variable(<urn:x>) "7"))
+  Head(ObjectPropertyAtom(:p Variable(<urn:x>) :a)))
+AnnotationAssertion(:note :a "said") Annotation(:note "of it")
+)"""
+
+
+def test_every_kind_of_axiom_comes_back_from_its_record() -> None:
+    found = read_ontology(TERMS.encode(), IRI).axioms
+    kinds = {type(axiom).__name__ for axiom in found}
+    assert len(kinds) > 14
+    for axiom in found:
+        text = json.dumps(encode(axiom))
+        again = decode(json.loads(text))
+        assert again == axiom
+        assert hash(again) == hash(axiom)
+    for change in (
+        AddAxiom(found[0]),
+        RenameEntity('individual', 'a', 'b'),
+        RemoveEntity('class', 'A'),
+    ):
+        assert decode(json.loads(json.dumps(encode(change)))) == change
+
+
+@pytest.mark.parametrize('record', [[], [5], [['t']], ['NoSuch', 'a']])
+def test_a_record_that_nobody_wrote_is_refused(record: list[object]) -> None:
+    with pytest.raises(ValueError, match=r'no record|unknown record'):
+        decode(record)
+
+
+@pytest.mark.parametrize(
+    ('record', 'words'),
+    [
+        (['load', 'map'], 'not enough values'),
+        (['load', 'map', {'iri': IRI}, [], []], "no setting 'path'"),
+        (['change'], 'not enough values'),
+        (7, 'cannot be read'),
+    ],
+)
+def test_a_record_that_cannot_be_read_ends_the_start_with_one_line(
+    tmp_path: Path, record: object, words: str
+) -> None:
+    journal = Journal(tmp_path / 'store')
+    journal.append([record])
+    journal.close()
+    with pytest.raises(StoreError, match=words) as refused:
+        Store(tmp_path / 'store').recover()
+    assert '\n' not in str(refused.value)
+    assert 'cannot be read: ' in str(refused.value)
+
+
+def reference(count: int = 3) -> Reference:
+    axioms = [ClassAssertion(f'{IRI}#K', f'{IRI}#n{number}') for number in range(count)]
+    kb = KnowledgeBase(IRI, axioms)
+    kb.reason()
+    origin = Origin('/a/map.ttl', 'ntriples', {'x': 'urn:x#'})
+    return Reference('map', kb, origin, True, True, 'me', base=2.5, quarantine=['a line'])
+
+
+@pytest.mark.parametrize('count', [0, 3, 100, 101, 250])
+def test_a_reference_is_made_from_its_records_again(tmp_path: Path, count: int) -> None:
+    store = Store(tmp_path / 'store')
+    ref = reference(count)
+    waits = Told('you', 7.0, (AddAxiom(ClassAssertion(f'{IRI}#K', f'{IRI}#later')),))
+    ref.waiting.append(waits)
+    store.loaded(ref)
+    store.close()
+    store = Store(tmp_path / 'store')
+    (again,) = store.recover()
+    store.close()
+    assert set(again.kb.axioms()) == set(ref.kb.axioms())
+    assert again.kb.iri == IRI
+    for name in ('name', 'origin', 'buffered_manipulation', 'buffered_reasoner', 'mounted', 'base'):
+        assert getattr(again, name) == getattr(ref, name), name
+    assert again.quarantine == ['a line']
+    assert again.waiting == [waits]
+    assert not again.opened
+    assert store.notes == []
+    # Damage costs a hundred axioms at most, and never the settings.
+    lines = (tmp_path / 'store' / 'journal-0.log').read_text().splitlines()
+    assert len(lines) == 2 + -(-count // 100)
+
+
+def test_a_reference_whose_first_record_is_damaged_has_its_axioms_from_the_others(
+    tmp_path: Path,
+) -> None:
+    store = Store(tmp_path / 'store')
+    store.loaded(reference(150))
+    store.close()
+    path = tmp_path / 'store' / 'journal-0.log'
+    lines = path.read_bytes().splitlines(keepends=True)
+    path.write_bytes(b'damaged\n' + b''.join(lines[1:]))
+    store = Store(tmp_path / 'store')
+    (again,) = store.recover()
+    store.close()
+    assert len(again.kb) == 150
+    assert again.mounted == 'me'
+    assert len(store.notes) == 1
+
+
+def test_what_was_not_reasoned_over_is_known_after_the_death_with_what_was_before(
+    tmp_path: Path,
+) -> None:
+    store = Store(tmp_path / 'store')
+    ref = reference()
+    ref.buffered_manipulation = False
+    store.loaded(ref)
+    before = tuple(ref.kb.axioms())
+    told = [
+        Told('you', 7.0, (AddAxiom(ClassAssertion(f'{IRI}#K', f'{IRI}#{name}')),)) for name in 'ab'
+    ]
+    for one in told:
+        store.changed('map', one)
+    ref.on_reasoning(1)
+    # As after a death: nobody closed it.
+    left = json.loads((tmp_path / 'store' / 'reasoning').read_text())
+    assert left == {'map': [1, 1]}
+    fcntl.flock(store._journal._lock, fcntl.LOCK_UN)
+    again = Store(tmp_path / 'store')
+    (found,) = again.recover()
+    assert found.untested == told
+    assert set(found.origin_axioms) == set(before)
+    assert (found.deaths, found.died_at) == (1, 1)
+    # A further one counts on, until reasoning is completed.
+    found.on_reasoning(-1)
+    assert json.loads((tmp_path / 'store' / 'reasoning').read_text()) == {'map': [2, -1]}
+    found.on_reasoning(None)
+    found.on_completed()
+    found.on_reasoning(0)
+    assert json.loads((tmp_path / 'store' / 'reasoning').read_text()) == {'map': [1, 0]}
+    again.close()
+    assert (tmp_path / 'store' / 'reasoning').read_text() == '{}'
+    store.close()
+
+
+def test_a_snapshot_is_written_from_the_size_on_that_was_set(tmp_path: Path) -> None:
+    store = Store(tmp_path / 'store', compact_from=1)
+    ref = reference()
+    store.loaded(ref)
+    size = store._journal.size
+
+    @contextmanager
+    def hold_all() -> Iterator[list[Reference]]:
+        yield [ref]
+
+    def compacted() -> bool:
+        begun = store._snapshot
+        store.compact_if_large(hold_all)
+        if store._snapshot is None or store._snapshot is begun:
+            return False
+        store._snapshot.join(60.0)
+        return True
+
+    store._compact_from = size + 1
+    assert not compacted()
+    # Reasoning over it may end the process, and the journal says by which directive.
+    ref.untested = [Told('me', 0.0, ())]
+    store._compact_from = size
+    assert compacted()
+    assert not list((tmp_path / 'store').glob('snapshot-*'))
+    ref.untested = [Told('me', 0.0, ())] * (store_module.MOST_UNTESTED + 1)
+    assert compacted()
+    (path,) = (tmp_path / 'store').glob('snapshot-*')
+    # The next one comes where the journal is as long as the snapshot.
+    store._compact_from = 1
+    while store._journal.size + 60 < path.stat().st_size:
+        store.mounted('map', 'me')
+    assert not compacted()
+    store.mounted('map', 'me')
+    store.mounted('map', 'me')
+    assert compacted()
+    store.close()
+
+
+def test_nothing_is_written_to_a_store_that_was_closed(tmp_path: Path) -> None:
+    store = Store(tmp_path / 'store')
+    store.close()
+    for use in (
+        lambda: store.mounted('map', 'me'),
+        lambda: store.dropped('map'),
+        lambda: store.flushed('map'),
+    ):
+        with pytest.raises(StoreError, match=r': closed$'):
+            use()

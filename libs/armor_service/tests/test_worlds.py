@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import hashlib
 import sqlite3
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import owlready2
 import pytest
@@ -12,9 +14,14 @@ import pytest
 from armor_service import worlds as worlds_module
 from armor_service.access import Settings
 from armor_service.client import ArmorClient, InProcessTransport
+from armor_service.reference import Origin, Reference
 from armor_service.service import ArmorService
 from armor_service.store import Store
 from armor_service.worlds import Worlds, file_stem
+from owl_reasoner.feed import Changes
+from owl_reasoner.knowledge_base import KnowledgeBase
+from owl_reasoner.owl.axioms import ClassAssertion, SubClassOf
+from owl_reasoner.owl.expressions import ObjectSomeValuesFrom
 
 from .seven_rooms import IRI, ONTOLOGY, Ask, asker, build_seven_rooms
 
@@ -150,3 +157,131 @@ def test_every_reference_name_makes_a_file_name_of_its_own(name: str) -> None:
     assert stem not in ('.', '..', '')
     assert len(stem) <= 200
     assert stem != file_stem(name + 'x')
+
+
+def test_a_long_name_of_a_reference_is_hashed_for_its_file() -> None:
+    assert file_stem('x' * 200) == 'x' * 200
+    assert file_stem('x' * 201) == hashlib.sha256(b'x' * 201).hexdigest()[:32]
+    assert file_stem('ä' * 34) == hashlib.sha256('ä'.encode() * 34).hexdigest()[:32], (
+        'each is %C3%A4'
+    )
+    assert file_stem('a/b c') == 'a%2Fb c'
+    assert file_stem(' a') == hashlib.sha256(b' a').hexdigest()[:32]
+
+
+class Followed:
+    """An ontology whose World is written, without a service."""
+
+    def __init__(self, folder: Path) -> None:
+        self.notes: list[str] = []
+        self.worlds = Worlds(folder / 'deep' / 'worlds', self.notes.append)
+        self.kb = KnowledgeBase(IRI, [self.of('a')])
+        self.kb.reason()
+        self.ref = Reference('map', self.kb, Origin('', ''))
+        with self.ref.lock:
+            self.worlds.follow(self.ref)
+
+    def of(self, name: str, cls: str = 'K') -> ClassAssertion:
+        return ClassAssertion(f'{IRI}#{cls}', f'{IRI}#{name}')
+
+    def held(self, cls: str = 'K') -> set[str]:
+        """Return who is of a class in the file."""
+        assert self.worlds.flush()
+        path = str(self.worlds.path('map'))
+        world = owlready2.World(filename=path, exclusive=False, read_only=True)
+        found = world[f'{IRI}#{cls}']
+        try:
+            return names(found.instances()) if found is not None else set()
+        finally:
+            world.close()
+
+
+@pytest.fixture
+def followed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Followed]:
+    """Provide it, written as soon as it changes."""
+    monkeypatch.setattr(worlds_module, 'PAUSE', 0.0)
+    monkeypatch.setattr(worlds_module, 'RETRY_SECONDS', 0.01)
+    made = Followed(tmp_path)
+    yield made
+    made.worlds.close()
+
+
+def test_a_file_is_written_anew_where_its_changes_are_too_many_or_cannot_be_told(
+    followed: Followed, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    wholes: list[int] = []
+    replace = worlds_module._WorldFile.replace
+
+    def noted(file: Any, asserted: Any, derived: Any) -> None:
+        wholes.append(len(asserted))
+        replace(file, asserted, derived)
+
+    monkeypatch.setattr(worlds_module._WorldFile, 'replace', noted)
+    monkeypatch.setattr(worlds_module, 'MOST_WAITING', 3)
+    assert followed.held() == {'a'}
+    wholes.clear()
+    followed.kb.change([followed.of(name) for name in 'bc'], [followed.of('a')])
+    assert followed.held() == {'b', 'c'}
+    assert wholes == []
+    followed.kb.change([followed.of(name) for name in 'defg'])
+    assert followed.held() == set('bcdefg')
+    assert wholes == [6]
+    # Of an axiom with a node of its own that was never written nobody knows which node that is.
+    unknown = SubClassOf(f'{IRI}#K', ObjectSomeValuesFrom(f'{IRI}#p', f'{IRI}#K'))
+    waiting = followed.worlds._waiting['map']
+    followed.worlds._note(waiting, Changes(9, (), ((unknown, False),), True))
+    assert followed.held() == set('bcdefg')
+    assert wholes == [6, 6]
+    # The last axiom that names a class takes its declaration with it.
+    followed.kb.change([], [followed.of('b')])
+    assert followed.held() == set('cdefg')
+    followed.kb.change([followed.of('b', 'OTHER')])
+    assert followed.held('OTHER') == {'b'}
+    followed.kb.change([], [followed.of('b', 'OTHER')])
+    assert followed.held('OTHER') == set()
+    world = owlready2.World(filename=str(followed.worlds.path('map')), exclusive=False)
+    assert world[f'{IRI}#OTHER'] is None
+    world.close()
+
+
+def test_who_uses_an_ontology_for_long_is_not_waited_for(
+    followed: Followed, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(worlds_module, 'IN_USE', 0.0)
+    monkeypatch.setattr(worlds_module, 'MOST_WAITING', 0)
+    assert followed.held() == {'a'}
+    with followed.ref.lock:
+        followed.kb.change([followed.of('b')])
+        assert not followed.worlds.flush(0.05)
+    assert followed.held() == {'a', 'b'}
+    assert followed.notes == []
+
+
+def test_another_ontology_of_the_same_name_has_the_file(followed: Followed) -> None:
+    assert followed.held() == {'a'}
+    first = followed.ref
+    followed.kb = KnowledgeBase(IRI, [followed.of('z')])
+    followed.kb.reason()
+    followed.ref = Reference('map', followed.kb, Origin('', ''))
+    with followed.ref.lock:
+        followed.worlds.follow(followed.ref)
+    assert followed.held() == {'z'}
+    # What becomes of the one before changes nothing.
+    first.kb.change([followed.of('b')])
+    followed.worlds.drop(first)
+    assert followed.held() == {'z'}
+    followed.worlds.drop(followed.ref)
+    followed.worlds.drop(followed.ref)
+    assert followed.worlds.flush()
+    assert not followed.worlds.path('map').exists()
+    assert not list(followed.worlds.directory.glob('map*'))
+
+
+def test_a_file_that_was_taken_away_is_made_again(followed: Followed) -> None:
+    assert followed.held() == {'a'}
+    with followed.ref.lock:
+        for file in followed.worlds._files.values():
+            file.close()
+        followed.worlds.path('map').unlink()
+        followed.kb.change([followed.of('b')])
+    assert followed.held() == {'a', 'b'}
