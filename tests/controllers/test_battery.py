@@ -120,3 +120,60 @@ def test_a_station_that_was_moved_charges_where_it_is_now() -> None:
     assert '(7.00, 0.00)' in (use.why_not_charging() or '')
     use.see_pose((7.0, 0.0, 0.0), 1.0)
     assert use.docked
+
+
+def test_a_station_with_a_rate_charges_by_it() -> None:
+    battery = Battery(PARAMETERS, 10.0)
+    stations = {'E': Station((1.0, 0.0, 0.0), 30.0), 'W': Station((9.0, 0.0, 0.0))}
+    use = BatteryInUse(battery, stations, 0.5, since=0.0)
+    use.see_pose((1.0, 0.5, 0.0), 0.0)
+    use.advance(60.0)
+    assert battery.level == pytest.approx(40.0)
+    use.see_pose((1.0, 0.51, 0.0), 61.0)
+    assert use.why_not_charging() == (
+        'the robot is at (1.00, 0.51), not at a station (1.00, 0.00) or (9.00, 0.00)'
+    )
+
+
+def test_a_day_away_is_counted_and_a_longer_time_is_another_clock() -> None:
+    parameters = BatteryParameters(capacity=100.0, rest_power=1.0)
+    for passed, drawn in ((86_400.0, 24.0), (86_401.0, 0.0), (0.0, 0.0), (-1.0, 0.0)):
+        battery = Battery(parameters)
+        BatteryInUse(battery, {}, 0.5, since=50.0).advance(50.0 + passed)
+        assert battery.energy == pytest.approx(100.0 - drawn)
+    battery = Battery(parameters)
+    use = BatteryInUse(battery, {}, 0.5, since=None)
+    use.advance(5000.0)
+    assert battery.level == 100, 'when time first passes nothing was drawn'
+    use.advance(8600.0)
+    assert battery.energy == pytest.approx(99.0)
+
+
+def test_what_somebody_else_accounts_for_is_not_counted_again() -> None:
+    battery, use = in_use()
+    use.see_pose((3.0, 0.0, 0.0), 0.0)
+    move_arm(use, 4.0, now=0.0)
+    use.see_pose((4.0, 0.0, 1.0), 2.0)
+    use.skip(2.0)
+    use.advance(2.0)
+    assert battery.energy == 0.5
+    use.advance(5.0)
+    assert battery.energy == pytest.approx(0.48), 'two of the four seconds of the arm'
+
+
+def test_turns_over_the_half_circle_are_counted_the_short_way() -> None:
+    battery, use = in_use()
+    use.see_pose((3.0, 0.0, 3.0), 0.0)
+    use.see_pose((3.0, 0.0, -3.0), 1.0)
+    use.see_pose((3.0, 0.0, 3.0), 1.0)  # of the same time: no turn that could be driven
+    use.see_pose((3.0, 0.0, 3.1), 2.0)
+    use.advance(2.0)
+    turned = math.tau - 6.0 + 0.1
+    assert battery.energy == pytest.approx(0.5 - 18 * turned / 3600)
+
+
+def test_the_arm_is_counted_for_20_s_at_the_most() -> None:
+    battery, use = in_use()
+    move_arm(use, 100.0, now=0.0)
+    use.advance(100.0)
+    assert battery.energy == pytest.approx(0.5 - 36 * 20 / 3600)

@@ -101,3 +101,94 @@ def test_negative_amounts_are_refused() -> None:
         battery.draw(-1)
     with pytest.raises(ValueError, match='expected 0 or more'):
         battery.charge(-1)
+
+
+def integrated(
+    level: float, seconds: float, parameters: BatteryParameters, rate: float | None = None
+) -> float:
+    """Return the level after charging in steps of a second, as the module describes its course."""
+    p, charge = parameters, level / 100
+    full = p.charging_power if rate is None else rate / 100 * p.capacity * 60
+    for _ in range(round(seconds)):
+        missing = (1 - charge) / (1 - p.taper_from)
+        power = full * (1.0 if charge < p.taper_from else max(p.taper_floor, missing))
+        charge = min(1.0, charge + power / 3600 / p.capacity)
+    return 100 * charge
+
+
+@pytest.mark.parametrize('rate', [None, 20.0])
+@pytest.mark.parametrize(
+    ('level', 'seconds'),
+    [(0, 60), (70, 60), (70, 400), (90, 120), (90, 900), (97.5, 60), (99.5, 60), (100, 60)],
+)
+def test_the_closed_form_is_the_course_that_small_steps_take(
+    level: float, seconds: float, rate: float | None
+) -> None:
+    parameters = BatteryParameters(capacity=20.0, charging_power=300.0, taper_from=0.8)
+    battery = Battery(parameters, level)
+    battery.charge(seconds, rate)
+    expected = integrated(level, seconds, parameters, rate)
+    assert battery.level == pytest.approx(expected, abs=0.15)
+    assert (battery.level == 100) == (expected == 100)
+
+
+def test_the_station_gives_less_as_the_battery_fills() -> None:
+    battery = Battery(BatteryParameters(charging_power=600.0, taper_from=0.8, taper_floor=0.1))
+    powers = []
+    for level in (0, 79.9, 80, 90, 97, 98, 99.9, 100):
+        battery.set_level(level)
+        powers.append(battery.charging_power())
+    assert powers == pytest.approx([600, 600, 600, 300, 90, 60, 60, 0])
+
+
+def test_whole_percent_are_those_that_were_set() -> None:
+    for capacity in (40.0, 7.3, 0.9):
+        battery = Battery(BatteryParameters(capacity=capacity))
+        for level in range(101):
+            battery.set_level(level)
+            assert battery.percent == level
+    battery.set_level(130)
+    assert battery.level == 100
+    battery.set_level(-4)
+    assert battery.level == 0
+
+
+def test_the_voltage_is_a_line_between_empty_and_full() -> None:
+    battery = Battery(BatteryParameters(empty_voltage=18.0, full_voltage=25.0), 0.0)
+    assert battery.voltage == 18.0
+    battery.set_level(50)
+    assert battery.voltage == 21.5
+    battery.set_level(100)
+    assert battery.voltage == 25.0
+
+
+def test_sizes_on_the_edge_are_taken_and_the_others_are_not() -> None:
+    BatteryParameters(
+        rest_power=0.0,
+        joules_per_metre=0.0,
+        joules_per_radian=0.0,
+        equipment_power=0.0,
+        taper_floor=1.0,
+    )
+    for values in (
+        {'charging_power': 0.0},
+        {'empty_voltage': 0.0},
+        {'joules_per_metre': -0.1},
+        {'joules_per_radian': -0.1},
+        {'equipment_power': -0.1},
+        {'taper_from': 0.0},
+        {'taper_floor': 1.01},
+        {'full_voltage': 18.0},
+    ):
+        with pytest.raises(ValueError, match=f'{next(iter(values))} is .*: expected '):
+            BatteryParameters(**values)
+
+
+def test_nothing_used_takes_nothing() -> None:
+    battery = Battery(BatteryParameters(), 50)
+    assert battery.draw(0) == 0
+    battery.charge(0)
+    assert battery.level == 50
+    for used in ({'metres': -1.0}, {'radians': -1.0}, {'equipment_seconds': -1.0}):
+        with pytest.raises(ValueError, match='negative amount'):
+            battery.draw(1, **used)
