@@ -10,7 +10,12 @@ import pytest
 
 from surveillance_controllers.geometry import Pose, Scan, composed, relative
 from surveillance_controllers.motion.localisation import Localiser
-from surveillance_controllers.motion.odometry import ContinuousOdometry, OdometryBuffer, joined
+from surveillance_controllers.motion.odometry import (
+    ContinuousOdometry,
+    OdometryBuffer,
+    is_jump,
+    joined,
+)
 
 
 def moving(at: float) -> Pose:
@@ -113,3 +118,96 @@ def test_between_two_readings_and_a_little_after_the_last_the_robot_goes_on() ->
     first, last = buffer.at(np.array([0.55, 1.1])).tolist()
     assert first == pytest.approx([0.55, 0.0, 3.155])
     assert last == pytest.approx([1.1, 0.0, 3.21])
+
+
+def test_where_each_ray_ended_stays_where_it_was() -> None:
+    """Rays of a lidar that sits aside, of a robot that drives and turns, beside plain geometry."""
+    buffer, rng = readings(1.0), np.random.default_rng(4)
+    mount, stamp = (0.2, -0.1, 0.4), 0.8
+    angles = np.linspace(-2.0, 2.0, 41)
+    ranges = rng.uniform(4.0, 6.0, 41)
+    ranges[[3, 20]] = np.inf, np.nan
+    times = np.linspace(0.0, 0.1, 41)
+    met = np.isfinite(ranges)
+    ends = []
+    for angle, reach, at in zip(angles, ranges, times, strict=True):
+        lidar = composed(moving(stamp + at), mount)
+        ends.append(composed(lidar, (reach * math.cos(angle), reach * math.sin(angle), 0.0))[:2])
+    expected = np.array(ends)[met]
+    seen = joined(Scan(angles, ranges, 9.0, mount, times), buffer, stamp)
+    told = np.array([composed(moving(1.0), (x, y, 0.0))[:2] for x, y in seen.points])
+    assert (np.diff(seen.angles) >= 0.0).all()
+    assert np.isinf(seen.ranges).sum() == np.isnan(seen.ranges).sum() == 1
+    order, again = np.lexsort(np.round(told, 2).T), np.lexsort(np.round(expected, 2).T)
+    assert told[order] == pytest.approx(expected[again], abs=0.003)
+    # Seen from where the lidar was in the middle of its turn.
+    middle = composed(moving(0.85), mount)
+    assert composed(moving(1.0), seen.mount) == pytest.approx(middle, abs=0.003)
+    still = OdometryBuffer()
+    for tick in range(51):
+        still.add(tick / 50, (1.0, 2.0, 0.5))
+    same = joined(Scan(angles, ranges, 9.0, mount, times), still, 0.8)
+    assert same.mount == pytest.approx(mount)
+    assert same.times is None
+    assert np.array_equal(same.angles, angles)
+    plain = Scan(angles, ranges, 9.0, mount)
+    assert joined(plain, still, 0.8) is plain
+
+
+def test_a_scan_of_one_moment_is_seen_from_where_the_lidar_was_then() -> None:
+    buffer, mount = readings(1.0), (0.2, -0.1, 0.4)
+    scan = Scan(np.zeros(1), np.ones(1), 9.0, mount)
+    seen = joined(scan, buffer, 0.5)
+    assert composed(moving(1.0), seen.mount) == pytest.approx(composed(moving(0.5), mount))
+    assert joined(scan, buffer, 1.0) is scan
+    at_once = Scan(np.zeros(1), np.ones(1), 9.0, mount, np.zeros(1))
+    assert joined(at_once, buffer, 0.5).mount == seen.mount
+
+
+def test_what_no_robot_drives_between_two_readings_is_a_jump() -> None:
+    first = (1.0, 2.0, 3.0)
+    for step, jumps in (
+        ((0.29, 0.0, 0.0), False),
+        ((0.0, -0.31, 0.0), True),
+        ((0.25, 0.25, 0.0), True),
+        ((0.0, 0.0, 0.59), False),
+        ((0.0, 0.0, -0.61), True),
+    ):
+        assert is_jump(first, composed(first, step)) is jumps
+
+
+def test_readings_are_kept_for_two_seconds_and_in_their_order() -> None:
+    buffer = OdometryBuffer()
+    assert buffer.latest is None
+    assert not buffer.covers(0.0, 0.0)
+    buffer.add(5.0, (0.0, 0.0, 0.0))
+    assert buffer.covers(5.0, 5.2)
+    assert not buffer.covers(4.99, 5.0)
+    assert not buffer.covers(5.0, 5.21)
+    buffer.add(5.0, (0.1, 0.0, 0.0))
+    buffer.add(4.91, (0.1, 0.0, 0.0))
+    assert buffer.latest == (5.0, (0.0, 0.0, 0.0)), 'late, or of the same time'
+    buffer.add(6.9, (0.1, 0.0, 0.0))
+    assert buffer.covers(5.0, 6.9)
+    buffer.add(7.1, (0.2, 0.0, 0.0))
+    assert not buffer.covers(5.0, 6.9)
+    assert buffer.covers(6.9, 7.1)
+    buffer.add(6.9, (0.2, 0.0, 0.0))
+    assert buffer.latest == (6.9, (0.2, 0.0, 0.0)), 'the clock was set back'
+    assert not buffer.covers(6.8, 6.8)
+    buffer.add(8.9, (0.2, 0.0, 0.0))
+    assert not buffer.covers(6.9, 8.9), 'nothing was heard for too long'
+
+
+def test_a_robot_goes_on_with_the_velocity_of_the_last_tenth_of_a_second() -> None:
+    buffer = OdometryBuffer()
+    for tick in range(11):  # 0.5 m/s, for the last 0.1 s 1 m/s
+        x = 0.5 * 0.05 * tick + (0.025 * max(0, tick - 8))
+        buffer.add(0.05 * tick, (x, -x, 0.0))
+    before, at, after = buffer.at(np.array([0.225, 0.5, 0.6]))
+    assert before == pytest.approx([0.1125, -0.1125, 0.0])
+    assert at == pytest.approx([0.3, -0.3, 0.0])
+    assert after == pytest.approx([0.4, -0.4, 0.0])
+    alone = OdometryBuffer()
+    alone.add(1.0, (1.0, 2.0, 0.3))
+    assert alone.at(np.array([1.1]))[0] == pytest.approx([1.0, 2.0, 0.3])
