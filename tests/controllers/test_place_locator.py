@@ -55,7 +55,9 @@ def test_the_cells_of_a_place_are_those_nearest_to_its_point(grid: Grid) -> None
     free = grid.free
     found = {name: regions.cells_of(name) for name in 'ABC'}
     a, b, c = found['A'], found['B'], found['C']
-    assert a is not None and b is not None and c is not None
+    assert a is not None
+    assert b is not None
+    assert c is not None
     away = np.abs(x - 2.0) > 0.1
     assert np.array_equal(a & away, free & (x < 2.0) & away)
     assert np.array_equal(b & away, free & (x > 2.0) & (to_b <= to_c) & away)
