@@ -555,6 +555,31 @@ def test_stays_of_one_picture_each_tell_of_a_dark_room_in_the_third_one():
     assert lights == [('R1', 'off'), ('R2', 'on')] * 2, 'in the third stay and the fourth one'
 
 
+@pytest.mark.parametrize(
+    ('apart', 'doorway', 'told'), [(2.0, False, False), (20.0, False, True), (20.0, True, False)]
+)
+def test_a_busy_machine_tells_a_dark_room_by_two_pictures_of_a_long_stay(apart, doorway, told):
+    watch = Round()
+    dark, between = np.full((240, 320), 3, np.uint8), texture()
+    watch.watcher.arrive('R1', watch.time)
+    for picture in [dark, between, dark] if doorway else [dark, dark]:
+        watch.time += apart
+        watch.watcher.picture(picture, None, watch.time, None)
+    off = [each for each in watch.told if each.kind == Kind.LIGHT and each.state == 'off']
+    assert bool(off) is told
+
+
+def test_two_dark_pictures_of_two_stays_tell_nothing():
+    """In between somebody may have switched the light on."""
+    watch = Round()
+    for place in ('R1', 'R2', 'R1'):
+        watch.watcher.arrive(place, watch.time)
+        watch.time += 60.0
+        picture = texture() if place == 'R2' else np.full((240, 320), 3, np.uint8)
+        watch.watcher.picture(picture, None, watch.time, None)
+    assert not [each for each in watch.told if each.kind == Kind.LIGHT]
+
+
 def test_a_lit_doorway_does_not_make_a_dark_room_lit():
     watch = Round()
     dark = np.full((240, 320), 3, np.uint8)

@@ -14,7 +14,7 @@ from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import datetime
-from typing import Any, Protocol
+from typing import Any, Generic, Protocol, TypeVar
 
 import cv2
 import numpy as np
@@ -73,7 +73,10 @@ SEEN_AGAIN = 10.0
 MOST_LIT = 500
 """Of so many places it is kept how light they were."""
 AGREED_PICTURES = 3
-"""A dark or covered view, and an unknown marker, must be seen in so many pictures."""
+"""A dark or covered view, and an unknown marker, must be seen in so many pictures in a row."""
+AGREED_SECONDS = 4.0
+"""Or in two of one stay that are as far apart as so many usually are, seconds: a busy machine looks
+at few of them."""
 ONE_LOOK, SEEN_TWICE = 0.5, 0.95
 """Confidence in a changed view after one look, at most, and after two, at least: a third is not
 waited for."""
@@ -101,8 +104,26 @@ BEHIND = 0.3
 """Depth of what stands in a way, metres."""
 
 
+_Value = TypeVar('_Value')
 _MarkerPicture = tuple[Picture, Viewpoint | None, float, Sequence[SeenMarker], CameraView]
 """A picture, from where it was taken, when, the markers in it, and where on the map that was."""
+
+
+class _Agreement(Generic[_Value]):
+    """What the last pictures say, and whether they agree on it."""
+
+    def __init__(self) -> None:
+        self._last: deque[tuple[_Value, int, float]] = deque(maxlen=AGREED_PICTURES)
+
+    def take(self, value: _Value, look: int, stamp: float) -> bool:
+        """Take what a picture of a stay says; tell whether that is settled."""
+        self._last.append((value, look, stamp))
+        if len(self._last) == AGREED_PICTURES and all(each[0] == value for each in self._last):
+            return True
+        return any(
+            before == value and stay == look and stamp - taken >= AGREED_SECONDS
+            for before, stay, taken in list(self._last)[-2:-1]
+        )
 
 
 @dataclass
@@ -244,10 +265,10 @@ class Watcher:
         # Pictures of this stay whose markers are judged once it is clear what else they show.
         self._held: list[_MarkerPicture] = []
         self._saw_clearly = False
-        self._strange: dict[int, int] = {}
-        self._sights: deque[Sight] = deque(maxlen=AGREED_PICTURES)
+        self._strange: dict[int, _Agreement[bool]] = {}
+        self._sights: _Agreement[Sight] = _Agreement()
         self._sight: Sight | None = None
-        self._lights: dict[str, deque[str]] = {}
+        self._lights: dict[str, _Agreement[str]] = {}
         self._light = ''
 
     # --- the floor and its doors ---
@@ -579,11 +600,10 @@ class Watcher:
         """
         grey = grey_of(picture)
         self._pictures += 1
-        self._sights.append(sight_of(grey))
-        settled = len(self._sights) == AGREED_PICTURES and len(set(self._sights)) == 1
-        sight = self._sights[-1]
+        sight = sight_of(grey)
+        settled = self._sights.take(sight, self._look, stamp)
         light = light_of(grey, sight)
-        if light and self._lit(light) and light != self._light:
+        if light and self._lit(light, stamp) and light != self._light:
             self._light = light
             self._take(Observation(Kind.LIGHT, light, self._place, stamp=stamp), grey)
         if settled and sight != self._sight:
@@ -647,17 +667,16 @@ class Watcher:
             if self._is_due(observation):
                 self._take(observation, picture, known.picture)
 
-    def _lit(self, light: str) -> bool:
+    def _lit(self, light: str, stamp: float) -> bool:
         """Take how light a picture of this place is; tell whether the last ones of it agree.
 
         A short stay has one or two pictures: those of earlier stays count, too.
         """
-        lights = self._lights.pop(self._place, None) or deque(maxlen=AGREED_PICTURES)
-        lights.append(light)
+        lights = self._lights.pop(self._place, None) or _Agreement()
         self._lights[self._place] = lights
         for oldest in list(self._lights)[:-MOST_LIT]:
             del self._lights[oldest]
-        return len(lights) == AGREED_PICTURES and len(set(lights)) == 1
+        return lights.take(light, self._look, stamp)
 
     def _doors_near(self, point: tuple[float, float]) -> dict[str, str]:
         """Return the states of the doors near a point, of those that this visit has seen."""
@@ -716,9 +735,11 @@ class Watcher:
         if not self._known_markers:
             return
         numbers = {each.number for each in seen} - self._known_markers
-        self._strange = {number: self._strange.get(number, 0) + 1 for number in numbers}
-        for number, count in self._strange.items():
-            if count >= AGREED_PICTURES:
+        self._strange = {
+            number: self._strange.get(number, _Agreement[bool]()) for number in numbers
+        }
+        for number, pictures in self._strange.items():
+            if pictures.take(True, self._look, stamp):
                 where = self._at
                 strange = Observation(
                     Kind.MARKER, 'unknown', self._place, str(number), where, 0.9, stamp
