@@ -162,7 +162,7 @@ class Robot:
         """Run the mission until the condition holds, or until ``latest``."""
         now = since
         while now < latest and not condition():
-            now = min(now + 20.0, latest)
+            now = min(now + 10.0, latest)
             self.until(now)
 
     def summary(self) -> Summary:

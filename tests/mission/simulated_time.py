@@ -24,7 +24,7 @@ from state_machines.ros import ClockWait
 CARRIES_ON = ('surveillance', 'patrol', 'machine', ' goal', '_recharge')
 """Ends of the names of threads whose sleep means that nothing else is under way."""
 
-STEP = 0.5
+STEP = 1.0
 """Time passes in steps of at least this many seconds; sleeps may last that much longer."""
 PATIENCE = 60.0
 """How long a node may take to follow the clock, and a sleeper to wake up, seconds of real time."""

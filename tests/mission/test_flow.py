@@ -20,6 +20,7 @@ from .robot import Robot, mission
 from .simulated_time import START
 
 BEHAVIOURS = ['surveillance', 'patrol']
+PLACES = {'C1', 'C2', 'E', 'R1', 'R2', 'R3', 'R4'}
 TRIPS = {'surveillance': 2, 'patrol': 3}
 """Round trips to the armor server a leg, of all nodes together."""
 
@@ -55,11 +56,11 @@ def test_a_leg_costs_few_round_trips(
     monkeypatch.setattr(ArmorServer, '_on_list', on_list)
     robot.configure('battery_controller', random_battery_time=[5000.0, 6000.0])
     robot.begin()
-    robot.until(60.0)
+    robot.until(30.0)
     before, legs = asked.total(), len(robot.decisions())
-    robot.until(200.0)
+    robot.until_true(lambda: len(robot.decisions()) - legs >= 8, since=30.0, latest=300.0)
     legs = len(robot.decisions()) - legs
-    assert legs > 10
+    assert legs >= 8
     assert (asked.total() - before) / legs < TRIPS[behaviour] + 0.5, asked
 
 
@@ -70,12 +71,14 @@ def test_a_server_that_comes_back_empty_is_told_what_was_and_nothing_else(
     robot.be_impatient()
     robot.configure('battery_controller', random_battery_time=[5000.0, 6000.0])
     robot.begin()
+    robot.until_visited(PLACES, since=0.0, latest=300.0)
+    began = robot.time.now - START
     # The behaviour first, then the server: whoever saw the visits is gone as well.
-    robot.time.at(170.0, lambda: robot.leave('robot_behavior'))
-    robot.time.at(171.0, lambda: robot.leave('armor_server'))
-    robot.time.at(173.0, lambda: robot.arrive('armor_server'))
-    robot.time.at(175.0, lambda: robot.arrive('robot_behavior'))
-    robot.until(205.0)
+    robot.time.at(began + 1.0, lambda: robot.leave('robot_behavior'))
+    robot.time.at(began + 2.0, lambda: robot.leave('armor_server'))
+    robot.time.at(began + 4.0, lambda: robot.arrive('armor_server'))
+    robot.time.at(began + 6.0, lambda: robot.arrive('robot_behavior'))
+    robot.until(began + 36.0)
     visits = [
         (event.time, event.text('place')) for event in robot.events() if event.name == 'visit'
     ]
@@ -90,12 +93,14 @@ def test_a_server_that_comes_back_empty_is_told_what_was_and_nothing_else(
         room: float(value_in(armor.query.dataprop_b2_ind('visitedAt', room)[0]))
         for room in armor.query.ind_b2_class('LOCATION')
     }
-    assert any(time < START + 171.0 for time, _ in stays.values()), 'one that nobody saw since'
+    assert any(time < START + began + 2.0 for time, _ in stays.values()), (
+        'one that nobody saw since'
+    )
     for room, seconds in told.items():
         if room != places[-1].place:
             first, last = stays.get(room, (0.0, 0.0))
             assert first - 1.0 <= seconds <= last, room
-    assert robot.visited(since=180.0), 'the mission goes on'
+    assert robot.visited(since=began + 10.0), 'the mission goes on'
     assert not any(
         'inconsistent' in event.text('reason')
         for event in robot.events()
@@ -116,9 +121,9 @@ def test_a_mission_outlives_an_ontology_that_contradicts_itself(
 
     robot.configure('battery_controller', random_battery_time=[5000.0, 6000.0])
     robot.begin()
-    robot.time.at(70.0, clash)
-    robot.until(150.0)
-    assert robot.visited(since=75.0), 'the mission goes on'
+    robot.time.at(40.0, clash)
+    robot.until(90.0)
+    assert robot.visited(since=45.0), 'the mission goes on'
     assert armor.utils.sync_buffered_reasoner(), 'consistent'
     told = [line for line in capfd.readouterr().err.splitlines() if 'contradicts itself' in line]
     assert len(told) == 1

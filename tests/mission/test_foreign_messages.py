@@ -1,4 +1,4 @@
-"""One well-formed message on any topic, benign or hostile, costs the mission nothing."""
+"""The same seeds give the same mission, and what a stranger says once changes nothing of it."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ NOT_OURS = ('/clock', '/parameter_events', '/rosout', '/diagnostics')
 """Simulated time is the whole domain's; a parameter event is what another node says of itself."""
 COMMANDS = ('container_init', 'map/build_map', '_action/')
 """What is sent there is obeyed: that is what the topic is for."""
-SECONDS = 160.0
+SECONDS = 110.0
 
 
 def heard_topics(nodes: list[Any]) -> dict[str, Any]:

@@ -29,6 +29,7 @@ from .scripted_peers import (
     SILENT,
     ScriptedMotion,
 )
+from .simulated_time import START
 
 PLACES = {'C1', 'C2', 'E', 'R1', 'R2', 'R3', 'R4'}
 BEHAVIOURS = ['surveillance', 'patrol']
@@ -53,8 +54,7 @@ def test_a_mission_reaches_all_places_and_charges(robot: Robot, graph: Any) -> N
         return often and many and done.recharges >= 1 and rules <= set(done.rules)
 
     robot.begin()
-    robot.until(200.0)
-    robot.until_true(is_all_done, since=200.0, latest=500.0)
+    robot.until_true(is_all_done, since=0.0, latest=500.0)
     assert is_all_done(), robot.summary()
     assert not robot.summary().failures
     assert all(message.place in PLACES and message.reason for message in decisions)
@@ -70,7 +70,7 @@ def test_every_node_may_leave_and_come_back(robot: Robot, graph: Any) -> None:
     for name in [*robot.nodes]:
         robot.time.at(moment, lambda name=name: robot.leave(name))
         robot.time.at(moment + 8.0, lambda name=name: robot.arrive(name))
-        moment += 50.0
+        moment += 30.0
     robot.until_visited(PLACES, since=moment, latest=moment + 300.0)
     assert any(message.waiting_for_help for message in status)
     assert robot.summary().restarts == 1
@@ -114,9 +114,11 @@ def test_whatever_planner_and_controller_answer_the_mission_goes_on(
     robot.nodes['scripted_motion'] = motion
     motion.planning.extend([GOOD, REJECTED, GOOD, ABORTED, SILENT, EMPTY, ELSEWHERE, NOT_FINITE])
     motion.moving.extend([GOOD, SHORT, GOOD, ABORTED, SILENT, GOOD, REJECTED])
-    robot.until_visited(PLACES, since=200.0, latest=500.0)
+    robot.until_true(lambda: not (motion.planning or motion.moving), since=0.0, latest=300.0)
     assert not motion.planning
     assert not motion.moving
+    since = robot.time.now - START
+    robot.until_visited(PLACES, since=since, latest=since + 300.0)
     reasons = ' '.join(event.text('reason') for event in robot.events() if event.name == 'failure')
     for words in (
         'the goal was rejected',
@@ -130,27 +132,6 @@ def test_whatever_planner_and_controller_answer_the_mission_goes_on(
         assert words in reasons
 
 
-@pytest.mark.parametrize('behaviour', BEHAVIOURS)
-def test_the_same_seeds_give_the_same_mission(
-    behaviour: str, graph: Any, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    taken = []
-    for number in range(2):
-        with monkeypatch.context() as patch:
-            again = type(graph)()
-            try:
-                record = tmp_path / f'{number}.jsonl'
-                with mission(again, patch, behaviour, record) as robot:
-                    robot.begin()
-                    robot.until(100.0)
-                    taken.append(robot.decisions())
-            finally:
-                again.close()
-    shorter = min(len(decisions) for decisions in taken)
-    assert shorter > 6
-    assert taken[0][:shorter] == taken[1][:shorter]
-
-
 def test_parameters_may_change_while_the_mission_runs(robot: Robot) -> None:
     robot.configure('battery_controller', random_battery_time=[5000.0, 6000.0])
     robot.begin()
@@ -162,7 +143,7 @@ def test_parameters_may_change_while_the_mission_runs(robot: Robot) -> None:
     assert 'URGENT stands twice' in refused
     assert robot.set_parameter(node, 'rooms_priority', ['CORRIDOR']) == ''
     assert robot.set_parameter(node, 'policy', 'oldest') == ''
-    robot.until(140.0)
+    robot.until(110.0)
     rules = [rule for _, rule in robot.decisions()][-5:]
     assert set(rules) == {'CORRIDOR'}
 
@@ -205,7 +186,7 @@ def test_a_machine_that_breaks_is_started_again_and_does_not_cry_on(
     monkeypatch.setattr(
         health, 'error', lambda *said: (errors.append(said[1]), note_error(*said))[1]
     )
-    robot.until(120.0)
+    robot.until(90.0)
     assert broken.is_set()
     cries = [message.waiting_for_help for message in status]
     assert any('a mistake' in message.text for message in status)
@@ -213,7 +194,7 @@ def test_a_machine_that_breaks_is_started_again_and_does_not_cry_on(
     assert not cries[-1]
     assert [each for each in errors if 'a mistake' in each]
     assert health.findings() == []
-    assert len(robot.visited(since=60.0)) > 2
+    assert len(robot.visited(since=30.0)) > 2
 
 
 def test_an_operator_asks_why_not_and_sends_the_robot_to_a_place(robot: Robot, graph: Any) -> None:
@@ -239,7 +220,7 @@ def test_an_operator_asks_why_not_and_sends_the_robot_to_a_place(robot: Robot, g
     taken = {mission.place, mission.heading_to}
     place = next(room for room in ('R4', 'R3', 'R2') if room not in taken)
     assert answer(sent, GoTo.Request(place=place)).success
-    robot.until(120.0)
+    robot.until_true(lambda: place in robot.visited(since=20.0), since=20.0, latest=120.0)
     assert (place, 'request') in robot.decisions()
     assert place in robot.visited(since=20.0)
     home = answer(sent, GoTo.Request())
