@@ -3,6 +3,9 @@ wrong."""
 
 from __future__ import annotations
 
+import re
+
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -12,9 +15,14 @@ from surveillance_controllers.manual.commands import (
     LONGEST_LINE,
     MOTION,
     PLANNER,
+    Argument,
+    Command,
     CommandError,
     Grammar,
     ParsedCommand,
+    move_request,
+    path_request,
+    point,
 )
 
 ALL = Grammar([*BATTERY, *PLANNER, *MOTION])
@@ -135,3 +143,112 @@ def test_help_lists_every_command_with_its_arguments() -> None:
     text = Grammar(BATTERY).help()
     for usage in ('battery set VALUE', 'battery offset OFFSET', 'help', 'status', 'exit'):
         assert usage in text
+
+
+def test_a_request_for_a_path_says_how_far_apart_its_ends_are() -> None:
+    start, goal = np.array([0.0, 0.0, 0.0]), np.array([3.0, 4.0, 0.0])
+    assert path_request('plan to R1', start, goal) == (
+        'New request: plan to R1\n'
+        '  start (0, 0, 0), goal (3, 4, 0), 5.00 m apart\n'
+        '  Answer with: plan set [[x,y,z],...]   (the points between start and goal)'
+    )
+
+
+@pytest.mark.parametrize(
+    ('count', 'along', 'shown'),
+    [
+        (1, '0.00 m along 1 point', '(0, 0, 0)'),
+        (2, '1.00 m along 2 points', '(0, 0, 0) (1, 0, 0)'),
+        (12, '11.00 m along 12 points', ' '.join(f'({n}, 0, 0)' for n in range(12))),
+        (
+            13,
+            '12.00 m along 13 points',
+            '(0, 0, 0) (1, 0, 0) (2, 0, 0) (3, 0, 0) (4, 0, 0) (5, 0, 0) ... 1 more ... '
+            '(7, 0, 0) (8, 0, 0) (9, 0, 0) (10, 0, 0) (11, 0, 0) (12, 0, 0)',
+        ),
+    ],
+)
+def test_a_request_for_a_motion_shows_its_path(count: int, along: str, shown: str) -> None:
+    path = np.array([[float(n), 0.0, 0.0] for n in range(count)])
+    assert move_request('move', path).splitlines() == [
+        'New request: move',
+        f'  start (0, 0, 0), goal ({count - 1}, 0, 0), {along}',
+        f'  path {shown}',
+        '  Answer with: move TIME DELTA   (seconds, metres)',
+    ]
+
+
+def test_points_are_shown_with_four_digits() -> None:
+    assert point([10.0, -0.12346, 1234.56]) == '(10, -0.1235, 1235)'
+
+
+@pytest.mark.parametrize(
+    ('line', 'values'),
+    [
+        ('battery set 0', (0,)),
+        ('battery set 100', (100,)),
+        ('battery offset -100', (-100,)),
+        ('battery offset +100', (100,)),
+        ('move 0 -1000', (0.0, -1000.0)),
+        ('move 86400 1000', (86_400.0, 1000.0)),
+        ('move\t5   -.5e1', (5.0, -5.0)),
+        ('plan set  [ [1,2,3] , [4,5,6] ] ', (((1, 2, 3), (4, 5, 6)),)),
+        (' ' * (LONGEST_LINE - 4) + 'help', ()),
+    ],
+)
+def test_values_on_their_bounds_are_taken(line: str, values: tuple[object, ...]) -> None:
+    parsed = ALL.parse(line)
+    assert parsed is not None
+    assert parsed.values == values
+
+
+@pytest.mark.parametrize(
+    'line',
+    [
+        'battery set -1',
+        'battery set 1234567890',
+        'battery offset 101',
+        'battery offset -101',
+        'move 86400.1 0',
+        'move 1 1000.1',
+        'move 1 1e999',
+        'plan set [[1,2,3],]',
+        'plan set [,[1,2,3]]',
+        'plan set [[1,2,3]] 4',
+        'plan set [1,2,3]',
+        'plan set [[1,2,3] [4,5,6]]',
+    ],
+)
+def test_values_beyond_their_bounds_are_not(line: str) -> None:
+    with pytest.raises(CommandError, match='expected'):
+        ALL.parse(line)
+
+
+def test_what_is_shown_of_a_long_word_has_an_end() -> None:
+    for length, shown in ((60, 'x' * 60), (61, 'x' * 57 + '...')):
+        with pytest.raises(CommandError, match=f"^'{re.escape(shown)}' is no command"):
+            ALL.parse('x' * length)
+
+
+def test_arguments_propose_what_is_known_after_those_before() -> None:
+    command = Command(
+        ('door', 'open'),
+        (
+            Argument('ROOM', 'a room', str, known=lambda: ('Hall', 'R1', 'R2')),
+            Argument('DOOR', 'a door', str, known=lambda room: (f'{room}-D1',)),
+        ),
+        'Open a door.',
+    )
+    grammar = Grammar([command])
+    assert grammar.completions('door open ') == ['Hall', 'R1', 'R2']
+    assert grammar.completions('DOOR open r') == ['R1', 'R2']
+    assert grammar.completions('door open R1 ') == ['R1-D1']
+    assert grammar.completions('door open R1 R1-D1 ') == []
+    assert grammar.completions('door shut ') == []
+    assert (command.name, command.usage) == ('door open', 'door open ROOM DOOR')
+    assert grammar.help().splitlines() == [
+        '  door open ROOM DOOR  Open a door.',
+        '  help                 List the commands.',
+        '  status               Show the request that waits for a command, if there is one.',
+        "  exit                 Stop this console's node.",
+    ]

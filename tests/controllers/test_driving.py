@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,6 +12,7 @@ import pytest
 from surveillance_controllers.geometry import composed
 from surveillance_controllers.motion.driving import Drive, RecoveryParameters, Spin, State
 from surveillance_controllers.motion.path_following import DriveParameters, Velocity
+from surveillance_controllers.motion.tracking import Mover
 
 NOTHING = np.zeros((0, 2))
 PERIOD = 0.1
@@ -206,3 +209,231 @@ def test_a_spin_that_does_not_go_on_ends() -> None:
         spin.step(1.0, steps * PERIOD)
         steps += 1
     assert 2.0 < steps * PERIOD < 10.0
+
+
+WALL = np.array([[0.26, y] for y in np.linspace(-0.3, 0.3, 31)])
+"""Right before the robot, in its frame."""
+AHEAD = [[0.0, 0.0], [5.0, 0.0]]
+ORIGIN = (0.0, 0.0, 0.0)
+
+
+def stand(drive: Drive, begin: float, end: float, seen: np.ndarray = WALL, **more: Any) -> Velocity:
+    """Step a drive of a robot that stands, every 0.1 s from one time up to before another."""
+    velocity = Velocity()
+    for moment in range(round((end - begin) * 10)):
+        velocity = drive.step(begin + 0.1 * moment, ORIGIN, seen, **more)
+    return velocity
+
+
+def test_each_recovery_takes_its_time_and_then_another_path_is_asked_for() -> None:
+    drive = Drive(AHEAD)
+    stand(drive, 0.0, 0.5)
+    assert (drive.state, drive.recoveries) == (State.DRIVING, 0)
+    drive.step(0.5, ORIGIN, WALL)
+    assert (drive.state, drive.recoveries) == (State.WAITING, 1)
+    assert drive.reason == 'something stands in the way at (0.26, 0.00)'
+    assert stand(drive, 0.6, 3.5) == Velocity()
+    assert drive.state is State.WAITING
+    drive.step(3.5, ORIGIN, WALL)
+    assert drive.state is State.ASKING
+    drive.new_path(AHEAD)
+    stand(drive, 4.0, 4.5)
+    drive.step(4.5, ORIGIN, WALL)
+    assert (drive.state, drive.recoveries) == (State.BACKING, 2)
+    for moment, x in enumerate((0.0, -0.1, -0.2, -0.3, -0.39)):
+        velocity = drive.step(4.6 + 0.1 * moment, (x, 0.0, 0.0), WALL)
+        assert (velocity, drive.state) == (Velocity(-0.15, 0.0), State.BACKING)
+    assert drive.step(5.2, (-0.4, 0.0, 0.0), WALL) == Velocity()
+    assert drive.state is State.ASKING
+    drive.no_path('a wall')
+    assert (drive.state, drive.reason, drive.recoveries) == (State.LOOKING, 'a wall', 3)
+    for turned in (0.5, 2.5, 4.5, 6.2):
+        assert drive.step(5.3, (-0.4, 0.0, turned), WALL) == Velocity(0.0, 1.0)
+    drive.step(5.4, (-0.4, 0.0, 6.3), WALL)
+    assert drive.state is State.ASKING
+    drive.no_path('a wall still')
+    assert (drive.state, drive.reason, drive.recoveries) == (State.FAILED, 'a wall still', 3)
+    assert drive.state.ended
+
+
+def finish(drive: Drive, now: float, movers: Sequence[Mover] = ()) -> None:
+    """Let what a drive tries come to its end: it waited, has backed up, or has looked around."""
+    for part in range(5):
+        if drive.state is not State.ASKING:
+            drive.step(now, (0.5 * part, 0.0, 2.0 * part), WALL, movers=movers)
+
+
+def trying(state: State) -> Drive:
+    """Return a drive that begins a recovery at 10 s."""
+    drive = Drive(AHEAD)
+    drive.step(0.0, (0.0, 2.0, 0.0), NOTHING)  # off its path
+    drive.no_path('stuck')
+    for now in (9.0, 10.0):
+        if drive.state is not state:
+            finish(drive, now)
+            drive.step(10.0, ORIGIN, WALL)
+            drive.no_path('stuck')
+    assert drive.state is state
+    return drive
+
+
+def test_a_recovery_that_does_not_go_on_ends() -> None:
+    backing = trying(State.BACKING)
+    assert stand(backing, 10.0, 20.0) == Velocity(-0.15, 0.0)
+    assert backing.step(20.1, ORIGIN, WALL) == Velocity()
+    assert backing.state is State.ASKING
+    looking = trying(State.LOOKING)
+    assert stand(looking, 10.0, 30.0) == Velocity(0.0, 1.0)
+    looking.step(30.1, ORIGIN, WALL)
+    assert looking.state is State.ASKING
+
+
+@pytest.mark.parametrize(('behind', 'backs'), [(-0.34, True), (-0.27, False)])
+def test_it_backs_up_where_there_is_room_behind(behind: float, backs: bool) -> None:
+    drive = trying(State.BACKING)
+    around = np.vstack([WALL, [[behind, 0.0]]])
+    assert (drive.step(10.1, ORIGIN, around) == Velocity(-0.15, 0.0)) is backs
+    assert (drive.state is State.BACKING) is backs
+
+
+def test_a_robot_that_is_lost_stands_looks_and_gives_up() -> None:
+    drive = Drive(AHEAD)
+    assert stand(drive, 0.0, 1.0, lost=True) == Velocity()
+    assert drive.step(1.0, ORIGIN, WALL, lost=True) == Velocity(0.0, 0.5)
+    assert stand(drive, 1.1, 31.0, lost=True) == Velocity(0.0, 0.5)
+    assert drive.step(31.1, ORIGIN, WALL, lost=True) == Velocity()
+    assert drive.state is State.FAILED
+    assert drive.reason == (
+        'the robot does not know where it is: what it sees is nowhere on the map'
+    )
+    found = Drive(AHEAD)
+    stand(found, 0.0, 30.0, lost=True)
+    found.step(30.0, ORIGIN, WALL)
+    stand(found, 30.1, 60.0, lost=True)
+    assert found.state is State.DRIVING, 'it knew for a moment'
+
+
+@pytest.mark.parametrize(
+    ('off', 'movers', 'asks'),
+    [
+        (0.49, (), False),
+        (0.51, (), True),
+        (0.99, (Mover(4.0, 4.0, 0.3, 0.0, 0.25),), False),
+        (1.01, (Mover(4.0, 4.0, 0.3, 0.0, 0.25),), True),
+    ],
+)
+def test_far_off_its_path_it_asks_for_another(
+    off: float, movers: tuple[Mover, ...], asks: bool
+) -> None:
+    drive = Drive(AHEAD)
+    drive.step(0.0, (1.0, off, 0.0), NOTHING, movers=movers)
+    assert (drive.state is State.ASKING) is asks
+    assert (drive.reason == f'the robot is {off:.2f} m off its path') is asks
+
+
+def test_after_six_other_paths_the_next_recovery_is_tried() -> None:
+    drive = Drive(AHEAD)
+    for number in range(1, 8):
+        drive.step(number, (1.0, 2.0, 0.0), NOTHING)
+        assert (drive.state is State.ASKING) is (number <= 6)
+        assert drive.recoveries == number
+        drive.new_path(AHEAD)
+    assert drive.state is State.DRIVING
+    drive.step(9.0, (1.0, 2.0, 0.0), NOTHING)
+    assert drive.state is State.ASKING, 'it is counted anew'
+
+
+def test_no_progress_begins_a_recovery_after_eight_seconds() -> None:
+    def held(step: float) -> tuple[State, str]:
+        drive, nothing = Drive(AHEAD), NOTHING
+        for moment in range(82):
+            drive.step(0.1 * moment, (step * moment, 0.0, 0.0), nothing)
+        return drive.state, drive.reason
+
+    assert held(0.0) == (State.WAITING, 'no progress for 8 s')
+    assert held(0.0013) == (State.DRIVING, '')
+    assert held(0.0011) == (State.WAITING, 'no progress for 8 s')
+
+
+def test_it_has_arrived_when_it_stands() -> None:
+    drive, nothing = Drive([[0.0, 0.0]]), NOTHING
+    drive.step(0.0, ORIGIN, nothing)
+    assert drive.state is State.STOPPING
+    drive.step(0.1, (0.005, 0.0, 0.0), nothing)
+    drive.step(0.2, (0.005, 0.0, 0.01), nothing)
+    assert drive.state is State.STOPPING
+    drive.step(0.3, (0.005, 0.003, 0.01), nothing)
+    assert drive.state is State.ARRIVED
+    assert drive.state.ended
+    sliding = Drive([[0.0, 0.0]])
+    for moment in range(31):
+        sliding.step(0.1 * moment, (0.01 * moment, 0.0, 0.0), nothing)
+    assert sliding.state is State.STOPPING
+    sliding.step(3.2, (0.5, 0.0, 0.0), nothing)
+    assert sliding.state is State.ARRIVED
+
+
+def test_an_obstacle_on_the_path_is_asked_around_once() -> None:
+    drive, nothing = Drive(AHEAD), NOTHING
+    drive.heed(np.array([[2.0, 0.1]]))
+    assert drive.state is State.DRIVING, 'it has not begun'
+    drive.heed(NOTHING)
+    drive.step(0.0, ORIGIN, nothing)
+    drive.heed(np.array([[3.5, 0.0]]))
+    assert drive.state is State.DRIVING, 'too far ahead'
+    drive.heed(np.array([[2.0, 0.1]]))
+    assert (drive.state, drive.reason) == (State.ASKING, 'something is on the path ahead')
+    drive.new_path(AHEAD)
+    drive.heed(np.array([[2.0, 0.1]]))
+    assert drive.state is State.DRIVING, 'this path was found in spite of it'
+
+
+def test_among_people_the_list_of_recoveries_starts_anew_for_a_minute() -> None:
+    def tried(until: float) -> tuple[list[State], float]:
+        """Try all, every 10 s, beside somebody who is there up to a time."""
+        drive, now = Drive(AHEAD), 0.0
+        drive.step(now, (0.0, 2.0, 0.0), NOTHING)
+        states: list[State] = []
+        while drive.state is not State.FAILED:
+            drive.no_path('people')
+            states.append(drive.state)
+            now += 10.0
+            finish(drive, now, (Mover(3.0, 3.0, 0.3, 0.0, 0.25),) if now <= until else ())
+        return states, now - 10.0
+
+    once = [State.WAITING, State.BACKING, State.LOOKING]
+    assert tried(0.0) == ([*once, State.FAILED], 30.0)
+    assert tried(100.0) == ([*once, *once[1:], *once[1:], State.FAILED], 70.0)
+
+
+def test_a_turn_goes_the_shorter_way_and_slows_down() -> None:
+    spin = Spin(math.pi / 2)
+    assert not spin.done
+    assert spin.step(0.0, 0.0) == Velocity(0.0, 1.0)
+    left = 0.1
+    assert spin.step(math.pi / 2 - left, 1.0).turn == pytest.approx(math.sqrt(6.0 * left))
+    assert spin.step(math.pi / 2 - 0.021, 1.1).turn > 0.0
+    assert not spin.done
+    assert spin.step(math.pi / 2 + 0.019, 1.2) == Velocity()
+    assert spin.done
+    back = Spin(-2.5)
+    assert back.step(2.5, 0.0).turn == 1.0, 'over the half circle'
+    back.step(-2.4, 0.5)
+    assert back.step(-2.4, 0.6).turn < 0.0, 'too far: it comes back'
+    assert not back.done
+
+
+def test_a_whole_turn_is_a_whole_turn_and_one_that_is_stuck_ends() -> None:
+    spin = Spin()
+    for part in range(1, 62):
+        assert spin.step(0.1 * part, 0.1 * part).turn > 0.0
+        assert not spin.done
+    spin.step(0.1 + math.tau, 6.3)
+    assert spin.done
+    stuck = Spin()
+    stuck.step(0.0, 0.0)
+    stuck.step(0.1, 1.0)
+    stuck.step(0.103, 4.9)
+    assert not stuck.done
+    stuck.step(0.103, 5.0)
+    assert stuck.done
