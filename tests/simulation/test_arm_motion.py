@@ -94,3 +94,52 @@ def test_the_camera_stands_upright_at_zero_and_follows_pan_and_tilt() -> None:
 def test_the_chain_refuses_a_wrong_number_of_joints() -> None:
     with pytest.raises(ValueError, match='2 positions: expected 5'):
         ARM.camera_frame([0.0, 0.0])
+
+
+def test_between_two_points_it_moves_on_the_cubic_of_hermite() -> None:
+    arm = ArmMotion(ARM)
+    arm.follow(
+        ['arm_pan'],
+        [point(2.0, 1.0, velocities=(0.5,)), point(3.0, 1.2, velocities=(0.0,))],
+        now=10.0,
+    )
+    # From 0 at rest to 1 with 0.5 rad/s in 2 s: a s^3 + b s^2 with a = -2 + 1, b = 3 - 1.
+    for share in (0.0, 0.25, 0.5, 0.9):
+        assert arm.positions(10.0 + 2.0 * share)[0] == pytest.approx(2 * share**2 - share**3)
+        assert arm.velocities(10.0 + 2.0 * share)[0] == pytest.approx(
+            (4 * share - 3 * share**2) / 2
+        )
+    # From 1 with 0.5 rad/s to 1.2 at rest in 1 s.
+    for share in (0.0, 0.3, 0.8):
+        expected = 1.0 + 0.5 * share - 0.4 * share**2 + 0.1 * share**3
+        assert arm.positions(12.0 + share)[0] == pytest.approx(expected)
+        assert arm.velocities(12.0 + share)[0] == pytest.approx(0.5 - 0.8 * share + 0.3 * share**2)
+    assert arm.positions(9.0)[0] == 0.0
+    assert arm.positions(99.0)[0] == 1.2
+    assert arm.velocities(13.0) == pytest.approx(np.zeros(5))
+
+
+def test_joints_that_a_point_does_not_name_stay_and_its_own_start_is_no_point() -> None:
+    arm = ArmMotion(ARM)
+    arm.follow(['arm_lift', 'arm_pan'], [point(0.0, 0.5, 0.5), point(1.0, 0.2, -0.4)], now=5.0)
+    first = list(ARM.home)
+    pan, lift = ARM.names.index('arm_pan'), ARM.names.index('arm_lift')
+    half = arm.positions(5.5)
+    assert half[pan] == pytest.approx((first[pan] - 0.4) / 2)
+    assert half[lift] == pytest.approx((first[lift] + 0.2) / 2)
+    first[pan], first[lift] = -0.4, 0.2
+    assert arm.positions(6.0) == pytest.approx(first)
+    mixed = [point(1.0, 0.5, velocities=(0.3,)), point(2.0, 1.0)]
+    arm.follow(['arm_pan'], mixed, now=7.0)
+    assert arm.velocities(7.5)[pan] == pytest.approx(0.9), 'on a line where one has no velocity'
+
+
+def test_a_cubic_does_not_leave_the_joints_limits() -> None:
+    arm = ArmMotion(ARM)
+    pan = ARM.names.index('arm_pan')
+    top = float(ARM.upper[pan])
+    arm.follow(['arm_pan'], [point(1.0, top, velocities=(-9.0,))], now=0.0)
+    reached = [arm.positions(0.02 * n)[pan] for n in range(51)]
+    assert max(reached) == top
+    arm.positions(2.0)[pan] = 9.0
+    assert arm.positions(2.0)[pan] == top, 'what it returned is not its own'
