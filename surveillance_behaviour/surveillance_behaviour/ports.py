@@ -208,6 +208,21 @@ class Doubt:
     position: Point | None = None
 
 
+@dataclass(frozen=True)
+class Check:
+    """What a person's rules want to have seen in a place, such as the spot of a marker.
+
+    Attributes:
+        name: Names it in the record, `marker 21`.
+        point: Where it is.
+        look_from: From where it is to be seen well; None: from the place's own point.
+    """
+
+    name: str
+    point: Point
+    look_from: Point | None = None
+
+
 class Looking(Protocol):
     """Who knows from where a place is to be looked at, and moves the robot there."""
 
@@ -216,6 +231,17 @@ class Looking(Protocol):
 
     def doubts(self, place: str) -> Sequence[Doubt]:
         """Return the alerts in a place that wait for a second look."""
+
+    def checks(self, place: str) -> Sequence[Check]:
+        """Return what is to be seen in a place before all else."""
+
+    def camera_angle(self) -> float | None:
+        """Return how much of the horizon a picture shows, rad; None: nobody has said."""
+
+    def saw(self, bearing: float) -> bool:
+        """Tell whether a picture to a bearing, map frame, rad, was looked at that was taken since
+        the camera was turned last. Where no pictures are looked at, the lidar has seen it.
+        """
 
     def position(self) -> Point | None:
         """Return where the robot is; None: nobody has said."""

@@ -65,15 +65,21 @@ from surveillance_perception.observation.backlog import (
 from surveillance_perception.observation.day_book import DayBook
 from surveillance_perception.observation.events import Event, EventBook, EventState
 from surveillance_perception.observation.evidence import EvidenceStore
-from surveillance_perception.observation.hung_markers import CameraView, SeenMarker
+from surveillance_perception.observation.hung_markers import CameraView, HungSpot, SeenMarker
 from surveillance_perception.observation.observations import Kind, Observation
 from surveillance_perception.observation.other_robots import OtherRobots
 from surveillance_perception.observation.persons import Person, load_finder
 from surveillance_perception.observation.reference_views import ReferenceViews, Viewpoint, same_view
 from surveillance_perception.observation.viewpoints import Viewpoints
-from surveillance_perception.observation.watch_rules import DEFAULT_RULES, Level, read_watch_file
+from surveillance_perception.observation.watch_rules import (
+    DEFAULT_RULES,
+    Level,
+    WatchRule,
+    read_watch_file,
+)
 from surveillance_perception.observation.watcher import Look, Watcher, same_map
 from surveillance_perception.observation.ways import Ways
+from surveillance_perception.stream.image_subscription import ImageSubscription
 from surveillance_runtime.conversions import (
     PlanarPose,
     map_from,
@@ -126,6 +132,14 @@ behind."""
 DETECTOR_PATIENCE, STANDING_PATIENCE = 5.0, 1.0
 """So long what the detector says is waited for, and a picture of a camera that stands, seconds of
 real time."""
+MOST_SIDES = 20
+"""Of so many pictures it is told that they were looked at."""
+SAME_SPOT = 0.3
+"""A spot that lies so near to where it was is looked at from the same point, metres."""
+IN_FRONT = 0.3
+"""A marker hangs in the place that is so far before it, metres."""
+MARKER_SIDE = 0.2
+"""The side of the markers that distances are told for, metres."""
 TOO_LATE = 30.0
 """What is looked at so long after it was taken is told late, seconds."""
 FACTS_PERIOD = 10.0
@@ -259,6 +273,12 @@ class Observer(PatrolNode):
         self._points = places
         self._looks = OwnedTopic(self, String, 'looks')
         self._doubts = OwnedTopic(self, String, 'doubts')
+        self._checks = OwnedTopic(self, String, 'checks')
+        self._said_checks = False
+        self._told_checks: dict[int, tuple[str, dict[str, Any]]] = {}
+        self._told_pictures = OwnedTopic(self, String, 'pictures')
+        # Of the last ones that were looked at: when, seconds, and to which bearings, degrees.
+        self._seen_sides: deque[tuple[float, int | None]] = deque(maxlen=MOST_SIDES)
         self._doubted: list[dict[str, Any]] = []
         self._last_looks: dict[str, Look] = {}
         self._said = ''
@@ -333,15 +353,14 @@ class Observer(PatrolNode):
                 CameraInfo, 'camera/rgb/camera_info', self._on_camera_info, SENSOR_QOS
             )
             # Raw: most pictures are not looked at.
-            self.create_subscription(
-                Image, 'camera/rgb/image_raw', self._on_image, SENSOR_QOS, raw=True
-            )
+            ImageSubscription(self, Image, 'camera/rgb/image_raw', self._on_image, raw=True)
         # The names of the fleet's other robots; a robot that is alone hears nothing there.
         hear_fleet(self, self._on_fleet, MOST_HEARD)
         self.create_service(ConsoleCommand, 'observer/command', self._on_command)
         self.create_timer(ASSESS_PERIOD, lambda: self._work.put_once(self._assess, 'assess'))
         self.create_timer(KEEP_PERIOD, lambda: self._work.put_once(self._keep, 'keep'))
         self._publish_events()
+        self._tell_pictures()
         self.spawn(self._watch, 'observer')
         if self._settings.facts:
             self.stopping.subscribe(self._facts_changed.set)
@@ -521,7 +540,10 @@ class Observer(PatrolNode):
 
     def _on_camera_info(self, message: CameraInfo) -> None:
         with conversions.refusing(self, 'camera_info'):
+            is_first = self._lens is None
             self._lens = camera_from_ros(message)
+            if is_first:
+                self._tell_pictures()
 
     def _on_joints(self, message: JointState) -> None:
         with conversions.refusing(self, 'joint_states'):
@@ -548,6 +570,7 @@ class Observer(PatrolNode):
     def _on_image(self, serialized: bytes) -> None:
         stamp, now = stamp_of_serialized(serialized), time.monotonic()
         self._is_pictured = True
+        self._lost.come('pictures')
         taken_at = self._image_stamps.span_of(stamp, self._now())
         if (warning := self._image_stamps.warning()) is not None:
             self.get_logger().warn(warning)
@@ -606,6 +629,7 @@ class Observer(PatrolNode):
         if is_detected and not found:
             causes.append(UNREAD)
         camera = None if viewpoint is None else self._camera_at(viewpoint)
+        bearing = None if viewpoint is None else self._bearing_of(viewpoint)
         if viewpoint is not None:
             self._looked_from = viewpoint
         self._images.clear()
@@ -616,6 +640,9 @@ class Observer(PatrolNode):
             late = [LATE] if self._now() - taken > TOO_LATE else []
             self._lost.count('pictures', *causes, *late)
             self._look(data, viewpoint, taken, markers, camera)
+            if viewpoint is not None:
+                self._seen_sides.append((round(taken, 3), bearing))
+                self._tell_pictures()
 
         self._work.put(look, 'pictures', worth=int(viewpoint is not None))
 
@@ -656,20 +683,34 @@ class Observer(PatrolNode):
             return [self._joints[ARM.names]]
         return [readings for _, readings in sorted(self._joints.items())]
 
-    def _camera_at(self, viewpoint: Viewpoint) -> _CameraAt | None:
-        """Return where the arm holds the camera; None: nobody says, or there is no such arm."""
-        if self._lens is None or not self._estimate or ARM.names not in self._joints:
+    def _bearing_of(self, viewpoint: Viewpoint) -> int | None:
+        """Return where the camera looked to, whole degrees of the map; None: nobody knows."""
+        pose = self._camera_pose(viewpoint)
+        if pose is not None:
+            return round(math.degrees(math.atan2(pose[1, 2], pose[0, 2]))) % 360
+        # Without joints the camera looks ahead.
+        return round(math.degrees(viewpoint[2])) % 360 if len(viewpoint) == 3 else None
+
+    def _camera_pose(self, viewpoint: Viewpoint) -> np.ndarray | None:
+        """Return where the arm holds the camera, (4, 4); None: there is no such arm."""
+        if ARM.names not in self._joints:
             return None
-        estimate = deserialize_message(self._estimate, PoseWithCovarianceStamped)
-        covariance = estimate.pose.covariance.reshape(6, 6)
-        if not np.isfinite(covariance).all():
-            return None  # who localises does not tell how sure it is
         x, y, yaw, *joints = viewpoint
         base = np.eye(4)
         cosine, sine = math.cos(yaw), math.sin(yaw)
         base[:2, :2] = [[cosine, -sine], [sine, cosine]]
         base[:2, 3] = x, y
-        pose = base @ ARM.camera_frame(joints)
+        return base @ np.asarray(ARM.camera_frame(joints))
+
+    def _camera_at(self, viewpoint: Viewpoint) -> _CameraAt | None:
+        """Return where the camera is, and how sure that is; None: nobody says."""
+        pose = self._camera_pose(viewpoint)
+        if pose is None or self._lens is None or not self._estimate:
+            return None
+        estimate = deserialize_message(self._estimate, PoseWithCovarianceStamped)
+        covariance = estimate.pose.covariance.reshape(6, 6)
+        if not np.isfinite(covariance).all():
+            return None  # who localises does not tell how sure it is
         # In the direction in which it is least sure: in a corridor, along it.
         spread = float(np.linalg.eigvalsh(covariance[:2, :2])[-1]), float(covariance[5, 5])
         deviation, turn = (
@@ -721,16 +762,72 @@ class Observer(PatrolNode):
     def _tell_viewpoints(self, grid: Grid) -> None:
         """Tell from where each place is to be looked at."""
         self._viewpoints = chosen = Viewpoints(grid, self._settings.radius)
+        self._told_checks = {}
         told = {}
         for place, point in self._points.items():
             floor = self._places.cells_of(place)
             if floor is not None:
                 first = float(point[0]), float(point[1])
-                found = chosen.of_room(floor, first, self._checks(floor, grid))
+                found = chosen.of_room(floor, first, self._door_checks(floor, grid))
                 told[place] = [[round(x, 2), round(y, 2)] for x, y in found]
         self._told_viewpoints.publish(String(data=json.dumps(told)))
 
-    def _checks(self, floor: np.ndarray, grid: Grid) -> list[tuple[float, float]]:
+    def _tell_pictures(self) -> None:
+        """Tell which pictures were looked at: a side counts as seen by that alone."""
+        lens = self._lens
+        told: dict[str, Any] = {'camera': self._settings.camera, 'looked': list(self._seen_sides)}
+        if lens is not None:
+            told['angle'] = round(
+                math.degrees(2.0 * math.atan(lens.width / 2.0 / lens.matrix[0, 0]))
+            )
+        self._told_pictures.publish(String(data=json.dumps(told)))
+
+    def _tell_checks(self) -> None:
+        """Tell from where the spots of markers are to be seen that a rule is about."""
+        rules = [each for each in self._watcher.rules if each.kind == Kind.MARKER]
+        if not rules or self._viewpoints is None:
+            return
+        told, before = {}, self._told_checks
+        for spot in self._watcher.spots():
+            x, y, _ = spot.position
+            known = before.get(spot.number)
+            if known is not None and math.dist(known[1]['at'], (x, y)) < SAME_SPOT:
+                told[spot.number] = known
+            elif (found := self._check_of(spot, rules)) is not None:
+                told[spot.number] = found
+        if told != before or not self._said_checks:
+            self._told_checks, self._said_checks = told, True
+            by_place: dict[str, list[dict[str, Any]]] = {}
+            for place, check in told.values():
+                by_place.setdefault(place, []).append(check)
+            self._checks.publish(String(data=json.dumps(by_place)))
+
+    def _check_of(
+        self, spot: HungSpot, rules: Sequence[WatchRule]
+    ) -> tuple[str, dict[str, Any]] | None:
+        """Return in which place a marker hangs, and how it is looked at; None: no rule asks."""
+        x, y, _ = spot.position
+        angle = 0.0 if spot.facing is None else spot.facing
+        ahead = 0.0 if spot.facing is None else IN_FRONT
+        place = self._places.place_at((x + ahead * math.cos(angle), y + ahead * math.sin(angle)))
+        if place is None or self._viewpoints is None or place not in self._points:
+            return None
+        if not any(each.is_about(str(spot.number), place) for each in rules):
+            return None
+        floor, (px, py, *_) = self._places.cells_of(place), self._points[place]
+        if floor is None:
+            return None
+        first, scale = (float(px), float(py)), (spot.side or MARKER_SIDE) / MARKER_SIDE
+        best = self._viewpoints.of_panel(floor, first, (x, y), spot.facing, scale)
+        look_from = None if best in (None, first) else [round(each, 2) for each in best]
+        check = {
+            'name': f'marker {spot.number}',
+            'at': [round(x, 2), round(y, 2)],
+            'from': look_from,
+        }
+        return place, check
+
+    def _door_checks(self, floor: np.ndarray, grid: Grid) -> list[tuple[float, float]]:
         """Return the doors of a room that the rules name."""
         named = {each.subject for each in self._watcher.rules if each.kind == Kind.DOOR}
         found = []
@@ -770,6 +867,10 @@ class Observer(PatrolNode):
 
     def _say_what_is_lost(self) -> None:
         """Tell of pictures and sweeps that are of no use, once for each cause, and when it ends."""
+        camera = self._settings.camera and self.count_publishers(
+            self.resolve_topic_name('camera/rgb/image_raw')
+        )
+        self._lost.expect('pictures', bool(camera))
         found = self._lost.findings()
         for (source, cause), text in found.items():
             self.incidents.begin(('sight', f'{source} {cause}'), text)
@@ -782,6 +883,7 @@ class Observer(PatrolNode):
     def _assess(self) -> None:
         self._tell_sees_around()
         self._say_what_is_lost()
+        self._tell_checks()
         now = self._now()
         self._watcher.assess(now)
         doubts = [

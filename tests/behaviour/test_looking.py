@@ -14,7 +14,7 @@ from state_machines.exceptions import CallError, CallInterruptedError
 from surveillance_behaviour.machines import MACHINES
 from surveillance_behaviour.mission.looking import one_way
 from surveillance_behaviour.mission.mission_log import MissionRecord, read
-from surveillance_behaviour.ports import Doubt, Point
+from surveillance_behaviour.ports import Check, Doubt, Point
 
 from .machine_runs import settings
 from .scripted_world import World
@@ -36,12 +36,24 @@ class ScriptedLooking:
         self.camera = 0
         self.sides: list[tuple[str, int]] = []
         self.rests: list[float] = []
+        self.asked: dict[str, list[Check]] = {}
+        self.angle: float | None = None
+        self.blind: set[int] = set()
 
     def viewpoints(self, place: str) -> Sequence[Point]:
         return self.points.get(place, [])
 
     def doubts(self, place: str) -> Sequence[Doubt]:
         return [each for each in self.waiting if each.place == place]
+
+    def checks(self, place: str) -> Sequence[Check]:
+        return self.asked.get(place, [])
+
+    def camera_angle(self) -> float | None:
+        return self.angle
+
+    def saw(self, bearing: float) -> bool:
+        return round(math.degrees(bearing)) % 360 not in self.blind
 
     def position(self) -> Point | None:
         return self.world.at
@@ -344,3 +356,102 @@ def test_a_machine_that_looks_has_no_dead_end(machine: str):
     built.check_consistency()
     labels = {'surveillance': 'PERFORM_ROOM_TASKS', 'patrol': 'Looking'}
     assert isinstance(built[labels[machine]], fsm.State)
+
+
+def stays(record: MissionRecord, place: str) -> list[dict[str, object]]:
+    """Return what the record says of each look at a place."""
+    looks = [each for each in read(record.path) if each.name == 'look']
+    return [dict(each.fields) for each in looks if each.fields['place'] == place]
+
+
+def test_a_viewpoint_that_one_stay_leaves_out_comes_first_in_the_next_also_after_a_restart(
+    tmp_path: Path,
+):
+    file = tmp_path / 'mission.jsonl'
+    points: list[Point] = [(12.0, 8.0, 0.0), (8.0, 8.0, 0.0), (10.0, 10.0, 0.0)]
+
+    def watched(world: World | None = None) -> Watched:
+        record = MissionRecord(file)
+        run = Watched('surveillance', record=record, world=world, exploration_seconds=12.0)
+        run.looking.points = {'C1': points}
+        run.looking.around = True
+        return run
+
+    run = watched().until(400.0)
+    driven = [point for _, point in run.looking.driven]
+    assert driven[:3] == points, 'one fits into each stay'
+    assert len(run.looking.driven) > 3
+    kept = [each for each in file.read_text().splitlines() if '"end"' not in each]
+    file.write_text('\n'.join(kept) + '\n')
+    again = watched(run.world).until(run.world.clock.time + 300.0)
+    following = [point for _, point in again.looking.driven]
+    order = [*driven, *following]
+    assert all(order[n] != order[n + 1] for n in range(len(order) - 1))
+    assert following[:2] == [points[len(driven) % 3], points[(len(driven) + 1) % 3]]
+
+
+def test_a_stay_too_short_for_a_viewpoint_is_told_once():
+    run = Watched('surveillance', exploration_seconds=12.0)
+    run.looking.points = {'C1': [(60.0, 8.0, 0.0)]}
+    run.until(900.0)
+    (line,) = [each for each in run.world.said if 'viewpoints' in each]
+    assert 'C1: 1 of its viewpoints are never looked from: a stay of 12 s is too short' in line
+    assert not run.looking.driven
+
+
+def test_a_camera_that_shows_little_is_turned_to_more_sides():
+    run = Watched('surveillance', exploration_seconds=60.0)
+    run.looking.angle = math.radians(60.0)
+    run.until(200.0)
+    place = run.looking.sides[0][0]
+    sides = [side for where, side in run.looking.sides if where == place]
+    assert sorted(set(sides)) == [0, 60, 120, 180, 240, 300]
+
+
+def test_a_side_of_which_no_picture_was_looked_at_is_not_called_looked_at(tmp_path: Path):
+    record = MissionRecord(tmp_path / 'mission.jsonl')
+    run = Watched('surveillance', record=record, exploration_seconds=60.0)
+    run.looking.arm, run.looking.blind = True, {90, 180}
+    run.until(70.0)
+    place = run.looking.sides[0][0]
+    (look,) = stays(record, place)
+    assert look['sides'] == [270, 0]
+    assert look['unseen'] == [90, 180]
+    bearings = [each.fields.get('bearing') for each in read(record.path)]
+    assert not {90, 180} & set(bearings)
+    turned = [side for where, side in run.looking.sides if where == place]
+    assert turned == [90, 180, 270, 0, 0], 'it goes on all the same'
+
+
+@pytest.mark.parametrize('arm', [False, True])
+def test_what_the_rules_ask_for_is_looked_at_before_all_else(arm: bool, tmp_path: Path):
+    record = MissionRecord(tmp_path / 'mission.jsonl')
+    run = Watched('surveillance', record=record, exploration_seconds=40.0)
+    run.looking.arm = arm
+    here = (12.0, 8.0, 0.0)
+    run.looking.asked = {
+        'C1': [
+            Check('marker 21', (12.0, 6.0, 0.0), here),
+            Check('marker 22', (10.0, 9.0, 0.0)),
+        ]
+    }
+    run.until(120.0)
+    in_c1 = [side for where, side in run.looking.sides if where == 'C1']
+    assert in_c1[0] == 270, 'from where it is read best, downwards'
+    assert run.looking.driven[0][1] == here
+    first = stays(record, 'C1')[0]
+    assert first['checks'] == ['marker 21', 'marker 22']
+    assert first['sides'], 'half of the time is for the rest'
+
+
+def test_where_there_is_time_for_one_thing_it_is_a_check_in_every_other_stay():
+    run = Watched('surveillance', exploration_seconds=12.0)
+    run.looking.arm = True
+    run.looking.asked = {
+        'C1': [Check('marker 21', (20.0, 8.0, 0.0)), Check('marker 22', (10.0, 1.0, 0.0))]
+    }
+    run.until(900.0)
+    aside = [side for where, side in run.looking.sides if where == 'C1']
+    assert len(aside) > 6
+    looked = run.mission.looked.to_json()['C1']
+    assert {'marker 21', 'marker 22', '90', '180'} <= set(looked)

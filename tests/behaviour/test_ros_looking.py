@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import threading
 from concurrent.futures import ThreadPoolExecutor
@@ -10,7 +11,7 @@ from typing import Any
 import pytest
 from geometry_msgs.msg import PoseWithCovarianceStamped
 from rclpy.callback_groups import ReentrantCallbackGroup
-from std_msgs.msg import Bool
+from std_msgs.msg import Bool, String
 
 from state_machines import Interrupt
 from state_machines.exceptions import CallInterruptedError
@@ -18,7 +19,7 @@ from state_machines.ros import GoalServer, work_aside
 from surveillance_behaviour.ros_adapters.looking import RosLooking
 from surveillance_behaviour.ros_adapters.peers import Deadlines, MissionClock
 from surveillance_interfaces.action import FollowPath
-from surveillance_interfaces.srv import MarkerRoutine
+from surveillance_interfaces.srv import MarkerRoutine, PointCamera
 from surveillance_runtime.conversions import point_from, pose_estimate
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.qos import STATE_QOS
@@ -115,3 +116,66 @@ def test_the_first_look_waits_for_the_observer(graph: Any) -> None:
     interrupt = Interrupt()
     interrupt.set()
     looking_of(graph).await_watcher(interrupt)
+
+
+def test_an_arm_that_can_be_pointed_looks_at_any_side(graph: Any) -> None:
+    looking, arm = looking_of(graph), graph.add(Arm)
+    arm.released.set()
+    points = []
+
+    def point(request: Any, response: Any) -> Any:
+        points.append((request.frame_id, request.point))
+        response.success = True
+        return response
+
+    arm.create_service(PointCamera, 'point_camera', point)
+    tell_pose(graph, looking, 1.0, 2.0, 0.5)
+    graph.until(lambda: looking.has_arm() and looking._pointing.is_ready())
+    looking.face(0.5 + 1.0, Interrupt())
+    ((frame, target),) = points
+    assert frame == 'base_link'
+    assert math.atan2(target.y, target.x) == pytest.approx(1.0, abs=0.01)
+    looking.face(0.5 + math.pi / 2, Interrupt())
+    assert arm.asked == [REQUEST.LEFT], 'a pose is that of the arm'
+    assert len(points) == 1
+
+
+def test_a_side_is_seen_once_a_picture_of_it_was_looked_at(graph: Any) -> None:
+    looking, arm = looking_of(graph), graph.add(Arm)
+    arm.released.set()
+    tell = graph.node.create_publisher(String, 'pictures', STATE_QOS)
+    tell_pose(graph, looking, 1.0, 2.0, 0.0)
+    graph.until(looking.has_arm)
+
+    def now() -> float:
+        return 1e-9 * float(graph.node.get_clock().now().nanoseconds)
+
+    def looked(*pictures: tuple[float, int | None], camera: bool = True) -> None:
+        told = {'camera': camera, 'looked': pictures, 'angle': 60}
+        tell.publish(String(data=json.dumps(told)))
+
+    before = now()
+    looking.face(math.pi / 2, Interrupt())
+    assert not looking.saw(math.pi / 2), 'nobody has said so'
+    looked((before, 90), (now(), 0))
+    graph.until(lambda: looking.camera_angle() == pytest.approx(math.radians(60)))
+    assert not looking.saw(math.pi / 2), 'one is old, the other is of another side'
+    looked((now(), 85))
+    graph.until(lambda: looking.saw(math.pi / 2))
+    looking.face(math.pi, Interrupt())
+    assert not looking.saw(math.pi)
+    looked((now(), None))
+    graph.until(lambda: looking.saw(math.pi))
+    looking.face(math.pi, Interrupt())
+    looked(camera=False)
+    graph.until(lambda: looking.saw(math.pi))
+
+
+def test_what_the_rules_ask_for_is_known_by_place(graph: Any) -> None:
+    looking = looking_of(graph)
+    told = {'C1': [{'name': 'marker 21', 'at': [1, 2], 'from': None}]}
+    graph.node.create_publisher(String, 'checks', STATE_QOS).publish(String(data=json.dumps(told)))
+    graph.until(lambda: looking.checks('C1'))
+    (check,) = looking.checks('C1')
+    assert (check.name, check.point[:2], check.look_from) == ('marker 21', (1.0, 2.0), None)
+    assert not looking.checks('C2')

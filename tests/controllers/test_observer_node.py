@@ -30,6 +30,8 @@ from surveillance_interfaces.msg import (
 )
 from surveillance_interfaces.srv import ConsoleCommand
 from surveillance_perception.observation.backlog import LostSight
+from surveillance_perception.observation.hung_markers import HungSpot
+from surveillance_runtime.conversions import map_from
 from surveillance_runtime.incidents import Cause
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
@@ -399,3 +401,33 @@ def test_who_drives_is_no_reason_to_worry_about_poses(graph, monkeypatch):
         eyes.show(tick / 10)
     assert all(viewpoint is None for viewpoint, _ in eyes.looked)
     assert not lost.lost
+
+
+def test_it_tells_which_sides_it_has_seen_and_from_where_a_marker_is_to_be_read(
+    graph, monkeypatch, tmp_path: Path
+):
+    (tmp_path / 'watch.yaml').write_text('rules:\n  hang: {marker: all}\n')
+    parameters = {
+        'facts': False,
+        'watch_file': str(tmp_path / 'watch.yaml'),
+    }
+    node = graph.add(Observer, parameters)
+    pictures = graph.listen(String, 'pictures', STATE_QOS)
+    checks = graph.listen(String, 'checks', STATE_QOS)
+    spot = HungSpot(21, (5.8, 2.5, 1.0), math.pi, 0.2)
+    monkeypatch.setattr(node._watcher, 'spots', lambda: [spot])
+    node._points = {'R1': (1.0, 2.5)}
+    node._places.set_positions(node._points)
+    grid = map_from(room_map(), 100_000)
+    node._places.set_map(grid)
+    node._tell_viewpoints(grid)
+    node._tell_checks()
+    graph.until(lambda: checks and json.loads(checks[-1].data))
+    ((place, (check,)),) = json.loads(checks[-1].data).items()
+    assert (place, check['name'], check['at']) == ('R1', 'marker 21', [5.8, 2.5])
+    assert 0.8 <= math.dist(check['from'], check['at']) <= 2.2
+    node._seen_sides.append((5.0, 90))
+    info = CameraInfo(width=640, height=480, k=[554.3, 0, 320, 0, 554.3, 240, 0, 0, 1.0])
+    node._on_camera_info(info)
+    graph.until(lambda: 'angle' in pictures[-1].data)
+    assert json.loads(pictures[-1].data) == {'camera': True, 'looked': [[5.0, 90]], 'angle': 60}

@@ -8,6 +8,8 @@ from surveillance_perception.observation.backlog import (
     DROPPED,
     FEWEST,
     NO_POSE,
+    NONE_CAME,
+    SILENT,
     WINDOW,
     Backlog,
     LostSight,
@@ -107,4 +109,24 @@ def test_few_losses_and_those_of_another_source_say_nothing(clock):
     clock.time += WINDOW + 1.0
     for _ in range(FEWEST - 1):
         lost.count('sweeps', DROPPED)
+    assert not lost.findings()
+
+
+def test_a_camera_that_is_there_and_sends_nothing_is_told(clock):
+    lost = LostSight(clock)
+    clock.time += 100.0
+    assert not lost.findings(), 'there is none'
+    lost.expect('pictures', True)
+    clock.time += SILENT - 1.0
+    lost.expect('pictures', True)
+    lost.come('pictures')
+    clock.time += SILENT - 1.0
+    assert not lost.findings()
+    clock.time += 1.0
+    assert list(lost.findings()) == [('pictures', NONE_CAME)]
+    assert lost.findings()['pictures', NONE_CAME].startswith('no pictures came')
+    lost.come('pictures')
+    assert not lost.findings()
+    clock.time += SILENT
+    lost.expect('pictures', False)
     assert not lost.findings()

@@ -71,3 +71,22 @@ def test_the_rooms_of_a_place_are_covered(name: str):
         spots = [first, *chosen.of_room(floor, first)]
         seen = np.logical_or.reduce([chosen.seen_from(each) for each in spots]) & floor
         assert seen.sum() >= 0.9 * floor.sum(), room
+
+
+def test_a_marker_is_looked_at_from_ahead_and_near_enough_to_be_read():
+    grid = corner()
+    chosen, first = Viewpoints(grid, 0.22), (1.5, 7.0)
+    # On the outer wall of the lower arm, looking upwards.
+    panel, facing = (6.0, 0.3), math.pi / 2
+    spot = chosen.of_panel(grid.free, first, panel, facing)
+    assert spot is not None
+    assert 0.8 <= math.dist(spot, panel) <= 2.2
+    turn = math.atan2(spot[1] - panel[1], spot[0] - panel[0]) - facing
+    assert abs(turn) < math.radians(45.0)
+    assert not chosen.seen_from(first)[grid.cell_of(*spot)], 'around the corner'
+    assert chosen.of_panel(grid.free, (6.0, 1.8), panel, facing) == (6.0, 1.8), 'its point will do'
+    assert chosen.of_panel(grid.free, first, panel, -facing) is None, 'behind the wall'
+    near = chosen.of_panel(grid.free, first, panel, facing, scale=0.5)
+    assert near is not None
+    assert math.dist(near, panel) <= 1.1
+    assert chosen.of_panel(grid.free, first, panel, None) is not None

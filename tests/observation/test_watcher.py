@@ -411,6 +411,22 @@ def test_a_marker_in_pictures_that_no_file_knows_is_unknown():
     assert [(each.subject, each.seen) for each in watch.book.events] == [('77', 'unknown')]
 
 
+def test_a_marker_that_no_file_knows_hangs_somewhere_all_the_same_and_may_move():
+    watch = Round(markers={14: None})
+    picture, moved = wall(), wall()
+    strange, there = hang(picture, 77, 140, 100), hang(moved, 77, 200, 100)
+    watch.watcher.arrive('R1', 1.0)
+    for number in range(6):
+        watch.watcher.picture(picture, None, 10.0 + number, [strange], camera(y=1.0))
+    assert of_markers(watch) == [('77', 'unknown', 'R1', EventState.OPEN)]
+    (unknown,) = watch.book.events
+    watch.watcher.answer(unknown.number, EventState.NORMAL)
+    for number in range(6):
+        watch.watcher.picture(moved, None, 60.0 + number, [there], camera(y=1.0))
+    open_ = [each[:3] for each in of_markers(watch) if each[3] == EventState.OPEN]
+    assert open_ == [('77', 'moved', 'R1')]
+
+
 def walk(watch: Round, start: tuple[float, float], step: tuple[float, float], steps: int) -> None:
     """One who walks before a robot that stands."""
     for number in range(steps):

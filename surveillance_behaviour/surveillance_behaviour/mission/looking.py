@@ -1,8 +1,12 @@
-"""Looking at a room: from its viewpoints, all around, within the time that there is; and again.
+"""Looking at a room: at what the rules ask for, from its viewpoints, all around, within the time
+that there is; and again.
 
 From where a room is to be looked at, and which alerts wait for a second look, says who watches (the
 port `Looking`). What cannot be driven to or turned is left out: a look is never a reason to stop
 patrolling. In a room with a charging station the robot keeps its place, so that it may charge.
+
+What does not fit into one stay comes first in the next one, also after a restart. A side counts as
+looked at in the record once a picture of it was looked at, not when the camera was turned there.
 """
 
 from __future__ import annotations
@@ -10,11 +14,13 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Sequence
+from dataclasses import dataclass, field
 
 from state_machines import Interrupt
 from state_machines.clock import elapsed_of
 from state_machines.exceptions import CallError, CallInterruptedError
 from surveillance_behaviour.mission.mission import Mission
+from surveillance_behaviour.mission.mission_log import side_name, stand_name
 from surveillance_behaviour.ports import Doubt, Looking, Point
 
 SETTLE = 4.0
@@ -23,11 +29,12 @@ BASE_MOVE, ARM_MOVE = 4.0, 3.0
 """So long the first move to another side is taken to last, of the base and of the arm, seconds."""
 DWELL = 4.5
 """The camera stands so long at each side: for two pictures of the observer, seconds."""
-ARM_SWEEP = (math.pi / 2, math.pi, -math.pi / 2)
-"""The sides in the order in which the arm passes them, from the robot's front, rad; ahead it looks
-when it arrives."""
-BASE_SIDES = (0.0, math.pi / 2, math.pi, -math.pi / 2)
-"""Where a base without an arm turns its camera, map frame, rad: the same views in each visit."""
+LONGEST_DWELL = 13.5
+"""And so long where no picture of that side was looked at yet, and there is time, seconds."""
+VIEW = math.pi / 2
+"""A picture is taken to show so much of the horizon where nobody says how much, rad."""
+NEAR = 0.3
+"""Who is so near to a point is there, metres."""
 DETOUR = 1.3
 """A way in a room is so much longer than the straight line."""
 LONGEST_DETOUR = 10.0
@@ -41,7 +48,30 @@ NOTE_SECONDS = 1.0
 HERE = 0.05
 """A bearing that differs by less is looked at already, rad."""
 POLL = 0.5
-"""Seconds between two looks whether a doubt is settled."""
+"""Seconds between two looks whether a doubt is settled, or a picture was looked at."""
+
+
+@dataclass
+class _Stay:
+    """What was looked at in one stay.
+
+    Attributes:
+        own: Where the robot arrived: the place's own point.
+        end: Until when it looks, seconds.
+        drives: Whether it may drive about.
+        sides: The bearings, whole degrees of the map frame.
+        unseen: Those to which the camera was turned, and of which no picture was looked at.
+        checks: The names of the checks.
+        faced: Whether the camera is turned aside.
+    """
+
+    own: Point | None
+    end: float
+    drives: bool
+    sides: list[int] = field(default_factory=list)
+    unseen: list[int] = field(default_factory=list)
+    checks: list[str] = field(default_factory=list)
+    faced: bool = False
 
 
 class RoomLook:
@@ -55,6 +85,7 @@ class RoomLook:
         self._mission = mission
         self._moves = {True: ARM_MOVE, False: BASE_MOVE}
         self._looked_again: deque[int] = deque(maxlen=MOST_DOUBTS)
+        self._short: set[str] = set()
         self._elapsed = elapsed_of(mission.clock)
         self._began = 0.0
 
@@ -87,39 +118,159 @@ class RoomLook:
             self._note_explored()
         mission.explored = math.inf
 
-    def _note_explored(self, **side: int) -> None:
+    def _note_explored(self, **side: object) -> None:
         seconds = round(self._elapsed() - self._began, 3)
         self._mission.note('exploring', place=self._mission.place, seconds=seconds, **side)
 
     def _look(self, looking: Looking, end: float, interrupt: Interrupt) -> None:
-        """Look at the place from its viewpoints, as far as that goes until a time."""
+        """Look at the place, as far as that goes until a time."""
         mission = self._mission
         if end - self._elapsed() < SETTLE:
             return
         drives = mission.place not in mission.settings.choice.recharge_rooms
+        stay = _Stay(looking.position(), end, drives)
+        has_arm = looking.has_arm()
         try:
-            points = list(looking.viewpoints(mission.place)) if drives else []
-            left_out = len(points)
-            sides = self._turn(looking, points, end, drives, interrupt)
-            if looking.sees_around():
-                self._stand(end, interrupt)
-            while points and (here := looking.position()) is not None:
-                point = self._next(here, points, end - self._elapsed())
-                if point is None:
-                    break
-                points.remove(point)
-                looking.drive(point, interrupt)
-                left_out -= 1
-                mission.note('viewpoint', place=mission.place, point=list(point[:2]))
-                turned = self._turn(looking, points, end, drives, interrupt)
-                sides += turned
-                if not turned:
-                    self._stand(end, interrupt)
-            mission.note('look', place=mission.place, sides=sides, left_out=left_out)
+            self._look_at_checks(looking, stay, interrupt)
+            stands: list[Point | None] = [None]
+            stands += looking.viewpoints(mission.place) if drives else []
+            self._look_from(looking, stay, stands, interrupt)
+            left_out = len(stands) - (None in stands)
+            more = {
+                name: found
+                for name, found in (('unseen', stay.unseen), ('checks', stay.checks))
+                if found
+            }
+            mission.note('look', place=mission.place, sides=stay.sides, left_out=left_out, **more)
         except CallInterruptedError:
+            if has_arm and stay.faced:
+                looking.rest_arm()
             raise
         except CallError as error:
+            if has_arm and stay.faced:
+                looking.rest_arm()
             mission.say(f'looking at {mission.place}: {error}', warning=True)
+
+    def _look_from(
+        self,
+        looking: Looking,
+        stay: _Stay,
+        stands: list[Point | None],
+        interrupt: Interrupt,
+    ) -> None:
+        """Look at the place from its points, those first that wait longest; drop those done."""
+        mission = self._mission
+        while stands:
+            here = looking.position()
+            left = stay.end - self._elapsed()
+            fits = self._next(here, stay, stands, left)
+            if fits is None:
+                break
+            (point,) = fits
+            stands.remove(point)
+            at = point or stay.own
+            away = at is not None and here is not None and math.dist(at[:2], here[:2]) > NEAR
+            if at is not None and (away or point is not None):
+                self._aim_ahead(looking, stay, interrupt)
+                looking.drive(at, interrupt)
+            if point is not None:
+                mission.note('viewpoint', place=mission.place, point=list(point[:2]))
+            others = [each for each in stands if each is not None]
+            turned = self._turn(looking, stay, point, others, interrupt)
+            if looking.sees_around() or not (turned or point is None):
+                self._stand(stay.end, interrupt)
+                mission.looked.note(mission.place, stand_name(point))
+        self._aim_ahead(looking, stay, interrupt)
+        self._say_short(looking, stay, stands)
+
+    def _say_short(self, looking: Looking, stay: _Stay, stands: Sequence[Point | None]) -> None:
+        """Say once of a place that a stay is too short to drive to some viewpoints at all."""
+        mission, own = self._mission, stay.own
+        if own is None or mission.place in self._short:
+            return
+        whole = stay.end - self._began
+        needed = [self._way(own, each) + SETTLE for each in stands if each is not None]
+        if too_long := [each for each in needed if each > whole]:
+            self._short.add(mission.place)
+            mission.say(
+                f'{mission.place}: {len(too_long)} of its viewpoints are never looked from: a stay '
+                f'of {whole:.0f} s is too short to drive there, {max(too_long):.0f} s would do '
+                '(exploration_seconds)'
+            )
+
+    def _look_at_checks(self, looking: Looking, stay: _Stay, interrupt: Interrupt) -> None:
+        """Look at what the rules ask for, what waits longest first, for half of the time.
+
+        Where there is no time for more than one thing, it is a check in every other stay.
+        """
+        mission = self._mission
+        place, has_arm = mission.place, looking.has_arm()
+        checks = sorted(
+            looking.checks(place), key=lambda each: mission.looked.rank(place, each.name)
+        )
+        if not checks or looking.sees_around() or not (has_arm or stay.drives):
+            return
+        spare = self._moves[True] if has_arm else 0.0
+        one = self._moves[has_arm] + DWELL
+        left = stay.end - self._elapsed() - spare
+        names = {each.name for each in checks}
+        if left < 2.0 * one and mission.looked.latest(place) in names:
+            return
+        half = self._elapsed() + left / 2.0
+        for check in checks:
+            here = looking.position()
+            if here is None or (stay.checks and self._elapsed() >= half):
+                break
+            point = (check.look_from or stay.own) if stay.drives else None
+            way = 0.0
+            if point is not None and math.dist(point[:2], here[:2]) > NEAR:
+                way = self._way(here, point)
+            if self._elapsed() + way + one > stay.end - spare:
+                continue
+            if point is not None and way:
+                self._aim_ahead(looking, stay, interrupt)
+                looking.drive(point, interrupt)
+                here = looking.position() or point
+            bearing = math.atan2(check.point[1] - here[1], check.point[0] - here[0])
+            seen = self._face(looking, stay, bearing, stay.end - spare, interrupt)
+            mission.looked.note(place, check.name)
+            if seen:
+                stay.checks.append(check.name)
+                self._note_explored(check=check.name)
+            self.verify(interrupt)
+
+    def _aim_ahead(self, looking: Looking, stay: _Stay, interrupt: Interrupt) -> None:
+        """Have the arm look ahead, if it looks elsewhere."""
+        if stay.faced and looking.has_arm():
+            looking.face(looking.heading(), interrupt)
+        stay.faced = False
+
+    def _face(
+        self,
+        looking: Looking,
+        stay: _Stay,
+        bearing: float,
+        latest: float,
+        interrupt: Interrupt,
+    ) -> bool:
+        """Turn the camera to a bearing, and stand until a picture of it was looked at.
+
+        Returns:
+            Whether one was, before a time, for a dwell or a little longer.
+        """
+        has_arm, began = looking.has_arm(), self._elapsed()
+        stay.faced = True
+        looking.face(bearing, interrupt)
+        faced = self._elapsed()
+        self._moves[has_arm] = max(0.1, 0.5 * (self._moves[has_arm] + faced - began))
+        seconds = DWELL
+        while True:
+            if not self._mission.clock.sleep(seconds, interrupt):
+                raise CallInterruptedError
+            seen, now = looking.saw(bearing), self._elapsed()
+            if seen or now + POLL > min(latest, faced + LONGEST_DWELL):
+                return seen
+            seconds = POLL
 
     def verify(self, interrupt: Interrupt) -> None:
         """Look again, from elsewhere, at what made an alert in this place that is not sure.
@@ -187,16 +338,34 @@ class RoomLook:
         speed = max(1e-3, self._mission.settings.choice.speed)
         return DETOUR * math.dist(here[:2], point[:2]) / speed + 2.0
 
-    def _next(self, here: Point, points: Sequence[Point], seconds: float) -> Point | None:
-        """Return the viewpoint to drive to; None where the way to none fits into the time.
+    def _next(
+        self,
+        here: Point | None,
+        stay: _Stay,
+        stands: Sequence[Point | None],
+        seconds: float,
+    ) -> tuple[Point | None] | None:
+        """Return the point to look from, None for the place's own; None where no way fits.
 
-        The nearest one while there is time for all, else the first one that fits: the order in
+        While there is time for all, that is the own one and then the nearest. Otherwise it is the
+        one that waits longest, and of those that never had their turn the first one: the order in
         which they are told is by what they show.
         """
+        if here is None:
+            return (None,) if None in stands else None
+        points = [each for each in stands if each is not None]
+        at_own = stay.own is None or math.dist(here[:2], stay.own[:2]) <= NEAR
         if self._needed(here, points) <= seconds:
-            return min(points, key=lambda each: math.dist(here[:2], each[:2]))
-        fits = (each for each in points if self._way(here, each) + SETTLE <= seconds)
-        return next(fits, None)
+            if None in stands and at_own:
+                return (None,)
+            if points:
+                return (min(points, key=lambda each: math.dist(here[:2], each[:2])),)
+        looked, place = self._mission.looked, self._mission.place
+        for each in sorted(stands, key=lambda each: looked.rank(place, stand_name(each))):
+            at = each or stay.own
+            if at is None or (each is None and at_own) or self._way(here, at) + SETTLE <= seconds:
+                return (each,)
+        return None
 
     def _needed(self, here: Point, points: Sequence[Point]) -> float:
         """Return the seconds for driving to points, the nearest first, and standing there."""
@@ -211,79 +380,62 @@ class RoomLook:
     def _turn(
         self,
         looking: Looking,
-        points: Sequence[Point],
-        end: float,
-        drives: bool,
+        stay: _Stay,
+        point: Point | None,
+        others: Sequence[Point],
         interrupt: Interrupt,
-    ) -> list[int]:
+    ) -> bool:
         """Turn the camera to as many sides as there is time for, those first that wait longest.
 
-        Where there are viewpoints to drive to, all sides but one leave time for those.
-
-        Returns:
-            The sides that it looked at, whole degrees of the map frame.
-        """
-        has_arm = looking.has_arm()
-        if looking.sees_around() or not (has_arm or drives):
-            return []
-        here, ahead = looking.position(), looking.heading()
-        rest = 0.0 if here is None else self._needed(here, points)
-        if not has_arm:
-            return self._pass(looking, BASE_SIDES, end, rest, interrupt)
-        try:
-            # An arm looks ahead again at the end.
-            sides = [ahead + each for each in ARM_SWEEP]
-            looked = self._pass(looking, sides, end - self._moves[True], rest, interrupt)
-            if looked:
-                looking.face(looking.heading(), interrupt)
-        except CallError:
-            # Whatever ended the look: who drives next has the camera ahead.
-            looking.rest_arm()
-            raise
-        return looked
-
-    def _pass(
-        self,
-        looking: Looking,
-        sides: Sequence[float],
-        end: float,
-        rest: float,
-        interrupt: Interrupt,
-    ) -> list[int]:
-        """Turn the camera to those of some sides that wait longest, as many as time allows.
-
-        They are passed in one sweep, which an arm, which has stops, makes in the order given.
+        Where there are viewpoints to drive to, all sides but one leave time for those. The sides
+        are the same ones in each visit, as many as show the whole horizon. An arm, which has
+        stops, passes them anticlockwise from the robot's front, and that last.
 
         Args:
             looking: Who turns it.
-            sides: Bearings in the map frame, rad.
-            end: When the last one has been looked at.
-            rest: All but the first one leave so many seconds until then.
+            stay: What was looked at in this stay.
+            point: From where; None: from the place's own point.
+            others: The viewpoints that are left.
             interrupt: Ends it.
 
         Returns:
-            The bearings, whole degrees.
+            Whether the camera was turned at all.
         """
         mission, has_arm = self._mission, looking.has_arm()
+        place = mission.place
+        if looking.sees_around() or not (has_arm or stay.drives):
+            return False
+        here, ahead = looking.position(), looking.heading()
+        rest = 0.0 if here is None else self._needed(here, others)
+        end = stay.end - (self._moves[True] if has_arm else 0.0)
+        count = max(1, math.ceil(math.tau / (looking.camera_angle() or VIEW) - 0.05))
+        sides = [math.tau * index / count for index in range(count)]
+        sides.sort(key=lambda each: (each - ahead - HERE) % math.tau)
         step, left = self._moves[has_arm] + DWELL, end - self._elapsed()
-        count = max(int(left >= step), int((left - rest) // step))
-        waiting = sorted(sides, key=lambda each: mission.looked.rank(mission.place, each))
-        chosen = [each for each in sides if each in waiting[:count]]
-        looked: list[int] = []
-        for side in chosen if has_arm else one_way(chosen, looking.heading()):
+        most = max(int(left >= step), int((left - rest) // step))
+
+        def name(side: float) -> str:
+            return side_name(round(math.degrees(side)), point)
+
+        waiting = sorted(sides, key=lambda each: mission.looked.rank(place, name(each)))
+        chosen = [each for each in sides if each in waiting[:most]]
+        is_first = True
+        for side in chosen if has_arm else one_way(chosen, ahead):
             # Also where it is slower than it was.
-            if looked and end - rest - self._elapsed() < self._moves[has_arm] + DWELL:
+            if not is_first and end - rest - self._elapsed() < self._moves[has_arm] + DWELL:
                 break
-            began = self._elapsed()
-            looking.face(side, interrupt)
-            took = self._elapsed() - began
-            self._moves[has_arm] = max(0.1, 0.5 * (self._moves[has_arm] + took))
-            if not mission.clock.sleep(DWELL, interrupt):
-                raise CallInterruptedError
-            looked.append(mission.looked.note(mission.place, side))
-            self._note_explored(bearing=looked[-1])
+            is_first = False
+            seen = self._face(looking, stay, side, end - rest, interrupt)
+            mission.looked.note(place, stand_name(point), name(side))
+            bearing = round(math.degrees(side))
+            if seen:
+                stay.sides.append(bearing)
+                at = {} if point is None else {'point': list(point[:2])}
+                self._note_explored(bearing=bearing, **at)
+            else:
+                stay.unseen.append(bearing)
             self.verify(interrupt)
-        return looked
+        return bool(chosen)
 
 
 def one_way(bearings: Sequence[float], ahead: float) -> list[float]:

@@ -16,7 +16,7 @@ from state_machines.clock import elapsed_of
 from state_machines.exceptions import CallError, CallInterruptedError
 from surveillance_behaviour.charging import BatteryMonitor, charge
 from surveillance_behaviour.mission.mission_log import (
-    LookedSides,
+    Looked,
     MissionRecord,
     is_other_simulation,
 )
@@ -92,7 +92,7 @@ class Mission:
         astray: Whether it has left its place and not arrived anywhere since.
         staying: Why it was decided to stay where it is for a while; empty: it was not.
         explored: Seconds for which it explored its place since it came there; inf: it is done.
-        looked: Where the camera looked in each place.
+        looked: What was looked at in each place.
         goes_on: Whether an earlier run of the same record is gone on with.
         docking: Whether a drive to a recharge room ends at its station, not at the room's point.
     """
@@ -125,7 +125,7 @@ class Mission:
         self._record = record
         self._cut_off = None if record is None else record.left_at
         self.goes_on = record is not None and record.is_begun
-        self.looked = LookedSides(None if record is None else record.looked.to_json())
+        self.looked = Looked(None if record is None else record.looked.to_json())
         self._started: float | None = None
         self._noted_places: frozenset[str] = frozenset()
         self._noted_threshold = 0.0

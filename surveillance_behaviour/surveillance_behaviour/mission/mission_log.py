@@ -17,7 +17,9 @@ and the event's own fields::
 A start, and a decision under another threshold than the last one, has ``urgency_threshold``,
 seconds. The ``path`` was planned; ``driven`` is where the robot was, where the motion controller
 tells it. An ``exploring`` may have ``bearing``: the camera had looked there then, whole degrees of
-the map frame, as the ``sides`` of a ``look`` are. ``promises`` says what can be kept of each place:
+the map frame, as the ``sides`` of a ``look`` are, with ``point`` where that was not the place's own
+one; or ``check``, by its name. To the ``unseen`` of a ``look`` the camera was turned, and nobody
+looked at a picture of it. ``promises`` says what can be kept of each place:
 ``place``, ``verdict``, ``words``, and ``threshold`` and ``wait`` in seconds, null where they have
 no end.
 
@@ -48,7 +50,7 @@ import os
 import shutil
 import zlib
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -163,8 +165,8 @@ class MissionRecord:
         return self._account.now is not None
 
     @property
-    def looked(self) -> LookedSides:
-        """Where the camera looked in each place."""
+    def looked(self) -> Looked:
+        """What was looked at in each place."""
         return self._account.looked
 
     def write(self, name: str, time: float, **fields: object) -> None:
@@ -343,45 +345,71 @@ class Summary:
         return '\n'.join(lines)
 
 
-SAME_SIDE = 45.0
-"""Bearings that differ by less show the same side, degrees."""
+MOST_LOOKED = 200
+"""So much is kept of each place."""
 
 
-class LookedSides:
-    """Where the camera looked in each place, so that what waits longest comes first.
+class Looked:
+    """What was looked at in each place, so that what waits longest comes first.
+
+    That is a side (`side_name`), a point from which the place was looked at (`stand_name`), or a
+    check by its name.
 
     Args:
         kept: What `to_json` gave; nothing: nowhere.
     """
 
-    def __init__(self, kept: Mapping[str, Iterable[int]] | None = None) -> None:
-        self._sides = {
-            str(place): [int(each) for each in sides] for place, sides in (kept or {}).items()
-        }
+    def __init__(self, kept: Mapping[str, Iterable[str | int]] | None = None) -> None:
+        self._seen = {str(place): list(map(str, some)) for place, some in (kept or {}).items()}
 
-    def note(self, place: str, bearing: float) -> int:
-        """Take that the camera looked to a bearing, map frame, rad; return it in whole degrees."""
-        degrees = round(math.degrees(bearing)) % 360
-        others = [each for each in self._sides.get(place, ()) if not _is_same(each, degrees)]
-        self._sides[place] = [*others, degrees]
-        return degrees
+    def note(self, place: str, *names: str) -> None:
+        """Take that something was looked at, now."""
+        others = [each for each in self._seen.get(place, ()) if each not in names]
+        self._seen[place] = [*others, *names][-MOST_LOOKED:]
 
-    def rank(self, place: str, bearing: float) -> int:
-        """Return how long ago the camera looked there, among the sides of a place: 0: never, else
-        greater where it is less long ago.
+    def rank(self, place: str, name: str) -> int:
+        """Return how long ago that was, among all of a place: 0: never, else greater where it is
+        less long ago.
         """
-        degrees = math.degrees(bearing)
-        sides = self._sides.get(place, ())
-        same = (number for number, each in enumerate(sides, start=1) if _is_same(each, degrees))
-        return max(same, default=0)
+        seen = self._seen.get(place, [])
+        return seen.index(name) + 1 if name in seen else 0
 
-    def to_json(self) -> dict[str, list[int]]:
-        """Return it as plain values: the bearings of each place, the latest last."""
-        return {place: list(sides) for place, sides in self._sides.items()}
+    def latest(self, place: str) -> str:
+        """Return what was looked at last in a place; empty: nothing."""
+        return self._seen.get(place, [''])[-1]
+
+    def to_json(self) -> dict[str, list[str]]:
+        """Return it as plain values: the names of each place, the latest last."""
+        return {place: list(names) for place, names in self._seen.items()}
 
 
-def _is_same(one: float, other: float) -> bool:
-    return abs(math.remainder(one - other, 360.0)) < SAME_SIDE
+def stand_name(point: Sequence[float] | None) -> str:
+    """Return how a point is called from which a place is looked at; None: the place's own."""
+    return 'own point' if point is None else f'{point[0]:g} {point[1]:g}'
+
+
+def side_name(bearing: int, point: Sequence[float] | None) -> str:
+    """Return how a side is called.
+
+    Args:
+        bearing: Whole degrees of the map frame.
+        point: From where it was looked at; None: from the place's own point.
+    """
+    return f'{bearing}' if point is None else f'{bearing} from {stand_name(point)}'
+
+
+def _looked_at(event: Event) -> list[str]:
+    """Return what an event tells to have been looked at."""
+    fields, at = event.fields, None
+    if isinstance(check := fields.get('check'), str):
+        return [check]
+    point = fields.get('point')
+    if isinstance(point, list) and [type(each) for each in point] == [float, float]:
+        at = point[0], point[1]
+    if event.name == 'viewpoint':
+        return [] if at is None else [stand_name(at)]
+    bearing = fields.get('bearing')
+    return [stand_name(at), side_name(bearing, at)] if isinstance(bearing, int) else []
 
 
 @dataclass
@@ -394,7 +422,7 @@ class Account:
         now: Time of the last event; None: there was none.
         left_at: Where the mission stands; None: it ended as told, or never began.
         visits: When the robot was in each place last, seconds on the present clock.
-        looked: Where the camera looked in each place.
+        looked: What was looked at in each place.
     """
 
     summary: Summary = field(default_factory=Summary)
@@ -402,7 +430,7 @@ class Account:
     now: float | None = None
     left_at: CutOff | None = None
     visits: dict[str, float] = field(default_factory=dict)
-    looked: LookedSides = field(default_factory=LookedSides)
+    looked: Looked = field(default_factory=Looked)
 
     def take(self, event: Event) -> None:
         """Count one event.
@@ -427,8 +455,8 @@ class Account:
         _count(summary, event, self.last_seen)
         if event.name == 'visit':
             self.visits[event.text('place')] = event.time
-        if isinstance(bearing := event.fields.get('bearing'), int):
-            self.looked.note(event.text('place'), math.radians(bearing))
+        if event.name in ('exploring', 'viewpoint'):
+            self.looked.note(event.text('place'), *_looked_at(event))
         self.left_at = _after(self.left_at, event)
         if self.left_at is not None:
             self.left_at = replace(self.left_at, time=event.time)
@@ -463,7 +491,7 @@ class Account:
                 left_at = replace(left_at, explored=math.inf)
             self.summary, self.left_at = summary, left_at
             self.last_seen, self.visits = _times(kept['last_seen']), _times(kept['visits'])
-            self.looked = LookedSides(kept.get('looked', {}))
+            self.looked = Looked(kept.get('looked', {}))
         except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
             raise FileError(f'a snapshot of the mission record is damaged: {error}') from None
 

@@ -1,9 +1,10 @@
-"""Viewpoints and doubts as the node `observer` tells them, and the driving and turning for a look.
+"""What the node `observer` tells a robot that looks, and the driving and turning for a look.
 
-`viewpoints` is JSON of the form `{"R1": [[x, y], ...]}`, `doubts` a list of alerts that wait for a
-second look, `sees_around` whether it sees all around without a turn. The first word of that says
-that the observer sees, which the first look of this process waits for. Without an observer there
-are no viewpoints, and the robot looks nowhere.
+`viewpoints` is JSON of the form `{"R1": [[x, y], ...]}`, `checks` tells of each place what the
+rules want to have seen there, `doubts` is a list of alerts that wait for a second look, `pictures`
+tells which sides were in the pictures that were looked at last, and `sees_around` whether it sees
+all around without a turn. The first word of that says that the observer sees, which the first look
+of this process waits for. Without an observer there are no viewpoints, and the robot looks nowhere.
 """
 
 from __future__ import annotations
@@ -19,10 +20,10 @@ from std_msgs.msg import Bool, String
 
 from state_machines import Interrupt
 from state_machines.ros import CallError, GoalCaller, ServiceCaller
-from surveillance_behaviour.ports import Doubt, Point
+from surveillance_behaviour.ports import Check, Doubt, Point
 from surveillance_behaviour.ros_adapters.peers import Deadlines, MissionClock, run
 from surveillance_interfaces.action import ComputePath, FollowPath
-from surveillance_interfaces.srv import MarkerRoutine
+from surveillance_interfaces.srv import MarkerRoutine, PointCamera
 from surveillance_runtime.conversions import (
     point_from,
     point_message,
@@ -30,6 +31,7 @@ from surveillance_runtime.conversions import (
     pose_of_serialized,
 )
 from surveillance_runtime.node import PatrolNode
+from surveillance_runtime.robot_arm import ARM
 from surveillance_runtime.state_topics import StateSubscription
 from surveillance_runtime.turning_path import turning_path
 
@@ -46,6 +48,12 @@ POSES = (
     MarkerRoutine.Request.RIGHT,
 )
 """Of the arm, a quarter turn apart, anticlockwise."""
+AT_POSE = 0.05
+"""A bearing that differs by less from a pose's is that of the pose, rad."""
+FAR = 20.0
+"""The arm is pointed at something so far away, metres."""
+SAME_SIDE = 0.35
+"""A picture whose middle is so near to a bearing shows it, rad."""
 
 
 class RosLooking:
@@ -56,9 +64,16 @@ class RosLooking:
         self._planner = GoalCaller(node, ComputePath, 'compute_path')
         self._follower = GoalCaller(node, FollowPath, 'follow_path')
         self._arm = ServiceCaller(node, MarkerRoutine, 'move_arm')
+        self._pointing = ServiceCaller(node, PointCamera, 'point_camera')
         self._node = node
         self._viewpoints: dict[str, list[Point]] = {}
         self._doubts: list[Doubt] = []
+        self._checks: dict[str, list[Check]] = {}
+        # Of each picture that was looked at when it was taken, seconds, and to which bearing, rad;
+        # None: nobody looks at pictures.
+        self._pictures: list[tuple[float, float | None]] | None = []
+        self._camera_angle: float | None = None
+        self._faced_at = 0.0
         self._position: Point | None = None
         self._heading = 0.0
         self._sees_around = False
@@ -67,6 +82,8 @@ class RosLooking:
         StateSubscription(node, Bool, 'sees_around', self._on_sees_around)
         StateSubscription(node, String, 'viewpoints', self._on_viewpoints)
         StateSubscription(node, String, 'doubts', self._on_doubts)
+        StateSubscription(node, String, 'checks', self._on_checks)
+        StateSubscription(node, String, 'pictures', self._on_pictures)
         StateSubscription(node, PoseWithCovarianceStamped, 'amcl_pose', self._on_pose, raw=True)
 
     def viewpoints(self, place: str) -> Sequence[Point]:
@@ -76,6 +93,24 @@ class RosLooking:
     def doubts(self, place: str) -> Sequence[Doubt]:
         """Return the alerts in a place that wait for a second look."""
         return [each for each in self._doubts if each.place == place]
+
+    def checks(self, place: str) -> Sequence[Check]:
+        """Return what is to be seen in a place before all else."""
+        return list(self._checks.get(place, ()))
+
+    def camera_angle(self) -> float | None:
+        """Return how much of the horizon a picture shows, rad; None: nobody has said."""
+        return self._camera_angle
+
+    def saw(self, bearing: float) -> bool:
+        """Tell whether a picture to a bearing was looked at, taken since the camera was turned."""
+        if self._pictures is None:
+            return True
+        return any(
+            taken >= self._faced_at
+            and (where is None or abs(math.remainder(where - bearing, math.tau)) <= SAME_SIDE)
+            for taken, where in self._pictures
+        )
 
     def position(self) -> Point | None:
         """Return where the robot is."""
@@ -117,23 +152,38 @@ class RosLooking:
         run(self._follower, request, limits.answer, limits.move, interrupt)
 
     def face(self, bearing: float, interrupt: Interrupt) -> None:
-        """Turn the camera to a bearing: the arm to its nearest pose, or the base without one."""
+        """Turn the camera to a bearing: the arm, or the base without one.
+
+        An arm that can be pointed anywhere is; another one takes its nearest pose.
+        """
         limits, here = self._deadlines, self._position
         if not self.has_arm():
             if here is None:
                 raise CallError('amcl_pose: nobody tells where the robot is')
             turn = FollowPath.Goal(path=point_messages(turning_path(here, bearing)))
             run(self._follower, turn, limits.answer, limits.move, interrupt)
-            return
-        self._resting.set()
-        self._clock.wait_for_event()
-        quarters = round((bearing - self._heading) / (math.pi / 2)) % len(POSES)
-        request = MarkerRoutine.Request(pos=POSES[quarters])
-        answer = self._arm.call(
-            request, limits.move or ARM_DEADLINE, interrupt, discovery=limits.answer
-        )
+        else:
+            self._resting.set()
+            self._clock.wait_for_event()
+            self._turn_arm(bearing - self._heading, interrupt)
+        self._faced_at = self._clock.now()
+
+    def _turn_arm(self, aside: float, interrupt: Interrupt) -> None:
+        """Have the arm look aside, rad from the robot's front, anticlockwise."""
+        limits = self._deadlines
+        quarters = round(aside / (math.pi / 2))
+        caller: ServiceCaller = self._arm
+        request: Any = MarkerRoutine.Request(pos=POSES[quarters % len(POSES)])
+        is_pose = abs(aside - quarters * math.pi / 2) < AT_POSE
+        if not is_pose and self._pointing.is_ready():
+            lens = ARM.camera_frame(ARM.home)[:3, 3]
+            target = lens[0] + FAR * math.cos(aside), lens[1] + FAR * math.sin(aside), lens[2]
+            caller = self._pointing
+            request = PointCamera.Request(point=point_message(target), frame_id='base_link')
+        seconds = limits.move or ARM_DEADLINE
+        answer = caller.call(request, seconds, interrupt, discovery=limits.answer)
         if not answer.success:
-            raise CallError(f'{self._arm.name}: {answer.message}')
+            raise CallError(f'{caller.name}: {answer.message}')
 
     def rest_arm(self) -> None:
         """Have the arm look ahead; what points it elsewhere afterwards comes before it."""
@@ -178,6 +228,33 @@ class RosLooking:
             )
             for each in told
         ]
+
+    def _on_checks(self, message: String) -> None:
+        told = _read(self._node, 'checks', message.data, dict)
+        self._checks = {
+            str(place): [
+                Check(
+                    str(each['name']),
+                    _point(each['at']),
+                    None if each.get('from') is None else _point(each['from']),
+                )
+                for each in some
+            ]
+            for place, some in told.items()
+        }
+
+    def _on_pictures(self, message: String) -> None:
+        told = _read(self._node, 'pictures', message.data, dict)
+        angle = told.get('angle')
+        self._camera_angle = None if angle is None else math.radians(float(angle))
+        self._pictures = (
+            [
+                (float(taken), None if bearing is None else math.radians(float(bearing)))
+                for taken, bearing in told.get('looked', ())
+            ]
+            if told.get('camera')
+            else None
+        )
 
     def _on_pose(self, serialized: bytes) -> None:
         x, y, yaw = pose_of_serialized(serialized)

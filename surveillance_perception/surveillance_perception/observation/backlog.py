@@ -87,12 +87,17 @@ FEWEST = 5
 MUCH = 0.5
 """What costs such a part of a source is worth a word; less than half of that ends it."""
 
+SILENT = 20.0
+"""Seconds without any of a source that is there, after which that is told."""
+
+NONE_CAME = 'none came'
 DROPPED = 'dropped'
 NO_POSE = 'no pose'
 UNREAD = 'unread'
 LATE = 'late'
 
 WORDS: Mapping[tuple[str, str], str] = {
+    ('pictures', NONE_CAME): 'came for 20 s or longer, although there is a camera',
     ('pictures', DROPPED): 'were left out: this machine is too busy to look at them',
     ('pictures', NO_POSE): (
         'count for little: nobody told where the camera was when they were taken '
@@ -123,7 +128,23 @@ class LostSight:
         self._lock = threading.Lock()
         self._taken: dict[str, deque[_Taken]] = {}
         self._said: set[tuple[str, str]] = set()
+        # Since when a source that is there has sent nothing.
+        self._since: dict[str, float] = {}
         self.lost: Counter[tuple[str, str]] = Counter()
+
+    def expect(self, source: str, is_there: bool) -> None:
+        """Take whether anybody is there who sends something of a source."""
+        with self._lock:
+            if is_there:
+                self._since.setdefault(source, self._now())
+            else:
+                self._since.pop(source, None)
+
+    def come(self, source: str) -> None:
+        """Take that something of a source came, of use or not."""
+        with self._lock:
+            if source in self._since:
+                self._since[source] = self._now()
 
     def count(self, source: str, *causes: str) -> None:
         """Take that a picture or a sweep came, and what was wrong with it; nothing: it was used."""
@@ -136,6 +157,10 @@ class LostSight:
         found = {}
         with self._lock:
             now = self._now()
+            for source, since in self._since.items():
+                key = source, NONE_CAME
+                if now - since >= (1.0 if key in self._said else SILENT):
+                    found[key] = f'no {source} {WORDS[key]}'
             for source, taken in self._taken.items():
                 while taken and now - taken[0].at > WINDOW:
                     taken.popleft()

@@ -145,6 +145,23 @@ class MarkerFinding:
 
 
 @dataclass(frozen=True)
+class HungSpot:
+    """Where a marker hangs.
+
+    Attributes:
+        number: Its id.
+        position: Map frame, metres.
+        facing: Where it looks to, map frame, rad; None: it was never read.
+        side: Of its black square, metres; 0: not known.
+    """
+
+    number: int
+    position: tuple[float, float, float]
+    facing: float | None
+    side: float
+
+
+@dataclass(frozen=True)
 class _Aspect:
     """How a marker and what surrounds it look from one side.
 
@@ -260,6 +277,18 @@ class HungMarkers:
         """Return where a marker hangs, map frame, metres; None: it was never read."""
         spot = self._spots.get(number)
         return None if spot is None else _plain(spot.position)
+
+    def spots(self) -> list[HungSpot]:
+        """Return where markers hang, as far as that is known."""
+        return [
+            HungSpot(
+                number,
+                _plain(spot.position),
+                None if not spot.aspects else _facing(spot.aspects[-1].rotation),
+                spot.side,
+            )
+            for number, spot in sorted(self._spots.items())
+        ]
 
     def accept(self, number: int) -> None:
         """Take that a marker hangs rightly where it was read last, or nowhere."""
@@ -685,6 +714,10 @@ def _is_seen_alike(aspect: _Aspect, camera: Array, share: float) -> bool:
     cosine = float(one @ other) / max(lengths[0] * lengths[1], 1e-9)
     times = max(lengths) / max(min(lengths), 1e-9)
     return cosine >= math.cos(SAME_ASPECT * share) and times <= SAME_DISTANCE**share
+
+
+def _facing(rotation: Array) -> float:
+    return math.atan2(float(rotation[1, 2]), float(rotation[0, 2]))
 
 
 def _plain(position: Array) -> tuple[float, float, float]:

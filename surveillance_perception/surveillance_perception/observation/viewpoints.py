@@ -35,6 +35,11 @@ CHECK_WEIGHT = 0.1
 """A check of this room weighs as much as this part of its floor."""
 CHECK_RANGE = 3.0
 """A check is looked at from so near, metres."""
+READ_FROM, READ_UP_TO, READ_WITHIN = 0.8, 2.2, 1.05
+"""A marker of 0.2 m is read from so near up to so far, metres, and so far from straight ahead,
+rad: so it can also be called gone (`hung_markers`)."""
+BEST_READ = 1.5
+"""From here it is read best, metres."""
 ASIDE = 1.0
 """A second look is taken from so far from the first one, metres, at least."""
 
@@ -82,6 +87,39 @@ class Viewpoints:
             covered |= seen
             open_checks = [each for each in open_checks if not self._shows(spot, each)]
         return found
+
+    def of_panel(
+        self, floor: Mask, first: Spot, panel: Spot, facing: float | None, scale: float = 1.0
+    ) -> Spot | None:
+        """Return from where in a room a panel on its wall is to be read; None: from nowhere.
+
+        Args:
+            floor: The room's cells.
+            first: Its point, which is as good as any from where the panel can be read.
+            panel: Where it hangs, map frame, metres.
+            facing: Where it looks to, same frame, rad; None: nobody knows.
+            scale: How much larger it is than a marker of 0.2 m.
+        """
+
+        def reads(spot: Spot) -> bool:
+            near, far = READ_FROM * min(1.0, scale), READ_UP_TO * scale
+            turn = 0.0 if facing is None else _bearing(panel, spot) - facing
+            return (
+                near <= math.dist(spot, panel) <= far
+                and abs(math.remainder(turn, math.tau)) <= READ_WITHIN
+                and self._shows(spot, panel, far)
+            )
+
+        if reads(first):
+            return first
+
+        def cost(spot: Spot) -> float:
+            turn = (
+                0.0 if facing is None else math.remainder(_bearing(panel, spot) - facing, math.tau)
+            )
+            return abs(math.dist(spot, panel) - BEST_READ * scale) + abs(turn)
+
+        return min(filter(reads, self._candidates(floor)), key=cost, default=None)
 
     def aside(self, floor: Mask, thing: Spot, seen_from: Spot) -> Spot | None:
         """Return from where to look again at a thing; None where there is no other such place.

@@ -116,6 +116,10 @@ class WatchRule:
             return False
         return self.hours.at(moment) == 'must'
 
+    def is_about(self, subject: str, place: str) -> bool:
+        """Tell whether it asks for a thing in a place, at whatever time."""
+        return self.subject in ('', subject) and (not self.places or place in self.places)
+
     def lasting(self, looks: int, seconds: float) -> bool:
         """Tell whether what was seen in so many looks, over so long, counts."""
         return looks >= self.looks and seconds >= self.seconds

@@ -34,7 +34,12 @@ from surveillance_perception.observation.floor import (
     is_leaf,
 )
 from surveillance_perception.observation.habits import Habits
-from surveillance_perception.observation.hung_markers import CameraView, HungMarkers, SeenMarker
+from surveillance_perception.observation.hung_markers import (
+    CameraView,
+    HungMarkers,
+    HungSpot,
+    SeenMarker,
+)
 from surveillance_perception.observation.motion import WalkFinder
 from surveillance_perception.observation.observations import Kind, Observation
 from surveillance_perception.observation.other_robots import OtherRobots
@@ -735,6 +740,8 @@ class Watcher:
         if not self._known_markers:
             return
         numbers = {each.number for each in seen} - self._known_markers
+        # One that has moved is that, and no longer merely unknown.
+        numbers -= {int(each) for each in self._misplaced()}
         self._strange = {
             number: self._strange.get(number, _Agreement[bool]()) for number in numbers
         }
@@ -767,11 +774,8 @@ class Watcher:
         def is_clear(point: Points) -> bool:
             return not hidden and not self._stands_before(camera, point)
 
-        known = [
-            each for each in seen if not self._known_markers or each.number in self._known_markers
-        ]
-        current = {e.subject for e in self.book.current if e.kind == Kind.MARKER}
-        for each in self._markers.take(picture, camera, known, self._look, is_clear):
+        current = self._misplaced()
+        for each in self._markers.take(picture, camera, seen, self._look, is_clear):
             if each.state == 'here' and str(each.number) not in current:
                 continue
             x, y, _ = each.position
@@ -785,6 +789,14 @@ class Watcher:
             told = Observation(Kind.MARKER, each.state, place, number, (x, y), SEEN_TWICE, stamp)
             if self._is_due(told):
                 self._take(told, picture, before)
+
+    def _misplaced(self) -> set[str]:
+        """Return the markers that hang otherwise than they did, as the events say."""
+        return {
+            each.subject
+            for each in self.book.current
+            if each.kind == Kind.MARKER and each.seen != 'unknown'
+        }
 
     def _stands_before(self, camera: CameraView, point: Points) -> bool:
         """Tell whether the lidar met something between a camera and a marker."""
@@ -808,9 +820,14 @@ class Watcher:
         event = self.book.answer(number, state)
         if state == EventState.NORMAL and event.kind == Kind.VIEW and event.subject:
             self._views.forget(event.subject)
-        if state == EventState.NORMAL and event.kind == Kind.MARKER:
+        is_marker = event.kind == Kind.MARKER and event.seen != 'unknown'
+        if state == EventState.NORMAL and is_marker:
             self._markers.accept(int(event.subject))
         return event
+
+    def spots(self) -> list[HungSpot]:
+        """Return where markers hang, as far as that is known."""
+        return self._markers.spots()
 
     # --- what is made of it ---
 

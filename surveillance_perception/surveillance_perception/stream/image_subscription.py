@@ -32,12 +32,20 @@ class ImageSubscription:
         kind: The message's type.
         topic: The topic's name, relative to the node's namespace.
         callback: Called with each image.
+        raw: Whether it gets the bytes as they came.
     """
 
     def __init__(
-        self, node: PatrolNode, kind: Any, topic: str, callback: Callable[[Any], None]
+        self,
+        node: PatrolNode,
+        kind: Any,
+        topic: str,
+        callback: Callable[[Any], None],
+        *,
+        raw: bool = False,
     ) -> None:
         self._node = node
+        self._raw = raw
         self._kind = kind
         self._topic = topic
         self._callback = callback
@@ -55,6 +63,7 @@ class ImageSubscription:
             self._callback,
             IMAGES_QOS if reliable else best_effort,
             event_callbacks=events,
+            raw=self._raw,
         )
 
     def _on_incompatible(self, _event: Any) -> None:
