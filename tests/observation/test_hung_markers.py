@@ -74,6 +74,15 @@ def test_light_that_falls_from_one_side_takes_no_marker_away(hung):
     assert told(markers, np.asarray(np.clip(empty * slope, 0, 255), np.uint8), []) == ['missing']
 
 
+@pytest.mark.parametrize('across', [-30, 0, 40])
+def test_the_cone_of_a_lamp_that_is_lit_meanwhile_keeps_no_marker(hung, across):
+    markers, _, _, empty = hung
+    rows, columns = np.indices(empty.shape[:2])
+    apart = np.hypot(columns - (LEFT + 12 + across), rows - (TOP + 12))
+    cone = (0.6 + 0.5 * np.exp(-((apart / 85.0) ** 2)))[..., None]
+    assert told(markers, np.asarray(np.clip(empty * cone, 0, 255), np.uint8), []) == ['missing']
+
+
 def test_nothing_is_said_of_a_marker_that_was_not_read_or_that_something_stands_before(hung):
     markers, picture, _, empty = hung
     blurred = np.asarray(cv2.GaussianBlur(picture, (0, 0), 1.5), np.uint8)

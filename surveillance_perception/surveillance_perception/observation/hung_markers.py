@@ -681,9 +681,12 @@ def _foreign(before: Picture, now: Picture, judged: Mask, gain: float) -> float:
         for each in (before, now)
     )
     before_, now_ = first + 4.0, second / gain + 4.0
-    # The light changes evenly over so little of a wall, and in all colours alike.
+    # The light changes smoothly over so little of a wall, and in all colours alike. The rim of a
+    # lamp's cone bends: a plane leaves .2 there.
     rows, columns = np.indices(judged.shape) / len(judged) - 0.5
-    terms = np.stack([np.ones_like(rows), rows, columns], axis=2)
+    terms = np.stack(
+        [np.ones_like(rows), rows, columns, rows * rows, rows * columns, columns * columns], axis=2
+    )
     light = np.log(now_ / before_).mean(axis=2)
     alike = judged
     smooth = np.zeros_like(light)
