@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import replace
 
 import cv2
 import numpy as np
 import pytest
 
-from surveillance_perception.observation.hung_markers import AGREED, HungMarkers, SeenMarker
+from surveillance_perception.observation.hung_markers import AGREED, MOST, HungMarkers, SeenMarker
 
 from .marked_walls import METRE, aside, bare, camera, hang, seen_at, wall
 
@@ -164,10 +165,74 @@ def test_it_outlives_a_restart_and_refuses_what_is_none(hung):
     again.restore(kept)
     assert told(again, picture, [seen]) == ['here']
     assert told(again, empty, []) == ['missing']
-    kept['14']['position'] = [1.0, None, 2.0]
+    kept['spots']['14']['position'] = [1.0, None, 2.0]
     with pytest.raises((ValueError, TypeError)):
         again.restore(kept)
     assert again.position_of(14) is not None
+
+
+@pytest.mark.parametrize('at', [(0.0, 2.0, 1.0), (-2.0, 0.0, 1.0)])
+def test_a_persons_word_about_a_marker_of_the_file_outlives_a_restart_until_the_file_is_changed(at):
+    markers, picture = HungMarkers({14: (-2.0, 0.0, 1.0)}), wall()
+    there = hang(picture, 14, LEFT, TOP)
+    assert told(markers, picture, [there]) == ['moved']
+    markers.accept(14)
+    again = HungMarkers({14: at})
+    again.restore(json.loads(json.dumps(markers.to_json())))
+    is_as_before = at == (-2.0, 0.0, 1.0)
+    assert told(again, picture, [there]) == ['here' if is_as_before else 'moved']
+
+
+def test_a_panel_of_another_size_is_judged_by_its_own():
+    markers, picture, seen = learned(wall)
+    small = replace(seen, side=seen.side / 2)
+    assert told(markers, picture, [small], 2) == ['here']
+    assert [each.side for each in markers._spots.values()] == [small.side]
+    assert all(np.isclose(e.camera[0], 0.0) for e in markers._spots[14].aspects)
+    assert len(markers._spots[14].aspects) == 1, 'how the other one looked is of no use'
+
+
+@pytest.mark.parametrize(
+    'change',
+    [
+        {'deviation': math.nan},
+        {'turn': math.inf},
+        {'deviation': 1e200},
+        {'y': math.nan},
+        {'y': 1e200},
+    ],
+)
+def test_a_camera_that_is_nowhere_tells_nothing_and_spoils_nothing(change):
+    markers, picture, seen = learned(wall)
+    before = markers.to_json()
+    assert told(markers, picture, [seen], view=camera(**change)) == []
+    assert markers.to_json() == before
+
+
+@pytest.mark.parametrize(
+    'change',
+    [
+        {'position': np.array([0.0, 0.0, 1e200])},
+        {'side': 1e200},
+        {'side': math.nan},
+        {'covariance': np.eye(3) * 1e200},
+    ],
+)
+def test_what_no_camera_measures_is_no_marker(change):
+    markers, picture, seen = learned(wall)
+    before = markers.to_json()
+    assert told(markers, picture, [replace(seen, **change)]) == []
+    assert markers.to_json() == before
+
+
+def test_a_month_of_misreadings_leaves_room_for_a_marker():
+    markers, picture = HungMarkers(), wall()
+    seen = hang(picture, 14, LEFT, TOP)
+    for number in range(100, 100 + 2 * MOST):
+        markers.take(picture, camera(), [replace(seen, number=number)], 1)
+    assert told(markers, picture, [seen], 2) == []
+    assert told(markers, picture, [seen], 3) == ['here']
+    assert len(markers.to_json()['spots']) == MOST
 
 
 def test_one_picture_that_is_far_off_decides_nothing():

@@ -669,6 +669,35 @@ def test_an_alert_in_doubt_waits_for_a_look_from_elsewhere_or_for_its_time():
     assert not watch.watcher.doubts(watch.time)
 
 
+@pytest.mark.parametrize(('passed', 'is_told'), [(10.0, False), (40.0, True), (-3600.0, True)])
+def test_an_alert_in_doubt_is_told_also_after_a_restart_or_when_the_clock_was_set_back(
+    passed: float, is_told: bool
+):
+    watch = Round(verify_seconds=30.0)
+    watch.visit('R1', HERE)
+    watch.visit('R1', HERE, boxes=[(1.2, 4.2, 0.1)])
+    assert not watch.alerts
+    (event,) = [each for each in watch.book.events if each.kind == Kind.OBJECT]
+    again = Round(verify_seconds=30.0)
+    again.watcher.restore(json.loads(json.dumps(watch.watcher.state())))
+    for each in (watch, again):
+        waiting = each.watcher.doubts(event.began + passed)
+        assert [doubt.number for doubt in waiting] == ([] if is_told else [event.number])
+        assert each.alerts == ([event.number] if is_told else [])
+
+
+def test_a_clock_that_is_set_back_keeps_nothing_from_being_told():
+    watch = Round()
+    watch.visit('R1', HERE)
+    watch.watcher.arrive('R1', watch.time)
+    before = len([each for each in watch.told if each.kind == Kind.DOOR])
+    watch.time -= 3600.0
+    for number in range(8):
+        watch.time += 1.0
+        watch.watcher.sweep(HERE, *beams(room(), HERE, (), True, seed=number), watch.time)
+    assert len([each for each in watch.told if each.kind == Kind.DOOR]) > before
+
+
 def test_a_look_says_how_much_of_the_room_was_in_view():
     watch = Round()
     watch.visit('R1', HERE)

@@ -67,7 +67,15 @@ LEVEL = (0.01, 0.007)
 ENOUGH = 20
 """So many pictures decide where a marker hangs."""
 MOST = 100
-"""So many markers are kept."""
+"""So many markers are kept; of those that are no more than a misreading one makes way."""
+REACH, LARGEST = 100.0, 10.0
+"""No marker is read farther away, nor larger, metres: that is no measurement."""
+LOST = 100.0
+"""With a greater standard deviation, metres or rad, nobody knows where the camera is."""
+LARGEST_MAP = 1e8
+"""No map has a place farther from its origin, metres."""
+SAME_SIZE = 0.1
+"""A marker whose side differs by this part or more is another panel."""
 
 
 @dataclass(frozen=True)
@@ -90,6 +98,12 @@ class CameraView:
     def at(self) -> Array:
         """Return where the camera is, (3,), metres."""
         return np.asarray(self.pose[:3, 3])
+
+    @property
+    def is_known(self) -> bool:
+        """Whether that is anything: on a map, and not doubted altogether."""
+        is_on_map = float(np.abs(self.pose).max()) <= LARGEST_MAP
+        return is_on_map and self.deviation <= LOST and self.turn <= LOST
 
     def doubt(self, point: Array) -> float:
         """Return the standard deviation of a point's place across the line of sight, metres."""
@@ -127,6 +141,16 @@ class SeenMarker:
     position: Array | None = None
     rotation: Array = field(default_factory=lambda: np.eye(3))
     covariance: Array = field(default_factory=lambda: np.zeros((3, 3)))
+
+    @property
+    def is_placed(self) -> bool:
+        """Whether it was measured where it is."""
+        return (
+            self.position is not None
+            and float(np.abs(self.position).max()) <= REACH
+            and 0.0 < self.side <= LARGEST
+            and float(np.abs(self.covariance).max()) <= REACH**2
+        )
 
 
 @dataclass(frozen=True)
@@ -244,12 +268,14 @@ class _Away:
     Attributes:
         position: (3,), map frame, metres.
         rotation: (3, 3), from its own frame to the map.
+        side: Of its black square, metres.
         read: In how many pictures it was read there.
         unread: In how many in a row it was in view there and not read.
     """
 
     position: Array
     rotation: Array
+    side: float
     read: int = 1
     unread: int = 0
 
@@ -263,10 +289,12 @@ class HungMarkers:
 
     def __init__(self, given: Mapping[int, tuple[float, float, float]] | None = None) -> None:
         exact = np.eye(3) * 1e-4
+        self._given = {number: np.asarray(where, float) for number, where in (given or {}).items()}
         self._spots = {
-            number: _Spot(0.0, np.asarray(where, float), exact, is_given=True)
-            for number, where in (given or {}).items()
+            number: _Spot(0.0, where, exact, is_given=True) for number, where in self._given.items()
         }
+        # Those that hang otherwise than their file says, by a person's word.
+        self._accepted: set[int] = set()
         # In how many pictures in a row each was found so.
         self._in_a_row: dict[int, tuple[str, int]] = {}
         self._away: dict[int, _Away] = {}
@@ -296,9 +324,11 @@ class HungMarkers:
         spot = self._spots.pop(number, None)
         self._gone.discard(number)
         self._in_a_row.pop(number, None)
+        if number in self._given:
+            self._accepted.add(number)
         if away is not None and spot is not None:
             covariance = spot.covariance + np.eye(3) * 1e-3
-            self._spots[number] = _Spot(spot.side, away.position, covariance, away.read)
+            self._spots[number] = _Spot(away.side, away.position, covariance, away.read)
 
     def take(
         self,
@@ -320,13 +350,15 @@ class HungMarkers:
         Returns:
             Of each marker that is settled what is the case.
         """
+        if not view.is_known:
+            return []
         shown = _Shown(picture, view)
         by_id: dict[int, list[SeenMarker]] = {}
         for each in seen:
             by_id.setdefault(each.number, []).append(each)
         settled = []
         for number in sorted({*by_id, *self._spots}):
-            some = [each for each in by_id.get(number, ()) if each.position is not None]
+            some = [each for each in by_id.get(number, ()) if each.is_placed]
             if number in by_id and not some:
                 continue  # it is read, and nobody knows where
             found = self._judge(number, some, shown, look, is_clear)
@@ -349,7 +381,7 @@ class HungMarkers:
         here, away = self._sorted(spot, some, shown)
         if here is not None:
             self._learn(spot, here, shown)
-        self._note_away(number, spot, away, shown)
+        self._note_away(number, away, shown)
         if here is not None:
             state = 'double' if away is not None else 'here'
         elif away is not None:
@@ -376,7 +408,7 @@ class HungMarkers:
         self, number: int, spot: _Spot | None, some: Sequence[SeenMarker], shown: _Shown, look: int
     ) -> None:
         """Learn where a marker hangs; one picture alone may be off by far."""
-        if len(some) != 1 or (spot is None and len(self._spots) >= MOST):
+        if len(some) != 1 or (spot is None and not self._makes_way()):
             return
         if spot is not None:
             here, _ = self._sorted(spot, some, shown)
@@ -387,6 +419,16 @@ class HungMarkers:
         position, covariance = shown.placed(some[0])
         self._spots[number] = _Spot(some[0].side, position, covariance)
         self._spots[number].aspects.append(shown.aspect(some[0]))
+
+    def _makes_way(self) -> bool:
+        """Have one that may be a misreading make way; tell whether there is room."""
+        if len(self._spots) < MOST:
+            return True
+        known = self._spots.items()
+        unsure = (n for n, each in known if not each.is_given and each.pictures < AGREED)
+        if (oldest := next(unsure, None)) is not None:
+            del self._spots[oldest]
+        return oldest is not None
 
     def _sorted(
         self, spot: _Spot, some: Sequence[SeenMarker], shown: _Shown
@@ -413,20 +455,23 @@ class HungMarkers:
             gain = spot.covariance @ np.linalg.inv(spot.covariance + covariance)
             spot.position = spot.position + gain @ (position - spot.position)
             spot.covariance = (np.eye(3) - gain) @ spot.covariance + np.eye(3) * COMMON**2
-        spot.side = spot.side or seen.side
+        if abs(seen.side - spot.side) > SAME_SIZE * spot.side:
+            # It was given by a file, or another panel hangs there now.
+            spot.side, spot.aspects = seen.side, []
         fresh = shown.aspect(seen)
         others = [each for each in spot.aspects if not _is_seen_alike(each, fresh.camera, 0.5)]
         spot.aspects = [*others, fresh][-ASPECTS:]
 
-    def _note_away(self, number: int, spot: _Spot, away: SeenMarker | None, shown: _Shown) -> None:
+    def _note_away(self, number: int, away: SeenMarker | None, shown: _Shown) -> None:
         known = self._away.get(number)
         if away is not None:
             position, _ = shown.placed(away)
             near = known is not None and np.linalg.norm(position - known.position) < MOVED
             read = known.read + 1 if known is not None and near else 1
-            self._away[number] = _Away(position, shown.view.pose[:3, :3] @ away.rotation, read)
+            rotation = shown.view.pose[:3, :3] @ away.rotation
+            self._away[number] = _Away(position, rotation, away.side, read)
         elif known is not None:
-            there = shown.shows_at(known.position, known.rotation, spot.side)
+            there = shown.shows_at(known.position, known.rotation, known.side)
             known.unread = known.unread + 1 if there else 0
             if known.unread >= AGREED:
                 del self._away[number]
@@ -461,7 +506,7 @@ class HungMarkers:
 
     def to_json(self) -> dict[str, Any]:
         """Return where they hang and how that looks as plain values, for `restore`."""
-        return {
+        spots = {
             str(number): {
                 'side': spot.side,
                 'position': spot.position.tolist(),
@@ -472,15 +517,24 @@ class HungMarkers:
             for number, spot in self._spots.items()
             if not spot.is_given
         }
+        accepted = {str(number): self._given[number].tolist() for number in sorted(self._accepted)}
+        return {'spots': spots, 'accepted': accepted}
 
     def restore(self, values: Mapping[str, Any]) -> None:
-        """Take what `to_json` gave; where a marker hangs by its file stays.
+        """Take what `to_json` gave.
+
+        Where a marker hangs by its file stays, unless a person accepted otherwise since the file
+        says so.
 
         Raises:
             ValueError, KeyError, TypeError: It is something else; nothing is changed then.
         """
-        found = {}
-        for number, each in values.items():
+        found, accepted = {}, set()
+        for number, where in values.get('accepted', {}).items():
+            given = self._given.get(int(number))
+            if given is not None and np.allclose(given, _array(where, 3)):
+                accepted.add(int(number))
+        for number, each in values.get('spots', {}).items():
             found[int(number)] = _Spot(
                 float(each['side']),
                 _array(each['position'], 3),
@@ -488,7 +542,8 @@ class HungMarkers:
                 int(each['pictures']),
                 aspects=[_Aspect.from_json(some) for some in each['aspects']],
             )
-        self._spots = {**found, **self._spots}
+        given_still = {n: spot for n, spot in self._spots.items() if n not in accepted}
+        self._spots, self._accepted = {**found, **given_still}, accepted
 
 
 class _Shown:

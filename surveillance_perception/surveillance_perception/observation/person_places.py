@@ -58,9 +58,11 @@ def place_of(person: Person, camera: CameraView, met: Array) -> tuple[float, flo
 
 
 def _things(points: Array) -> list[Array]:
-    """Return groups of ends that lie together, in the order of the beams."""
+    """Return groups of ends that lie together, in the order of the beams, which begin anywhere."""
     if len(points) < FEWEST:
         return []
     steps = np.hypot(*np.diff(points, axis=0).T)
     groups = np.split(points, np.flatnonzero(steps > TOGETHER) + 1)
+    if len(groups) > 1 and math.dist(points[0], points[-1]) <= TOGETHER:
+        groups = [np.concatenate([groups[-1], groups[0]]), *groups[1:-1]]
     return [each for each in groups if len(each) >= FEWEST]

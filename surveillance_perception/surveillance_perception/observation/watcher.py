@@ -422,7 +422,7 @@ class Watcher:
         if states.count(state) < AGREEING:
             return
         door.look = self._look
-        if state == door.told and stamp - door.told_at < SEEN_AGAIN:
+        if state == door.told and abs(stamp - door.told_at) < SEEN_AGAIN:
             return
         sure = float(np.mean([sure for each, sure in door.readings if each == state]))
         door.told, door.told_at = state, stamp
@@ -836,7 +836,7 @@ class Watcher:
         cell = [] if seen.position is None else [str(round(each)) for each in seen.position]
         key = (seen.kind, seen.state, seen.subject, sensor, *cell)
         stamp, at = self._told.get(key, (-math.inf, None))
-        if seen.stamp - stamp < SEEN_AGAIN:
+        if abs(seen.stamp - stamp) < SEEN_AGAIN:
             here = self._at
             if at is None or here is None or math.dist(at, here) < ELSEWHERE:
                 return False
@@ -877,13 +877,14 @@ class Watcher:
     def doubts(self, stamp: float) -> list[Event]:
         """Return the alerts that wait until the robot has looked again.
 
-        One that nobody could look at again in time is told as it is.
+        One that nobody could look at again in time is told as it is; so is one whose time is no
+        longer known, for the clock was set back.
         """
         for number, until in list(self._doubts.items()):
             event = self.book.find(number)
             if event is None or event.state != EventState.OPEN:
                 del self._doubts[number]
-            elif stamp >= until:
+            elif not until - self._verify_seconds <= stamp < until:
                 del self._doubts[number]
                 self._alert(event)
         return [each for each in map(self.book.find, self._doubts) if each is not None]
@@ -915,6 +916,7 @@ class Watcher:
             'hung': self._markers.to_json(),
             'views': self._views.to_json(),
             'habits': self._habits.to_json(),
+            'doubts': {str(number): until for number, until in self._doubts.items()},
         }
 
     def restore(self, kept: Mapping[str, Any]) -> None:
@@ -924,11 +926,12 @@ class Watcher:
             ValueError, KeyError, TypeError: It is something else.
         """
         look, normal = int(kept['look']), dict(kept['normal'])
+        doubts = {int(each): float(until) for each, until in kept.get('doubts', {}).items()}
         self._markers.restore(kept.get('hung', {}))
         self._views.restore(kept.get('views', {'views': [], 'next': 1}))
         self._habits.restore(kept.get('habits', {}))
         self.book.restore(kept['book'])
-        self._look, self._kept = look, normal
+        self._look, self._kept, self._doubts = look, normal, doubts
         if self._grid is not None and normal:
             self._normal = _unpacked(normal, self._grid)
 
