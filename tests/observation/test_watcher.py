@@ -793,6 +793,41 @@ def test_whom_the_camera_saw_is_there_until_the_camera_sees_that_nobody_is(found
     assert again.events == watch.book.events
 
 
+def test_a_robot_that_charges_for_hours_tells_what_comes_and_goes_before_it():
+    """Its first look ended when it left: a thing was told as late as half the time after it came,
+    and one who walked past was said to be there until the morning."""
+    watch = Round()
+    watch.visit('R1', HERE)
+    watch.watcher.arrive('R1', watch.time)
+
+    def charge(seconds: float, boxes=()) -> None:
+        for number in range(round(seconds / 5.0)):
+            watch.time += 5.0
+            sweep = CHARGES[bool(boxes)][number % 3]
+            watch.watcher.sweep(HERE, *sweep, watch.time)
+            watch.watcher.assess(watch.time)
+
+    charge(400.0)
+    walk(watch, (1.0, 1.0), (0.3, 0.0), 12)
+    (person,) = [each for each in watch.book.events if each.kind == Kind.PERSON]
+    assert person.state == EventState.OPEN
+    charge(250.0)
+    assert watch.book.find(person.number).state == EventState.OVER
+    charge(90.0, boxes=[(1.5, 1.5, 0.15)])
+    (box,) = [each for each in watch.book.events if each.kind == Kind.OBJECT]
+    assert (box.seen, box.state) == ('appeared', EventState.OPEN)
+    charge(250.0)
+    assert watch.book.find(box.number).state == EventState.OVER
+    assert 6 <= len(watch.looks) <= 10
+
+
+CHARGES = [
+    [beams(room(), HERE, boxes, True, seed) for seed in range(3)]
+    for boxes in ([], [(1.5, 1.5, 0.15)])
+]
+"""Sweeps of a robot that stands: nothing new, and a box."""
+
+
 def test_evidence_keeps_the_most_severe_and_newest_within_its_bound(tmp_path: Path):
     store = EvidenceStore(tmp_path, most_bytes=40_000)
     noise = np.random.default_rng(1).integers(0, 255, (100, 100), np.uint8)
@@ -853,6 +888,26 @@ def test_the_end_of_a_wall_that_comes_into_view_bit_by_bit_does_not_walk(alone: 
         met = fresh if alone else np.concatenate([wall, fresh])
         walks += finder.add((2.0, 0.0), fresh, met, 360, 10.0 + 0.3 * number)
     assert bool(walks) is alone
+
+
+@pytest.mark.parametrize(
+    ('along', 'walks'),
+    [
+        ([1.0, 1.02, 1.01, 2.5, 2.52, 2.51, 2.5], False),
+        ([1.0, 2.5, 2.52, 2.51, 2.5, 2.52, 2.51], False),
+        ([1.0, 1.3, 1.6, 1.9, 2.2, 2.5, 2.8], True),
+        ([1.0, 1.3, 1.6, 2.4, 2.7, 3.0, 3.3], True),
+    ],
+    ids=['stands twice', 'met once before', 'walks', 'walks behind something'],
+)
+def test_two_things_that_stand_and_are_met_one_after_the_other_do_not_walk(along, walks):
+    """As in the log of an office (Freiburg 079): most walks told there were one step long."""
+    finder, found = WalkFinder(), []
+    times = np.linspace(0.0, 2.4, 7)
+    for stamp, x in zip(times, along, strict=True):
+        legs = np.array([(x, 2.0), (x, 2.15)])
+        found += finder.add((2.0, 0.0), legs, legs, 360, 10.0 + float(stamp))
+    assert bool(found) is walks
 
 
 def test_who_stands_beyond_an_open_door_is_in_the_room_there_and_where_the_lidar_meets_legs():

@@ -45,6 +45,9 @@ STEADY = 0.85
 """So much of the variance of the spots is a steady motion along a line."""
 STRAIGHT = 0.6
 """The way from the first spot to the last is this part of the whole way, at least."""
+ONE_STEP = 0.5
+"""Without its longest step a walk is still this part of its way, or long enough by itself: what was
+met at two places only has not walked, and who walks behind something is met again farther on."""
 MOST_SHARE = 0.25
 """When more of a sweep ends where all was free, the pose is wrong, not the room full."""
 APART = 0.2
@@ -184,8 +187,12 @@ def _walk(spots: Sequence[_Spot], distance: float) -> Walk | None:
         return None
     (began, first), (ended, last) = spots[0], spots[-1]
     away = math.dist(first, last)
-    way = sum(math.dist(a[1], b[1]) for a, b in pairwise(spots))
-    if away < max(WAY, WAY_AFAR * distance) or away < STRAIGHT * way:
+    steps = [math.dist(a[1], b[1]) for a, b in pairwise(spots)]
+    enough = max(WAY, WAY_AFAR * distance)
+    if away < enough or away < STRAIGHT * sum(steps):
+        return None
+    # Two things that stand, one of which is met and then the other, are one step apart.
+    if away - max(steps) < min(enough, ONE_STEP * away):
         return None
     if _steadiness(spots) < STEADY:
         return None

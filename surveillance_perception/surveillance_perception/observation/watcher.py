@@ -94,6 +94,10 @@ LOOKED = 0.6
 lidar must have seen before nobody is said to walk there."""
 LOOKED_SECONDS = 5.0
 """And for so long."""
+LONGEST_STAND = 120.0
+"""A robot that stands for longer begins another look, seconds. A thing is told once it was met in
+three tenths of the sweeps of a look: so within 40 s, however long the robot stands. A whole look,
+which takes 30 s (docs/watching.md), is not cut."""
 FOUND = 0.88
 """Share of the persons in single photographs that are found (docs/watching.md): so sure are
 pictures of a whole floor that nobody is there."""
@@ -266,6 +270,8 @@ class Watcher:
         self._told: dict[tuple[str, ...], tuple[float, tuple[float, float] | None]] = {}
         self._last: tuple[tuple[float, float], Points] = ((0.0, 0.0), np.zeros((0, 2)))
         self._at: tuple[float, float] | None = None
+        # Where the robot stands, and since when.
+        self._stands: tuple[tuple[float, float] | None, float] = None, math.nan
         self._views = views or ReferenceViews()
         # Pictures of this stay whose markers are judged once it is clear what else they show.
         self._held: list[_MarkerPicture] = []
@@ -293,13 +299,17 @@ class Watcher:
 
     def arrive(self, place: str, stamp: float) -> None:
         """Take that the robot is in a place; the visit of another one ends."""
-        if place == self._place:
-            return
-        self.assess(stamp)
+        if place != self._place:
+            self._compare(stamp)
+            self._begin_look(place, stamp)
+
+    def _begin_look(self, place: str, stamp: float) -> None:
+        """End the look at the place before, and begin one at this place."""
         self._end_look(stamp)
         self._learn()
         self._place = place
         self._began, self._pictures, self._persons = stamp, 0, 0
+        self._stands = self._at, stamp
         self._shown, self._shown_elsewhere = None, False
         self._person_by = {}
         self._walks.clear()
@@ -401,6 +411,8 @@ class Watcher:
             apart = self._others.apart(ends, stamp)
             ends, met = ends[apart], met[apart]
         self._last, self._at = (sensor, ends[met]), sensor
+        if self._stands[0] is None or math.dist(sensor, self._stands[0]) > ELSEWHERE:
+            self._stands = sensor, stamp
         if self._grid is not None:
             if self._visit is None:
                 self._visit = FloorVisit(self._grid)
@@ -448,7 +460,17 @@ class Watcher:
         return door.place or self._place
 
     def assess(self, stamp: float) -> None:
-        """Compare what this visit saw so far with what is normal."""
+        """Compare what this look saw so far with what is normal; call it every few seconds.
+
+        A robot that stands for long, as at its dock, ends its look and begins another one.
+        """
+        self._compare(stamp)
+        # A clock that was set back is no reason to stand for ever.
+        if self._place and not 0.0 <= stamp - self._stands[1] < LONGEST_STAND:
+            self._begin_look(self._place, stamp)
+
+    def _compare(self, stamp: float) -> None:
+        """Compare what this look saw so far with what is normal."""
         if self._visit is None or self._visit.sweeps < FEWEST_SWEEPS or self._normal is None:
             return
         now = self._visit.view()
