@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from geometry_msgs.msg import PoseWithCovarianceStamped
 from nav_msgs.msg import Odometry
 from rclpy.callback_groups import ReentrantCallbackGroup
 from sensor_msgs.msg import JointState
@@ -26,6 +28,7 @@ from surveillance_perception.conversions import (
     base_pose_from_ros,
     fuse_views,
     fused_to_ros,
+    pose_on_map,
     scan_feedback_to_ros,
     scan_plan_from_ros,
     scan_result_to_ros,
@@ -40,7 +43,7 @@ from surveillance_runtime.robot_arm import ARM, REST_PATIENCE, Arm, Array
 from surveillance_runtime.settled_frames import SettledFrames
 from surveillance_runtime.stamp_offset import StampOffset
 from surveillance_runtime.stamped_readings import StampedReadings
-from surveillance_runtime.state_topics import OwnedTopic
+from surveillance_runtime.state_topics import OwnedTopic, StateSubscription
 
 _POSES = {
     MarkerRoutine.Request.LEFT: 'left',
@@ -49,6 +52,12 @@ _POSES = {
     MarkerRoutine.Request.BACK: 'back',
 }
 _FAILURES = (ArmMotionError, ValueError)
+MAP = 'map'
+KEPT_ODOMETRY = 100
+SAME_TIME = 0.02
+"""A pose on the map belongs to the odometry whose stamp is so near, seconds."""
+DRIFTED = 3.0
+"""Odometry alone is good for so far, metres: then two readings of one panel look like two."""
 
 
 _PAN = {'left': math.pi / 2, 'home': 0.0, 'right': -math.pi / 2, 'back': math.pi}
@@ -142,13 +151,26 @@ class ArmController(PatrolNode):
         self.stopping.subscribe(self._driver.wake)
         self.create_subscription(JointState, 'joint_states', self._on_joints, SENSOR_QOS)
         self._read = SettledFrames(self)
-        self._fused = FusedPositions()
+        self._fused, self._fused_in = FusedPositions(), ''
+        # Where the odometry began on the map, as who localises tells of the same stamps.
+        self._odometry: deque[tuple[float, np.ndarray]] = deque(maxlen=KEPT_ODOMETRY)
+        self._odom_in_map: np.ndarray | None = None
+        self._doubt: tuple[float, float] | None = None
+        self._map_frame = MAP
+        self._driven, self._last_at = 0.0, np.zeros(3)
         self._twins: dict[int, str] = {}
         self._markers = self.create_publisher(MarkerDetectionArray, 'arm/markers', 10)
         self.create_subscription(
             MarkerDetectionArray, 'aruco_detector/detections', self._on_detections, 10
         )
         self.create_subscription(Odometry, 'odom', self._on_odometry, SENSOR_QOS)
+        StateSubscription(
+            self,
+            PoseWithCovarianceStamped,
+            'amcl_pose',
+            self._on_pose,
+            owner='motion_controller',
+        )
         self.create_service(MarkerRoutine, 'move_arm', self._on_move, callback_group=group)
         self.create_service(PointCamera, 'point_camera', self._on_point, callback_group=group)
         GoalServer(self, ScanSurroundings, 'scan_surroundings', self._scan)
@@ -165,7 +187,15 @@ class ArmController(PatrolNode):
             self.get_logger().warn(str(error), throttle_duration_sec=60.0)
             return
         self._base = frame, base
-        self._bases.add(self._measured(message, self._base_stamps), base[:3].ravel().tolist())
+        self._driven += float(np.linalg.norm(base[:3, 3] - self._last_at))
+        self._last_at = base[:3, 3]
+        stamp, measured = (
+            seconds_of(message.header.stamp),
+            self._measured(message, self._base_stamps),
+        )
+        # `amcl_pose` has the node's clock, or the driver's, as who localises likes it.
+        self._odometry += [(each, base) for each in {stamp, measured}]
+        self._bases.add(measured, base[:3].ravel().tolist())
 
     def _measured(self, message: JointState | Odometry, stamps: StampOffset) -> float:
         """Return when a reading was made, seconds of this node's clock."""
@@ -175,19 +205,46 @@ class ArmController(PatrolNode):
             self.get_logger().warn(warning)
         return measured
 
+    def _on_pose(self, message: PoseWithCovarianceStamped) -> None:
+        try:
+            on_map, doubt = pose_on_map(message)
+        except ValueError as error:
+            self.get_logger().warn(f'amcl_pose: {error}', throttle_duration_sec=60.0)
+            return
+        stamp = seconds_of(message.header.stamp)
+        self._map_frame = message.header.frame_id or MAP
+        for measured, base in self._odometry:
+            if abs(measured - stamp) <= SAME_TIME:
+                self._odom_in_map, self._doubt = on_map @ np.linalg.inv(base), doubt
+
+    def _fixed(self, frame: str) -> tuple[str, np.ndarray, tuple[float, float] | None]:
+        """Return the frame in which markers hang still, how the odometry lies in it, its doubt.
+
+        That is the map's once somebody tells where the robot is. The odometry's drifts: there
+        positions begin anew after `DRIFTED` metres.
+        """
+        if self._odom_in_map is not None:
+            fixed, moved = self._map_frame, self._odom_in_map
+        else:
+            fixed, moved = frame, np.eye(4)
+        has_drifted = self._odom_in_map is None and self._driven > DRIFTED
+        if fixed != self._fused_in or has_drifted:
+            self._fused, self._fused_in, self._driven = FusedPositions(), fixed, 0.0
+        return fixed, moved, self._doubt
+
     def _now(self) -> float:
         return float(self.get_clock().now().nanoseconds / 1e9)
 
     def _on_detections(self, message: MarkerDetectionArray) -> None:
-        """Fuse what is seen at rest with what was seen from elsewhere, in the odometry's frame."""
+        """Fuse what is seen at rest with what was seen from elsewhere, on the map if it can be."""
         taken_at = self._stamps.span_of(seconds_of(message.header.stamp), self._now())
         base, posture = self._bases.stood(*taken_at), self._postures.stood(*taken_at)
         if self._base is None or base is None or posture is None or not message.detections:
             return
-        frame = self._base[0]
-        standing = np.vstack([np.reshape(base, (3, 4)), [0.0, 0.0, 0.0, 1.0]])
+        frame, odom, doubt = self._fixed(self._base[0])
+        standing = odom @ np.vstack([np.reshape(base, (3, 4)), [0.0, 0.0, 0.0, 1.0]])
         camera = standing @ ARM.camera_frame(posture)
-        taken = fuse_views(self._fused, message, camera)
+        taken = fuse_views(self._fused, message, camera, doubt)
         self._report_twins(frame)
         fused = [(each, self._fused.position_of(each)) for each in taken]
         seen = MarkerDetectionArray(header=Header(stamp=message.header.stamp, frame_id=frame))
@@ -224,7 +281,7 @@ class ArmController(PatrolNode):
     async def _on_point(self, request: Any, response: Any) -> Any:
         def work() -> str:
             point = np.array([request.point.x, request.point.y, request.point.z])
-            target = in_base(point, request.frame_id, self._base)
+            target = in_base(point, request.frame_id, self._base, self._odom_in_map)
             aim = look_at(ARM, target, self._driver.posture)
             response.error = aim.error
             self._driver.move(aim.positions, self.stopping.is_set)

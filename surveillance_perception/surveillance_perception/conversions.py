@@ -8,7 +8,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
-from geometry_msgs.msg import Point, Pose, PoseArray, Quaternion, TransformStamped, Vector3
+from geometry_msgs.msg import (
+    Point,
+    Pose,
+    PoseArray,
+    PoseWithCovarianceStamped,
+    Quaternion,
+    TransformStamped,
+    Vector3,
+)
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 from std_msgs.msg import Header
@@ -27,6 +35,7 @@ from surveillance_perception.marker_registry import MarkedPlace
 from surveillance_perception.observation.hung_markers import SeenMarker
 from surveillance_perception.stream.encodings import image_of_pixels, printable
 from surveillance_perception.stream.image_files import ImageArray, decode_image
+from surveillance_runtime.conversions import pose_from
 
 if TYPE_CHECKING:  # the detector behind it takes 0.2 s to import: one node needs it
     from marker_detection.marker_stream import Sighting
@@ -147,13 +156,20 @@ def detections_to_ros(header: Header, sightings: Iterable[Sighting]) -> MarkerDe
     return MarkerDetectionArray(header=header, detections=[*map(detection_to_ros, sightings)])
 
 
-def fuse_views(fused: FusedPositions, message: MarkerDetectionArray, camera: Array) -> list[int]:
+def fuse_views(
+    fused: FusedPositions,
+    message: MarkerDetectionArray,
+    camera: Array,
+    doubt: tuple[float, float] | None = None,
+) -> list[int]:
     """Take the confirmed markers of an image into their fused positions.
 
     Args:
         fused: Takes the views.
         message: What `aruco_detector` saw.
         camera: Transform (4, 4) from the camera's optical frame to the fixed frame.
+        doubt: Standard deviations of the camera's own place, metres, and direction, rad; None:
+            they are those of an arm on a base that stands.
 
     Returns:
         The ids whose view counts.
@@ -167,7 +183,11 @@ def fuse_views(fused: FusedPositions, message: MarkerDetectionArray, camera: Arr
         # a covariance of zeros means: unknown
         if not each.confirmed or not covariance.any():
             continue
-        if fused.add(each.id, camera, position, covariance, each.pose_ambiguity):
+        carrier = None
+        if doubt is not None:
+            away = float(np.linalg.norm(position))
+            carrier = np.eye(3) * (doubt[0] ** 2 + (doubt[1] * away) ** 2)
+        if fused.add(each.id, camera, position, covariance, each.pose_ambiguity, carrier):
             taken.append(each.id)
     return taken
 
@@ -287,6 +307,30 @@ def base_pose_from_ros(message: Odometry) -> npt.NDArray[np.float64]:
     pose[:3, :3] = rotation_of(turn)
     pose[:3, 3] = place
     return pose
+
+
+def pose_on_map(
+    message: PoseWithCovarianceStamped,
+) -> tuple[npt.NDArray[np.float64], tuple[float, float]]:
+    """Return the transform (4, 4) from base_link to the map, and how sure that is.
+
+    Returns:
+        The transform, and standard deviations: metres, in the direction in which it is least
+        sure, and rad.
+
+    Raises:
+        ValueError: A number is not finite, or the orientation is zero.
+    """
+    x, y, yaw = pose_from(message.pose.pose)
+    cosine, sine = math.cos(yaw), math.sin(yaw)
+    pose = np.eye(4)
+    pose[:2, :2] = [[cosine, -sine], [sine, cosine]]
+    pose[:2, 3] = x, y
+    covariance = np.asarray(message.pose.covariance, float).reshape(6, 6)
+    if not np.isfinite(covariance).all():
+        raise ValueError('the covariance must be finite')
+    along = float(np.linalg.eigvalsh(covariance[:2, :2])[-1])
+    return pose, (math.sqrt(max(0.0, along)), math.sqrt(max(0.0, float(covariance[5, 5]))))
 
 
 def marked_place_to_ros(place: MarkedPlace, response: RoomInformation.Response) -> None:

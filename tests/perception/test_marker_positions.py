@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from builtin_interfaces.msg import Time
-from geometry_msgs.msg import Point
+from geometry_msgs.msg import Point, PoseWithCovarianceStamped
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import Image, JointState
 from std_msgs.msg import Header
@@ -25,11 +25,12 @@ from marker_detection.testing.marker_scene import (
 )
 from surveillance_interfaces.msg import MarkerDetection, MarkerDetectionArray
 from surveillance_perception import aruco_detector_node
+from surveillance_perception.arm.kinematics import in_base
 from surveillance_perception.arm_controller_node import ArmController
 from surveillance_perception.aruco_detector_node import ArucoDetector
 from surveillance_perception.conversions import image_to_ros
 from surveillance_perception.marker_server_node import MarkerServer
-from surveillance_runtime.conversions import seconds_of
+from surveillance_runtime.conversions import pose_estimate, seconds_of
 from surveillance_runtime.qos import SENSOR_QOS
 from surveillance_runtime.robot_arm import ARM
 
@@ -186,6 +187,43 @@ def test_two_panels_with_one_id_are_a_finding_with_both_positions(
     assert log.warnings[0].startswith('marker 7 hangs at (')
     assert log.warnings[0].endswith(') in odom: two panels with one id')
     assert any('marker 7 hangs at' in text for _, text in node.health.findings())
+
+
+@pytest.mark.parametrize('localised', [True, False])
+def test_odometry_that_drifts_makes_no_second_panel_of_a_marker(
+    graph: Any, monkeypatch: pytest.MonkeyPatch, localised: bool
+) -> None:
+    node = graph.add(ArmController)
+    log: Any = Log()
+    told: list[Any] = []
+    monkeypatch.setattr(node, 'get_logger', lambda: log)
+    monkeypatch.setattr(node, '_markers', SimpleNamespace(publish=told.append))
+    monkeypatch.setattr(node._stamps, 'span_of', lambda stamp, _now: (stamp, stamp))
+    now, x = 1e-9 * graph.node.get_clock().now().nanoseconds - 1.5, 0.0
+    # It goes to and fro between two places, and the odometry gets lost by half a metre each time.
+    for way in range(6):
+        x = 2.0 * (way % 2)
+        for tick in range(8):
+            now += 0.03
+            stamp = stamp_of(now)
+            carried(node, x + 0.5 * way, stamp)
+            if localised:
+                pose = PoseWithCovarianceStamped(pose=pose_estimate((x, 0.0, 0.0), 0.03, 0.01))
+                pose.header.stamp, pose.header.frame_id = stamp, 'map'
+                node._on_pose(pose)
+            image = MarkerDetectionArray(detections=[seen(7, 0.0, 0.0, 5.0 - x)])
+            image.header.stamp = stamp
+            if tick:
+                node._on_detections(image)
+    assert log.warnings == []
+    assert {each.header.frame_id for each in told} == {'map' if localised else 'odom'}
+    if localised:
+        camera = ARM.camera_frame(ARM.home)
+        place = told[-1].detections[0].pose.position
+        expected = camera[:3, 3] + 5.0 * camera[:3, 2]
+        assert [place.x, place.y, place.z] == pytest.approx(expected.tolist(), abs=1e-3)
+        point = in_base(np.array([5.0, 0.0, 1.0]), 'map', node._base, node._odom_in_map)
+        assert point[0] == pytest.approx(5.0 - x)
 
 
 def room() -> Any:

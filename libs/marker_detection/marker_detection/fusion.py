@@ -64,22 +64,24 @@ class _Place:
     def __init__(self) -> None:
         self._information = np.zeros((3, 3))
         self._weighed = np.zeros(3)
+        self._carrier = np.zeros((3, 3))
         self.views = self.in_a_row = 0
         self.told = False
         self.image = 0
 
-    def add(self, place: Array, covariance: Array, image: int) -> None:
+    def add(self, place: Array, covariance: Array, carrier: Array, image: int) -> None:
         information = np.linalg.inv(covariance)
         self._information += information
         self._weighed += information @ place
         self.views += 1
+        self._carrier += (carrier - self._carrier) / self.views
         self.in_a_row += 1
         self.image = image
 
     @property
     def fused(self) -> FusedPosition:
         # what all views share does not become less with their number
-        covariance = np.linalg.inv(self._information) + np.eye(3) * _CARRIER_DEVIATION**2
+        covariance = np.linalg.inv(self._information) + self._carrier
         position = np.asarray(np.linalg.solve(self._information, self._weighed), dtype=float)
         return FusedPosition(position, covariance, self.views)
 
@@ -153,7 +155,13 @@ class FusedPositions:
         self._image += 1
 
     def add(
-        self, marker_id: int, camera: Array, position: Array, covariance: Array, ambiguity: float
+        self,
+        marker_id: int,
+        camera: Array,
+        position: Array,
+        covariance: Array,
+        ambiguity: float,
+        carrier: Array | None = None,
     ) -> bool:
         """Take a view.
 
@@ -163,20 +171,24 @@ class FusedPositions:
             position: (3,) of the marker in the optical frame, metres.
             covariance: (3, 3) of it, square metres.
             ambiguity: Of the pose, 0 to 1; near 1 the distance is as doubtful as the tilt.
+            carrier: (3, 3) of the marker's place by what the camera's own pose may be off, in the
+                fixed frame, square metres: many views from one stand share that error, so that it
+                does not become less with their number. None: an arm on a base that stands.
 
         Returns:
             Whether it counts: it is a finite view, not too ambiguous, of where the marker is.
         """
         # the arm and its base are not exact either
-        covariance = covariance + np.eye(3) * _CARRIER_DEVIATION**2
+        least = np.eye(3) * _CARRIER_DEVIATION**2
+        shared = least if carrier is None else least + carrier
         if ambiguity > _MOST_AMBIGUOUS or not is_measured(position, covariance):
             return False
         turn = camera[:3, :3]
-        covariance = turn @ covariance @ turn.T
+        covariance = turn @ covariance @ turn.T + shared
         place = turn @ position + camera[:3, 3]
         panels = self._panels.setdefault(marker_id, _Panels())
         seen = panels.place_of(place, covariance)
-        seen.add(place, covariance, self._image)
+        seen.add(place, covariance, shared, self._image)
         panels.note(seen)
         return seen is panels.places[0]
 

@@ -114,3 +114,23 @@ def test_moved_marker_and_a_wrong_view_are_no_second_panel() -> None:
         looked(fused, HERE)
     assert fused.two_places(7) is None
     assert fused.twins == []
+
+
+def test_many_views_from_a_camera_that_is_not_sure_where_it_is_make_no_second_panel() -> None:
+    fused = FusedPositions()
+    exact, carrier = np.eye(3) * 1e-6, np.eye(3) * 0.1**2
+    # From one stand all views are off alike, and from the next one otherwise.
+    for off in (0.12, -0.13, 0.1):
+        for _ in range(50):
+            fused.next_image()
+            seen = np.array([off, 0.0, 2.0])
+            assert fused.add(7, np.eye(4), seen, exact, 0.0, carrier)
+    at = fused.position_of(7)
+    assert at is not None
+    assert np.sqrt(at.covariance[0, 0]) > 0.09, 'their number makes it no surer'
+    assert fused.twins == []
+    for _ in range(10):
+        fused.next_image()
+        fused.add(7, np.eye(4), np.array([0.1, 0.0, 2.0]), exact, 0.0, carrier)
+        fused.add(7, np.eye(4), np.array([1.1, 0.0, 2.0]), exact, 0.0, carrier)
+    assert fused.twins == [7], 'one that hangs there'

@@ -96,14 +96,21 @@ def direction_of(azimuth: float, elevation: float) -> Array:
     return np.array([flat * math.cos(azimuth), flat * math.sin(azimuth), math.sin(elevation)])
 
 
-def in_base(point: Array, frame: str, base: tuple[str, Array] | None) -> Array:
+def in_base(
+    point: Array,
+    frame: str,
+    base: tuple[str, Array] | None,
+    odom_in_map: Array | None = None,
+) -> Array:
     """Return a point (3,) of some frame in base_link, metres.
 
     Args:
         point: (3,) metres.
         frame: `base_link` (also when empty), `map`, or the frame of the odometry.
         base: Frame of the odometry and the transform (4, 4) from base_link to it; None when there
-            is no odometry. The map's frame is taken for the odometry's.
+            is no odometry.
+        odom_in_map: Transform (4, 4) from the odometry's frame to the map's; None: nobody has told
+            where the robot is, and the one is taken for the other.
 
     Raises:
         ValueError: The frame is not known.
@@ -113,7 +120,10 @@ def in_base(point: Array, frame: str, base: tuple[str, Array] | None) -> Array:
     if base is None or frame not in (base[0], 'map'):
         known = "'base_link'" if base is None else f"'base_link', 'map' or '{base[0]}'"
         raise ValueError(f"frame '{frame}' is not known, expected {known}")
-    return np.asarray((np.linalg.inv(base[1]) @ np.array([*point, 1.0]))[:3])
+    to_frame = base[1]
+    if frame == 'map' and odom_in_map is not None:
+        to_frame = odom_in_map @ to_frame
+    return np.asarray((np.linalg.inv(to_frame) @ np.array([*point, 1.0]))[:3])
 
 
 def _descend(arm: Arm, target: Array, start: Array, posture: Array) -> Aim:
