@@ -109,6 +109,7 @@ def _merged(
         run.behaviour,
         place=run.place,
         robot=profile_of(config, run),
+        watched=run.watch is not None,
         chosen=[*fleet, *(_folders_of(folder.resolve()) if folder is not None else ())],
         files=[*files, *(Path(file) for file in (more.files if more else ()))],
         options=[

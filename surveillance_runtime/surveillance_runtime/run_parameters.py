@@ -1,8 +1,8 @@
 """The parameters of one run of the robot: where they come from, and which source wins.
 
-Weakest first: `parameters.yaml`, the robot's profile, the place's file, what the behaviour needs,
-what the run itself chooses, the user's files, the options. `launch.py` and the launch file for an
-installed ROS use this alike, so that a robot gets the same values from both.
+Weakest first: `parameters.yaml`, what `--watch` asks for, the robot's profile, the place's file,
+what the behaviour needs, what the run itself chooses, the user's files, the options. `launch.py`
+and the launch file for an installed ROS use this alike, so that a robot gets the same from both.
 """
 
 from __future__ import annotations
@@ -30,6 +30,9 @@ from surveillance_runtime.run_options import MUJOCO
 BEHAVIOUR_NODE = 'robot_behavior'
 PAGE = 'mission_page'
 OBSERVER = 'observer'
+WATCHED_STAY = 30.0
+"""With `--watch` the robot stays so long in each place unless somebody says otherwise, seconds: the
+usual stay is too short to look at anything."""
 PLACES = {'surveillance': 'seven_rooms.yaml', 'patrol': 'patrol_world.yaml'}
 
 
@@ -61,6 +64,7 @@ def run_layers(
     *,
     place: Path | None = None,
     robot: ProfileFile | None = None,
+    watched: bool = False,
     chosen: Iterable[Entry] = (),
     files: Iterable[Path] = (),
     options: Iterable[Entry] = (),
@@ -72,6 +76,7 @@ def run_layers(
         behaviour: One of `node_table.BEHAVIOURS`.
         place: The file of the place, None for the behaviour's own.
         robot: The robot's profile; None: the nodes' defaults, which are the built-in robot.
+        watched: Whether the robot looks at the rooms.
         chosen: What the run chooses where the user says nothing, as the folders that it writes to.
         files: The user's parameter files; a later one wins.
         options: What options say as parameters.
@@ -80,6 +85,9 @@ def run_layers(
         FileError, ParameterError: A file cannot be used.
     """
     layers = [file_layer(config / 'parameters.yaml')]
+    if watched:
+        stay = for_node(BEHAVIOUR_NODE, 'exploration_seconds', WATCHED_STAY, '--watch')
+        layers.append(Layer('--watch', (stay,)))
     if robot is not None:
         layers.append(profile_layer(robot))
     layers.append(file_layer(place_file(config, behaviour, place)))

@@ -132,6 +132,10 @@ def test_a_short_stay_leaves_no_time_to_look():
     run.until(150.0)
     assert not run.looking.driven
     assert not run.looking.sides
+    said = [each for each in run.world.said if 'too short to look' in each]
+    assert said == [
+        'a stay of 2 s is too short to look at anything: exploration_seconds of 12 or more would do'
+    ]
 
 
 @pytest.mark.parametrize(

@@ -9,6 +9,7 @@ import sys
 import threading
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 import yaml
@@ -137,6 +138,18 @@ def test_the_users_file_comes_after_the_projects_and_the_launchers_own_last(tmp_
     robot = read_profile(CONFIG / 'robots' / 'turtlebot4.yaml')
     layers = run_layers(CONFIG, 'surveillance', place=place, robot=robot)
     assert [Path(layer.source).name for layer in layers][1:3] == ['turtlebot4.yaml', 'office.yaml']
+
+
+def test_a_robot_that_watches_stays_long_enough_to_look_unless_somebody_says_otherwise(tmp_path):
+    watch, own = tmp_path / 'watch.yaml', tmp_path / 'own.yaml'
+    own.write_text('robot_behavior: {ros__parameters: {exploration_seconds: 5.0}}')
+
+    def stay(**run: Any) -> object:
+        return settings_of('robot_behavior', Run(**run))['exploration_seconds']
+
+    assert stay() == 2.0
+    assert stay(watch=watch) == 30.0
+    assert stay(watch=watch, parameters=own) == 5.0
 
 
 def settings_of(node: str, run: Run) -> dict[str, object]:

@@ -31,6 +31,8 @@ DWELL = 4.5
 """The camera stands so long at each side: for two pictures of the observer, seconds."""
 LONGEST_DWELL = 13.5
 """And so long where no picture of that side was looked at yet, and there is time, seconds."""
+LEAST_STAY = 12.0
+"""A shorter stay has no time for a side, seconds."""
 VIEW = math.pi / 2
 """A picture is taken to show so much of the horizon where nobody says how much, rad."""
 NEAR = 0.3
@@ -86,6 +88,7 @@ class RoomLook:
         self._moves = {True: ARM_MOVE, False: BASE_MOVE}
         self._looked_again: deque[int] = deque(maxlen=MOST_DOUBTS)
         self._short: set[str] = set()
+        self._said_short = False
         self._elapsed = elapsed_of(mission.clock)
         self._began = 0.0
 
@@ -105,6 +108,14 @@ class RoomLook:
         mission, looking = self._mission, self._mission.ports.looking
         if looking is not None:
             looking.await_watcher(interrupt)
+            least = SETTLE if looking.sees_around() else LEAST_STAY
+            if seconds < least and not self._said_short:
+                self._said_short = True
+                mission.say(
+                    f'a stay of {seconds:g} s is too short to look at anything: '
+                    f'exploration_seconds of {least:g} or more would do',
+                    warning=True,
+                )
         self._began = self._elapsed() - min(mission.explored, seconds)
         mission.explored = 0.0
         end = self._began + seconds
