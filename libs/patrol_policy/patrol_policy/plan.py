@@ -120,14 +120,11 @@ class Course:
                     return target
             elif target != place and target not in state.avoided:
                 idle = state.now - state.seen[target]
-                if target in rules.windows:
-                    leg = rules.away[place][target]
-                    opens = rules.opens_in(target, state.now)
-                    if not rules.is_open(target, state.now + max(0.0, opens - leg), leg) or (
-                        opens - leg > self.patience
-                    ):
-                        state.position = self.after(state.position)
-                        continue
+                if target in rules.windows and not rules.is_open(
+                    target, state.now, rules.away[place][target]
+                ):
+                    state.position = self.after(state.position)
+                    continue
                 if idle >= self.skip:
                     gate = rules.gates[target]
                     if gate < 0:
