@@ -96,7 +96,7 @@ def test_the_edges_of_zones_to_keep_out_of_are_told_in_the_robots_frame() -> Non
     corner = near[np.argmin(np.hypot(near[:, 0] - 2.0, near[:, 1] - 1.4))]
     assert corner == pytest.approx([2.0, 1.4])
     assert zones.edges_near((1.0, 0.5, 0.0), 2.5).shape == (0, 2), 'it is in it, and is to leave'
-    assert zones.edges_near((1.0, 4.0, 0.0), 2.5).shape == (0, 2)
+    assert zones.edges_near((1.0, 4.0, 0.0), 2.2).shape == (0, 2)
 
 
 # --- boxes ---
