@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import threading
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from types import SimpleNamespace
 from typing import Any
 
@@ -18,6 +19,7 @@ from sensor_msgs.msg import LaserScan
 from state_machines import Interrupt
 from surveillance_controllers.controller_parameters import MotionSettings
 from surveillance_controllers.geometry import Mount, Scan, composed
+from surveillance_controllers.motion import driving
 from surveillance_controllers.motion.arrival import MotionFailedError
 from surveillance_controllers.motion.driving import Drive, Spin
 from surveillance_controllers.motion.localisation import Localiser
@@ -28,6 +30,7 @@ from surveillance_controllers.motion.transforms import ScanReader
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.parameters import ParameterError
 from surveillance_runtime.qos import SENSOR_QOS
+from surveillance_runtime.turning_path import turning_path
 
 
 class Steersman:
@@ -84,6 +87,39 @@ def scan(**fields: Any) -> LaserScan:
     return LaserScan(
         angle_min=-1.0, angle_increment=0.1, range_max=8.0, ranges=[1.0] * 20, **fields
     )
+
+
+@pytest.mark.parametrize(('yaw', 'fails'), [(0.0, True), (1.5, False)])
+def test_a_turn_that_the_robot_has_no_room_for_is_no_turn(
+    graph: Any, steersman: Steersman, monkeypatch: pytest.MonkeyPatch, yaw: float, fails: bool
+) -> None:
+    monkeypatch.setattr(driving, 'SPIN_PATIENCE', 0.1)
+    navigator, task = steersman, None
+
+    def see(_scan: Scan, now: float, _lidar: str = '') -> Velocity:
+        nonlocal task
+        steersman.pose = (0.0, 0.0, yaw)
+        task = navigator.task
+        return Velocity() if task is None else task.step(yaw, now)
+
+    monkeypatch.setattr(steersman, 'see', see)
+    motion = motion_of(graph.node, steersman)
+    scans = graph.node.create_publisher(LaserScan, 'scan', SENSOR_QOS)
+    run: Any = SimpleNamespace(interrupt=Interrupt())
+    path = np.array(turning_path((0.0, 0.0), 1.5))
+    with ThreadPoolExecutor() as threads:
+        turned = threads.submit(motion.follow, path, run, lambda _: None)
+
+        def ends() -> bool:
+            scans.publish(scan())
+            return turned.done()
+
+        graph.until(ends)
+        if fails:
+            with pytest.raises(MotionFailedError, match='cannot turn: 86 degrees are left'):
+                turned.result()
+        else:
+            assert turned.result()[:2] == pytest.approx([0.0, 0.0])
 
 
 def test_without_scans_or_odometry_the_robot_is_told_to_stand(

@@ -95,6 +95,9 @@ SPIN_PATIENCE = 4.0
 """A turn on the spot that does not go on for so long ends, seconds: a robot that is not round may
 have no room for it."""
 
+TURNED = 0.1
+"""A turn that ends so near to its bearing, rad, has got there."""
+
 _RECOVERIES = (State.WAITING, State.BACKING, State.LOOKING)
 """What is tried one after the other; after each, another path is asked for."""
 
@@ -359,8 +362,12 @@ class Spin:
         """Whether the turn is complete, to a degree, or does not go on."""
         if self._last is None:
             return False
-        left = self._whole - self._turned
-        return self._is_stuck or (left if self._bearing is None else abs(left)) <= 0.02
+        return self._is_stuck or (self.left if self._bearing is None else abs(self.left)) <= 0.02
+
+    @property
+    def left(self) -> float:
+        """How far there is to turn, rad, anticlockwise."""
+        return self._whole - self._turned
 
     def step(self, yaw: float, now: float) -> Velocity:
         """Decide the velocity for the next moment.
@@ -379,6 +386,5 @@ class Spin:
         self._is_stuck = now - self._moved_at >= SPIN_PATIENCE
         if self.done:
             return Velocity()
-        left = self._whole - self._turned
-        speed = min(SPIN_SPEED, math.sqrt(2 * SPIN_ACCELERATION * abs(left)))
-        return Velocity(0.0, math.copysign(speed, left))
+        speed = min(SPIN_SPEED, math.sqrt(2 * SPIN_ACCELERATION * abs(self.left)))
+        return Velocity(0.0, math.copysign(speed, self.left))

@@ -7,6 +7,7 @@ have (`obstacles`). Asks `compute_path` for another path when a drive does not g
 
 from __future__ import annotations
 
+import math
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
@@ -33,7 +34,7 @@ from surveillance_controllers.geometry import Points, Pose, Scan, point_of
 from surveillance_controllers.map_knowledge import MapKnowledge
 from surveillance_controllers.motion.arrival import MotionFailedError, expect_place
 from surveillance_controllers.motion.command_publisher import CommandPublisher
-from surveillance_controllers.motion.driving import Drive, Spin, State
+from surveillance_controllers.motion.driving import TURNED, Drive, Spin, State
 from surveillance_controllers.motion.holding import Hold
 from surveillance_controllers.motion.navigator import Navigator
 from surveillance_controllers.motion.path_following import DriveParameters, Velocity
@@ -179,11 +180,19 @@ class NavigationMotion:
         return end
 
     def _turn(self, bearing: float, run: GoalRun) -> Points:
-        """Turn on the spot; return where the robot is then."""
+        """Turn on the spot; return where the robot is then.
+
+        Raises:
+            MotionFailedError: It has no room for that, or its sensors are silent.
+        """
         spin = Spin(bearing)
         with self._carrying_out(spin, run.interrupt):
             self._await(lambda: spin.done, run.interrupt)
-        return point_of(self._navigator.pose or (float('nan'),) * 3)
+        end = point_of(self._navigator.pose or (float('nan'),) * 3)
+        if spin.done and abs(spin.left) > TURNED:
+            short = math.degrees(abs(spin.left))
+            raise MotionFailedError(f'the robot cannot turn: {short:.0f} degrees are left', end)
+        return end
 
     def place_reached(self, goal: Points, end: Points) -> str:
         """Return the place the robot is in after a drive.
