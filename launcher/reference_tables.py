@@ -175,6 +175,7 @@ def _variants(node: node_table.Node) -> Iterator[dict[str, Any]]:
         settings = Configuration(layers, schema).resolve(node.name)
         described = {name: setting.value for name, setting in settings.items()}
         described |= {'behaviour': behaviour, 'console': False, 'use_sim_time': True}
+        described['looks'] = True  # as with an observer
         if node.name == 'video_source':
             described['source'] = str(CHECKOUT / 'docs' / 'images' / 'camera.jpg')
         for mode in node_table.MODES if node.has_modes else (node_table.DEFAULT_MODE,):
