@@ -94,16 +94,15 @@ def test_a_turn_that_the_robot_has_no_room_for_is_no_turn(
     graph: Any, steersman: Steersman, monkeypatch: pytest.MonkeyPatch, yaw: float, fails: bool
 ) -> None:
     monkeypatch.setattr(driving, 'SPIN_PATIENCE', 0.1)
-    navigator, task = steersman, None
+    navigator: Any = steersman
 
     def see(_scan: Scan, now: float, _lidar: str = '') -> Velocity:
-        nonlocal task
-        steersman.pose = (0.0, 0.0, yaw)
-        task = navigator.task
-        return Velocity() if task is None else task.step(yaw, now)
+        navigator.pose = (0.0, 0.0, yaw)
+        spin: Any = navigator.task
+        return Velocity() if spin is None else spin.step(yaw, now)
 
-    monkeypatch.setattr(steersman, 'see', see)
-    motion = motion_of(graph.node, steersman)
+    monkeypatch.setattr(navigator, 'see', see)
+    motion = motion_of(graph.node, navigator)
     scans = graph.node.create_publisher(LaserScan, 'scan', SENSOR_QOS)
     run: Any = SimpleNamespace(interrupt=Interrupt())
     path = np.array(turning_path((0.0, 0.0), 1.5))
