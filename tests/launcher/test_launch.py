@@ -74,13 +74,16 @@ def test_a_mission_goes_on_after_kills_and_ctrl_c_ends_it_with_its_summary_and_n
     mission = launch('--mode', 'RANDOM')
     mission.until(r'robot_behavior +\| decision 1:')
     mission.until(r'robot_behavior +\| arrived in')
-    # One that decides, one that keeps what is known, one that moves: tests/mission has them all.
-    for node in ('robot_behavior', 'armor_server', 'motion_controller'):
+    # What is known and what moves die below the one that decides, and then that one; tests/mission
+    # has them all.
+    for nodes in (('armor_server', 'motion_controller'), ('robot_behavior',)):
         seen = len(mission.lines)
-        earlier = [line for line in mission.lines if f'started {node} ' in line][-1]
-        os.kill(int(earlier.split('process ')[1].rstrip(')')), signal.SIGKILL)
-        mission.until(rf'{node} died \(killed by SIGKILL\)', after=seen)
-        process_of(mission, node, after=seen)
+        for node in nodes:
+            started = [line for line in mission.lines if f'started {node} ' in line]
+            os.kill(int(started[-1].split('process ')[1].rstrip(')')), signal.SIGKILL)
+        for node in nodes:
+            mission.until(rf'{node} died \(killed by SIGKILL\)', after=seen)
+            process_of(mission, node, after=seen)
         back = len(mission.lines)
         for _ in range(2):  # the first may still be an answer from before
             mission.until(r'robot_behavior +\| arrived in', after=back)
