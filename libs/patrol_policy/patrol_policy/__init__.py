@@ -8,30 +8,49 @@
 
 from __future__ import annotations
 
-from patrol_policy.battery import Battery, BatteryLimits
-from patrol_policy.decision import (
-    DecisionSettings,
-    NowhereToGoError,
-    Rules,
-    WhyNot,
-    decide,
-    why_not,
-)
-from patrol_policy.graph import GraphError, PatrolGraph, graph_of_places
-from patrol_policy.world import Decision, World
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
-__all__ = [
-    'Battery',
-    'BatteryLimits',
-    'Decision',
-    'DecisionSettings',
-    'GraphError',
-    'NowhereToGoError',
-    'PatrolGraph',
-    'Rules',
-    'WhyNot',
-    'World',
-    'decide',
-    'graph_of_places',
-    'why_not',
-]
+if TYPE_CHECKING:
+    from patrol_policy.battery import Battery as Battery
+    from patrol_policy.battery import BatteryLimits as BatteryLimits
+    from patrol_policy.decision import DecisionSettings as DecisionSettings
+    from patrol_policy.decision import NowhereToGoError as NowhereToGoError
+    from patrol_policy.decision import Rules as Rules
+    from patrol_policy.decision import WhyNot as WhyNot
+    from patrol_policy.decision import decide as decide
+    from patrol_policy.decision import why_not as why_not
+    from patrol_policy.graph import GraphError as GraphError
+    from patrol_policy.graph import PatrolGraph as PatrolGraph
+    from patrol_policy.graph import graph_of_places as graph_of_places
+    from patrol_policy.world import Decision as Decision
+    from patrol_policy.world import World as World
+
+_HOME = {
+    'Battery': 'patrol_policy.battery',
+    'BatteryLimits': 'patrol_policy.battery',
+    'Decision': 'patrol_policy.world',
+    'DecisionSettings': 'patrol_policy.decision',
+    'GraphError': 'patrol_policy.graph',
+    'NowhereToGoError': 'patrol_policy.decision',
+    'PatrolGraph': 'patrol_policy.graph',
+    'Rules': 'patrol_policy.decision',
+    'WhyNot': 'patrol_policy.decision',
+    'World': 'patrol_policy.world',
+    'decide': 'patrol_policy.decision',
+    'graph_of_places': 'patrol_policy.graph',
+    'why_not': 'patrol_policy.decision',
+}
+__all__ = list(_HOME)
+
+
+def __getattr__(name: str) -> Any:
+    # Late, so that who only reads hours and thresholds does not load the policies.
+    if name not in _HOME:
+        raise AttributeError(f'module {__name__!r} has no attribute {name!r}')
+    found = globals()[name] = getattr(import_module(_HOME[name]), name)
+    return found
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})
