@@ -24,20 +24,20 @@ def sweep(
 ) -> np.ndarray:
     """Return where beams end that meet segments; exact geometry, written without the module."""
     generator = np.random.default_rng(seed)
-    ends = []
-    for angle in np.linspace(-math.pi, math.pi, beams, endpoint=False):
-        ray = np.array([math.cos(angle), math.sin(angle)])
-        nearest = farthest
-        for x1, y1, x2, y2 in lines:
-            matrix = np.array([[ray[0], x1 - x2], [ray[1], y1 - y2]])
-            if abs(np.linalg.det(matrix)) < 1e-12:
-                continue
-            distance, part = np.linalg.solve(matrix, [x1 - sensor[0], y1 - sensor[1]])
-            if distance > 0 and 0 <= part <= 1:
-                nearest = min(nearest, distance)
-        measured = nearest + generator.normal(0, noise) if nearest < farthest else farthest
-        ends.append(np.asarray(sensor) + ray * measured)
-    return np.array(ends)
+    angles = np.linspace(-math.pi, math.pi, beams, endpoint=False)
+    rays = np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    # Each ray with each segment: sensor + distance * ray = start + part * along.
+    start, end = np.split(np.array(lines), 2, axis=1)
+    along, apart = end - start, start - sensor
+    determinant = rays[:, [1]] * along[:, 0] - rays[:, [0]] * along[:, 1]
+    with np.errstate(divide='ignore', invalid='ignore'):
+        distance = (along[:, 0] * apart[:, 1] - along[:, 1] * apart[:, 0]) / determinant
+        part = (rays[:, [0]] * apart[:, 1] - rays[:, [1]] * apart[:, 0]) / determinant
+    meets = (abs(determinant) >= 1e-12) & (distance > 0) & (part >= 0) & (part <= 1)
+    nearest = np.where(meets, distance, farthest).min(axis=1)
+    met = nearest < farthest
+    nearest[met] += generator.normal(0, noise, np.count_nonzero(met))
+    return np.asarray(sensor + rays * nearest[:, None])
 
 
 def rooms(

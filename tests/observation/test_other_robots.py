@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from surveillance_perception.observation.observations import Kind
 
-from .test_watcher import HERE, Round, beams, room, texture
+from .test_watcher import HERE, Round, beams, texture
 
 
 def drive_past(watch: Round, heard: bool, boxes=()) -> None:
@@ -16,7 +16,7 @@ def drive_past(watch: Round, heard: bool, boxes=()) -> None:
             # What is told is an estimate, some centimetres and a moment off.
             watch.others.hear('robot2', x - 0.08, y + 0.05, watch.time - 0.2)
         things = [(x, y, 0.25), *boxes]
-        watch.watcher.sweep(HERE, *beams(room(), HERE, things, True, seed=number), watch.time)
+        watch.watcher.sweep(HERE, *beams(HERE, things, True, seed=number), watch.time)
         if number % 6 == 5:
             watch.watcher.assess(watch.time)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from datetime import UTC, datetime
+from functools import lru_cache
 from pathlib import Path
 
 import cv2
@@ -51,27 +52,40 @@ def room() -> Grid:
     return Grid(cells, 0.05)
 
 
-def beams(
-    grid: Grid, sensor: tuple[float, float], boxes=(), shut: bool = False, seed: int = 1
-) -> tuple[np.ndarray, np.ndarray]:
-    """Walk along beams until a wall, a round thing (x, y, radius) or the shut door is met."""
-    angles = np.linspace(-math.pi, math.pi, 360, endpoint=False)
-    rays = np.stack([np.cos(angles), np.sin(angles)], axis=1)
-    steps = np.arange(0.05, 8.0, 0.01)
-    points = np.asarray(sensor) + rays[:, None, :] * steps[None, :, None]
+ANGLES = np.linspace(-math.pi, math.pi, 360, endpoint=False)
+RAYS = np.stack([np.cos(ANGLES), np.sin(ANGLES)], axis=1)
+STEPS = np.arange(0.05, 8.0, 0.01)
+
+
+@lru_cache(maxsize=8)
+def along_beams(sensor: tuple[float, float], shut: bool) -> tuple[np.ndarray, np.ndarray]:
+    """Return the points along each beam, and which of them a wall or the shut door blocks."""
+    grid = room()
+    points = np.asarray(sensor) + RAYS[:, None, :] * STEPS[None, :, None]
     cells = grid.cells_of(points.reshape(-1, 2))
     inside = grid.contains(cells)
     cells[~inside] = 0
     blocked = (grid.occupied[cells[:, 0], cells[:, 1]] | ~inside).reshape(points.shape[:2])
-    for x, y, radius in boxes:
-        blocked |= np.hypot(points[..., 0] - x, points[..., 1] - y) < radius
     if shut:
         across = np.abs(points[..., 0] - DOOR[0]) < 0.03
         blocked |= across & (points[..., 1] > DOOR[1]) & (points[..., 1] < DOOR[3])
+    return points, blocked
+
+
+def beams(
+    sensor: tuple[float, float], boxes=(), shut: bool = False, seed: int = 1
+) -> tuple[np.ndarray, np.ndarray]:
+    """Walk along beams until a wall, a round thing (x, y, radius) or the shut door is met."""
+    points, walls = along_beams(sensor, shut)
+    blocked = walls.copy()
+    for x, y, radius in boxes:
+        # Few beams pass a thing so near that they may meet it.
+        near = np.abs(RAYS @ (y - sensor[1], sensor[0] - x)) < radius
+        blocked[near] |= np.hypot(points[near, :, 0] - x, points[near, :, 1] - y) < radius
     met = np.asarray(blocked.any(axis=1))
-    lengths = np.where(met, steps[blocked.argmax(axis=1)], 8.0)
+    lengths = np.where(met, STEPS[blocked.argmax(axis=1)], 8.0)
     lengths += np.random.default_rng(seed).normal(0.0, 0.01, len(lengths)) * met
-    return np.asarray(sensor) + rays * lengths[:, None], met
+    return np.asarray(sensor) + RAYS * lengths[:, None], met
 
 
 class Halves:
@@ -131,7 +145,7 @@ class Round:
         self.watcher.arrive(place, self.time)
         for number in range(12):
             self.time += 1.0
-            self.watcher.sweep(at, *beams(room(), at, boxes, shut, seed=number), self.time)
+            self.watcher.sweep(at, *beams(at, boxes, shut, seed=number), self.time)
             if number % 4 == 3:
                 self.watcher.assess(self.time)
         self.watcher.arrive('', self.time)
@@ -306,7 +320,7 @@ def test_a_view_waits_until_this_visit_has_seen_its_doors():
         watch.watcher.arrive('R1', watch.time)
         for number in range(sweeps):
             watch.time += 1.0
-            watch.watcher.sweep(here, *beams(room(), here, (), shut, seed=number), watch.time)
+            watch.watcher.sweep(here, *beams(here, (), shut, seed=number), watch.time)
         for _ in range(4):
             watch.time += 2.0
             watch.watcher.picture(picture, view, watch.time, None)
@@ -336,7 +350,7 @@ def test_markers_move_and_go_missing_only_where_their_spot_was_in_view():
     hung, there = hang(picture, 14, 140, 100), hang(moved, 14, 200, 100)
     other, at = wall(2), (1.0, 1.0, 0.5)
     watch.watcher.arrive('R1', 1.0)
-    watch.watcher.sweep((0.0, 0.0), *beams(room(), (0.1, 0.1)), 1.0)
+    watch.watcher.sweep((0.0, 0.0), *beams((0.1, 0.1)), 1.0)
     for number in range(3):
         watch.watcher.picture(picture, at, 1.0 + number, [hung], camera(y=1.0))
         watch.watcher.picture(other, at, 1.0 + number, [], camera(y=1.0, yaw=math.pi))
@@ -433,7 +447,7 @@ def walk(watch: Round, start: tuple[float, float], step: tuple[float, float], st
         watch.time += 0.25
         x, y = start[0] + number * step[0], start[1] + number * step[1]
         legs = [(x, y - 0.1, 0.06), (x, y + 0.1, 0.06)]
-        watch.watcher.sweep(HERE, *beams(room(), HERE, legs, True, seed=number), watch.time)
+        watch.watcher.sweep(HERE, *beams(HERE, legs, True, seed=number), watch.time)
 
 
 def test_one_who_walks_is_seen_by_the_lidar_and_is_over_when_nobody_is_there():
@@ -442,7 +456,7 @@ def test_one_who_walks_is_seen_by_the_lidar_and_is_over_when_nobody_is_there():
     watch.watcher.arrive('R1', watch.time)
     for number in range(8):
         watch.time += 0.25
-        watch.watcher.sweep(HERE, *beams(room(), HERE, (), True, seed=number), watch.time)
+        watch.watcher.sweep(HERE, *beams(HERE, (), True, seed=number), watch.time)
     walk(watch, (1.0, 1.0), (0.3, 0.0), 12)
     seen = [each for each in watch.book.events if each.kind == Kind.PERSON]
     assert [(each.seen, each.place, each.state) for each in seen] == [
@@ -482,7 +496,7 @@ def test_one_who_walks_past_a_door_is_seen_and_its_leaf_is_not():
                 for r in np.arange(0.05, DOOR[3] - DOOR[1], 0.05)
             ]
             things = leaf if x is None else [(x, 0.8 + 0.25 * number, 0.15)]
-            watch.watcher.sweep(HERE, *beams(room(), HERE, things, True, seed=number), watch.time)
+            watch.watcher.sweep(HERE, *beams(HERE, things, True, seed=number), watch.time)
         assert any(each.kind == Kind.PERSON for each in watch.told) is seen
 
 
@@ -493,7 +507,7 @@ def test_what_stands_or_is_uncovered_by_the_robot_does_not_walk():
     for number in range(40):
         watch.time += 0.25
         at = 1.8 + 0.06 * number, 2.5 + 0.3 * math.sin(number / 6.0)
-        watch.watcher.sweep(at, *beams(room(), at, chairs, True, seed=number), watch.time)
+        watch.watcher.sweep(at, *beams(at, chairs, True, seed=number), watch.time)
     assert not [each for each in watch.told if each.kind == Kind.PERSON]
 
 
@@ -536,7 +550,7 @@ def test_one_who_walks_in_the_next_room_is_the_one_whom_the_camera_sees_there():
     for number in range(20):
         watch.time += 0.25
         things = [(7.0 + 0.25 * (number - 8), 2.5, 0.15)] if number >= 8 else []
-        watch.watcher.sweep(at, *beams(room(), at, things, False, seed=number), watch.time)
+        watch.watcher.sweep(at, *beams(at, things, False, seed=number), watch.time)
     watch.watcher.picture(texture(), None, watch.time, None)
     people = [each for each in watch.book.events if each.kind == Kind.PERSON]
     assert [each.place for each in people] == ['R2']
@@ -654,7 +668,7 @@ def test_an_alert_in_doubt_waits_for_a_look_from_elsewhere_or_for_its_time():
     def look(at: tuple[float, float], sweeps: int) -> None:
         for number in range(sweeps):
             watch.time += 1.0
-            watch.watcher.sweep(at, *beams(room(), at, box, True, seed=number), watch.time)
+            watch.watcher.sweep(at, *beams(at, box, True, seed=number), watch.time)
             if number % 2:
                 watch.watcher.assess(watch.time)
 
@@ -730,7 +744,7 @@ def stay(watch: Round, picture: np.ndarray, sides: int, *, is_posed: bool = True
     watch.watcher.arrive('R1', watch.time)
     for number in range(8):
         watch.time += 1.0
-        watch.watcher.sweep(HERE, *beams(room(), HERE, (), True, number), watch.time)
+        watch.watcher.sweep(HERE, *beams(HERE, (), True, number), watch.time)
         view = looks_ahead(HERE, (number % sides) * math.tau / 5)
         watch.watcher.picture(picture, None, watch.time, None, view if is_posed else None)
     watch.watcher.arrive('', watch.time)
@@ -918,7 +932,7 @@ def test_who_stands_beyond_an_open_door_is_in_the_room_there_and_where_the_lidar
     stands = [(7.5, 2.4, 0.06), (7.5, 2.6, 0.06), (5.5, 2.6, 0.03)]
     for number in range(3):
         watch.time += 0.25
-        watch.watcher.sweep(at, *beams(room(), at, stands, False, seed=number), watch.time)
+        watch.watcher.sweep(at, *beams(at, stands, False, seed=number), watch.time)
     pose = np.array([[0, 0, 1, at[0]], [-1, 0, 0, at[1]], [0, -1, 0, 1.0], [0, 0, 0, 1]], float)
     lens = np.array([[300.0, 0.0, 160.0], [0.0, 300.0, 120.0], [0.0, 0.0, 1.0]])
     watch.watcher.picture(texture(), None, watch.time, None, CameraView(pose, lens, 0.02, 0.01))
