@@ -708,7 +708,7 @@ def test_a_clock_that_is_set_back_keeps_nothing_from_being_told():
     watch.time -= 3600.0
     for number in range(8):
         watch.time += 1.0
-        watch.watcher.sweep(HERE, *beams(room(), HERE, (), True, seed=number), watch.time)
+        watch.watcher.sweep(HERE, *beams(HERE, (), True, seed=number), watch.time)
     assert len([each for each in watch.told if each.kind == Kind.DOOR]) > before
 
 
@@ -836,8 +836,7 @@ def test_a_robot_that_charges_for_hours_tells_what_comes_and_goes_before_it():
 
 
 CHARGES = [
-    [beams(room(), HERE, boxes, True, seed) for seed in range(3)]
-    for boxes in ([], [(1.5, 1.5, 0.15)])
+    [beams(HERE, boxes, True, seed) for seed in range(3)] for boxes in ([], [(1.5, 1.5, 0.15)])
 ]
 """Sweeps of a robot that stands: nothing new, and a box."""
 
