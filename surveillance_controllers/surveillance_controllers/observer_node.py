@@ -124,6 +124,8 @@ SETTLED = 0.5
 """It has to stand for so long before a picture that is compared, seconds."""
 LEAST_DOUBT = 0.01, 0.005
 """Standard deviation of a pose at least, metres and rad: some localisations tell none."""
+MOST_MARKERS, MOST_JOINTS = 1000, 1000
+"""In one message."""
 MOST_JOINT_GROUPS = 10
 """Joints are followed of so many drivers, each of which tells its own."""
 MOST_HELD, MOST_HELD_BYTES = 60, 64_000_000
@@ -563,9 +565,12 @@ class Observer(PatrolNode):
             self._joints[names].add(measured, tuple(joints.values()))
 
     def _on_detections(self, message: MarkerDetectionArray) -> None:
-        found = [seen_marker_from_ros(each) for each in message.detections if each.confirmed]
-        self._detected.append((seconds_of(message.header.stamp), tuple(found)))
-        self._look_at_next()
+        with conversions.refusing(self, 'aruco_detector/detections'):
+            if (count := len(message.detections)) > MOST_MARKERS:
+                raise ValueError(f'{count} markers in a picture: expected at most {MOST_MARKERS}')
+            found = [seen_marker_from_ros(each) for each in message.detections if each.confirmed]
+            self._detected.append((seconds_of(message.header.stamp), tuple(found)))
+            self._look_at_next()
 
     def _on_image(self, serialized: bytes) -> None:
         stamp, now = stamp_of_serialized(serialized), time.monotonic()
@@ -1016,6 +1021,8 @@ def camera_joints(names: Sequence[str], positions: Sequence[float]) -> dict[str,
     """
     if not len(positions):
         return {}  # of speeds, or forces, alone
+    if len(names) > MOST_JOINTS:
+        raise ValueError(f'{len(names)} joints: expected at most {MOST_JOINTS}')
     if len(positions) < len(names):
         raise ValueError(f'{len(positions)} positions: expected one for each of {len(names)} names')
     told = dict(zip(names, map(float, positions), strict=False))

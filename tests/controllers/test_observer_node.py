@@ -330,6 +330,18 @@ def test_a_picture_has_a_pose_also_where_the_drivers_have_another_clock(graph, m
     assert eyes.looked == [(pytest.approx((1.0, 5.0, 0.0, 0.5)), None)]
 
 
+def test_huge_messages_of_a_stranger_are_refused_in_a_line(graph, monkeypatch, capfd):
+    eyes = Eyes(graph, monkeypatch)
+    for _ in range(2):
+        eyes.detect(-0.1, *range(observer_node.MOST_MARKERS + 1))
+        eyes.bend(-0.1, [f'joint_{number}' for number in range(1001)], [0.0] * 1001)
+    lines = capfd.readouterr().err
+    assert lines.count('1001 markers in a picture: expected at most 1000') == 1
+    assert lines.count('1001 joints: expected at most 1000') == 1
+    eyes.show(-0.1)
+    assert [numbers for _, numbers in eyes.looked] == [None]
+
+
 def test_what_was_read_in_one_picture_is_not_of_another_one_with_the_same_stamp(graph, monkeypatch):
     eyes = Eyes(graph, monkeypatch)
     eyes.show(-1.0, b'1')

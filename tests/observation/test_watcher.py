@@ -712,6 +712,25 @@ def test_a_clock_that_is_set_back_keeps_nothing_from_being_told():
     assert len([each for each in watch.told if each.kind == Kind.DOOR]) > before
 
 
+def test_a_disk_that_became_one_to_read_from_costs_pictures_alone(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    store, views = (
+        EvidenceStore(tmp_path / 'evidence', most_days=1.0),
+        ReferenceViews(tmp_path / 'views'),
+    )
+    store.keep(texture(), 'box', 1, 1_000_000.0)
+    view = views.add((0.0, 0.0, 0.0), texture(), 1_000_000.0)
+
+    def refuse(*_args: object, **_options: object) -> None:
+        raise OSError(30, 'Read-only file system')
+
+    monkeypatch.setattr(Path, 'unlink', refuse)
+    store.forget_old(2_000_000.0)
+    views.forget(view.name)
+    assert views.at((0.0, 0.0, 0.0)) is None
+
+
 def test_a_look_says_how_much_of_the_room_was_in_view():
     watch = Round()
     watch.visit('R1', HERE)

@@ -5,6 +5,7 @@ The least severe goes first, and of like severity the oldest: a file's name says
 
 from __future__ import annotations
 
+import contextlib
 import re
 from itertools import chain, count
 from pathlib import Path
@@ -109,6 +110,11 @@ class EvidenceStore:
         """
         for name in [each for each in self._sizes if int(each[2:15]) < oldest(stamp, self._days)]:
             del self._sizes[name]
+            self._delete(name)
+
+    def _delete(self, name: str) -> None:
+        # The disk may have become one to read from alone.
+        with contextlib.suppress(OSError):
             (self._folder / name).unlink(missing_ok=True)
 
     def _prune(self, stamp: float) -> None:
@@ -118,7 +124,7 @@ class EvidenceStore:
             if total <= self._most:
                 return
             total -= self._sizes.pop(name)
-            (self._folder / name).unlink(missing_ok=True)
+            self._delete(name)
 
 
 def oldest(stamp: float, days: float) -> int:

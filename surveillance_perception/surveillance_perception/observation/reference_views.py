@@ -6,6 +6,7 @@ picture for each state in which the doors nearby were found.
 
 from __future__ import annotations
 
+import contextlib
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -153,7 +154,9 @@ class ReferenceViews:
         """Drop a view: the next picture from there is how it looks normally."""
         self._views = [each for each in self._views if each.name != name]
         if self._folder is not None:
-            self._path(self._folder, name).unlink(missing_ok=True)
+            # The disk may have become one to read from alone.
+            with contextlib.suppress(OSError):
+                self._path(self._folder, name).unlink(missing_ok=True)
 
     def to_json(self) -> dict[str, Any]:
         """Return all but the pictures as plain values, for `restore`."""
