@@ -15,7 +15,10 @@ from owl_reasoner.owl.expressions import language_tag
 _ABSOLUTE = re.compile(r'[A-Za-z][A-Za-z0-9+.\-]*:')
 _EMPTY_END = re.compile(r'(?:\?#|[?#])\Z')
 FORBIDDEN = re.compile(r'[\x00-\x20<>"{}|\\^`]')
-_REFERENCE = re.compile(rb'&([A-Za-z_][\w.-]*);')
+_REFERENCE = re.compile(
+    rb'<!--.*?-->|<!\[CDATA\[.*?\]\]>|<\?.*?\?>|&([^\s#&;<>"\'][^\s&;<>"\']*);', re.DOTALL
+)
+"""An entity in the text or an attribute, or what holds none whatever stands in it."""
 _ESCAPED = re.compile(r'&(?:amp|lt|gt|quot|apos|#\d{1,7}|#x[0-9A-Fa-f]{1,6});')
 _MAX_ENTITY = 512
 _MAX_DEPTH = 20_000
@@ -219,7 +222,7 @@ class XmlReader:
     def _end_doctype(self) -> None:
         # Without an external subset the parser refuses them itself; with one it leaves them out.
         for found in _REFERENCE.finditer(self.data) if self._has_external else ():
-            if found[1] not in self._entities:
+            if found[1] is not None and found[1] not in self._entities:
                 line = self.data.count(b'\n', 0, found.start()) + 1
-                name = found[1].decode()
+                name = found[1].decode(errors='replace')
                 raise OntologyFileError(f'entity {name!r} is not declared here', line, 1)
