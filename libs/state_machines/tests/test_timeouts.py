@@ -204,12 +204,14 @@ def test_an_item_that_hangs_is_followed_by_the_next_item():
 def test_a_preempt_is_bounded_although_a_time_limit_on_a_clock_that_stands_is_watched():
     deaf = Deaf()
     machine = fsm.StateMachine(['done', 'preempted'])
-    machine.set_clock(FakeClock())
+    clock = FakeClock()
+    machine.set_clock(clock)
     machine.preempt_timeout = 0.05
     with machine:
         fsm.StateMachine.add('DEAF', deaf, timeout=1000.0)
     run = Background(machine)
     began(deaf)
+    clock.until_sleeping()  # Nothing but the request wakes who watches.
     machine.request_preempt()
     assert run.result() == 'preempted'
     deaf.release.set()
