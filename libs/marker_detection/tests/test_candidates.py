@@ -1,0 +1,235 @@
+"""Outlines of dark blobs, borders and their sides, beside plain loops and drawn shapes."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import pytest
+
+from marker_detection.candidates import (
+    BorderCheck,
+    EdgeFit,
+    Mask,
+    dark_masks,
+    distinct,
+    quads_around,
+)
+from marker_detection.dictionaries import MarkerCodes, dictionary_named
+from marker_detection.image_sampling import ImagePyramid, corners_of, homographies_of
+
+SQUARE = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
+
+
+def blank(*boxes, size=(120, 160)):
+    pixels = np.zeros(size, np.uint8)
+    for left, top, right, bottom in boxes:
+        pixels[top : bottom + 1, left : right + 1] = 255
+    return pixels
+
+
+def ordered(quad):
+    """Return corners from the upper left one on, clockwise as they are."""
+    return np.roll(quad, -int(quad.sum(axis=1).argmin()), axis=0)
+
+
+def box_of(left, top, right, bottom):
+    return np.array([[left, top], [right, top], [right, bottom], [left, bottom]], float)
+
+
+@pytest.mark.parametrize(('scale', 'eroded'), [(1, 0), (1, 2), (2, 0), (2, 1)])
+def test_a_quad_runs_along_the_outer_edges_of_the_pixels_of_a_blob(scale, eroded):
+    (quad,) = quads_around([Mask(blank((10, 20, 29, 49)), scale, eroded)])
+    edge = 0.5 + eroded
+    expected = box_of(10 - edge, 20 - edge, 29 + edge, 49 + edge)
+    assert ordered(quad) == pytest.approx((expected + 0.5) * scale - 0.5, abs=1e-4)
+
+
+def test_each_side_of_a_slanted_quad_is_moved_by_as_much():
+    generator = np.random.default_rng(4)
+    for _ in range(5):
+        drawn = np.rint(40.0 * SQUARE + (80.0, 60.0) + generator.uniform(-15, 15, (4, 2)))
+        pixels = np.zeros((120, 160), np.uint8)
+        cv2.fillConvexPoly(pixels, drawn.astype(np.int32), 255)
+        plain, eroded = (quads_around([Mask(pixels, 1, width)])[0] for width in (0, 3))
+        assert np.abs(ordered(plain) - ordered(drawn)).max() < 2.5
+        plain, eroded = ordered(plain), ordered(eroded)
+        for start in range(4):
+            first, second = plain[start], plain[(start + 1) % 4]
+            along = (second - first) / np.linalg.norm(second - first)
+            outwards = np.array([along[1], -along[0]])
+            for corner in (eroded[start], eroded[(start + 1) % 4]):
+                assert (corner - first) @ outwards == pytest.approx(3.0, abs=1e-4)
+
+
+@pytest.mark.parametrize(
+    ('box', 'found'),
+    [
+        ((5, 5, 12, 9), 1),
+        ((5, 5, 11, 9), 0),
+        ((5, 5, 9, 12), 1),
+        ((5, 5, 14, 6), 1),
+        ((5, 5, 14, 5), 0),
+    ],
+)
+def test_how_small_a_blob_may_be(box, found):
+    assert len(quads_around([Mask(blank(box))], min_length=8.0)) == found
+    assert len(quads_around([Mask(blank(box), 2)], min_length=16.0)) == found
+
+
+def test_the_likeliest_blobs_come_first_and_alone_after_the_limit():
+    pixels = blank((10, 10, 29, 29))
+    cv2.fillConvexPoly(pixels, np.array([[60, 10], [90, 10], [60, 50]]), 255)
+    cv2.ellipse(pixels, (120, 30), (14, 20), 0, 0, 360, 255, -1)
+    # an L lies far from its middle
+    pixels[70:82, 10:60] = pixels[70:115, 10:22] = 255
+    quads = quads_around([Mask(pixels)])
+    middles = quads.mean(axis=1)
+    assert middles[0] == pytest.approx([19.5, 19.5], abs=0.1)
+    assert middles[1] == pytest.approx([120.0, 30.0], abs=1.0)
+    assert middles[3][1] > 70
+    assert len(quads) == 4
+    # the first mask does not count for the others, and these end at the limit
+    assert [len(quads_around([Mask(pixels)] * count, limit=0)) for count in (1, 2, 3)] == [3, 6, 6]
+    assert len(quads_around([Mask(pixels)], limit=3)) == 4
+    assert len(quads_around([Mask(pixels)], limit=2)) == 3
+
+
+def test_a_box_is_looked_at_once_but_for_the_first_mask():
+    mask = Mask(blank((10, 10, 29, 29)))
+    assert [len(quads_around([mask] * count)) for count in range(4)] == [0, 1, 2, 2]
+    moved = Mask(blank((13, 13, 32, 32)))
+    assert len(quads_around([mask, mask, moved])) == 3
+    half = Mask(blank((5, 5, 14, 14)), 2)
+    assert len(quads_around([mask, mask, half])) in (2, 3)
+
+
+def test_a_mask_without_blobs_has_no_quads():
+    assert quads_around([Mask(np.zeros((9, 9), np.uint8))]).shape == (0, 4, 2)
+
+
+def test_masks_are_what_is_darker_than_around():
+    generator = np.random.default_rng(2)
+    image = np.full((64, 96), 200, np.uint8)
+    image[20:40, 30:50] = 60
+    image[4, 4] = 20  # a speck
+    image = np.clip(image + generator.integers(-2, 3, image.shape), 0, 255).astype(np.uint8)
+    black, small, wide, split, closed_down, closed_across = dark_masks(image, [5, 31], 7.0, [5])
+    assert [each.scale for each in (black, small, wide, split)] == [1, 1, 2, 2]
+    assert {each.eroded for each in (black, small, wide, split, closed_down)} == {0}
+    padded = np.pad(image.astype(float), 2, mode='edge')
+    around = np.lib.stride_tricks.sliding_window_view(padded, (5, 5)).mean(axis=(2, 3))
+    darker = (np.rint(around) - image) > 6.5
+    near = np.pad(darker, 2, mode='reflect')
+    near = np.lib.stride_tricks.sliding_window_view(near, (5, 5)).sum(axis=(2, 3))
+    differs = (small.pixels > 0) != (darker & (near > 2.5))
+    assert not differs[2:-2, 2:-2].any()
+    assert not small.pixels[4, 4]
+    assert small.pixels[20:22, 32:48].all()
+    assert not small.pixels[26:34, 36:44].any()  # further inside than the window
+    assert wide.pixels.shape == split.pixels.shape == (32, 48)
+    assert wide.pixels[10:20, 15:25].all()
+    assert wide.pixels.sum() == split.pixels.sum() == 255 * 100
+    assert black.pixels.sum() == 255  # the speck alone is darker than a quarter of white
+    for closed, shape in ((closed_down, (5, 1)), (closed_across, (1, 5))):
+        expected = cv2.morphologyEx(small.pixels, cv2.MORPH_CLOSE, np.ones(shape, np.uint8))
+        assert (closed.pixels == expected).all()
+    clean = blank((30, 20, 49, 39), size=(64, 96))
+    touching = [*dark_masks(255 - clean, [31, 5], 7.0, [], touching=True)]
+    assert [each.eroded for each in touching] == [0, 0, 0, 0, 1, 2, 1, 2]
+    assert [each.scale for each in touching] == [1, 2, 1, 2, 1, 1, 1, 1]
+    assert touching[6].pixels.sum() == 255 * 18**2
+    assert touching[7].pixels.sum() == 255 * 16**2
+
+
+def test_of_quads_that_are_nearly_the_same_the_first_is_kept():
+    generator = np.random.default_rng(8)
+    middles = generator.uniform(0, 60, (150, 1, 2))
+    quads = middles + SQUARE * generator.choice([5.0, 5.2, 8.0], (150, 1, 1))
+    kept: list[int] = []
+    for index, quad in enumerate(quads):
+        size = np.linalg.norm(quad - quad.mean(axis=0), axis=1).mean()
+        for other in kept:
+            apart = np.abs(quad.mean(axis=0) - quads[other].mean(axis=0)).max()
+            its = np.linalg.norm(quads[other] - quads[other].mean(axis=0), axis=1).mean()
+            if apart <= 2.0 and abs(its - size) < max(2.0, 0.06 * size):
+                break
+        else:
+            kept.append(index)
+    assert distinct(quads, 2.0).tolist() == kept
+    assert distinct(quads[:1], 2.0).tolist() == [0]
+
+
+# Borders and their sides.
+
+
+def marker(homography, white=200.0, black=40.0, side=7, entry=0, around=None):
+    """Return an image of a code, with a margin of a cell and a half on a wall."""
+    cells = MarkerCodes.of(dictionary_named('DICT_5X5_100'), [11]).cells[entry]
+    y, x = np.mgrid[:600, :800] / 4.0 - 0.375
+    back = np.linalg.inv(homography)
+    u, v, w = (back[n, 0] * x + back[n, 1] * y + back[n, 2] for n in range(3))
+    u, v = u / w, v / w
+    places = [
+        np.clip(np.floor((each + 1.0) * side / 2.0).astype(int) + 1, 0, side + 1) for each in (u, v)
+    ]
+    image = black + (white - black) * (cells[places[1], places[0]] > 0)
+    if around is not None:
+        image[np.maximum(np.abs(u), np.abs(v)) > 1.0 + around[0]] = around[1]
+    return np.rint(image.reshape(150, 4, 200, 4).mean(axis=(1, 3))).astype(np.uint8)
+
+
+SEEN = homographies_of(
+    (35.0 * SQUARE + (100.0, 75.0) + [(3.0, 2.0), (-4.0, 0.0), (0.0, -3.0), (2.0, 1.0)])[None]
+)
+
+
+def test_a_border_with_its_margin_correlates_and_other_places_do_not():
+    check = BorderCheck(7)
+    pyramid = ImagePyramid(marker(SEEN[0]))
+    ((found,), (beside,), (inside,)) = (
+        check.correlation(pyramid, homographies, 7.0)
+        for homographies in (
+            SEEN,
+            homographies_of(corners_of(SEEN) + np.array([12.0, 0.0])),
+            homographies_of(0.6 * (corners_of(SEEN) - (100.0, 75.0)) + (100.0, 75.0)),
+        )
+    )
+    assert found > 0.95
+    assert beside == inside == -1.0
+    assert check.correlation(pyramid, SEEN, 155.0)[0] > 0.9
+    assert check.correlation(pyramid, SEEN, 165.0)[0] == -1.0
+    thin = ImagePyramid(marker(SEEN[0], around=(0.5 / 3.5, 20.0)))
+    assert check.correlation(thin, SEEN, 7.0)[0] > 0.9
+    white_on_black = ImagePyramid(255 - marker(SEEN[0]))
+    assert check.correlation(white_on_black, SEEN, 7.0)[0] == -1.0
+    empty = marker(SEEN[0])
+    cv2.fillConvexPoly(empty, np.rint(corners_of(SEEN)[0]).astype(np.int32), 40)
+    assert check.correlation(ImagePyramid(empty), SEEN, 7.0)[0] == -1.0
+    one_side, two_sides = marker(SEEN[0]), marker(SEEN[0])
+    one_side[:, 132:] = two_sides[:, 132:] = two_sides[:, :69] = 40
+    assert check.correlation(ImagePyramid(one_side), SEEN, 7.0)[0] > 0.0
+    assert check.correlation(ImagePyramid(two_sides), SEEN, 7.0)[0] == -1.0
+
+
+def test_the_correlation_is_that_of_two_levels_with_noise_around_them():
+    noise = np.random.default_rng(6).normal(0.0, 40.0, (150, 200))
+    noisy = np.clip(marker(SEEN[0], 170.0, 90.0) + noise, 0, 255).astype(np.uint8)
+    (found,) = BorderCheck(7).correlation(ImagePyramid(noisy), SEEN, 7.0)
+    # contrast / sqrt(contrast^2 + 4 variance); halving the image once leaves a quarter of it,
+    # interpolation about half
+    assert found == pytest.approx(80.0 / np.sqrt(80.0**2 + 4.0 * 40.0**2 / 4.0 * 0.45), abs=0.06)
+
+
+@pytest.mark.parametrize('wrong', [-0.09, 0.0, 0.12])
+def test_sides_are_moved_onto_the_edges(wrong):
+    pyramid = ImagePyramid(marker(SEEN[0]))
+    truth = corners_of(SEEN)
+    start = truth + wrong * (truth - (100.0, 75.0))
+    start[:, 1] += (1.5, -2.0)
+    fitted = EdgeFit(7).fitted(pyramid, start)
+    assert np.abs(fitted - truth).max() < 0.8
+    again = EdgeFit(7).fitted(pyramid, fitted)
+    assert np.abs(again - truth).max() < 0.8
+    both = EdgeFit(7).fitted(pyramid, np.concatenate([start, truth]))
+    assert both[0] == pytest.approx(fitted[0])
+    assert np.abs(both[1] - truth).max() < 0.8
