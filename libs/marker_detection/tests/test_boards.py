@@ -10,6 +10,7 @@ import pytest
 
 from marker_detection import (
     CameraModel,
+    Detection,
     DetectorSettings,
     MarkerDetector,
     aprilgrid,
@@ -95,3 +96,61 @@ def test_pose_of_opencvs_boards_is_where_the_sheet_is(kind: str) -> None:
 
 def test_board_of_which_nothing_is_seen_has_no_pose() -> None:
     assert board_pose([], aprilgrid(6, 6, 0.088, 0.3), CAMERA) is None
+
+
+def tags(board: cv2.aruco.Board, ids: list[int], noise: float = 0.0) -> list[Detection]:
+    """Return detections of a board's markers in front of the camera, turned by `TURN`."""
+    places = dict(zip(np.ravel(board.getIds()).tolist(), board.getObjPoints(), strict=True))
+    generator = np.random.default_rng(7)
+    found = []
+    for each in ids:
+        corners = CAMERA.project(np.reshape(places[each], (4, 3)) @ TURN.T + (-0.1, 0.05, 1.5))
+        found.append(Detection(each, corners + generator.normal(0.0, noise, (4, 2)), 0.9, True))
+    return found
+
+
+def test_an_aprilgrid_is_where_kalibr_says() -> None:
+    board = aprilgrid(3, 2, 0.1, 0.25)
+    assert np.ravel(board.getIds()).tolist() == list(range(6))
+    places = np.array(board.getObjPoints()).reshape(6, 4, 3)
+    low_left = [(0.125 * column, 0.125 * row, 0.0) for row in range(2) for column in range(3)]
+    assert places[:, 3] == pytest.approx(np.array(low_left))
+    square = np.array([[0.0, 0.1, 0.0], [0.1, 0.1, 0.0], [0.1, 0.0, 0.0], [0.0, 0.0, 0.0]])
+    assert places - places[:, 3:] == pytest.approx(np.broadcast_to(square, (6, 4, 3)), abs=1e-6)
+
+
+def test_a_board_counts_the_ids_that_are_its_own_and_there_once() -> None:
+    board = aprilgrid(3, 2, 0.1, 0.25)
+    other = tags(aprilgrid(3, 3, 0.1, 0.25), [8])
+    twice = tags(board, [2], 30.0)
+    pose = board_pose([*tags(board, [5, 2, 0, 1]), *twice, *other], board, CAMERA)
+    assert pose is not None
+    assert pose.ids == (0, 1, 5)
+    assert pose.position == pytest.approx([-0.1, 0.05, 1.5], abs=1e-4)
+    assert pose.rotation == pytest.approx(TURN, abs=1e-4)
+    assert pose.reprojection_error < 1e-2
+    rough = board_pose(tags(board, [0, 1, 2, 3, 4, 5], 0.5), board, CAMERA)
+    assert rough is not None
+    # of 48 numbers six are the pose
+    assert rough.reprojection_error == pytest.approx(0.5 * np.sqrt(2 * 42 / 48), rel=0.25)
+    assert board_pose(other, board, CAMERA) is None
+    assert board_pose([*twice, *tags(board, [2])], board, CAMERA) is None
+
+
+def test_a_board_is_measured_through_a_lens_or_not_at_all() -> None:
+    board = aprilgrid(3, 2, 0.1, 0.25)
+    skewed = CAMERA.matrix.copy()
+    skewed[0, 1] = 5.0
+    lens = CameraModel(640, 480, skewed, np.array([-0.2, 0.05, 0.0, 0.0, 0.0]))
+    found = []
+    for each in tags(board, [0, 2, 5]):
+        ideal = (each.corners - CAMERA.matrix[:2, 2]) / np.diag(CAMERA.matrix)[:2]
+        square = (ideal**2).sum(axis=1, keepdims=True)
+        bent = ideal * (1.0 - 0.2 * square + 0.05 * square**2)
+        corners = bent @ skewed[:2, :2].T + skewed[:2, 2]
+        found.append(Detection(each.marker_id, corners, 0.9, True))
+    pose = board_pose(found, board, lens)
+    assert pose is not None
+    assert pose.position == pytest.approx([-0.1, 0.05, 1.5], abs=2e-3)
+    hopeless = CameraModel(640, 480, skewed, np.array([-90.0, 5.0, 0.0, 0.0, 0.0]))
+    assert board_pose(found, board, hopeless) is None

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+import re
+
 import cv2
 import numpy as np
 import pytest
@@ -136,3 +139,75 @@ def test_pixels_beyond_where_the_polynomial_turns_back_have_no_ray(model, number
         elif found is not None:
             # such a pixel is also what a ray on the near side shows
             assert np.degrees(np.arctan(found[0, 0])) < turns_back
+
+
+def test_camera_of_a_field_of_view_sees_its_edges_at_half_of_it():
+    camera = CameraModel.from_field_of_view(640, 480, 1.2)
+    focal = 320.0 / math.tan(0.6)
+    assert camera.matrix.tolist() == [[focal, 0.0, 319.5], [0.0, focal, 239.5], [0.0, 0.0, 1.0]]
+    assert camera.horizontal_field_of_view == pytest.approx(1.2)
+    edges = camera.rays(np.array([[-0.5, 239.5], [639.5, 239.5]]))
+    assert edges is not None
+    assert np.arctan(edges[:, 0]) == pytest.approx([-0.6, 0.6])
+    assert camera.project(np.array([[0.0, 0.0, 2.0], [1.0, -1.0, 2.0]])) == pytest.approx(
+        np.array([[319.5, 239.5], [319.5 + focal / 2, 239.5 - focal / 2]])
+    )
+    for wrong in (0.0, math.pi, -1.0):
+        with pytest.raises(ValueError, match=r'must lie between 0 and pi rad, got'):
+            CameraModel.from_field_of_view(640, 480, wrong)
+
+
+@pytest.mark.parametrize(
+    ('changes', 'reason'),
+    [
+        ({'height': 0}, 'an image of 640x0 pixels has no area'),
+        ({'matrix': np.eye(2)}, 'the camera matrix must be 3x3 finite numbers'),
+        (
+            {'matrix': np.diag([500.0, 0.0, 1.0])},
+            'focal lengths must be positive, got 500 and 0: the camera is not calibrated',
+        ),
+        (
+            {'matrix': np.diag([6.41e6, 500.0, 1.0])},
+            'the camera matrix must have no number above 6.4e+06',
+        ),
+        (
+            {'matrix': K + np.array([[0, 0, 0], [1, 0, 0], [0, 0, 0]])},
+            'the camera matrix must have the form [fx skew cx, 0 fy cy, 0 0 1], '
+            'got 500 0 320 1 510 240 0 0 1',
+        ),
+        ({'distortion_model': 'nix'}, "distortion model 'nix' is not known"),
+    ],
+)
+def test_a_refused_description_says_what_was_expected(changes, reason):
+    with pytest.raises(ValueError, match=f'^{re.escape(reason)}$'):
+        CameraModel(**({'width': 640, 'height': 480, 'matrix': K} | changes))
+    CameraModel(640, 480, np.diag([6.4e6, 1e-9, 1.0]))
+
+
+def test_camera_with_images_of_another_size_sees_the_same():
+    skewed = K + np.array([[0.0, 3.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
+    camera = CameraModel(640, 480, skewed, np.array(MODELS['plumb_bob']))
+    assert camera.scaled_to(640, 480) is camera
+    points = np.array([[0.2, -0.1, 1.0], [-0.3, 0.2, 1.5]])
+    plain = CameraModel(640, 480, K)
+    for size in ((1280, 960), (320, 240), (642, 480)):
+        scaled = plain.scaled_to(*size)
+        assert (scaled.width, scaled.height) == size
+        grown = (plain.project(points) + 0.5) * (size[0] / 640, size[1] / 480) - 0.5
+        assert scaled.project(points) == pytest.approx(grown)
+    assert plain.scaled_to(653, 480) is None
+    assert plain.scaled_to(652, 480) is not None
+    assert plain.scaled_to(640, 490) is None
+    assert (camera.scaled_to(320, 240).distortion == camera.distortion).all()
+
+
+def test_rays_of_a_straight_camera_are_lines():
+    skewed = K + np.array([[0.0, 3.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
+    rays = CameraModel(640, 480, skewed).rays(PIXELS)
+    assert rays is not None
+    assert rays[:, 1] == pytest.approx((PIXELS[:, 1] - 240.0) / 510.0)
+    assert rays[:, 0] == pytest.approx((PIXELS[:, 0] - 320.0 - 3.0 * rays[:, 1]) / 500.0)
+    fisheye = CameraModel(640, 480, K, np.zeros(4), 'equidistant').rays(PIXELS)
+    assert fisheye is not None
+    angle = np.linalg.norm((PIXELS - (320.0, 240.0)) / (500.0, 510.0), axis=1)
+    assert np.arctan(np.linalg.norm(fisheye, axis=1)) == pytest.approx(angle, abs=1e-4)

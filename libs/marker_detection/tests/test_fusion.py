@@ -134,3 +134,86 @@ def test_many_views_from_a_camera_that_is_not_sure_where_it_is_make_no_second_pa
         fused.add(7, np.eye(4), np.array([0.1, 0.0, 2.0]), exact, 0.0, carrier)
         fused.add(7, np.eye(4), np.array([1.1, 0.0, 2.0]), exact, 0.0, carrier)
     assert fused.twins == [7], 'one that hangs there'
+
+
+def test_fused_views_are_the_weighted_mean_of_all_of_them() -> None:
+    fused, generator = FusedPositions(), np.random.default_rng(4)
+    total, weighed = np.zeros((3, 3)), np.zeros(3)
+    for count in range(1, 6):
+        camera = from_side(float(generator.uniform(-90, 90)), 2.0)
+        spread = np.diag(generator.uniform(1e-4, 1e-2, 3))
+        seen = np.array([0.0, 0.0, 2.0]) + generator.normal(0.0, 0.01, 3)
+        assert fused.add(3, camera, seen, spread, 0.95)
+        turn = camera[:3, :3]
+        information = np.linalg.inv(turn @ (spread + 4e-4 * np.eye(3)) @ turn.T)
+        total, weighed = total + information, weighed + information @ (turn @ seen + camera[:3, 3])
+        at = fused.position_of(3)
+        assert at is not None
+        assert at.views == count
+        assert at.position == pytest.approx(np.linalg.solve(total, weighed))
+        assert at.covariance == pytest.approx(np.linalg.inv(total) + 4e-4 * np.eye(3))
+        apart = np.array([0.1, -0.2, 0.3])
+        distance = np.sqrt(apart @ np.linalg.inv(at.covariance) @ apart)
+        assert at.distance_to(at.position + apart) == pytest.approx(distance)
+    assert not fused.add(3, np.eye(4), np.array([0.0, 0.0, 2.0]), EXACT, 0.951)
+    assert fused.position_of(4) is None
+    assert fused.two_places(4) is None
+
+
+def test_a_view_belongs_to_a_place_within_four_deviations() -> None:
+    # 16.27 is the 99.9 % of chi squared with three degrees of freedom
+    for factor, same in ((0.99, True), (1.01, False)):
+        fused = FusedPositions()
+        fused.add(7, np.eye(4), HERE, EXACT, 0.0)
+        at = fused.position_of(7)
+        assert at is not None
+        deviation = np.sqrt(at.covariance[0, 0] + 1e-4 + 4e-4)
+        beside = HERE + np.array([factor * np.sqrt(16.27) * deviation, 0.0, 0.0])
+        assert fused.add(7, np.eye(4), beside, EXACT, 0.0) is same
+
+
+def test_a_marker_is_moved_after_five_views_in_a_row_at_one_other_place() -> None:
+    third = np.array([0.0, 1.0, 2.0])
+    fused = FusedPositions()
+    looked(fused, HERE)
+    for _ in range(4):
+        looked(fused, THERE)
+    # seen at the first place again: it begins anew
+    looked(fused, HERE)
+    for _ in range(4):
+        looked(fused, THERE)
+        assert fused.position_of(7).position == pytest.approx(HERE)
+    looked(fused, third)
+    looked(fused, THERE)
+    assert fused.position_of(7).position == pytest.approx(THERE)
+    assert fused.two_places(7) is None
+    for _ in range(4):
+        looked(fused, HERE)
+    assert fused.two_places(7) is None
+    looked(fused, HERE)
+    # it was told there before: a marker that was moved does not come back
+    assert np.allclose(both(fused), [THERE, HERE])
+
+
+def test_the_least_seen_of_four_places_gives_way_to_a_fifth() -> None:
+    def at(number: int) -> np.ndarray:
+        return np.array([float(number), 0.0, 2.0])
+
+    fused = FusedPositions()
+    for number, views in ((0, 9), (1, 2), (2, 1), (3, 2)):
+        for _ in range(views):
+            looked(fused, at(number))
+    looked(fused, at(4))  # in place of 2
+    for _ in range(2):
+        looked(fused, at(1))
+    assert fused.position_of(7).position == pytest.approx(at(0))
+    looked(fused, at(1))  # the fifth there without another at the first place
+    assert fused.position_of(7).position == pytest.approx(at(1))
+
+
+def test_without_images_nothing_is_seen_at_the_same_time() -> None:
+    fused = FusedPositions()
+    for _ in range(4):
+        for place in (HERE, THERE):
+            fused.add(7, np.eye(4), place, EXACT, 0.0)
+    assert fused.twins == []

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+import cv2
 import numpy as np
 import pytest
 
@@ -43,8 +44,6 @@ def test_marker_seen_squarely_from_near_has_one_pose():
 
 
 def test_pose_is_the_same_through_a_distorting_lens():
-    import cv2
-
     distortion = np.array([-0.25, 0.08, 0.0, 0.0, 0.0])
     lens = CameraModel(640, 480, CAMERA.matrix, distortion)
     points = corners_in_camera(Panel(0, 1.2, turn=0.5, offset=(150.0, 90.0)), CAMERA)
@@ -110,3 +109,70 @@ def test_corners_that_are_no_square_within_a_pixel_have_no_pose():
     corners = corners_in_image(Panel(0, 2.0, turn=0.5), CAMERA)
     corners[0] += (6.0, 5.0)
     assert pose_of(corners, 0.2, CAMERA) is None
+
+
+def test_covariance_is_the_inverse_of_how_corners_move_with_the_pose():
+    camera = CameraModel(640, 480, np.array([[610.0, 0, 330.0], [0, 480.0, 250.0], [0, 0, 1]]))
+    outline = 0.15 * np.array([[-1.0, 1, 0], [1, 1, 0], [1, -1, 0], [-1, -1, 0]])
+    turned = cv2.Rodrigues(np.array([2.8, 0.3, 0.5]))[0]
+    place = np.array([0.3, -0.2, 1.7])
+
+    def pixels(change):
+        about, moved = cv2.Rodrigues(change[3:])[0], place + change[:3]
+        return camera.project(outline @ (about @ turned).T + moved).ravel()
+
+    small = 1e-6
+    slopes = [(pixels(small * way) - pixels(-small * way)) / (2 * small) for way in np.eye(6)]
+    jacobian = np.column_stack(slopes)
+    expected = np.linalg.inv(jacobian.T @ jacobian)
+    exact = pose_of(pixels(np.zeros(6)).reshape(4, 2), 0.3, camera)
+    assert exact.position == pytest.approx(place, abs=1e-5)
+    assert exact.rotation == pytest.approx(turned, abs=1e-5)
+    assert exact.reprojection_error < 1e-3
+    assert exact.covariance == pytest.approx(0.15**2 * expected, rel=1e-3, abs=1e-9)
+    # a residual above the corners' own deviation counts: two numbers more than a pose has
+    apart = np.array([[0.5, 0.0], [-0.5, 0.0], [0.5, 0.0], [-0.5, 0.0]])
+    rough = pose_of(pixels(np.zeros(6)).reshape(4, 2) + apart, 0.3, camera)
+    deviation = rough.reprojection_error * np.sqrt(2.0)
+    assert deviation > 0.3
+    scale = np.trace(rough.covariance) / np.trace(exact.covariance)
+    assert scale == pytest.approx((deviation / 0.15) ** 2, rel=0.2)
+
+
+@pytest.mark.parametrize('roll', [0.0, 1.0, math.pi, 5.0])
+@pytest.mark.parametrize('turn', [0.2, 0.6, 1.1])
+def test_pose_is_that_of_the_panel_and_the_other_is_tilted_the_other_way(turn, roll):
+    panel = Panel(0, 4.0, turn, roll=roll, axis=0.7, offset=(120.0, -90.0), size=0.3)
+    corners = corners_in_image(panel, CAMERA)
+    pose = pose_of(corners, 0.3, CAMERA)
+    truth = corners_in_camera(panel, CAMERA)
+    outline = 0.15 * np.array([[-1.0, 1, 0], [1, 1, 0], [1, -1, 0], [-1, -1, 0]])
+    assert outline @ pose.rotation.T + pose.position == pytest.approx(truth, abs=1e-4)
+    assert np.linalg.det(pose.rotation) == pytest.approx(1.0)
+    if pose.other is None:
+        return
+    other = pose.other
+    sight = pose.position / np.linalg.norm(pose.position)
+    # both normals make nearly the same angle with the sight, on opposite sides of it
+    angles = [math.acos(abs(each.rotation[:, 2] @ sight)) for each in (pose, other)]
+    assert angles[1] == pytest.approx(angles[0], abs=0.12)
+    assert other.rotation[:, 2] @ pose.rotation[:, 2] < math.cos(angles[0])
+    seen = CAMERA.project(outline @ other.rotation.T + other.position) - corners
+    assert other.reprojection_error == pytest.approx(
+        np.sqrt((seen**2).sum(axis=1).mean()), rel=1e-3
+    )
+    assert other.ambiguity == 0.0
+    assert other.other is None
+
+
+@pytest.mark.parametrize(('side', 'largest'), [(100, 1.0), (199, 1.0), (400, 2.0)])
+def test_largest_error_of_a_pose_is_a_pixel_or_a_share_of_a_large_marker(side, largest):
+    square = side / 2 * np.array([[-1.0, -1], [1, -1], [1, 1], [-1, 1]]) + (320.0, 240.0)
+    sheared = np.array([[1.0, 0.0], [1.0, 0.0], [-1.0, 0.0], [-1.0, 0.0]])
+    errors = []
+    for pixels in np.arange(0.0, 4.0 * largest, 0.05 * largest):
+        pose = pose_of(square + pixels * sheared, 0.2, CAMERA)
+        errors.append(math.inf if pose is None else pose.reprojection_error)
+    assert errors == sorted(errors)
+    assert errors[-1] == math.inf
+    assert 0.9 * largest < max(each for each in errors if each < math.inf) <= largest * 1.01
