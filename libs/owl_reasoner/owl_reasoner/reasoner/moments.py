@@ -49,6 +49,7 @@ _DURATION = re.compile(
 _REFERENCES = ((1696, 9), (1697, 2), (1903, 3), (1903, 7))
 """Years and months to which durations are added to compare them (XML Schema 1.1 part 2, 3.3.6.2):
 months have 28 to 31 days."""
+_MIDNIGHT = re.compile(r'24:00:00(?:\.0+)?(?![.\d])', re.ASCII)
 _ZONE = re.compile(r'(?:Z|[+-]\d\d:\d\d)?$', re.ASCII)
 
 
@@ -128,7 +129,7 @@ def calendar_value(datatype: str, text: str) -> Moment:
     mark, before, behind = CALENDAR[datatype]
     if not text.startswith(mark):
         raise ValueError(f'{text!r} is no {datatype}')
-    if datatype == 'time' and text.startswith('24:00:00'):
+    if datatype == 'time' and _MIDNIGHT.match(text):
         text = '00' + text[2:]
     moment = _ZONE.sub(lambda zone: behind + zone[0], text[len(mark) :], count=1)
     return (datatype, *moment_of(before + moment)[1:])
