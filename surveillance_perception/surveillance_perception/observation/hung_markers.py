@@ -28,54 +28,81 @@ from surveillance_perception.observation.views import Picture, grey_of
 Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
 
-MOVED = 0.2
-"""A marker seen so far from where it hung hangs elsewhere, metres."""
+# --- what is decided by, and why it is so much ---
+
 SURE = 3.0
-"""If that is also so many standard deviations; and a spot is in view with so many around it."""
-LEAST_SIDE = 9.0
-"""Smaller spots show too little to be judged, pixels."""
-STEEPEST = 1.2
-"""So far from straight ahead a spot is judged, rad."""
-SCALE = 16
-"""Surroundings are compared at so many pixels to the side of a marker."""
-SHEET, AROUND = 1.8, 2.8
-"""What surrounds a spot lies outside of its sheet and within this, in sides of the marker."""
-FARTHEST = 1.5
-"""Where the camera's pose leaves more open than this, nothing is called gone, sides."""
-SEARCHED = 1.0
-"""So much farther around a marker is looked for by its picture, sides."""
-SAME_ASPECT, SAME_DISTANCE = 0.35, 1.6
-"""Surroundings are compared with those seen from nearly the same side, rad, and distance, times."""
-ASPECTS = 4
-"""Of each marker the surroundings are kept from so many sides."""
-FOREIGN = 0.3
-"""What looks otherwise around a spot may have so much area, square sides of the marker."""
-OF_LIGHT = (0.6, 1.6)
-"""The surroundings may be so much lighter or darker than the picture as a whole."""
-STILL_THERE = 0.5
-"""Correlation with the marker's own picture from which it may hang there unread."""
-COMMON = 0.01
-"""Standard deviation that no number of pictures takes away, metres."""
-LAID = 0.5
-"""Surroundings that correlate less have no features to be laid by."""
+"""What counts is so many standard deviations: 1 error of 370 is larger, along one axis."""
+MOVED = 0.2
+"""A marker read so far from where it hung hangs elsewhere, metres, if that is `SURE`, too: so much
+are three deviations of this project's localisation (.03 m, .02 rad) at 3 m, from where a check is
+looked at (`viewpoints.CHECK_RANGE`)."""
 AGREED, READ = 3, 2
-"""So many pictures in a row must agree that it is gone, and so many that it is read elsewhere."""
+"""So many pictures in a row must agree that it is gone, and so many that it is read elsewhere. A
+reading is a code that was checked; that nothing is read has many causes. In a mission one picture
+alone had put two of eight markers .3 m off."""
 MOSTLY = 0.6
-"""Where so much of a spot is in view it is not there that a marker hangs that is read elsewhere."""
+"""Where so much of a spot's side, from its middle on, is in view, a marker that is read elsewhere
+does not hang there. Without a reading elsewhere all of the spot has to be in view."""
+
+LEAST_SIDE = 9.0
+"""Smaller spots are not judged, pixels: 1.5 for each of the six cells of a code of 4 by 4."""
+STEEPEST = 1.2
+"""Nor those so far from straight ahead, rad: a marker is a third as wide there as it is high."""
 LEVEL = (0.01, 0.007)
-"""Standard deviations of a camera's height, metres, and of its pitch, rad: the floor is even."""
+"""Standard deviations of a camera's height, metres, and of its pitch, rad: a floor indoors is even,
+and the pose on it is what a robot does not know."""
+
+SCALE = 16
+"""Surroundings are compared at so many pixels to the side of a marker: so large is one of .2 m at 7
+m in a picture of 640 pixels and 60 degrees, and nearer ones have no less detail."""
+SHEET = 1.8
+"""A printed marker's sheet is up to so large, sides of the marker: .4 of white to each side."""
+AROUND = SHEET + 1.0
+"""What surrounds a spot lies outside of its sheet, and within half a side around that."""
+MARGIN = 0.1
+"""With so much of its white, sides, a marker's own picture is looked for: so it has an outline."""
+FARTHEST = 1.5
+"""Where the camera's pose leaves more open than this, nothing is called gone, sides: for a marker
+of .2 m that is .3 m, three deviations of this project's localisation at 4.8 m, and at less where it
+is not known as well where the marker hung."""
+SEARCHED = 1.0
+"""So much farther around a marker is looked for by its picture, sides: one that slipped, or that
+the pose is further off than it says, is there and not gone."""
+ALIKE = 0.5
+"""Normalised correlation from which pictures show the same: what they have in common is as strong
+as what they have not. Then a marker that was not read hangs there still, and surroundings are laid
+by their features."""
+SAME_ASPECT, SAME_DISTANCE = 0.35, 1.6
+"""Surroundings are compared with those seen from nearly the same side, rad, and distance, times:
+what stands half a side before the wall shifts against it by a fifth of a side at this angle."""
+ASPECTS = math.ceil(STEEPEST / SAME_ASPECT)
+"""Of each marker the surroundings are kept from so many sides: all those from which it is
+judged."""
+FOREIGN = 0.3
+"""What looks otherwise around a spot may have so much area, square sides of the marker: an arm
+before the spot, as long as a side, has as much. Lines of less than 3 pixels of `SCALE` do not
+count, as texture is laid a pixel off."""
+OF_LIGHT = (0.6, 1.6)
+"""The surroundings may be so much lighter or darker than the picture as a whole. A wall keeps about
+its part of the light in a room; what is beyond is another surface, plain as it may be."""
+
+COMMON = 0.01
+"""Standard deviation that no number of pictures takes away, metres: all share the size that the
+marker is said to have, and the camera's place on the robot."""
 ENOUGH = 20
-"""So many pictures decide where a marker hangs."""
+"""So many pictures decide where a marker hangs; later ones do not let it wander."""
+SAME_SIZE = 0.1
+"""A marker whose side differs by this part or more is another panel."""
+
+# --- bounds of what is taken at all ---
+
 MOST = 100
 """So many markers are kept; of those that are no more than a misreading one makes way."""
 REACH, LARGEST = 100.0, 10.0
-"""No marker is read farther away, nor larger, metres: that is no measurement."""
-LOST = 100.0
-"""With a greater standard deviation, metres or rad, nobody knows where the camera is."""
+"""No marker is read farther away, nor larger, metres: that is no measurement. Nor does anybody know
+where a camera is that is off by a standard deviation of more than `REACH`."""
 LARGEST_MAP = 1e8
 """No map has a place farther from its origin, metres."""
-SAME_SIZE = 0.1
-"""A marker whose side differs by this part or more is another panel."""
 
 
 @dataclass(frozen=True)
@@ -103,7 +130,7 @@ class CameraView:
     def is_known(self) -> bool:
         """Whether that is anything: on a map, and not doubted altogether."""
         is_on_map = float(np.abs(self.pose).max()) <= LARGEST_MAP
-        return is_on_map and self.deviation <= LOST and self.turn <= LOST
+        return is_on_map and self.deviation <= REACH and self.turn <= REACH
 
     def doubt(self, point: Array) -> float:
         """Return the standard deviation of a point's place across the line of sight, metres."""
@@ -636,7 +663,7 @@ class _Shown:
         now, covered = self._flat(
             spot.position, aspect.rotation, spot.side, half + open_ + SEARCHED
         )
-        if _is_found(_cut(aspect.picture, SHEET / 3), now):
+        if _is_found(_cut(aspect.picture, 0.5 + MARGIN), now):
             return False
         reach = half + open_
         now, covered = _cut(now, reach), _cut(covered, reach)
@@ -701,7 +728,7 @@ def _box(size: int, half: float) -> Mask:
 def _is_found(marker: Picture, now: Picture) -> bool:
     """Tell whether the marker's own picture is to be found, read or not."""
     alike = cv2.matchTemplate(grey_of(now), grey_of(marker), cv2.TM_CCOEFF_NORMED)
-    return float(np.nan_to_num(alike, posinf=0.0).max()) >= STILL_THERE
+    return float(np.nan_to_num(alike, posinf=0.0).max()) >= ALIKE
 
 
 def _laid(before: Picture, judged: Mask, now: Picture) -> tuple[int, int]:
@@ -718,7 +745,7 @@ def _laid(before: Picture, judged: Mask, now: Picture) -> tuple[int, int]:
         cv2.matchTemplate(second, first, cv2.TM_CCOEFF_NORMED, mask=mask), posinf=0.0, neginf=0.0
     )
     row, column = np.unravel_index(int(alike.argmax()), alike.shape)
-    if alike[row, column] < LAID:
+    if alike[row, column] < ALIKE:
         return spare // 2, spare // 2
     return int(row), int(column)
 
