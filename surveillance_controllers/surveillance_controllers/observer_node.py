@@ -65,7 +65,8 @@ from surveillance_perception.observation.backlog import (
 from surveillance_perception.observation.day_book import DayBook
 from surveillance_perception.observation.events import Event, EventBook, EventState
 from surveillance_perception.observation.evidence import EvidenceStore
-from surveillance_perception.observation.hung_markers import CameraView, HungSpot, SeenMarker
+from surveillance_perception.observation.hung_markers import CameraView, SeenMarker
+from surveillance_perception.observation.marker_checks import MarkerChecks
 from surveillance_perception.observation.observations import Kind, Observation
 from surveillance_perception.observation.other_robots import OtherRobots
 from surveillance_perception.observation.persons import Person, load_finder
@@ -74,7 +75,6 @@ from surveillance_perception.observation.viewpoints import Viewpoints
 from surveillance_perception.observation.watch_rules import (
     DEFAULT_RULES,
     Level,
-    WatchRule,
     read_watch_file,
 )
 from surveillance_perception.observation.watcher import Look, Watcher, same_map
@@ -110,7 +110,7 @@ ASSESS_PERIOD, PICTURE_PERIOD, KEEP_PERIOD = 2.0, 2.0, 20.0
 """Seconds of real time between two comparisons, pictures, and writings of the state."""
 CAMERA_PATIENCE = 10.0
 """The first picture is waited for so long after the first sweep, seconds of real time."""
-MOST_WAITING = {'sweeps': 10, 'pictures': 4}
+MOST_WAITING = {'sweeps': 10, 'pictures': 4, 'passing': 4}
 """So many wait for the worker; beyond that the oldest of the least worth is left out, and told."""
 MOST_HEARD = 20
 """Depth of the queue of what the fleet tells."""
@@ -136,12 +136,6 @@ DETECTOR_PATIENCE, STANDING_PATIENCE = 5.0, 1.0
 real time."""
 MOST_SIDES = 20
 """Of so many pictures it is told that they were looked at."""
-SAME_SPOT = 0.3
-"""A spot that lies so near to where it was is looked at from the same point, metres."""
-IN_FRONT = 0.3
-"""A marker hangs in the place that is so far before it, metres."""
-MARKER_SIDE = 0.2
-"""The side of the markers that distances are told for, metres."""
 TOO_LATE = 30.0
 """What is looked at so long after it was taken is told late, seconds."""
 FACTS_PERIOD = 10.0
@@ -276,8 +270,7 @@ class Observer(PatrolNode):
         self._looks = OwnedTopic(self, String, 'looks')
         self._doubts = OwnedTopic(self, String, 'doubts')
         self._checks = OwnedTopic(self, String, 'checks')
-        self._said_checks = False
-        self._told_checks: dict[int, tuple[str, dict[str, Any]]] = {}
+        self._told_checks: dict[str, list[dict[str, Any]]] | None = None
         self._told_pictures = OwnedTopic(self, String, 'pictures')
         # Of the last ones that were looked at: when, seconds, and to which bearings, degrees.
         self._seen_sides: deque[tuple[float, int | None]] = deque(maxlen=MOST_SIDES)
@@ -313,6 +306,7 @@ class Observer(PatrolNode):
             verify_seconds=self._settings.verify_seconds,
             others=self.others,
         )
+        self._marker_checks = MarkerChecks(self._watcher.rules, self._places, self._points)
         self._kept = KeptFile(self._settings.state_file, 'starting without it')
         self._complain(self._kept.read(self._restore))
         for rule in self._watcher.rules:
@@ -337,7 +331,7 @@ class Observer(PatrolNode):
         self._next_picture = self._waits_since = 0.0
         self._looked_from: Viewpoint | None = None
         self._lost = LostSight(time.monotonic)
-        self._work = Backlog(MOST_WAITING, lambda kind: self._lost.count(kind, DROPPED))
+        self._work = Backlog(MOST_WAITING, self._on_dropped)
         self._lidar.subscribe(self._on_scan)
         StateSubscription(self, OccupancyGrid, 'map', self._on_map, owner='simulator')
         owner = 'motion_controller'
@@ -428,6 +422,10 @@ class Observer(PatrolNode):
 
     def _now(self) -> float:
         return float(self.get_clock().now().nanoseconds / 1e9)
+
+    def _on_dropped(self, kind: str) -> None:
+        if kind in ('pictures', 'sweeps'):
+            self._lost.count(kind, DROPPED)
 
     def _on_map(self, message: OccupancyGrid) -> None:
         with conversions.refusing(self, 'map'):
@@ -569,8 +567,25 @@ class Observer(PatrolNode):
             if (count := len(message.detections)) > MOST_MARKERS:
                 raise ValueError(f'{count} markers in a picture: expected at most {MOST_MARKERS}')
             found = [seen_marker_from_ros(each) for each in message.detections if each.confirmed]
-            self._detected.append((seconds_of(message.header.stamp), tuple(found)))
+            stamp = seconds_of(message.header.stamp)
+            self._detected.append((stamp, tuple(found)))
+            if found:
+                self._pass_by(stamp, found)
             self._look_at_next()
+
+    def _pass_by(self, stamp: float, found: Sequence[SeenMarker]) -> None:
+        """Take where markers seem to hang that are read on the way, so that they are looked at."""
+        taken = stamp + self._image_stamps.offset
+        joints = self._joints_of_camera()
+        stood = [each.stood(taken - SAME_TIME, taken) for each in joints]
+        if self._odom_in_map is None or None in stood or not self._readings.covers(taken, taken):
+            return
+        (x, y, yaw) = (float(each) for each in self._readings.at(np.array([taken]))[0])
+        base = composed(self._odom_in_map, (x, y, yaw))
+        values = (value for each in stood if each is not None for value in each)
+        pose = self._camera_pose((*base, *values))
+        if pose is not None:
+            self._work.put(lambda: self._watcher.pass_by(pose, found), 'passing')
 
     def _on_image(self, serialized: bytes) -> None:
         stamp, now = stamp_of_serialized(serialized), time.monotonic()
@@ -767,7 +782,7 @@ class Observer(PatrolNode):
     def _tell_viewpoints(self, grid: Grid) -> None:
         """Tell from where each place is to be looked at."""
         self._viewpoints = chosen = Viewpoints(grid, self._settings.radius)
-        self._told_checks = {}
+        self._marker_checks.use(chosen)
         told = {}
         for place, point in self._points.items():
             floor = self._places.cells_of(place)
@@ -789,48 +804,12 @@ class Observer(PatrolNode):
 
     def _tell_checks(self) -> None:
         """Tell from where the spots of markers are to be seen that a rule is about."""
-        rules = [each for each in self._watcher.rules if each.kind == Kind.MARKER]
-        if not rules or self._viewpoints is None:
-            return
-        told, before = {}, self._told_checks
-        for spot in self._watcher.spots():
-            x, y, _ = spot.position
-            known = before.get(spot.number)
-            if known is not None and math.dist(known[1]['at'], (x, y)) < SAME_SPOT:
-                told[spot.number] = known
-            elif (found := self._check_of(spot, rules)) is not None:
-                told[spot.number] = found
-        if told != before or not self._said_checks:
-            self._told_checks, self._said_checks = told, True
-            by_place: dict[str, list[dict[str, Any]]] = {}
-            for place, check in told.values():
-                by_place.setdefault(place, []).append(check)
-            self._checks.publish(String(data=json.dumps(by_place)))
-
-    def _check_of(
-        self, spot: HungSpot, rules: Sequence[WatchRule]
-    ) -> tuple[str, dict[str, Any]] | None:
-        """Return in which place a marker hangs, and how it is looked at; None: no rule asks."""
-        x, y, _ = spot.position
-        angle = 0.0 if spot.facing is None else spot.facing
-        ahead = 0.0 if spot.facing is None else IN_FRONT
-        place = self._places.place_at((x + ahead * math.cos(angle), y + ahead * math.sin(angle)))
-        if place is None or self._viewpoints is None or place not in self._points:
-            return None
-        if not any(each.is_about(str(spot.number), place) for each in rules):
-            return None
-        floor, (px, py, *_) = self._places.cells_of(place), self._points[place]
-        if floor is None:
-            return None
-        first, scale = (float(px), float(py)), (spot.side or MARKER_SIDE) / MARKER_SIDE
-        best = self._viewpoints.of_panel(floor, first, (x, y), spot.facing, scale)
-        look_from = None if best in (None, first) else [round(each, 2) for each in best]
-        check = {
-            'name': f'marker {spot.number}',
-            'at': [round(x, 2), round(y, 2)],
-            'from': look_from,
-        }
-        return place, check
+        told: dict[str, list[dict[str, Any]]] = {}
+        for each in self._marker_checks.of(self._watcher.spots()):
+            told.setdefault(each.place, []).append(each.to_json())
+        if told != self._told_checks:
+            self._told_checks = told
+            self._checks.publish(String(data=json.dumps(told)))
 
     def _door_checks(self, floor: np.ndarray, grid: Grid) -> list[tuple[float, float]]:
         """Return the doors of a room that the rules name."""

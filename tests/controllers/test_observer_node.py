@@ -428,7 +428,7 @@ def test_it_tells_which_sides_it_has_seen_and_from_where_a_marker_is_to_be_read(
     checks = graph.listen(String, 'checks', STATE_QOS)
     spot = HungSpot(21, (5.8, 2.5, 1.0), math.pi, 0.2)
     monkeypatch.setattr(node._watcher, 'spots', lambda: [spot])
-    node._points = {'R1': (1.0, 2.5)}
+    node._points['R1'] = (1.0, 2.5)
     node._places.set_positions(node._points)
     grid = map_from(room_map(), 100_000)
     node._places.set_map(grid)
@@ -443,3 +443,24 @@ def test_it_tells_which_sides_it_has_seen_and_from_where_a_marker_is_to_be_read(
     node._on_camera_info(info)
     graph.until(lambda: 'angle' in pictures[-1].data)
     assert json.loads(pictures[-1].data) == {'camera': True, 'looked': [[5.0, 90]], 'angle': 60}
+
+
+def test_a_marker_that_is_read_on_the_way_is_looked_for_where_it_hangs(graph, monkeypatch):
+    eyes = Eyes(graph, monkeypatch)
+    for tick in range(-20, 1):
+        eyes.carry(tick / 20, tick / 20)  # it drives
+        joints = JointState(name=[*ARM.names], position=[*ARM.home])
+        joints.header.stamp = eyes.stamp(tick / 20)
+        eyes.node._on_joints(joints)
+    marker = MarkerDetection(id=21, confirmed=True, size=0.2)
+    marker.pose.position.z = 2.0
+    marker.pose.orientation.x, marker.pose.orientation.w = 1.0, 0.0
+    marker.pose_covariance = (np.eye(6) * 1e-4).ravel().tolist()
+    message = MarkerDetectionArray(detections=[marker])
+    message.header.stamp = eyes.stamp(-0.525)
+    eyes.node._on_detections(message)
+    (spot,) = eyes.node._watcher.spots()
+    lens = ARM.camera_frame(ARM.home)[:3, 3]
+    assert spot.position == pytest.approx((-0.525 + lens[0] + 2.0, 5.0, lens[2]), abs=0.02)
+    assert abs(spot.facing) == pytest.approx(math.pi)
+    assert not eyes.looked

@@ -242,3 +242,27 @@ def test_one_picture_that_is_far_off_decides_nothing():
     assert told(markers, picture, [seen], 1) == []
     assert told(markers, picture, [seen], 2) == ['here']
     assert markers.position_of(14) == pytest.approx((2.0, 0.05, 1.05), abs=0.02)
+
+
+def test_a_marker_that_is_read_in_passing_tells_where_to_look_and_nothing_else():
+    markers, picture = HungMarkers(), wall()
+    seen = hang(picture, 14, LEFT, TOP)
+    view = camera(y=1.0)
+    markers.pass_by(view.pose, [seen, SeenMarker(15)])
+    (spot,) = markers.spots()
+    assert spot.number == 14
+    assert spot.position == pytest.approx(
+        (2.0, 1.0 - (LEFT + 11.5 - 159.5) / METRE, 1.05), abs=0.01
+    )
+    assert spot.facing is not None
+    towards = math.atan2(1.0 - spot.position[1], -2.0)
+    assert spot.facing == pytest.approx(towards), 'it faces the camera'
+    assert markers.position_of(14) is None
+    assert told(markers, wall(), [], view=view) == [], 'it is not known to hang there'
+    assert told(markers, picture, [seen], 1, view) == []
+    assert told(markers, picture, [seen], 1, view) == ['here']
+    markers.pass_by(camera(y=-1.0).pose, [seen])
+    assert markers.spots()[0].position == pytest.approx(markers.position_of(14))
+    far = SeenMarker(16, 0.15, np.array([0.0, 0.0, 9.0]), np.diag([1.0, -1.0, -1.0]))
+    markers.pass_by(view.pose, [far])
+    assert [each.number for each in markers.spots()] == [14]

@@ -29,12 +29,16 @@ BASE_MOVE, ARM_MOVE = 4.0, 3.0
 """So long the first move to another side is taken to last, of the base and of the arm, seconds."""
 DWELL = 4.5
 """The camera stands so long at each side: for two pictures of the observer, seconds."""
+CHECK_DWELL = 5.5
+"""At a check it stands for three pictures, seconds: so many must agree that a marker is gone."""
 LONGEST_DWELL = 13.5
 """And so long where no picture of that side was looked at yet, and there is time, seconds."""
 LEAST_STAY = 12.0
 """A shorter stay has no time for a side, seconds."""
 VIEW = math.pi / 2
 """A picture is taken to show so much of the horizon where nobody says how much, rad."""
+OVERLAP = 0.07
+"""So far the pictures of neighbouring sides overlap, that none cuts a marker in two, rad."""
 NEAR = 0.3
 """Who is so near to a point is there, metres."""
 DETOUR = 1.3
@@ -222,7 +226,7 @@ class RoomLook:
         if not checks or looking.sees_around() or not (has_arm or stay.drives):
             return
         spare = self._moves[True] if has_arm else 0.0
-        one = self._moves[has_arm] + DWELL
+        one = self._moves[has_arm] + CHECK_DWELL
         left = stay.end - self._elapsed() - spare
         names = {each.name for each in checks}
         if left < 2.0 * one and mission.looked.latest(place) in names:
@@ -237,13 +241,17 @@ class RoomLook:
             if point is not None and math.dist(point[:2], here[:2]) > NEAR:
                 way = self._way(here, point)
             if self._elapsed() + way + one > stay.end - spare:
-                continue
+                way = 0.0  # from here it is seen less well, and better than never
+            if self._elapsed() + one > stay.end - spare:
+                break
             if point is not None and way:
                 self._aim_ahead(looking, stay, interrupt)
                 looking.drive(point, interrupt)
                 here = looking.position() or point
             bearing = math.atan2(check.point[1] - here[1], check.point[0] - here[0])
-            seen = self._face(looking, stay, bearing, stay.end - spare, interrupt)
+            seen = self._face(
+                looking, stay, bearing, stay.end - spare, interrupt, dwell=CHECK_DWELL
+            )
             mission.looked.note(place, check.name)
             if seen:
                 stay.checks.append(check.name)
@@ -263,18 +271,19 @@ class RoomLook:
         bearing: float,
         latest: float,
         interrupt: Interrupt,
+        dwell: float = DWELL,
     ) -> bool:
         """Turn the camera to a bearing, and stand until a picture of it was looked at.
 
         Returns:
-            Whether one was, before a time, for a dwell or a little longer.
+            Whether one was: within the dwell, or a little later if there is time until `latest`.
         """
         has_arm, began = looking.has_arm(), self._elapsed()
         stay.faced = True
         looking.face(bearing, interrupt)
         faced = self._elapsed()
         self._moves[has_arm] = max(0.1, 0.5 * (self._moves[has_arm] + faced - began))
-        seconds = DWELL
+        seconds = dwell
         while True:
             if not self._mission.clock.sleep(seconds, interrupt):
                 raise CallInterruptedError
@@ -419,7 +428,9 @@ class RoomLook:
         here, ahead = looking.position(), looking.heading()
         rest = 0.0 if here is None else self._needed(here, others)
         end = stay.end - (self._moves[True] if has_arm else 0.0)
-        count = max(1, math.ceil(math.tau / (looking.camera_angle() or VIEW) - 0.05))
+        view = looking.camera_angle()
+        part = VIEW if view is None else max(0.2, view - OVERLAP)
+        count = max(1, math.ceil(math.tau / part - 1e-6))
         sides = [math.tau * index / count for index in range(count)]
         sides.sort(key=lambda each: (each - ahead - HERE) % math.tau)
         step, left = self._moves[has_arm] + DWELL, end - self._elapsed()

@@ -89,6 +89,9 @@ its part of the light in a room; what is beyond is another surface, plain as it 
 COMMON = 0.01
 """Standard deviation that no number of pictures takes away, metres: all share the size that the
 marker is said to have, and the camera's place on the robot."""
+GLANCED = 8.0
+"""From so near a marker that is read in passing tells where to look for it, metres: beyond, one of
+.2 m has 14 pixels of 640 over 60 degrees, and its place is off by half a metre."""
 ENOUGH = 20
 """So many pictures decide where a marker hangs; later ones do not let it wander."""
 SAME_SIZE = 0.1
@@ -202,7 +205,8 @@ class HungSpot:
     Attributes:
         number: Its id.
         position: Map frame, metres.
-        facing: Where it looks to, map frame, rad; None: it was never read.
+        facing: Where it looks to, map frame, rad; of one that was read in passing, from where
+            that was. None: it was never read.
         side: Of its black square, metres; 0: not known.
     """
 
@@ -326,6 +330,7 @@ class HungMarkers:
         self._in_a_row: dict[int, tuple[str, int]] = {}
         self._away: dict[int, _Away] = {}
         self._gone: set[int] = set()
+        self._glanced: dict[int, HungSpot] = {}
         self._read_at: dict[int, int] = {}
 
     def position_of(self, number: int) -> tuple[float, float, float] | None:
@@ -333,17 +338,38 @@ class HungMarkers:
         spot = self._spots.get(number)
         return None if spot is None else _plain(spot.position)
 
+    def pass_by(self, pose: Array, seen: Sequence[SeenMarker]) -> None:
+        """Take markers that were read in passing: where to look for them, and no more.
+
+        Args:
+            pose: (4, 4), roughly, from the camera's optical frame to the map, metres.
+            seen: The markers.
+        """
+        for each in seen:
+            if each.position is None or each.number in self._spots:
+                continue
+            position = pose[:3, :3] @ each.position + pose[:3, 3]
+            if float(np.linalg.norm(each.position)) > GLANCED:
+                continue
+            if each.number in self._glanced or len(self._glanced) < MOST:
+                # Far away its tilt is guesswork: it faces where it is read, more or less.
+                dx, dy, _ = pose[:3, 3] - position
+                facing = math.atan2(float(dy), float(dx))
+                spot = HungSpot(each.number, _plain(position), facing, each.side)
+                self._glanced[each.number] = spot
+
     def spots(self) -> list[HungSpot]:
-        """Return where markers hang, as far as that is known."""
-        return [
-            HungSpot(
+        """Return where markers hang, as far as that is known, also those read in passing."""
+        found = {
+            number: HungSpot(
                 number,
                 _plain(spot.position),
                 None if not spot.aspects else _facing(spot.aspects[-1].rotation),
                 spot.side,
             )
-            for number, spot in sorted(self._spots.items())
-        ]
+            for number, spot in self._spots.items()
+        }
+        return [each for _, each in sorted({**self._glanced, **found}.items())]
 
     def accept(self, number: int) -> None:
         """Take that a marker hangs rightly where it was read last, or nowhere."""

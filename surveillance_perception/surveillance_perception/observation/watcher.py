@@ -847,6 +847,10 @@ class Watcher:
             self._markers.accept(int(event.subject))
         return event
 
+    def pass_by(self, pose: Points, seen: Sequence[SeenMarker]) -> None:
+        """Take markers that were read in passing, see `HungMarkers.pass_by`."""
+        self._markers.pass_by(pose, seen)
+
     def spots(self) -> list[HungSpot]:
         """Return where markers hang, as far as that is known."""
         return self._markers.spots()
