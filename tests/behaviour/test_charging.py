@@ -26,22 +26,42 @@ def test_an_hour_of_patrol_reaches_all_places_and_charges_in_time(machine: str) 
     assert run.mission.failure is None
 
 
+AT_THE_START = ('start', 'wait_until_built')
+"""Calls that are made once, before the robot moves."""
+
+
 @pytest.mark.parametrize(('name', 'call'), [(m, c) for m, calls in CALLS.items() for c in calls])
 def test_a_battery_that_falls_during_any_call_is_charged_next(name: str, call: str) -> None:
     world = World()
     seen: list[float] = []
+    if call == 'recharge':
+        # It is called by who comes to charge alone.
+        world.clock.after(70.0, lambda: world.set_level(15.0))
 
     def fall(called: str) -> None:
-        if called == call and world.clock.time > 60.0 and not seen:
+        begun = call in AT_THE_START or world.clock.time > 60.0
+        if called == call and begun and not seen:
             seen.append(world.clock.time)
             world.set_level(12.0)
 
     world.faults = fall
     run = Run(name, world).until(300.0)
-    if not seen:
-        return  # A call of the start only.
-    after = [decision for decision in world.decisions if decision.time >= seen[0]]
-    assert any(decision.rule == 'recharge' for decision in after[:2])
+    assert seen
+    if call in AT_THE_START:
+        # It stands at its station, and leaves that when it has charged.
+        charged, moved = (
+            next(number for number, text in enumerate(world.said) if text.startswith(words))
+            for words in ('charged in E to ', 'arrived in ')
+        )
+        assert charged < moved
+    elif call == 'recharge':
+        charges = [each.time for each in world.decisions if each.rule == 'recharge']
+        assert len(charges) == 1, 'what fell while it charged is charged with the rest'
+        assert charges[0] <= seen[0]
+        assert world.level > 99.0
+    else:
+        after = [decision for decision in world.decisions if decision.time >= seen[0]]
+        assert any(decision.rule == 'recharge' for decision in after[:2])
     assert world.level > 12.0
     assert run.mission.failure is None
 

@@ -345,3 +345,23 @@ def test_what_was_noticed_counts_as_overdue() -> None:
     plan.advance(replace(world, place='R3', now=1005.0, avoided=frozenset({'R4', 'R9'})))
     assert list(itertools.compress(plan.rules.graph.places, plan._state.met)) == ['R3']
     assert plan._state.avoided == {index['R4']}
+
+
+def test_ways_into_a_round_are_tried_with_other_patience_and_with_places_left_out() -> None:
+    plan = planned(known(CHAIN, 100.0))
+    found = list(plan._candidates())
+    rounds = dict.fromkeys((plan._search.begun, plan._search.best))
+    ways = [[plan._entered(each, phase) for phase in plan._phases(each)] for each in rounds]
+    begun = [course for each in ways for course in each[:2]]
+    assert found[: len(begun)] == begun
+    turned = found[len(begun) : 2 * len(begun)]
+    assert [course.targets for course in turned] == [course.targets[::-1] for course in begun]
+    assert [course.patience for course in turned] == [course.patience for course in begun]
+    first, bound = ways[-1][0], plan._bound
+    assert found[2 * len(begun) : 2 * len(begun) + 9] == [
+        replace(first, skip=skip * bound, patience=patience)
+        for skip in (0.0, 0.3, 0.6)
+        for patience in (0.0, first.patience, math.inf)
+    ]
+    rest = found[2 * len(begun) + 9 :]
+    assert sorted(map(str, rest)) == sorted(str(course) for each in ways for course in each[2:])

@@ -6,6 +6,7 @@ import itertools
 import math
 import random
 from collections import Counter
+from dataclasses import replace
 
 import pytest
 from hypothesis import given, settings
@@ -22,7 +23,7 @@ from patrol_policy.battery import (
 from patrol_policy.bounds import default_ranks
 from patrol_policy.graph import PatrolGraph
 from patrol_policy.rollout import RuleMap
-from patrol_policy.rounds import Round, RoundChanges, RoundSearch, filled, with_charges
+from patrol_policy.rounds import Breach, Round, RoundChanges, RoundSearch, filled, with_charges
 
 from .test_plan import grid
 from .worlds import graphs
@@ -415,3 +416,74 @@ def test_the_search_begins_with_the_best_of_each_group_and_is_finished_when_none
     assert search.work == done
     # Without any start it is a round of one place.
     assert RoundSearch(rules, [], graph.tour.length).best.targets == (0,)
+
+
+def test_a_round_of_one_place_takes_no_time() -> None:
+    rules = RuleMap(one_way(1, 5), 50.0, [1] * 5, 0)
+    assert search_of(rules, (0, 1, 2, 3, 4)).judged((3,)) == Round((3,), 0.0, 0.0, (), 0.0)
+    charged = with_stations(300.0)
+    alone = search_of(charged, (7, 0, 1, 2, 3, 4, 5, 6)).judged((3,))
+    assert (alone.length, alone.wait, alone.breaches, alone.short) == (0.0, 0.0, (), 0.0)
+    # A round without any charge lacks all that it takes.
+    rounds = search_of(charged, (7, 0, 1, 2, 3, 4, 5, 6))
+    without = rounds.judged((0, 1, 2, 3, 4, 5, 6))
+    assert without.short == pytest.approx(without.length) == charged.length(without.targets)
+
+
+@settings(max_examples=30)
+@given(rule_maps(uneven=True), st.integers(0, 10**6), st.floats(0.3, 1.5))
+def test_a_round_is_judged_in_part_only_where_it_costs_more_than_the_limit(
+    rules: RuleMap, seed: int, part: float
+) -> None:
+    targets = some_round(rules, seed, 3, 0)
+    search = search_of(rules, targets)
+    whole = search.judged(targets)
+    limit = part * search.cost(whole)
+    judged = search.judged(targets, limit)
+    if search.cost(whole) <= limit:
+        assert judged == whole
+    else:
+        assert search.cost(judged) > limit - 1e-6
+        assert whole.breaches[: len(judged.breaches)] == judged.breaches
+        # One more than fits is enough to know.
+        most = max(0.0, (limit - whole.wait) / (4.0 * rules.mean_leg))
+        assert len(judged.breaches) <= math.floor(most) + 1
+
+
+def test_work_is_counted_by_steps_and_tries() -> None:
+    graph = one_way(3, 6)
+    rules = RuleMap(graph, 100.0, [1] * 6, 0)
+    search = search_of(rules, (0, 3, 1, 4, 2, 5))
+    steps = sum(len(rules.path(a, b)) for a, b in itertools.pairwise((5, 0, 3, 1, 4, 2, 5)))
+    assert search.work == pytest.approx(0.35 * steps)
+    search.judged((0, 1, 2))
+    more = sum(len(rules.path(a, b)) for a, b in itertools.pairwise((2, 0, 1, 2)))
+    assert search.work == pytest.approx(0.35 * (steps + more))
+    before = search.work
+    search.improve(1.0)
+    assert search.work >= before + 4.0
+
+
+def test_a_search_ends_where_nothing_can_be_better() -> None:
+    graph = one_way(3, 6)
+    even = RuleMap(graph, 100.0, [1] * 6, 0)
+    tour = graph.tour
+    search = search_of(even, tour.order)
+    assert search.finished, 'the shortest tour'
+    best = search.best
+    for wait, finished in ((1.0039, True), (1.0041, False)):
+        length = wait * tour.length
+        search.best = replace(best, length=length, wait=length)
+        assert search.finished == finished
+    search.best = replace(best, breaches=(Breach(0, 1),))
+    assert not search.finished
+    search.best = replace(best, short=0.1)
+    assert not search.finished
+    # Of three targets nothing can be changed, and a very long search finds no more.
+    search.best = replace(best, targets=(0, 1, 2), short=0.1)
+    assert search.finished
+    search.best = replace(best, short=0.1)
+    search.work = 10e6
+    assert not search.finished
+    search.work = 10e6 + 1.0
+    assert search.finished

@@ -18,6 +18,7 @@ from patrol_policy.graph import PatrolGraph
 from patrol_policy.hours import Openings
 from patrol_policy.rollout import (
     NEVER,
+    Choice,
     RuleMap,
     State,
     lookahead,
@@ -370,3 +371,107 @@ def test_ends_of_corridors_are_held_until_they_are_urgent() -> None:
     later = RuleMap(graph, 50.0, default_ranks(graph), 0, {0: 70.0})
     assert later.least_period == pytest.approx(77.0, abs=0.01)
     assert later.least_wait == pytest.approx(57.0, abs=0.01)
+
+
+def test_any_station_is_afforded() -> None:
+    rules = charged(stations=('E', 'R4'))
+    low = State(rules.graph.index['C1'], 0.0, [0.0] * 7, [True] * 7, level=1.0)
+    assert rules.affords(low, 7)
+    assert rules.affords(low, 8)
+    assert rules.guarded(low, 8) == 8
+
+
+@st.composite
+def patrolled_maps(draw: st.DrawFn) -> tuple[RuleMap, State]:
+    """Draw a map with rules and thresholds that differ, and where a patrol stands on it."""
+    graph = draw(graphs(most=6))
+    count = len(graph.places)
+    ranks = draw(st.lists(st.integers(1, 3), min_size=count, max_size=count))
+    own = draw(st.dictionaries(st.integers(0, count - 1), st.sampled_from([20.0, 90.0])))
+    rules = RuleMap(graph, draw(st.sampled_from([15.0, 60.0, 200.0])), ranks, 0, own)
+    seen = [-float(draw(st.integers(0, 80))) for _ in range(count)]
+    met = draw(st.lists(st.booleans(), min_size=count, max_size=count))
+    return rules, State(draw(st.integers(0, count - 1)), 0.0, seen, met)
+
+
+@settings(max_examples=30)
+@given(patrolled_maps(), st.sampled_from([oldest, lookahead]))
+def test_a_walk_ahead_comes_to_what_walking_it_comes_to(
+    drawn: tuple[RuleMap, State], choose: Choice
+) -> None:
+    rules, begin = drawn
+    before = replace(begin, seen=begin.seen.copy(), met=begin.met.copy())
+    found = roll_out(rules, choose, begin, 600.0)
+    assert begin == before, 'the state is not changed'
+    now, place, seen, met = 0.0, begin.place, begin.seen.copy(), begin.met.copy()
+    settled, first, waits, gaps = 0.0, 0.0, [0.0] * rules.count, []
+    for stop in found.walk:
+        now += rules.leg_seconds[place][stop]
+        wait = now - seen[stop]
+        waits[stop] = max(waits[stop], wait)
+        gaps.append(wait - rules.slack[stop])
+        if met[stop]:
+            settled = max(settled, gaps[-1])
+        else:
+            first = max(first, gaps[-1])
+        seen[stop], met[stop], place = now, True, stop
+    if found.back is None:
+        assert now >= 600.0
+        for each in range(rules.count):
+            waits[each] = max(waits[each], now - seen[each])
+            settled = max(settled, now - seen[each] - rules.slack[each])
+        lasting = settled
+    else:
+        # From there on it does the same again, in steps as long as before.
+        lap = found.walk[found.back :]
+        assert lap
+        state = State(place, now, seen.copy(), met)
+        for stop in lap:
+            assert rules.guarded(state, choose(rules, state)) == stop
+            rules.go(state, stop)
+            state.seen[stop] = state.now
+        assert state.place == place
+        lasting = max(gaps[found.back :])
+    assert found.settled == pytest.approx(settled)
+    assert found.first == pytest.approx(max(first, settled))
+    assert found.lasting == pytest.approx(lasting)
+    assert found.waits == pytest.approx(waits)
+    assert not found.cut
+
+
+def test_a_walk_ahead_is_cut_where_there_is_no_time_or_it_takes_too_many_moves(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    graph = chain(3)
+    rules = RuleMap(graph, 100.0, [1, 1, 1], 9)
+    begin = State(0, 0.0, [0.0] * 3, [False] * 3)
+    draw = random.Random(2)
+
+    def wander(_: RuleMap, state: State) -> int:
+        # Never the same state again.
+        state.position = draw.randrange(10**9)
+        return 1 if state.place != 1 else draw.choice((0, 2))
+
+    looks: list[int] = []
+
+    def late() -> bool:
+        looks.append(1)
+        return len(looks) > 2
+
+    found = roll_out(rules, wander, begin, 1e9, late=late)
+    assert (found.cut, len(found.walk)) == (True, 2 * 64)
+    monkeypatch.setattr('patrol_policy.rollout.MOST_MOVES', 10)
+    monkeypatch.setattr('patrol_policy.rollout.MOVES_A_PLACE', 2)
+    found = roll_out(rules, wander, begin, 1e9)
+    assert (found.cut, len(found.walk)) == (True, 16)
+    # It may be repeated from where all places come behind it.
+    assert found.back is None
+    start = found.repeated_from(rules)
+    assert start is not None
+    assert set(found.walk[start:]) == {0, 1, 2}
+    assert set(found.walk[start + 1 :]) < {0, 1, 2}
+    assert replace(found, walk=[1, 0, 1]).repeated_from(rules) is None
+    assert replace(found, walk=[1, 0, 1], back=1).repeated_from(rules) == 1
+    # Who stays stays for good.
+    still = roll_out(rules, lambda _, state: state.place, begin, 500.0)
+    assert (still.walk, still.settled, still.waits) == ([], 500.0, [500.0] * 3)

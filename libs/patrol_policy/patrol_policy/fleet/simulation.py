@@ -259,7 +259,7 @@ class FleetPatrol:
             heapq.heappush(self._due, (self.now, name))
         else:
             # A policy that names no time looks around where it is again and again.
-            until = choice.until if choice.until is not None else self.now + 1.0
+            until = choice.until or self.now
             heapq.heappush(self._due, (until if until > self.now else self.now + 1.0, name))
 
     def _drive(self, name: str) -> None:
