@@ -119,3 +119,19 @@ def test_the_simulators_person_looks_like_one_to_a_network_that_knows_photograph
         drawn.close()
         seen.append(find(np.ascontiguousarray(picture[..., ::-1])))
     assert [len(each) for each in seen] == [1, 1, 1]
+
+
+@pytest.mark.parametrize('content', [b'\xff' * 3_000_000, b'\0' * 3_000_000, b'\x0a' * 999, b''])
+def test_what_is_no_network_is_refused_at_once(tmp_path: Path, content: bytes):
+    """Not after the minutes that a number of megabytes takes to read."""
+    path = tmp_path / 'network.pb'
+    path.write_bytes(content)
+    with pytest.raises(ValueError, match=r'^person_weights .*network.pb: expected '):
+        load_finder(str(path))
+
+
+def test_a_file_that_is_far_too_large_is_not_read(tmp_path: Path):
+    with (tmp_path / 'disk.img').open('wb') as file:
+        file.truncate(10**12)
+    with pytest.raises(ValueError, match=r'disk\.img: expected a frozen graph'):
+        load_finder(str(tmp_path / 'disk.img'))

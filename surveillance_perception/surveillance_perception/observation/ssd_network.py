@@ -38,6 +38,10 @@ _BOXES, _CLASSES = 'BoxEncodingPredictor', 'ClassPredictor'
 _STRUCTURE = '013446db1bff975a724d7eb9f31f66f1bace3ac4222bcafd3ffbcd7e135e1092'
 """SHA-256 of the layers' names, operations, inputs and lengths, without their weights. OpenCV ends
 the process at a graph that it does not understand."""
+_MOST_BYTES = 100_000_000
+"""The file has 18 MB: what is larger by far is another one, and not read."""
+_LONGEST_VARINT = 10
+"""Bytes."""
 _CENTRE_UNIT, _SIZE_UNIT = 10.0, 5.0
 """What the network tells is in tenths of the anchor's side, and in fifths of the size's log."""
 
@@ -49,7 +53,11 @@ def read_network(path: Path) -> Network:
         ValueError: One line: the file cannot be read, or holds another network.
     """
     try:
-        graph, structure = _layers(path.read_bytes())
+        with path.open('rb') as file:
+            content = file.read(_MOST_BYTES + 1)
+        if len(content) > _MOST_BYTES:
+            raise IndexError
+        graph, structure = _layers(content)
     except OSError as error:
         raise ValueError(f'{path}: {error.strerror}') from None
     except (IndexError, UnicodeDecodeError):
@@ -159,6 +167,8 @@ def _fields(message: bytes) -> Iterator[tuple[int, bytes | int]]:
     while at < len(message):
         key, at = _read_varint(message, at)
         kind = key & 7
+        if key < 8:
+            raise IndexError  # no field has the number 0
         if kind == 0:
             value, at = _read_varint(message, at)
             yield key >> 3, value
@@ -177,6 +187,8 @@ def _fields(message: bytes) -> Iterator[tuple[int, bytes | int]]:
 def _read_varint(message: bytes, at: int) -> tuple[int, int]:
     value = shift = 0
     while True:
+        if shift >= 7 * _LONGEST_VARINT:
+            raise IndexError
         byte = message[at]
         at += 1
         value |= (byte & 0x7F) << shift
