@@ -712,6 +712,23 @@ def test_a_clock_that_is_set_back_keeps_nothing_from_being_told():
     assert len([each for each in watch.told if each.kind == Kind.DOOR]) > before
 
 
+@pytest.mark.parametrize('restarted', [False, True])
+def test_a_door_that_is_seen_shut_is_open_no_more_also_when_the_clock_was_set_back(restarted: bool):
+    watch = Round()
+    watch.visit('R1', HERE)
+    watch.visit('R1', HERE, shut=False)
+    assert [each.state for each in watch.book.events] == [EventState.OPEN]
+    after = watch
+    if restarted:
+        after = Round()
+        after.watcher.restore(json.loads(json.dumps(watch.watcher.state())))
+    after.time = watch.time - 3600.0
+    after.visit('R1', HERE)
+    (event,) = (each for each in after.book.events if each.kind == Kind.DOOR)
+    assert event.state == EventState.OVER
+    assert event.began <= event.last <= after.time
+
+
 def test_a_disk_that_became_one_to_read_from_costs_pictures_alone(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):

@@ -247,6 +247,19 @@ class EventBook:
         self._keep(event)
         return event
 
+    def set_back(self, stamp: float) -> None:
+        """Take that the clock was set back: what happened later than now happened now.
+
+        Else nothing that is seen from now on could end it until its time comes once more.
+
+        Args:
+            stamp: Now, seconds since 1970.
+        """
+        for event in [each for each in self._events.values() if each.last > stamp]:
+            changed = replace(event, began=min(event.began, stamp), last=stamp)
+            self._events[event.number] = changed
+            self._index(changed)
+
     def false_rate(self, since: float) -> float:
         """Return which part of the events since a time a person has called false."""
         found = [each for each in self._events.values() if each.began >= since]

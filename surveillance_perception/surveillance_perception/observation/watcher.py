@@ -82,6 +82,8 @@ AGREED_PICTURES = 3
 AGREED_SECONDS = 4.0
 """Or in two of one stay that are as far apart as so many usually are, seconds: a busy machine looks
 at few of them."""
+SET_BACK = 30.0
+"""A clock that is earlier by more was set back, seconds: work may wait for so long."""
 ONE_LOOK, SEEN_TWICE = 0.5, 0.95
 """Confidence in a changed view after one look, at most, and after two, at least: a third is not
 waited for."""
@@ -262,6 +264,7 @@ class Watcher:
         self._robot = robot
         self._place = ''
         self._look = 0
+        self._latest = math.inf
         self._grid: Grid | None = None
         self._visit: FloorVisit | None = None
         self._normal: FloorView | None = None
@@ -407,6 +410,7 @@ class Watcher:
             met: Whether something was met there, (n,).
             stamp: Seconds since 1970.
         """
+        self._heed_clock(stamp)
         if self._others is not None:
             apart = self._others.apart(ends, stamp)
             ends, met = ends[apart], met[apart]
@@ -464,10 +468,18 @@ class Watcher:
 
         A robot that stands for long, as at its dock, ends its look and begins another one.
         """
+        self._heed_clock(stamp)
         self._compare(stamp)
         # A clock that was set back is no reason to stand for ever.
         if self._place and not 0.0 <= stamp - self._stands[1] < LONGEST_STAND:
             self._begin_look(self._place, stamp)
+
+    def _heed_clock(self, stamp: float) -> None:
+        """Have no event be of the future, where the clock was set back, perhaps before a start."""
+        if stamp < self._latest - SET_BACK:
+            self.book.set_back(stamp)
+            self._latest = stamp
+        self._latest = max(self._latest, stamp)
 
     def _compare(self, stamp: float) -> None:
         """Compare what this look saw so far with what is normal."""
