@@ -818,9 +818,10 @@ def test_that_nobody_is_there_only_pictures_of_the_floor_tell(picture, sides, is
 
 
 @pytest.mark.parametrize(
-    ('found', 'sides', 'over'), [('walks', 1, True), ('stands', 1, False), ('stands', 5, True)]
+    ('found', 'sides', 'over'),
+    [('walks', 1, True), ('stands', 0, False), ('stands', 1, True), ('stands', 5, True)],
 )
-def test_whom_the_camera_saw_is_there_until_the_camera_sees_that_nobody_is(found, sides, over):
+def test_whom_the_camera_saw_is_there_until_pictures_show_nobody(found, sides, over):
     """Who walked is gone when the lidar sees nobody walk."""
     seen = [Person((10, 20, 60, 80), 0.9)]
     watch = Round(find_persons=lambda _: list(seen))
@@ -834,7 +835,8 @@ def test_whom_the_camera_saw_is_there_until_the_camera_sees_that_nobody_is(found
         stay(watch, texture()[:240, :320], 1)
         seen.clear()
     watch.time += 60.0
-    stay(watch, texture()[:240, :320], sides)
+    dark = np.full((240, 320), 3, np.uint8)
+    stay(watch, texture()[:240, :320] if sides else dark, sides or 1)
     (event,) = [each for each in watch.book.events if each.kind == Kind.PERSON]
     assert event.sensors == ('lidar' if found == 'walks' else 'camera',)
     assert event.state == (EventState.OVER if over else EventState.OPEN)
@@ -869,6 +871,22 @@ def test_a_robot_that_charges_for_hours_tells_what_comes_and_goes_before_it():
     charge(250.0)
     assert watch.book.find(box.number).state == EventState.OVER
     assert 6 <= len(watch.looks) <= 10
+
+
+def test_one_who_stood_there_is_over_when_the_lidar_passes_through_where_they_stood():
+    """In the dark, where pictures show nothing."""
+    watch = Round(find_persons=lambda _: [])
+    watch.visit('R1', HERE)
+    at = (1.5, 1.5)
+    seen = Observation(
+        Kind.PERSON, 'seen', 'R1', '', at, confidence=0.9, stamp=watch.time, sensor='camera'
+    )
+    event = watch.book.take(seen, severity=3, rule='', look=1)
+    assert event is not None
+    watch.visit('R1', HERE, boxes=[(*at, 0.1)])
+    assert watch.book.find(event.number).state == EventState.OPEN
+    watch.visit('R1', HERE)
+    assert watch.book.find(event.number).state == EventState.OVER
 
 
 CHARGES = [
