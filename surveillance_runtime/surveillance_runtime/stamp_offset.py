@@ -14,9 +14,8 @@ from collections import Counter, deque
 
 # seconds within which a stamp is believed as it is: a slow driver, or fast simulated time
 _LARGE = 2.0
-# seconds that a stamp of the same clock may be ahead: two machines are in step to less than that;
-# and under simulated time, which each node hears by itself
-_AHEAD, _AHEAD_SIMULATED = 0.1, 2.0
+# seconds that a stamp may be ahead of a clock that is in step with the source's
+_AHEAD = 0.1
 # seconds of the node's clock, and messages, from which the offset is estimated
 _WINDOW, _MOST_SAMPLES = 5.0, 50
 # of the last so many messages, how many must be odd before it is said
@@ -33,13 +32,15 @@ class StampOffset:
     Args:
         source: What the source is called in a finding, such as its topic.
         simulated: Whether the node's clock is the one of a simulation, which all share: then what
-            is behind by seconds is late, since a second may pass in a tenth of one.
+            is behind by seconds is late, since a second may pass in a tenth of one; and what is
+            ahead shows that the node's own clock is.
     """
 
     def __init__(self, source: str, simulated: bool = False) -> None:
         self._source = source
         self._late = _LATEST if simulated else _LARGE
-        self._ahead = _AHEAD_SIMULATED if simulated else _AHEAD
+        # each node hears simulated time by itself, and may hear it late
+        self._ahead = _LATEST if simulated else _AHEAD
         # what each recent message seems to have taken, and when it came
         self._delays: deque[tuple[float, float]] = deque(maxlen=_MOST_SAMPLES)
         self._last: float | None = None

@@ -128,7 +128,7 @@ def test_no_message_was_stamped_after_it_came():
 def test_in_simulated_time_a_message_that_is_seconds_behind_is_late() -> None:
     """At speed 10 a camera of a busy machine was 2.4 s behind: a quarter of a second."""
     stamps = StampOffset('images', simulated=True)
-    for index, delay in enumerate((2.4, 9.0, 0.1, 5.0, 2.4) * 4):
+    for index, delay in enumerate((2.4, 9.0, 0.1, -5.0, 5.0, 2.4) * 4):
         stamp = 100.0 + index
         assert stamps.span_of(stamp, stamp + delay) == (stamp, stamp)
     assert stamps.finding() is None
