@@ -31,6 +31,7 @@ class ChargeEstimate:
 
     _rates: dict[str, Rates] = field(default_factory=dict)
     _mark: tuple[str, float, float] | None = None
+    _curves: dict[str, ChargeCurve] = field(default_factory=dict, compare=False, repr=False)
 
     def observe(self, place: str, time: float, level: float) -> None:
         """Take the level at a time, seconds, of a robot in a place."""
@@ -46,20 +47,22 @@ class ChargeEstimate:
             band = min(BANDS - 1, int((mark[2] + level) / 2.0 * BANDS / 100.0))
             rates = self._rates.setdefault(place, {})
             rates.setdefault(band, deque(maxlen=RATES_REMEMBERED)).append(rise / seconds)
+            self._curves.pop(place, None)
 
     def curves(self) -> dict[str, ChargeCurve]:
         """Return what is known of each station, by its place."""
-        found = {}
-        for place, rates in self._rates.items():
+        # A level is heard seldom, and a decision asks often.
+        for place in self._rates.keys() - self._curves.keys():
+            rates = self._rates[place]
             medians = {band: median(values) for band, values in rates.items()}
             # Only what differs in two digits makes a new plan.
-            found[place] = ChargeCurve(
+            self._curves[place] = ChargeCurve(
                 tuple(
                     float(f'{medians[min(medians, key=lambda b: (abs(b - band), b))]:.2g}')
                     for band in range(BANDS)
                 )
             )
-        return found
+        return {place: self._curves[place] for place in self._rates}
 
     def to_json(self) -> dict[str, Any]:
         """Return what was learned, to be kept in a file."""
@@ -81,3 +84,4 @@ class ChargeEstimate:
                     raise ValueError(f'charge rates of {place}: expected positive ones by band')
                 known = self._rates.setdefault(str(place), {})
                 known[int(band)] = deque(seconds, maxlen=RATES_REMEMBERED)
+            self._curves.pop(str(place), None)

@@ -116,6 +116,9 @@ class LegTimes:
     errors: deque[float] = field(default_factory=lambda: deque(maxlen=ERRORS_REMEMBERED))
     _used: dict[Leg, float] = field(default_factory=dict)
     _fit: tuple[float, float] | None = None
+    _expected: dict[tuple[str, str, float], float] = field(
+        default_factory=dict, compare=False, repr=False
+    )
 
     def observe(
         self, start: str, goal: str, seconds: float, straight: float, metres: float | None = None
@@ -136,7 +139,7 @@ class LegTimes:
             self.errors.append(seconds / expected)
         self.metres[start, goal] = metres if metres else self.metres.get((start, goal), straight)
         self.drives.setdefault((start, goal), deque(maxlen=DRIVES_REMEMBERED)).append(seconds)
-        self._fit = None
+        self._forget()
 
     def expected(self, start: str, goal: str, straight: float) -> float:
         """Return the seconds that the leg is expected to take.
@@ -146,7 +149,15 @@ class LegTimes:
             goal: Where it ends.
             straight: Metres between the two places in a straight line.
         """
-        leg, back = (start, goal), (goal, start)
+        # Every decision asks for every leg; a drive or another speed changes them.
+        asked = start, goal, straight
+        found = self._expected.get(asked)
+        if found is None:
+            found = self._expected[asked] = self._estimated((start, goal), straight)
+        return found
+
+    def _estimated(self, leg: Leg, straight: float) -> float:
+        back = leg[::-1]
         prediction = self._predicted(leg, straight)
         if back in self.drives and leg not in self.drives:
             leg = back
@@ -154,6 +165,10 @@ class LegTimes:
         if not own:
             return prediction
         return robust_mean(own, prediction, prior=1.0)
+
+    def _forget(self) -> None:
+        self._fit = None
+        self._expected.clear()
 
     @property
     def spread(self) -> float:
@@ -206,7 +221,8 @@ class LegTimes:
     def forget_fit(self, speed: float) -> None:
         """Take another configured speed."""
         if speed != self.speed:
-            self.speed, self._fit = speed, None
+            self.speed = speed
+            self._forget()
 
     def to_json(self) -> dict[str, Any]:
         """Return what was learned, to be kept in a file."""
@@ -235,7 +251,7 @@ class LegTimes:
         if not all(0.0 < value < math.inf for value in errors):
             raise ValueError('errors: expected finite and positive numbers')
         self.errors.extend(errors)
-        self._fit = None
+        self._forget()
         return left_out
 
 

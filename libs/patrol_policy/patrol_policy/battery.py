@@ -132,10 +132,11 @@ class ChargeCurve:
     def seconds(self, start: float, end: float) -> float:
         """Return the seconds from one level to a higher one, percent; 0: nothing is to be done."""
         width, total = 100.0 / BANDS, 0.0
-        for band, rate in enumerate(self.rates):
+        first, last = max(0, int(start / width)), min(len(self.rates), math.ceil(end / width))
+        for band in range(first, last):
             low, high = max(start, band * width), min(end, (band + 1) * width)
             if high > low:
-                total += (high - low) / rate
+                total += (high - low) / self.rates[band]
         return total
 
 
