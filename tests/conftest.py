@@ -58,7 +58,8 @@ def pytest_configure(config: pytest.Config) -> None:
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Mark each test by what it needs: nothing (unit), ROS nodes (nodes), a whole mission.
 
-    Several processes begin with the files that take longest, and end at about the same time.
+    Several processes begin with the files that take longest, those that start processes or whole
+    missions, and end at about the same time.
     """
     kinds = ('mission', 'nodes', 'unit')
     dearest: dict[Path, int] = {}
@@ -72,7 +73,8 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         else:
             kind = 2
         item.add_marker(kinds[kind])
-        dearest[item.path] = min(kind, dearest.get(item.path, kind))
+        dear = 0 if fixtures & PROCESS_FIXTURES else kind
+        dearest[item.path] = min(dear, dearest.get(item.path, dear))
     if hasattr(config, 'workerinput'):
         items.sort(key=lambda item: (dearest[item.path], item.path))
 
@@ -90,6 +92,8 @@ def pytest_collection_finish() -> None:
 
 NODE_FIXTURES = {'graph', 'ros_domain'}
 """Fixtures with ROS nodes in the test's own process."""
+PROCESS_FIXTURES = {'start', 'terminal'}
+"""Fixtures that start processes, which a test then waits for."""
 MISSION_FIXTURES = {'robot', 'launch', 'started', 'mission', 'page', 'viewer'}
 """Fixtures with a whole mission, in this process or as `launch.py` starts it."""
 

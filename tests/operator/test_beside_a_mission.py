@@ -145,6 +145,19 @@ def viewer(mission: Started) -> Iterator[Viewer]:
     viewer.close()
 
 
+def leg(viewer: Viewer) -> tuple[str, str]:
+    """Return the decision and the last transition that the page shows."""
+    last = viewer.js('return mission.state.transitions.at(-1)[0]')
+    return viewer.text('#decision-line'), last
+
+
+@pytest.fixture(scope='module')
+def first_leg(viewer: Viewer) -> tuple[str, str]:
+    """Provide what a page that was just opened shows of the mission's leg."""
+    viewer.until(lambda: viewer.count('#machine path.last'))
+    return leg(viewer)
+
+
 def asked_until(viewer: Viewer, button: str, seen: str, failed: str) -> None:
     """Wait for an answer; ask again where the busy mission gave none within its deadline."""
 
@@ -161,6 +174,7 @@ def done(viewer: Viewer, words: str) -> None:
     assert viewer.text('#done').startswith('✓')
 
 
+@pytest.mark.usefixtures('first_leg')
 def test_the_map_shows_the_robot_moving(viewer: Viewer) -> None:
     assert viewer.attribute('#map image', 'href').startswith('data:image/png')
     viewer.changes(lambda: viewer.attribute('.robot', 'style'))
@@ -196,15 +210,6 @@ def test_the_machine_is_drawn_and_lit(viewer: Viewer) -> None:
     assert viewer.count('#machine .leaf') > 8
     assert viewer.count('#machine path.last') == 1
     assert '→' in viewer.text('#transitions li')
-
-
-def test_decision_and_machine_follow_the_mission_to_its_next_leg(viewer: Viewer) -> None:
-    def shown() -> tuple[str, str]:
-        last = viewer.js('return mission.state.transitions.at(-1)[0]')
-        return viewer.text('#decision-line'), last
-
-    decision, transition = shown()
-    viewer.until(lambda: decision != shown()[0] and transition != shown()[1])
 
 
 def test_the_strips_of_time_run(viewer: Viewer) -> None:
@@ -304,6 +309,16 @@ def test_axe_finds_nothing(viewer: Viewer, size: tuple[int, int], dark: bool) ->
     found = viewer.axe()
     viewer.size(*DESK)
     assert found == []
+
+
+def test_decision_and_machine_follow_the_mission_to_its_next_leg(
+    viewer: Viewer, first_leg: tuple[str, str]
+) -> None:
+    def both_changed() -> bool:
+        decision, transition = leg(viewer)
+        return decision != first_leg[0] and transition != first_leg[1]
+
+    viewer.until(both_changed)
 
 
 def complaints(viewer: Viewer, *expected: str) -> list[str]:
