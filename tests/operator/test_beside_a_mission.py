@@ -46,6 +46,7 @@ def mission(mission_domain: int) -> Iterator[Started]:
     words = ['--composed', '--web-control', '--web-address', f'127.0.0.1:{port}']
     words += ['--domain', str(mission_domain), '--record', 'off']
     words += ['-p', 'speed:=2.0', '--params', str(ROOT / 'config/fast.yaml')]
+    words += ['-p', 'camera.rate:=1.0']  # drawing its pictures is most of a mission's work
     started = Started([*LAUNCH, *words])
     started.until('decision 1')
     yield started
