@@ -23,7 +23,7 @@ PROCESS = ROOT / 'tests' / 'launcher' / 'mission_process.py'
 ELSEWHERE = ('git clone', 'python3 launch.py\n', 'benchmarks/')
 """Commands that other tests run: a clone, a mission without end, a benchmark."""
 
-AS_FAST_AS_NODES = ('--for', '600', '-p', 'speed:=0.0', '--domain')
+AS_FAST_AS_NODES = ('--for', '600', '-p', 'speed:=0.0', '-p', 'camera.rate:=1.0', '--domain')
 """Time waits for the nodes, for which ten times real time may be too fast on a busy machine; and a
 mission ends when the test has seen enough, not when a minute is over."""
 

@@ -38,7 +38,8 @@ class Leg(NamedTuple):
 @contextmanager
 def mission(record: Path) -> Iterator[Stack]:
     """Provide a robot that patrols as fast as simulated time goes."""
-    stack = Stack(PLACE, {'robot_behavior': {'record': str(record)}})
+    slow = {'camera.rate': 1.0}
+    stack = Stack(PLACE, {'robot_behavior': {'record': str(record)}, 'simulator': slow})
     stack.start()
     try:
         yield stack
