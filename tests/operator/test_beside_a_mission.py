@@ -46,7 +46,8 @@ def mission(mission_domain: int) -> Iterator[Started]:
     words = ['--composed', '--web-control', '--web-address', f'127.0.0.1:{port}']
     words += ['--domain', str(mission_domain), '--record', 'off']
     words += ['-p', 'speed:=2.0', '--params', str(ROOT / 'config/fast.yaml')]
-    words += ['-p', 'camera.rate:=1.0']  # drawing its pictures is most of a mission's work
+    # Drawing pictures is most of a mission's work, and what is larger than a datagram gets lost.
+    words += ['-p', 'camera.width:=160', '-p', 'camera.height:=120', '-p', 'camera.rate:=5.0']
     started = Started([*LAUNCH, *words])
     started.until('decision 1')
     yield started
