@@ -238,9 +238,9 @@ class Looking(Protocol):
     def camera_angle(self) -> float | None:
         """Return how much of the horizon a picture shows, rad; None: nobody has said."""
 
-    def saw(self, bearing: float) -> bool:
-        """Tell whether a picture to a bearing, map frame, rad, was looked at that was taken since
-        the camera was turned last. Where no pictures are looked at, the lidar has seen it.
+    def saw(self, bearing: float) -> int:
+        """Return how many pictures to a bearing, map frame, rad, were looked at that were taken
+        since the camera was turned last. Where no pictures are looked at, the lidar has seen it.
         """
 
     def position(self) -> Point | None:

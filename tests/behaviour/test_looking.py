@@ -39,6 +39,7 @@ class ScriptedLooking:
         self.asked: dict[str, list[Check]] = {}
         self.angle: float | None = None
         self.blind: set[int] = set()
+        self.faced_at, self.picture_period = 0.0, 1.8
 
     def viewpoints(self, place: str) -> Sequence[Point]:
         return self.points.get(place, [])
@@ -52,8 +53,11 @@ class ScriptedLooking:
     def camera_angle(self) -> float | None:
         return self.angle
 
-    def saw(self, bearing: float) -> bool:
-        return round(math.degrees(bearing)) % 360 not in self.blind
+    def saw(self, bearing: float) -> int:
+        if round(math.degrees(bearing)) % 360 in self.blind:
+            return 0
+        since = self.world.clock.time - self.faced_at
+        return int(since / self.picture_period)
 
     def position(self) -> Point | None:
         return self.world.at
@@ -74,6 +78,7 @@ class ScriptedLooking:
         self.camera = round(math.degrees(bearing)) % 360
         if not self.world.clock.sleep(2.0, interrupt):
             raise CallInterruptedError
+        self.faced_at = self.world.clock.time
         if not self.arm:
             self.front = bearing
         self.sides.append((self.world.place, self.camera))
@@ -459,3 +464,22 @@ def test_where_there_is_time_for_one_thing_it_is_a_check_in_every_other_stay():
     assert len(aside) > 6
     looked = run.mission.looked.to_json()['C1']
     assert {'marker 21', 'marker 22', '90', '180'} <= set(looked)
+
+
+@pytest.mark.parametrize(('period', 'stands'), [(1.8, 5.5), (3.0, 9.0), (100.0, 13.5)])
+def test_at_a_check_the_robot_stands_until_enough_pictures_were_looked_at(period, stands):
+    run = Watched('surveillance', exploration_seconds=60.0)
+    run.looking.arm, run.looking.picture_period = True, period
+    run.looking.asked = {'C1': [Check('marker 21', (20.0, 8.0, 0.0))]}
+    faced: list[float] = []
+    turned = run.looking.face
+
+    def face(bearing: float, interrupt: Interrupt) -> None:
+        turned(bearing, interrupt)
+        if run.world.place == 'C1':
+            faced.append(run.world.clock.time)
+
+    run.looking.face = face  # type: ignore[method-assign]
+    run.until(200.0)
+    first, following = faced[0], faced[1]
+    assert following - 2.0 - first == pytest.approx(stands, abs=0.51)

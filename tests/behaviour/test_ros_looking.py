@@ -161,7 +161,7 @@ def test_a_side_is_seen_once_a_picture_of_it_was_looked_at(graph: Any) -> None:
     graph.until(lambda: looking.camera_angle() == pytest.approx(math.radians(60)))
     assert not looking.saw(math.pi / 2), 'one is old, the other is of another side'
     looked((now(), 85))
-    graph.until(lambda: looking.saw(math.pi / 2))
+    graph.until(lambda: looking.saw(math.pi / 2) == 1)
     looking.face(math.pi, Interrupt())
     assert not looking.saw(math.pi)
     looked((now(), None))

@@ -91,7 +91,7 @@ class Patrol:
         self.detector = MarkerDetector(DetectorSettings(dictionary=plan.marker_dictionary))
         self.now, self.stay, self.visits, self.pictures = 0.0, stay, 0, 0
         self.at, self.bearing, self.ahead = (0.0, 0.0), 0.0, 0.0
-        self.next_picture, self.seen_since = math.inf, False
+        self.next_picture, self.seen_since = math.inf, 0
         settings = SimpleNamespace(choice=SimpleNamespace(recharge_rooms=('E',), speed=SPEED))
         self.mission: Any = SimpleNamespace(
             clock=self,
@@ -165,7 +165,7 @@ class Patrol:
     def camera_angle(self) -> float:
         return math.radians(60.0)
 
-    def saw(self, _bearing: float) -> bool:
+    def saw(self, _bearing: float) -> int:
         return self.seen_since
 
     def sees_around(self) -> bool:
@@ -189,7 +189,7 @@ class Patrol:
 
     def face(self, bearing: float, _interrupt: Interrupt) -> None:
         self.now += TURN
-        self.bearing, self.seen_since = bearing, False
+        self.bearing, self.seen_since = bearing, 0
         self.next_picture = self.now + FIRST_PICTURE
 
     def rest_arm(self) -> None: ...
@@ -221,7 +221,7 @@ class Patrol:
         view = CameraView(told, self.camera.matrix, *DOUBT)
         viewpoint = (*self.at, self.bearing)
         self.watcher.picture(picture, viewpoint, self.now, self._read(picture), view)
-        self.seen_since = True
+        self.seen_since += 1
 
 
 @pytest.mark.parametrize(

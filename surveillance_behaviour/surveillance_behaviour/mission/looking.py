@@ -29,10 +29,11 @@ BASE_MOVE, ARM_MOVE = 4.0, 3.0
 """So long the first move to another side is taken to last, of the base and of the arm, seconds."""
 DWELL = 4.5
 """The camera stands so long at each side: for two pictures of the observer, seconds."""
-CHECK_DWELL = 5.5
-"""At a check it stands for three pictures, seconds: so many must agree that a marker is gone."""
+CHECK_DWELL, CHECK_PICTURES = 5.5, 3
+"""At a check it stands so long, seconds, and for so many pictures, which must agree where a marker
+hangs, and that it is gone."""
 LONGEST_DWELL = 13.5
-"""And so long where no picture of that side was looked at yet, and there is time, seconds."""
+"""And so long where too few pictures of that side were looked at, and there is time, seconds."""
 LEAST_STAY = 12.0
 """A shorter stay has no time for a side, seconds."""
 VIEW = math.pi / 2
@@ -250,7 +251,7 @@ class RoomLook:
                 here = looking.position() or point
             bearing = math.atan2(check.point[1] - here[1], check.point[0] - here[0])
             seen = self._face(
-                looking, stay, bearing, stay.end - spare, interrupt, dwell=CHECK_DWELL
+                looking, stay, bearing, stay.end - spare, interrupt, CHECK_DWELL, CHECK_PICTURES
             )
             mission.looked.note(place, check.name)
             if seen:
@@ -272,8 +273,9 @@ class RoomLook:
         latest: float,
         interrupt: Interrupt,
         dwell: float = DWELL,
+        pictures: int = 1,
     ) -> bool:
-        """Turn the camera to a bearing, and stand until a picture of it was looked at.
+        """Turn the camera to a bearing, and stand until pictures of it were looked at.
 
         Returns:
             Whether one was: within the dwell, or a little later if there is time until `latest`.
@@ -288,8 +290,8 @@ class RoomLook:
             if not self._mission.clock.sleep(seconds, interrupt):
                 raise CallInterruptedError
             seen, now = looking.saw(bearing), self._elapsed()
-            if seen or now + POLL > min(latest, faced + LONGEST_DWELL):
-                return seen
+            if seen >= pictures or now + POLL > min(latest, faced + LONGEST_DWELL):
+                return seen > 0
             seconds = POLL
 
     def verify(self, interrupt: Interrupt) -> None:

@@ -52,6 +52,8 @@ AT_POSE = 0.05
 """A bearing that differs by less from a pose's is that of the pose, rad."""
 FAR = 20.0
 """The arm is pointed at something so far away, metres."""
+MANY = 100
+"""Pictures that stand for those of a robot that has no camera."""
 SAME_SIDE = 0.35
 """A picture whose middle is so near to a bearing shows it, rad."""
 
@@ -102,11 +104,11 @@ class RosLooking:
         """Return how much of the horizon a picture shows, rad; None: nobody has said."""
         return self._camera_angle
 
-    def saw(self, bearing: float) -> bool:
-        """Tell whether a picture to a bearing was looked at, taken since the camera was turned."""
+    def saw(self, bearing: float) -> int:
+        """Return how many pictures to a bearing were looked at, taken since the camera turned."""
         if self._pictures is None:
-            return True
-        return any(
+            return MANY
+        return sum(
             taken >= self._faced_at
             and (where is None or abs(math.remainder(where - bearing, math.tau)) <= SAME_SIDE)
             for taken, where in self._pictures
