@@ -404,7 +404,7 @@ def test_a_stay_too_short_for_a_viewpoint_is_told_once():
     run.looking.points = {'C1': [(60.0, 8.0, 0.0)]}
     run.until(900.0)
     (line,) = [each for each in run.world.said if 'viewpoints' in each]
-    assert 'C1: 1 of its viewpoints are never looked from: a stay of 12 s is too short' in line
+    assert 'C1: nobody looks from 1 of 1 viewpoints: a stay of 12 s is too short' in line
     assert not run.looking.driven
 
 

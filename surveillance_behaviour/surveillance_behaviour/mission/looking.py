@@ -209,9 +209,9 @@ class RoomLook:
         if too_long := [each for each in needed if each > whole]:
             self._short.add(mission.place)
             mission.say(
-                f'{mission.place}: {len(too_long)} of its viewpoints are never looked from: a stay '
-                f'of {whole:.0f} s is too short to drive there, {max(too_long):.0f} s would do '
-                '(exploration_seconds)'
+                f'{mission.place}: nobody looks from {len(too_long)} of {len(needed)} viewpoints: '
+                f'a stay of {whole:.0f} s is too short to drive there, {max(too_long):.0f} s '
+                'would do (exploration_seconds)'
             )
 
     def _look_at_checks(self, looking: Looking, stay: _Stay, interrupt: Interrupt) -> None:
