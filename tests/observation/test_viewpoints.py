@@ -4,12 +4,17 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from surveillance_controllers.motion.place_locator import PlaceRegions
+from surveillance_perception.observation.hung_markers import HungSpot
+from surveillance_perception.observation.marker_checks import MarkerChecks
 from surveillance_perception.observation.viewpoints import ENOUGH, Viewpoints
+from surveillance_perception.observation.watch_rules import rule_from
 from surveillance_runtime.place.description import read_place_file
 from surveillance_runtime.place.occupancy_grid import Grid
 from surveillance_runtime.place.plan_grid import draw
@@ -90,3 +95,19 @@ def test_a_marker_is_looked_at_from_ahead_and_near_enough_to_be_read():
     assert near is not None
     assert math.dist(near, panel) <= 1.1
     assert chosen.of_panel(grid.free, first, panel, None) is not None
+
+
+def test_a_marker_is_looked_at_from_the_same_point_while_it_can_be_read_from_there():
+    grid = corner()
+    rooms: Any = SimpleNamespace(cells_of=lambda _: grid.free, place_at=lambda _: 'R1')
+    checks = MarkerChecks([rule_from({'marker': 'all'})], rooms, {'R1': (1.5, 7.0)})
+    checks.use(Viewpoints(grid, 0.22))
+    at = 6.0, 0.3, 1.0
+    # Read in passing from the left it seems to face there, which is wrong by a radian.
+    (first,) = checks.of([HungSpot(21, at, math.pi / 2 + 1.0, 0.2)])
+    assert first.look_from is not None
+    (again,) = checks.of([HungSpot(21, (6.05, 0.28, 1.0), math.pi / 2 + 0.2, 0.2)])
+    assert again == first, 'how it looks from there is known'
+    (other,) = checks.of([HungSpot(21, at, math.pi / 2 - 1.0, 0.2)])
+    assert other.look_from != first.look_from, 'it cannot be read from there'
+    assert checks.of([]) == []

@@ -18,9 +18,9 @@ from surveillance_perception.observation.viewpoints import Spot, Viewpoints
 from surveillance_perception.observation.watch_rules import WatchRule
 from surveillance_perception.observation.watcher import Rooms
 
-SAME_SPOT = (0.3, 0.6)
-"""A spot that is so near to where it was, metres, and faces so nearly as it did, rad, is looked at
-from the same point."""
+SAME_SPOT = 0.3
+"""A spot that is so near to where it was, metres, is looked at from the same point, as long as it
+can be read from there."""
 IN_FRONT = 0.3
 """A marker hangs in the place that is so far before it, metres."""
 MARKER_SIDE = 0.2
@@ -76,12 +76,26 @@ class MarkerChecks:
         found = {}
         for spot in spots:
             known = self._checks.get(spot.number)
-            if known is not None and _is_same(known[0], spot):
+            if known is not None and known[0] == spot:
                 found[spot.number] = known
-            elif (check := self._check_of(spot)) is not None:
+                continue
+            check = self._check_of(spot)
+            if known is not None and check is not None and self._is_good(known[1], check, spot):
+                check = known[1]
+            if check is not None:
                 found[spot.number] = spot, check
         self._checks = found
         return [check for _, check in found.values()]
+
+    def _is_good(self, known: MarkerCheck, now: MarkerCheck, spot: HungSpot) -> bool:
+        """Tell whether a check that was told before serves for a spot as it is known now."""
+        at = spot.position[0], spot.position[1]
+        if known.place != now.place or math.dist(known.at, at) >= SAME_SPOT:
+            return False
+        if known.look_from is None or self._viewpoints is None:
+            return now.look_from is None
+        scale = (spot.side or MARKER_SIDE) / MARKER_SIDE
+        return self._viewpoints.reads_panel(known.look_from, at, spot.facing, scale)
 
     def _check_of(self, spot: HungSpot) -> MarkerCheck | None:
         x, y, _ = spot.position
@@ -100,12 +114,3 @@ class MarkerChecks:
         best = self._viewpoints.of_panel(floor, first, (x, y), spot.facing, scale)
         look_from = None if best == first else best
         return MarkerCheck(f'marker {spot.number}', place, (x, y), look_from)
-
-
-def _is_same(one: HungSpot, other: HungSpot) -> bool:
-    """Tell whether two spots of one marker are looked at from the same point."""
-    if math.dist(one.position[:2], other.position[:2]) >= SAME_SPOT[0]:
-        return False
-    if one.facing is None or other.facing is None:
-        return one.facing is other.facing
-    return abs(math.remainder(one.facing - other.facing, math.tau)) < SAME_SPOT[1]

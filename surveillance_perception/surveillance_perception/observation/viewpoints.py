@@ -102,13 +102,7 @@ class Viewpoints:
         """
 
         def reads(spot: Spot) -> bool:
-            near, far = READ_FROM * min(1.0, scale), READ_UP_TO * scale
-            turn = 0.0 if facing is None else _bearing(panel, spot) - facing
-            return (
-                near <= math.dist(spot, panel) <= far
-                and abs(math.remainder(turn, math.tau)) <= READ_WITHIN
-                and self._shows(spot, panel, far)
-            )
+            return self.reads_panel(spot, panel, facing, scale)
 
         if reads(first):
             return first
@@ -120,6 +114,18 @@ class Viewpoints:
             return abs(math.dist(spot, panel) - BEST_READ * scale) + abs(turn)
 
         return min(filter(reads, self._candidates(floor)), key=cost, default=None)
+
+    def reads_panel(
+        self, spot: Spot, panel: Spot, facing: float | None, scale: float = 1.0
+    ) -> bool:
+        """Tell whether a panel can be read from a point, and called gone; see `of_panel`."""
+        near, far = READ_FROM * min(1.0, scale), READ_UP_TO * scale
+        turn = 0.0 if facing is None else _bearing(panel, spot) - facing
+        return (
+            near <= math.dist(spot, panel) <= far
+            and abs(math.remainder(turn, math.tau)) <= READ_WITHIN
+            and self._shows(spot, panel, far)
+        )
 
     def aside(self, floor: Mask, thing: Spot, seen_from: Spot) -> Spot | None:
         """Return from where to look again at a thing; None where there is no other such place.
