@@ -730,20 +730,27 @@ def try_at_import(mutant: Mutant, root: Path, reach: Reach, trials: Trials) -> N
     _, changed = mutant.sources()
 
     def attempt() -> bool:
-        plain = SourceFileLoader.get_code
+        plain, placed = SourceFileLoader.get_code, []
 
         def get_code(loader: SourceFileLoader, fullname: str) -> CodeType | None:
             if Path(loader.path).resolve() == mutant.path:
+                placed.append(fullname)
                 return compile(changed, loader.path, 'exec', dont_inherit=True)
             return plain(loader, fullname)
 
         SourceFileLoader.get_code = get_code  # type: ignore[assignment,method-assign]
+        # The launcher, whose table of libraries is read here, has imported some of them.
+        package = mutant.path.relative_to(root).parts[0]
+        for name in [each for each in sys.modules if each.split('.')[0] == package]:
+            del sys.modules[name]
         os.chdir(root)
         limit(ENOUGH)
         files = sorted({test.split('::')[0] for test in ordered})
         with tempfile.TemporaryDirectory() as scratch:
             words = [*options(root, scratch), '-x', *files]
             done = pytest.main(words, plugins=[Chosen(ordered, reach)])
+        if not placed:
+            raise LookupError(mutant)
         return done == 0
 
     trials.start(mutant, attempt)

@@ -11,7 +11,7 @@ import state_machines as fsm
 from state_machines import exceptions
 from state_machines.testing import FakeClock, watching
 
-from .states import Answer, Background, Waiter, began
+from .states import Answer, Background, Deaf, Waiter, began
 
 
 @pytest.fixture
@@ -274,3 +274,54 @@ def test_a_step_and_a_force_say_why_they_cannot_be():
         fsm.InvalidStateError, match=re.escape("has no interrupt 'X': its interrupts are ['ALARM']")
     ):
         root.raise_interrupt('X')
+
+
+def test_who_did_not_acknowledge_a_preempt_is_told(lines):
+    def both_of(**children):
+        both = fsm.Concurrence(['done', 'preempted'], 'done')
+        both.set_name('BOTH')
+        for label, state in children.items():
+            both.add_state(label, state)
+        return both
+
+    waiter, deaf = Waiter(60.0), Deaf()
+    both = both_of(HEEDS=waiter, IGNORES=deaf)
+    both.userdata.key = 1
+    run = Background(both)
+    began(waiter)
+    began(deaf)
+    both.request_preempt()
+    deaf.release.set()
+    assert run.result() == 'preempted'
+    told = [line for line in lines if 'acknowledge' in line]
+    assert told == ["warn 'BOTH': ['IGNORES'] did not acknowledge the preempt"]
+    lines.clear()
+    assert both_of(A=Answer('done')).execute() == 'done'
+    assert not [line for line in lines if 'acknowledge' in line]
+
+
+@pytest.mark.parametrize(
+    ('loop', 'breaking', 'told'),
+    [(['done'], ['again'], True), (['done'], [], False), ([], ['again'], False)],
+)
+def test_an_iterator_says_which_of_its_outcomes_count(lines, loop, breaking, told):
+    each = fsm.Iterator(['all', 'again'], [], [], it=[1], it_label='k', exhausted_outcome='all')
+    each.set_name('EACH')
+    each.set_state('DO', Answer('done', 'again'), loop, breaking)
+    expected = "warn Iterator 'EACH' has loop and break outcomes: the latter count"
+    assert lines == [expected] * told
+
+
+def test_a_machine_inside_is_tried_again(lines):
+    """It begins anew, and what comes after it is reached."""
+    first = Answer('aborted', 'done')
+    inner = fsm.StateMachine(['done', 'aborted'])
+    inner.add_state('FIRST', first)
+    last = Answer('done')
+    root = fsm.StateMachine(['done', 'aborted'])
+    root.set_name('ROOT')
+    root.add_state('INNER', inner, {'done': 'LAST'}, retry=1)
+    root.add_state('LAST', last)
+    assert root.execute() == 'done'
+    assert (first.runs, last.runs) == (2, 1)
+    assert "warn State 'ROOT/INNER' ended with 'aborted': attempt 2 of 2" in lines
