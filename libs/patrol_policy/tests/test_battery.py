@@ -271,6 +271,8 @@ DEAD_ENDS = {'A': {'B': 8.0, 'C': 9.0}, 'B': {'A': 8.0}, 'C': {'A': 9.0}}
         (TRIANGLE, [1, 1, 1], 200.0, 0.5),
         (TRIANGLE, [1, 1, 1], 90.0, 0.5),
         (TRIANGLE, [1, 1, 1], 140.0, 1.0),
+        # The way home needs more than the fixed 20 %, and so one charge for each place.
+        (TRIANGLE, [1, 1, 1], 40.0, 0.5),
         # C is entered only when it is URGENT.
         (DEAD_ENDS, [1, 1, 2], 300.0, 1.05),
     ],

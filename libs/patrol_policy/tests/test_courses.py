@@ -290,6 +290,19 @@ def test_a_plan_is_for_one_map_and_keeps_while_times_differ_little() -> None:
         assert plan.fits(replace(world, openings=openings), None) == fits
 
 
+def test_a_plan_keeps_while_the_battery_differs_little() -> None:
+    world = known(CHAIN, level=80.0)
+
+    def energy(rate: float) -> Energy:
+        station = Station('P0', ChargeCurve.even(2.0))
+        return Energy(CHAIN, [station], Draw(rate), 0.0, BatteryLimits(0.0, 90.0, 5.0))
+
+    plan = planned(world, energy=energy(0.3))
+    for rate, fits in ((0.3, True), (0.315, True), (0.285, True), (0.4, False), (0.2, False)):
+        assert plan.fits(world, energy(rate)) == fits, rate
+    assert not plan.fits(world, None)
+
+
 def test_a_plan_that_is_remembered_serves_until_it_does_not_fit() -> None:
     world = known(seven_rooms(), 60.0, memory=PolicyMemory())
     first = plan_of(world)
