@@ -7,7 +7,7 @@ import threading
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from datetime import datetime
-from typing import Any
+from typing import Any, cast
 
 import pytest
 from hypothesis import given, settings
@@ -479,3 +479,38 @@ def test_all_are_held_or_none_where_one_is_in_use(monkeypatch: pytest.MonkeyPatc
             assert held == []
         assert is_free(found['a'])
     assert all(map(is_free, found.values()))
+
+
+def test_one_that_is_in_use_for_a_moment_is_waited_for() -> None:
+    registry, found = registered('a')
+    ref = found['a']
+    plain, held = ref.lock, threading.Event()
+    waited_for = threading.Event()
+
+    class Lock:
+        """Whoever holds it gives it back as soon as somebody waits for it."""
+
+        def acquire(self, timeout: float) -> bool:
+            if timeout > 0.0:
+                waited_for.set()
+                user.join()
+            return plain.acquire(timeout=timeout)
+
+        def release(self) -> None:
+            plain.release()
+
+    def use() -> None:
+        with plain:
+            held.set()
+            waited_for.wait(60.0)
+
+    user = threading.Thread(target=use)
+    user.start()
+    held.wait(60.0)
+    ref.lock = cast(Any, Lock())
+    try:
+        with registry.held_briefly() as all_of_them:
+            assert [each.name for each in all_of_them] == ['a']
+    finally:
+        waited_for.set()
+        user.join()

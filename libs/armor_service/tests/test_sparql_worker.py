@@ -91,12 +91,27 @@ def test_terms_are_written_as_in_answers() -> None:
         + fact('a', 'p', '"text"')
         + fact('a', 'p', '"Haus"@de')
         + fact('a', 'p', typed('007'))
+        + fact('a', 'p', typed('x', 'urn:after-xsd'))
+        + fact('a', 'p', typed('x', 'http://x.org/#after-xsd'))
         + fact('a', 'p', '_:n')
     )
     found = [row[0] for row in values('SELECT ?o { x:a x:p ?o }', (graph, ''))]
     (blank,) = (text for text in found if text.startswith('_:'))
     assert len(blank) > 2
-    assert sorted(set(found) - {blank}) == ['007^^' + LONG, 'Haus@de', f'{X}b', 'text']
+    assert sorted(set(found) - {blank}) == [
+        '007^^' + LONG,
+        'Haus@de',
+        f'{X}b',
+        'text',
+        'x^^http://x.org/#after-xsd',
+        'x^^urn:after-xsd',
+    ]
+
+
+def test_names_that_are_no_iris_are_read_as_from_documents() -> None:
+    graph = f'<no-iri> <{X}p> <{X}b> .\n'
+    assert values('SELECT ?s { ?s x:p x:b }', (graph, '')) == [['no-iri']]
+    assert values('SELECT ?s { ?s x:p x:b }', (graph, ''), ('', graph)) == []
 
 
 def test_a_row_has_what_it_binds() -> None:
