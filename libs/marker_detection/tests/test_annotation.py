@@ -60,6 +60,8 @@ def test_a_marker_at_the_upper_or_left_edge_has_its_id_where_it_can_be_read():
     image = np.zeros((300, 400), np.uint8)
     low = drawn_in(annotated(image, [square(7, -20, 10)]), (20, 20, 20))
     assert low[0] == 0
+    # It is drawn whole: as of a marker whose left side is the image's.
+    assert low == drawn_in(annotated(image, [square(7, 0, 10)]), (20, 20, 20))
     assert low[1] >= 70
     above = drawn_in(annotated(image, [square(7, 30, 18)]), (20, 20, 20))
     assert above[3] < 18

@@ -97,6 +97,17 @@ def test_cells_of_blurred_print_are_not_taken_for_another_code():
     assert np.isfinite(seen.error).all()
 
 
+def test_doubtful_cells_are_told_as_such_and_not_held_against_other_print():
+    # a cell of the other colour, and so much noise that nobody would take it for a marker anyway
+    generator = np.random.default_rng(1)
+    cells = np.array([levels(entry) for entry in range(100)])
+    cells[:, 3, 3] = 250.0 - cells[:, 3, 3]
+    cells = np.clip(cells + generator.normal(0.0, 50.0, cells.shape), 0.0, 255.0)
+    error = DIFFERENCES.read(cells.astype(np.float32)).error
+    assert (error > 1e-3).sum() > 20
+    assert np.isfinite(error).all()
+
+
 def test_cells_of_the_other_colour_are_counted():
     entries = np.array([40])
     cells = levels(40)[None]

@@ -247,6 +247,20 @@ def test_marker_two_pixels_from_the_edge_is_read_whatever_its_id():
         assert [each.marker_id for each in DETECTOR.detect(image)] == [marker_id]
 
 
+@pytest.mark.parametrize('degrees', [14, 18])
+@pytest.mark.parametrize('above', [0.05, 0.2, 0.4])
+def test_corner_in_the_last_row_of_pixels_is_found_where_it_is(above, degrees):
+    drop = 0.0
+    for _ in range(4):
+        panel = Panel(14, 1.0, roll=math.radians(degrees), offset=(0.0, drop))
+        truth = corners_in_image(panel, CAMERA)
+        drop += 479.0 - above - truth[:, 1].max()
+    lowest = truth[:, 1].argmax()
+    assert 478.5 < truth[lowest, 1] < 479.1
+    seen_at = found(DETECTOR.detect(seen([panel])))[14].corners[lowest]
+    assert seen_at[1] == pytest.approx(truth[lowest, 1], abs=0.25)
+
+
 def lit(degradation, **changes):
     return seen([Panel(14, 2.0, 0.3, roll=0.1, **changes)], degradation)
 
