@@ -209,3 +209,70 @@ def test_a_slip_in_a_cluttered_room_is_mended_nearby_and_the_robot_is_not_turned
         assert abs(angle_between(localiser.pose[2], true[2])) < 0.4
     assert error(localiser, true)[0] < 0.1
     assert localiser.jumps == 0
+
+
+@pytest.mark.parametrize('corner', [(-3.0, -1.0), (200.0, -300.0)], ids=['near', 'far'])
+def test_it_is_all_the_same_where_the_map_has_its_origin(
+    flat: Any, corner: tuple[float, float]
+) -> None:
+    grid = Grid(flat.grid.cells, flat.grid.resolution, corner)
+    pose, off = (1.2, 1.3, 0.7), (0.08, -0.06, 0.09)
+    scan = flat.scan(pose)
+    true = (pose[0] + corner[0], pose[1] + corner[1], pose[2])
+    localiser = Localiser(grid, composed(true, off))
+    localiser.see(scan, now=0.0)
+    gap, turn = error(localiser, true)
+    assert gap < 0.03
+    assert turn < 0.02
+    assert localiser.certain
+
+
+def box() -> Grid:
+    """Return a room of 4 x 2 m between walls of one cell, its south-west corner at (10, -20)."""
+    cells = np.zeros((42, 82), np.int8)
+    cells[[0, -1], :] = cells[:, [0, -1]] = 100
+    return Grid(cells, 0.05, (9.95, -20.05))
+
+
+def test_a_ray_ends_at_the_wall_or_at_the_lidar_s_reach() -> None:
+    localiser = Localiser(box(), (11.0, -19.0, 0.0))
+    angles = np.array([0.0, math.pi / 2, math.pi, -math.pi / 2, math.pi / 4])
+    ahead = localiser.cast((11.0, -19.0, 0.0), angles, 8.0)
+    assert ahead == pytest.approx([3.0, 1.0, 1.0, 1.0, math.sqrt(2.0)], abs=0.026)
+    turned = localiser.cast((11.0, -19.0, math.pi / 2), angles, 8.0)
+    assert turned == pytest.approx([1.0, 1.0, 1.0, 3.0, math.sqrt(2.0)], abs=0.026)
+    assert localiser.cast((11.0, -19.0, 0.0), angles[:2], 1.5) == pytest.approx(
+        [1.5, 1.0], abs=0.026
+    )
+
+
+def test_the_part_of_the_rays_that_a_pose_explains_is_counted() -> None:
+    localiser = Localiser(box(), (11.0, -19.0, 0.0))
+    angles = np.array([0.0, math.pi / 2, math.pi, -math.pi / 2])
+    pose = (11.0, -19.0, 0.0)
+
+    def explained(*ranges: float) -> float:
+        return localiser.explained(pose, Scan(angles, np.array(ranges), 8.0))
+
+    assert explained(3.0, 1.0, 1.0, 1.0) == 1.0
+    assert explained(2.0, 1.0, 1.0, 1.0) == 0.75
+    assert explained(np.inf, 1.0, np.nan, np.nan) == 0.5, 'what tells nothing does not count'
+    assert explained(*[np.nan] * 4) == 0.0
+    slack = localiser.parameters.hit + 0.025
+    assert explained(3.0 + slack + 0.03, 1.0 - slack - 0.03, 1.0, 1.0) == 0.5
+    assert explained(3.0 + slack - 0.03, 1.0 - slack + 0.03, 1.0, 1.0) == 1.0
+
+
+def test_a_mounted_lidar_explains_from_where_it_sits() -> None:
+    localiser = Localiser(box(), (11.0, -19.0, 0.0))
+    scan = Scan(np.array([0.0, math.pi]), np.array([0.5, 1.5]), 8.0, (0.0, 0.5, math.pi / 2))
+    assert localiser.explained((11.0, -19.0, 0.0), scan) == 1.0
+    assert localiser.explained((11.0, -19.5, 0.0), scan) == 0.0
+
+
+def test_a_scan_of_few_points_moves_nothing() -> None:
+    localiser = Localiser(box(), (11.0, -19.0, 0.0))
+    angles = np.linspace(-1.0, 1.0, 7)
+    localiser.see(Scan(angles, np.full(7, 0.9), 8.0), now=0.0)
+    assert localiser.pose == (11.0, -19.0, 0.0)
+    assert localiser.search(Scan(angles, np.full(7, 0.9), 8.0)) == []

@@ -45,6 +45,30 @@ def test_a_navigator_says_what_it_waits_for(flat: Any) -> None:
     assert navigator.pose == pytest.approx((2, 1.5, 0), abs=0.05)
 
 
+def test_a_navigator_that_has_seen_nothing_knows_of_nothing() -> None:
+    navigator = Navigator()
+    assert navigator.awaits == ('map', 'odom', 'scan')
+    assert navigator.obstacles.shape == (0, 2)
+    assert navigator.obstacles_stay.shape == (0,)
+    assert navigator.jumps == 0
+    assert (navigator.pose, navigator.odometry, navigator.place) == (None, None, None)
+    assert not navigator.lost
+    assert not navigator.ambiguous
+    assert not navigator.stands
+
+
+def test_all_that_has_not_come_is_named(flat: Any) -> None:
+    navigator = Navigator()
+    navigator.move((2, 1.5, 0))
+    assert navigator.awaits == ('map', 'scan')
+    navigator.set_map(flat.grid)
+    assert navigator.awaits == ('scan',)
+    assert navigator.odometry == (2, 1.5, 0)
+    navigator.see(flat.scan((2, 1.5, 0)), 0.1)
+    assert navigator.awaits == ()
+    assert navigator.obstacles.shape == (0, 2)
+
+
 def test_a_drive_through_the_door_changes_the_place_once(flat: Any, navigator: Navigator) -> None:
     true = (2.0, 1.5, 0.0)
     navigator.move(true)

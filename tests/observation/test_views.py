@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import skimage
 
-from surveillance_perception.observation.views import Sight, sight_of, view_changes
+from surveillance_perception.observation.views import Sight, light_of, sight_of, view_changes
 
 PHOTOS = sorted((Path(__file__).resolve().parents[3] / 'shared' / 'photos').glob('*.jpg'))[:12]
 needs_photos = pytest.mark.skipif(not PHOTOS, reason='the shared photographs are not there')
@@ -197,3 +197,64 @@ def test_what_stands_near_is_seen_beside_its_old_spot_when_the_camera_moved():
     changes = view_changes(*pictures)
     assert changes is not None
     assert not [each for each in changes if not each.may_be_light]
+
+
+def spoilt(where: tuple[slice | int, ...]) -> np.ndarray:
+    """Return the dark with the noise of a sensor of which some pixels are always white."""
+    noise = np.random.default_rng(4).normal(4.0, 1.0, (360, 480))
+    picture = np.clip(noise, 0, 255).astype(np.uint8)
+    picture[where] = 255
+    return picture
+
+
+@pytest.mark.parametrize(
+    'where',
+    [
+        (slice(None, None, 60), slice(None)),
+        (slice(None), slice(None, None, 60)),
+        (slice(None, None, 8), slice(None, None, 8)),
+    ],
+    ids=['rows', 'columns', 'pixels'],
+)
+def test_a_sensor_s_bad_rows_columns_and_pixels_are_no_light(where):
+    picture = spoilt(where)
+    assert (picture == 255).mean() > 0.01
+    assert sight_of(picture) == Sight.DARK
+
+
+@pytest.mark.parametrize(('side', 'sight'), [(60, Sight.CLEAR), (20, Sight.DARK)])
+def test_a_lit_window_in_the_dark_is_seen_when_it_is_large_enough(side, sight):
+    """Of 60 pixels a side it has a fiftieth of the picture, of 20 a four-hundredth."""
+    picture = spoilt((slice(100, 100 + side), slice(200, 200 + side)))
+    assert picture.mean() < 18.0
+    assert sight_of(picture) == sight
+
+
+@pytest.mark.parametrize(
+    ('grey_level', 'sight'), [(17, Sight.DARK), (19, Sight.BLOCKED)], ids=['dark', 'covered']
+)
+def test_a_plain_picture_is_dark_or_covered_by_its_brightness(grey_level, sight):
+    assert sight_of(np.full((360, 480), grey_level, np.uint8)) == sight
+
+
+def test_a_colour_picture_of_any_size_is_judged_by_its_grey():
+    picture = np.zeros((720, 960, 3), np.uint8)
+    picture[..., 1] = 20
+    assert sight_of(picture) == Sight.DARK, 'green of 20 is a grey of 12'
+    picture[:, 480:] = 200
+    assert sight_of(picture) == Sight.CLEAR
+
+
+@pytest.mark.parametrize(
+    ('dark', 'light'), [(0, 'on'), (238, 'on'), (242, ''), (332, ''), (338, 'off'), (480, 'off')]
+)
+def test_the_light_is_on_where_less_than_half_is_dark_and_off_where_most_is(dark, light):
+    picture = np.full((360, 480), 120, np.uint8)
+    picture[:, :dark] = 18
+    assert light_of(picture, Sight.CLEAR) == light
+
+
+def test_a_dark_view_has_no_light_and_a_covered_one_says_nothing():
+    picture = np.full((360, 480), 120, np.uint8)
+    assert light_of(picture, Sight.DARK) == 'off'
+    assert light_of(picture, Sight.BLOCKED) == ''

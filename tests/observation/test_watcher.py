@@ -96,7 +96,7 @@ class Halves:
             return None
         return 'R1' if point[0] < DOOR[0] else 'R2'
 
-    def cells_of(self, place: str) -> np.ndarray:
+    def cells_of(self, place: str) -> np.ndarray | None:
         free = room().free
         west = np.arange(free.shape[1]) * 0.05 < DOOR[0]
         return free & (west if place == 'R1' else ~west)
@@ -112,6 +112,7 @@ class Round:
         markers=None,
         find_persons=None,
         verify_seconds: float = 0.0,
+        rooms: Halves | None = None,
     ) -> None:
         self.others = OtherRobots(0.25)
         self.looks: list[Look] = []
@@ -130,7 +131,7 @@ class Round:
             store=store,
             views=ReferenceViews(views),
             markers=markers,
-            rooms=Halves(),
+            rooms=rooms or Halves(),
             ways_of=lambda grid: Ways(
                 grid, 0.22, {'D1': DOOR}, {'R1': (3.0, 2.5), 'R2': (9.0, 2.5)}
             ),
@@ -204,6 +205,46 @@ def test_a_door_must_be_open_in_two_looks_by_its_rule():
     assert watch.alerts
     watch.visit('R1', HERE)
     assert [each.state for each in watch.book.events] == [EventState.OVER]
+
+
+class Sized(Halves):
+    """The two rooms with so many cells of floor each; a room is left out, or has no floor."""
+
+    def __init__(self, sizes: dict[str, int | None]) -> None:
+        self.sizes = sizes
+        self.asked: list[tuple[float, float]] = []
+
+    def place_at(self, point) -> str | None:
+        self.asked.append((float(point[0]), float(point[1])))
+        place = super().place_at(point)
+        return place if place in self.sizes else None
+
+    def cells_of(self, place: str) -> np.ndarray | None:
+        size = self.sizes.get(place)
+        return None if size is None else np.arange(500) < size
+
+
+@pytest.mark.parametrize(
+    ('sizes', 'place'),
+    [
+        ({'R1': 300, 'R2': 299}, 'R2'),
+        ({'R1': 299, 'R2': 300}, 'R1'),
+        ({'R1': 300}, 'R1'),
+        ({'R2': 400}, 'R2'),
+        ({'R1': None, 'R2': 400}, 'R2'),
+        ({'R1': 400, 'R2': None}, 'R1'),
+        ({}, 'hall'),
+    ],
+)
+def test_a_door_belongs_to_the_smaller_room_that_it_closes(
+    sizes: dict[str, int | None], place: str
+):
+    rooms = Sized(sizes)
+    watch = Round(rooms=rooms)
+    watch.visit('hall', HERE)
+    assert {each.place for each in watch.told if each.kind == Kind.DOOR} == {place}
+    # 30 cm to either side of the door's middle.
+    assert {(5.7, 2.5), (6.3, 2.5)} <= {(round(x, 6), round(y, 6)) for x, y in rooms.asked}
 
 
 @pytest.mark.parametrize('answer', [EventState.NORMAL, EventState.FALSE, EventState.ACKNOWLEDGED])

@@ -32,7 +32,16 @@ def read(encoding, values, height=4, width=6, **options):
         ('8UC1', GREY, GREY),
         ('8UC3', COLOUR, COLOUR),
         ('rgb8', COLOUR[..., ::-1], COLOUR),
+        ('bgr8', COLOUR, COLOUR),
+        ('rgba8', np.dstack([COLOUR[..., ::-1], GREY]), COLOUR),
+        ('bgra8', np.dstack([COLOUR, GREY]), COLOUR),
+        ('8UC4', np.dstack([COLOUR, GREY]), COLOUR),
         ('rgb16', COLOUR[..., ::-1].astype(np.uint16), COLOUR),
+        ('bgr16', COLOUR.astype(np.uint16), COLOUR),
+        ('16UC3', COLOUR.astype(np.uint16), COLOUR),
+        ('rgba16', np.dstack([COLOUR[..., ::-1], GREY]).astype(np.uint16), COLOUR),
+        ('bgra16', np.dstack([COLOUR, GREY]).astype(np.uint16), COLOUR),
+        ('16UC4', np.dstack([COLOUR, GREY]).astype(np.uint16), COLOUR),
     ],
 )
 def test_values_arrive_unchanged(encoding, values, expected):
@@ -123,6 +132,63 @@ def test_bayer_weighs_the_colours_as_grey_does(pattern, red, blue):
     mosaic = np.zeros((16, 16), np.uint8)
     mosaic[blue[0] :: 2, blue[1] :: 2] = 200
     assert read(f'bayer_{pattern}8', mosaic, 16, 16)[4:-4, 4:-4].mean() < 30
+
+
+@pytest.mark.parametrize(
+    ('width', 'height', 'text'),
+    [
+        (0, 4, 'image of 0x4 pixels is empty'),
+        (6, 0, 'image of 6x0 pixels is empty'),
+        (1001, 1000, 'image of 1001x1000 pixels is larger than 1000000 pixels'),
+    ],
+)
+def test_sizes_that_no_image_has_are_refused(width, height, text):
+    with pytest.raises(ImageError) as error:
+        read('mono8', GREY, height, width)
+    assert str(error.value) == text
+
+
+def test_the_largest_image_is_read():
+    assert image_of_pixels('mono8', 6, 4, 6, GREY.tobytes(), max_pixels=24).shape == (4, 6)
+    with pytest.raises(ImageError, match='is larger than 23 pixels'):
+        image_of_pixels('mono8', 6, 4, 6, GREY.tobytes(), max_pixels=23)
+
+
+@pytest.mark.parametrize(
+    ('encoding', 'least'),
+    [
+        *(('mono8', 6), ('8UC1', 6), ('rgb8', 18), ('8UC4', 24), ('mono16', 12), ('16UC1', 12)),
+        *(('bgra16', 48), ('uyvy', 12), ('nv12', 6), ('bayer_rggb8', 6), ('bayer_rggb16', 12)),
+    ],
+)
+def test_a_row_has_all_its_bytes(encoding, least):
+    assert image_of_pixels(encoding, 6, 4, least, bytes(1000), max_pixels=LIMIT).shape[:2] == (4, 6)
+    with pytest.raises(ImageError) as error:
+        image_of_pixels(encoding, 6, 4, least - 1, bytes(1000), max_pixels=LIMIT)
+    assert str(error.value) == (
+        f'image has rows of {least - 1} bytes, expected at least {least} for 6 pixels of {encoding}'
+    )
+
+
+def test_a_byte_too_few_is_told():
+    with pytest.raises(ImageError) as error:
+        image_of_pixels('mono8', 6, 4, 8, bytes(29), max_pixels=LIMIT)
+    assert str(error.value) == 'image of 6x4 pixels has 29 bytes, expected 30'
+
+
+@pytest.mark.parametrize('wide', [False, True])
+def test_bayer_of_sixteen_bits_is_that_of_eight(wide):
+    mosaic = np.tile(np.array([[250, 90], [120, 40]], np.uint8), (8, 8))
+    expected = cv2.cvtColor(mosaic, cv2.COLOR_BayerRGGB2GRAY)
+    values = mosaic.astype(np.uint16) * 257 if wide else mosaic
+    found = read(f'bayer_rggb{16 if wide else 8}', values, 16, 16)
+    scale = expected.max() / 255 if wide else 1.0
+    assert np.allclose(found * scale, expected, atol=1.0)
+
+
+@pytest.mark.parametrize(('length', 'shown'), [(40, 'x' * 40), (41, 'x' * 40 + '...')])
+def test_long_names_are_shortened(length, shown):
+    assert printable('x' * length) == repr(shown)
 
 
 def test_last_row_may_lack_its_padding():

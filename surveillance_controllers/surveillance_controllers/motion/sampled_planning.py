@@ -144,12 +144,12 @@ class SampledPlanner:
         self, controls: Floats, path: Points, away: Floats, movers: Sequence[Mover]
     ) -> Floats:
         """Return what sequences cost, shape (samples,); `away` as of `_away_from`."""
-        poses = _rolled_out(controls, self._parameters.step)
+        poses = rolled_out(controls, self._parameters.step)
         return (
             self._of_standing(poses, controls, away)
             + self._of_moving(poses, controls, movers)
-            + self._of_way(poses, path)
-            + self._of_effort(controls)
+            + price_of_way(poses, path)
+            + price_of_effort(controls)
         )
 
     def _shift(self, dt: float) -> None:
@@ -247,27 +247,41 @@ class SampledPlanner:
             price += (near * moving * sooner).sum(axis=1)
         return price
 
-    def _of_way(self, poses: Floats, path: Points) -> Floats:
-        """Return what leaving the path costs, less what getting on along it is worth."""
-        line = path.astype(np.float32)
-        some = poses[:, 1::3, :2]
-        gaps = np.hypot(some[..., 0, None] - line[:, 0], some[..., 1, None] - line[:, 1])
-        off = gaps.min(axis=2)
-        done = gaps[:, -1].argmin(axis=1)
-        spacing = float(np.hypot(*(path[1] - path[0]))) if len(path) > 1 else 0.0
-        end = np.hypot(*(poses[:, -1, :2] - line[-1]).T)
-        ahead = np.diff(line, axis=0, append=2 * line[-1:] - line[-2:-1])
-        heading = np.arctan2(ahead[done, 1], ahead[done, 0])
-        askew = 1.0 - np.cos(poses[:, -1, 2] - heading)
-        # Towards the end of a short path, coming nearer to it counts.
-        left = (len(path) - 1 - done) * spacing + off[:, -1] + 0.3 * end
-        return np.asarray(1.0 * off.sum(axis=1) + 4.0 * left + askew, np.float32)
 
-    @staticmethod
-    def _of_effort(controls: Floats) -> Floats:
-        back = np.maximum(-controls[..., 0], 0.0).sum(axis=1)
-        rough = np.abs(np.diff(controls, axis=1)).sum(axis=(1, 2))
-        return np.asarray(1.5 * back + 0.15 * rough, np.float32)
+def price_of_way(poses: Floats, path: Points) -> Floats:
+    """Return what leaving the path costs, less what getting on along it is worth.
+
+    Args:
+        poses: Where sequences lead, x, y and yaw, shape (samples, steps, 3).
+        path: At equal distances, shape (n, 2), n of at least 2, metres.
+
+    Returns:
+        Shape (samples,).
+    """
+    line = path.astype(np.float32)
+    some = poses[:, 1::3, :2]
+    gaps = np.hypot(some[..., 0, None] - line[:, 0], some[..., 1, None] - line[:, 1])
+    off = gaps.min(axis=2)
+    done = gaps[:, -1].argmin(axis=1)
+    spacing = float(np.hypot(*(path[1] - path[0])))
+    end = np.hypot(*(poses[:, -1, :2] - line[-1]).T)
+    ahead = np.diff(line, axis=0, append=2 * line[-1:] - line[-2:-1])
+    heading = np.arctan2(ahead[done, 1], ahead[done, 0])
+    askew = 1.0 - np.cos(poses[:, -1, 2] - heading)
+    # Towards the end of a short path, coming nearer to it counts.
+    left = (len(path) - 1 - done) * spacing + off[:, -1] + 0.3 * end
+    return np.asarray(1.0 * off.sum(axis=1) + 4.0 * left + askew, np.float32)
+
+
+def price_of_effort(controls: Floats) -> Floats:
+    """Return what driving backwards and changes of the velocity cost, shape (samples,).
+
+    Args:
+        controls: Speeds and turning speeds, shape (samples, steps, 2).
+    """
+    back = np.maximum(-controls[..., 0], 0.0).sum(axis=1)
+    rough = np.abs(np.diff(controls, axis=1)).sum(axis=(1, 2))
+    return np.asarray(1.5 * back + 0.15 * rough, np.float32)
 
 
 def _standing(seen: Points, movers: Sequence[Mover]) -> Points:
@@ -284,7 +298,7 @@ def _turned_back(x: Any, y: Any, yaw: Any) -> tuple[Any, Any]:
     return cos * x + sin * y, cos * y - sin * x
 
 
-def _rolled_out(controls: Floats, step: float) -> Floats:
+def rolled_out(controls: Floats, step: float) -> Floats:
     """Return where sequences of velocities lead, x, y and yaw, shape (samples, steps, 3)."""
     turns = controls[..., 1] * np.float32(step)
     yaw = np.cumsum(turns, axis=1)

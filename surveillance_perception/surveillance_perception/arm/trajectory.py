@@ -57,8 +57,6 @@ class ArmTrajectory:
 
     def at(self, time: float) -> ArmState:
         """State at a time since the start, between the points linearly; after the end at rest."""
-        if time >= self.duration:
-            return ArmState.resting(self.goal)
         rows = (self.positions, self.speeds, self.accelerations)
         values = [
             np.array([np.interp(time, self.times, column) for column in row.T]) for row in rows
