@@ -762,3 +762,57 @@ def test_nothing_is_missed_without_cases(seed: int) -> None:
 def test_nothing_is_missed_without_cases_for_long() -> None:
     for seed in range(10_000):
         assert_as_by_cases(seed)
+
+
+@pytest.mark.parametrize(('members', 'all_over'), [((A, B), True), ((A,), False), ((B,), False)])
+def test_what_only_both_classes_say_of_a_chain_holds_for_members_of_both(
+    members: tuple[str, ...], all_over: bool
+) -> None:
+    kb = reasoned(
+        SubClassOf(ex.ObjectIntersectionOf((A, B)), ex.ObjectAllValuesFrom(P, D)),
+        ax.TransitiveObjectProperty(P),
+        ax.ObjectPropertyAssertion(P, i, j),
+        ax.ObjectPropertyAssertion(P, j, k),
+        *(ClassAssertion(cls, i) for cls in members),
+        # What k is takes cases: F is disjoint with D.
+        SubClassOf(C, ex.ObjectUnionOf(('x:E', 'x:F'))),
+        ax.DisjointClasses(('x:F', D)),
+        ClassAssertion(C, k),
+    )
+    assert kb.types(k) == ({C, D, 'x:E'} if all_over else {C})
+
+
+def test_rules_that_forbid_every_value_contradict_a_value_that_must_exist() -> None:
+    def forbidden(comparison: str) -> Axiom:
+        x, v = ex.Variable('x:x'), ex.Variable('x:v')
+        compared = ex.BuiltinAtom(SWRLB + comparison, (v, whole(5)))
+        return ax.Rule((ex.DataPropertyAtom(T, x, v), compared), ())
+
+    some = SubClassOf(A, ex.DataSomeValuesFrom(T, number(('minInclusive', 3), ('maxInclusive', 6))))
+    below, above = forbidden('lessThan'), forbidden('greaterThanOrEqual')
+    assert not reasoned(some, ClassAssertion(A, i), below, above).consistent
+    recognised = SubClassOf(ex.DataSomeValuesFrom(T, number(('minInclusive', 5))), B)
+    kb = reasoned(some, ClassAssertion(A, i), below, recognised)
+    assert kb.consistent
+    assert kb.types(i) == {A, B}
+    kb = reasoned(some, ClassAssertion(A, i), recognised)
+    assert kb.types(i) == {A}
+
+
+def test_a_value_that_classes_forbid_leaves_the_other() -> None:
+    def without(cls: str, value: int) -> Axiom:
+        one = ex.DataSomeValuesFrom(T, ex.DataOneOf((whole(value),)))
+        return SubClassOf(ex.ObjectIntersectionOf((cls, one)), NOTHING)
+
+    two = ex.DataOneOf((whole(1), whole(2)))
+    kb = reasoned(
+        SubClassOf(A, ex.DataSomeValuesFrom(T, two)),
+        without(B, 1),
+        without(C, 2),
+        ClassAssertion(A, i),
+        ClassAssertion(B, i),
+    )
+    assert kb.holds(ax.DataPropertyAssertion(T, i, whole(2)))
+    assert not kb.holds(ax.DataPropertyAssertion(T, i, whole(1)))
+    kb.add(ClassAssertion(C, i))
+    assert not kb.reason()

@@ -39,6 +39,7 @@ from owl_reasoner.owl.expressions import (
     DataAllValuesFrom,
     DataComplementOf,
     DataHasValue,
+    DataMaxCardinality,
     DataMinCardinality,
     DataOneOf,
     DataSomeValuesFrom,
@@ -59,7 +60,7 @@ from owl_reasoner.owl.expressions import (
     ObjectUnionOf,
     Variable,
 )
-from owl_reasoner.owl.vocabulary import NOTHING, THING, XSD
+from owl_reasoner.owl.vocabulary import NOTHING, THING, TOP_LITERAL, XSD
 from owl_reasoner.reasoner.consequence_based.classification import Classification
 
 A, B, C, D, E = (f'x:{name}' for name in 'ABCDE')
@@ -381,3 +382,37 @@ def test_values_that_classes_require_go_by_the_name_of_who_is_the_same() -> None
         assert kb.reason()
         assert kb.types(i) == {B}
         assert kb.object_values(P, i) == {m}
+
+
+@pytest.mark.parametrize(('parent', 'joined'), [([], set()), ([SubClassOf(A, D)], {C, D})])
+def test_only_a_parent_that_counts_is_the_one_neighbour(
+    parent: list[Axiom], joined: set[str]
+) -> None:
+    # B needs a C before it, and has room for one D: the A before it is that one if it is a D.
+    kb = reasoned(
+        SubClassOf(A, some(P, B)),
+        SubClassOf(B, ObjectSomeValuesFrom(ObjectInverseOf(P), C)),
+        SubClassOf(B, ObjectMaxCardinality(1, ObjectInverseOf(P), D)),
+        SubClassOf(C, D),
+        *parent,
+    )
+    assert kb.superclasses(A) == joined
+
+
+@pytest.mark.parametrize(
+    ('second', 'most', 'possible'),
+    [((5, 9), 3, False), ((5, 9), 4, True), ((4, 9), 3, True), ((4, 9), 1, True)],
+)
+def test_values_of_ranges_that_share_none_are_counted_together(
+    second: tuple[int, int], most: int, possible: bool
+) -> None:
+    least = (1, 5), second
+    number = 2 if most > 1 else 1
+    kb = reasoned(
+        *(SubClassOf(A, DataMinCardinality(number, T, between(*bounds))) for bounds in least),
+        SubClassOf(A, DataMaxCardinality(most, T, TOP_LITERAL)),
+        ClassAssertion(A, i),
+        consistent=possible,
+    )
+    # A class that can have no member is below every other.
+    assert kb.superclasses(A) == (set() if possible else {B, C, D, E})

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from owl_reasoner import KnowledgeBase, OntologyFileError, read_ontology
+from owl_reasoner.documents.catalogs import catalog_entries
 from owl_reasoner.documents.reading import OntologyDocument
 from owl_reasoner.documents.writing import ontology_bytes
 from owl_reasoner.owl import axioms as ax
@@ -406,3 +407,224 @@ def test_imports_are_found_in_a_catalog_and_in_packages(tmp_path: Path) -> None:
     assert note.startswith('owl:imports <http://ex.org/web> is not followed')
     (folder / 'catalog-v001.xml').write_text('no XML')
     assert len(read_ontology(folder / 'map.ofn', 'urn:map').unsupported) == 3
+
+
+def test_a_catalog_leads_to_files_by_its_uri_entries_alone(tmp_path: Path) -> None:
+    catalog = tmp_path / 'catalog-v001.xml'
+    catalog.write_text(
+        '<catalog xmlns="urn:oasis:names:tc:entity:xmlns:xml:catalog" xmlns:o="urn:other">'
+        '<uri uri="lost.ofn"/><uri name="empty"/>'
+        '<uri name="twice" uri="first.ofn"/><uri name="twice" uri="second.ofn"/>'
+        '<o:uri name="other" uri="o.ofn"/><public name="public" uri="p.ofn"/>'
+        '<group xml:base="in/"><uri name="grouped" uri="g%20g.ofn"/>'
+        '<group xml:base="er"><uri name="deeper" uri="d.ofn" xml:base="own/"/></group>'
+        '<uri name="after" uri="a.ofn"/></group>'
+        '<group xml:base="http://y/"><uri name="of the web" uri="w.ofn"/>'
+        '<uri name="of the disk" uri="file:///z/d.ofn"/></group>'
+        '<uri name="last" uri="l.ofn"/><uri name="away" uri="http://y/a.ofn"/></catalog>'
+    )
+    assert catalog_entries(catalog) == {
+        'twice': tmp_path / 'first.ofn',
+        'grouped': tmp_path / 'in' / 'g g.ofn',
+        'deeper': tmp_path / 'in' / 'er' / 'own' / 'd.ofn',
+        'after': tmp_path / 'in' / 'a.ofn',
+        'of the disk': Path('/z/d.ofn'),
+        'last': tmp_path / 'l.ofn',
+    }
+
+
+def test_a_catalog_has_a_largest_size(tmp_path: Path) -> None:
+    catalog = tmp_path / 'catalog-v001.xml'
+    catalog.write_bytes(b'<a/>'.ljust(1 << 20))
+    assert catalog_entries(catalog) == {}
+    catalog.write_bytes(b'<a/>'.ljust((1 << 20) + 1))
+    with pytest.raises(OntologyFileError, match='larger than 1048576 bytes'):
+        catalog_entries(catalog)
+
+
+def read_functional(*lines: str) -> OntologyDocument:
+    head = f'Prefix(:=<x:>)\nPrefix(xsd:=<{XSD}>)\nPrefix(rdfs:=<{RDFS}>)\nOntology(<{IRI}>\n'
+    return read_ontology((head + '\n'.join(lines) + ')').encode(), IRI)
+
+
+@pytest.mark.parametrize(
+    ('text', 'axiom'),
+    [
+        (
+            'SubClassOf(:A ObjectMinCardinality(2 :p))',
+            ax.SubClassOf('x:A', ex.ObjectMinCardinality(2, 'x:p', THING)),
+        ),
+        (
+            'SubClassOf(ObjectMaxCardinality(0 :p :B) DataExactCardinality(1 :d xsd:int))',
+            ax.SubClassOf(
+                ex.ObjectMaxCardinality(0, 'x:p', 'x:B'),
+                ex.DataExactCardinality(1, 'x:d', XSD + 'int'),
+            ),
+        ),
+        ('SubClassOf(:A ObjectOneOf(:i))', ax.SubClassOf('x:A', ex.ObjectOneOf(('x:i',)))),
+        (
+            'SubClassOf(:A DataSomeValuesFrom(:d DataOneOf("1")))',
+            ax.SubClassOf('x:A', ex.DataSomeValuesFrom('x:d', ex.DataOneOf((Literal('1'),)))),
+        ),
+        ('DisjointUnion(:A :B :C)', ax.DisjointUnion('x:A', ('x:B', 'x:C'))),
+        (
+            'SubObjectPropertyOf(ObjectPropertyChain(:p ObjectInverseOf(:q)) :r)',
+            ax.SubPropertyChainOf(('x:p', ex.ObjectInverseOf('x:q')), 'x:r'),
+        ),
+        (
+            'ObjectPropertyAssertion(ObjectInverseOf(ObjectInverseOf(:p)) :i :j)',
+            ax.ObjectPropertyAssertion('x:p', 'x:i', 'x:j'),
+        ),
+        (
+            'NegativeObjectPropertyAssertion(ObjectInverseOf(:p) :i :j)',
+            ax.NegativeObjectPropertyAssertion('x:p', 'x:j', 'x:i'),
+        ),
+        (
+            'HasKey(:A (:p ObjectInverseOf(:q)) (:d :e))',
+            ax.HasKey('x:A', ('x:p', ex.ObjectInverseOf('x:q')), ('x:d', 'x:e')),
+        ),
+        (
+            'SubAnnotationPropertyOf(:n :m)',
+            ax.AnnotationAssertion(RDFS + 'subPropertyOf', 'x:n', 'x:m'),
+        ),
+        (
+            'Annotation(rdfs:comment "c")',
+            ax.AnnotationAssertion(RDFS + 'comment', IRI, Literal('c')),
+        ),
+        (
+            'DataPropertyRange(:d DatatypeRestriction(xsd:int xsd:minInclusive "1"^^xsd:int'
+            ' xsd:maxExclusive "3"^^xsd:int))',
+            ax.DataPropertyRange(
+                'x:d',
+                ex.DatatypeRestriction(
+                    XSD + 'int',
+                    (
+                        (XSD + 'minInclusive', Literal('1', XSD + 'int')),
+                        (XSD + 'maxExclusive', Literal('3', XSD + 'int')),
+                    ),
+                ),
+            ),
+        ),
+        (
+            'DLSafeRule(Annotation(rdfs:label "r") Body(BuiltInAtom(:add Variable(:x) "1"))'
+            ' Head(DifferentIndividualsAtom(Variable(:x) :i)))',
+            ax.Rule(
+                (ex.BuiltinAtom('x:add', (Variable('x:x'), Literal('1'))),),
+                (ex.DifferentIndividualsAtom(Variable('x:x'), 'x:i'),),
+                ((RDFS + 'label', Literal('r')),),
+            ),
+        ),
+    ],
+)
+def test_a_construct_of_functional_syntax_is_one_axiom(text: str, axiom: ax.Axiom) -> None:
+    document = read_functional(text)
+    assert document.axioms == [axiom]
+    assert document.unsupported == []
+
+
+@pytest.mark.parametrize(
+    ('text', 'reason'),
+    [
+        ('SubClassOf(:A ObjectMinCardinality(2))', 'expected 2 or 3 parts, got 1'),
+        ('SubClassOf(:A ObjectMinCardinality(2 :p :B :C))', 'expected 2 or 3 parts, got 4'),
+        ('SubClassOf(:A ObjectSomeValuesFrom(:p))', 'expected 2 parts, got 1'),
+        ('SubClassOf(:A)', 'expected 2 parts, got 1'),
+        ('SubClassOf(:A ObjectIntersectionOf(:B))', 'expected at least 2 parts, got 1'),
+        ('SubClassOf(:A ObjectOneOf())', 'expected at least 1 parts, got 0'),
+        ('EquivalentClasses(:A)', 'expected at least 2 parts, got 1'),
+        ('DisjointUnion(:A :B)', 'expected at least 2 parts, got 1'),
+        ('SubObjectPropertyOf(ObjectPropertyChain(:p) :q)', 'expected at least 2 parts, got 1'),
+        ('Declaration(Class(:A :B))', 'expected 1 parts, got 2'),
+        ('ObjectPropertyAssertion(:p :i)', 'expected 3 parts, got 2'),
+        ('SubClassOf(:A DataHasValue(:d :i))', 'expected a literal, got x:i'),
+        ('SubClassOf(:A ObjectUnionOf(:B DataOneOf("1")))', 'DataOneOf is no class'),
+        ('SubClassOf(:A ObjectSomeValuesFrom("p" :B))', "expected an IRI, got Literal(lexical='p'"),
+        ('SubClassOf(:A DataMinCardinality("2" :d))', "expected a number, got Literal(lexical='2'"),
+        ('DataPropertyRange(:d DatatypeRestriction(xsd:int xsd:minInclusive))', 'its parts'),
+    ],
+)
+def test_an_ill_formed_construct_of_functional_syntax_says_what_was_expected(
+    text: str, reason: str
+) -> None:
+    document = read_functional(text, 'SubClassOf(:A :B)')
+    assert document.axioms == [ax.SubClassOf('x:A', 'x:B')]
+    (said,) = document.unsupported
+    assert said.startswith(f'line 5: {text.split("(")[0]} is not understood: {reason}')
+
+
+def test_an_annotation_on_an_annotation_is_reported_and_the_outer_one_kept() -> None:
+    document = read_functional('SubClassOf(Annotation(Annotation(:n "y") rdfs:label "r") :A :B)')
+    axiom = ax.SubClassOf('x:A', 'x:B')
+    note = ax.AxiomAnnotation(axiom, ((RDFS + 'label', Literal('r')),))
+    assert document.axioms == [axiom, note]
+    assert document.unsupported == ['line 5: an annotation on an annotation is not kept']
+
+
+@pytest.mark.parametrize(
+    ('statement', 'report'),
+    [
+        (':d rdfs:subPropertyOf [ owl:inverseOf :e ]', 'expected the name of a data property'),
+        ('[ owl:inverseOf :e ] rdfs:subPropertyOf :d', 'expected the name of a data property'),
+        (':d owl:equivalentProperty [ owl:inverseOf :e ]', 'expected the name of a data property'),
+        ('[] owl:disjointUnionOf (:A :B)', 'a node without a name cannot be defined'),
+    ],
+)
+def test_what_needs_a_name_and_has_none_is_left_out_and_reported(
+    statement: str, report: str
+) -> None:
+    document = read_turtle(f':d a owl:DatatypeProperty . {statement} .')
+    assert document.axioms == [ax.Declaration('data_property', 'http://x/#d')]
+    (said,) = document.unsupported
+    assert said.startswith('a statement about ')
+    assert said.endswith(f' is left out: {report}')
+
+
+@pytest.mark.parametrize(
+    ('text', 'axiom'),
+    [
+        (
+            '[ owl:inverseOf :q ] owl:propertyDisjointWith :p',
+            ax.DisjointObjectProperties((ex.ObjectInverseOf('http://x/#q'), 'http://x/#p')),
+        ),
+        (
+            ':U owl:disjointUnionOf (:A :B)',
+            ax.DisjointUnion('http://x/#U', ('http://x/#A', 'http://x/#B')),
+        ),
+        (
+            ':K owl:oneOf (:i :j)',
+            ax.EquivalentClasses(
+                ('http://x/#K', ex.ObjectOneOf(('http://x/#i', 'http://x/#j'))),
+            ),
+        ),
+        (
+            ':N a rdfs:Datatype ; owl:oneOf (1 2)',
+            ax.DatatypeDefinition(
+                'http://x/#N',
+                ex.DataOneOf((Literal('1', XSD + 'integer'), Literal('2', XSD + 'integer'))),
+            ),
+        ),
+        (':p rdfs:domain :A', ax.ObjectPropertyDomain('http://x/#p', 'http://x/#A')),
+        (':p rdfs:range :A', ax.ObjectPropertyRange('http://x/#p', 'http://x/#A')),
+        (':d rdfs:domain :A', ax.DataPropertyDomain('http://x/#d', 'http://x/#A')),
+        (':d rdfs:range xsd:int', ax.DataPropertyRange('http://x/#d', XSD + 'int')),
+        (':d rdfs:subPropertyOf :e', ax.SubDataPropertyOf('http://x/#d', 'http://x/#e')),
+        (':p rdfs:subPropertyOf :q', ax.SubObjectPropertyOf('http://x/#p', 'http://x/#q')),
+        (
+            ':p owl:propertyChainAxiom ( :p [ owl:inverseOf :q ] )',
+            ax.SubPropertyChainOf(
+                ('http://x/#p', ex.ObjectInverseOf('http://x/#q')), 'http://x/#p'
+            ),
+        ),
+        (
+            '[ owl:propertyChain (:p :q) ] rdfs:subPropertyOf :p',
+            ax.SubPropertyChainOf(('http://x/#p', 'http://x/#q'), 'http://x/#p'),
+        ),
+        (':p owl:inverseOf :q', ax.InverseObjectProperties('http://x/#p', 'http://x/#q')),
+    ],
+)
+def test_a_statement_of_rdf_is_one_axiom(text: str, axiom: ax.Axiom) -> None:
+    kinds = ':d a owl:DatatypeProperty . :p a owl:ObjectProperty . :q a owl:ObjectProperty .\n'
+    document = read_turtle(f'{kinds}{text} .')
+    stated = [each for each in document.axioms if not isinstance(each, ax.Declaration)]
+    assert stated == [axiom]
+    assert document.unsupported == []

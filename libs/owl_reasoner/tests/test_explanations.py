@@ -10,6 +10,8 @@ from owl_reasoner.owl.axioms import (
     ClassAssertion,
     DataPropertyAssertion,
     DifferentIndividuals,
+    DisjointClasses,
+    FunctionalObjectProperty,
     InverseFunctionalObjectProperty,
     ObjectPropertyAssertion,
     SameIndividual,
@@ -29,6 +31,7 @@ from .patrol_map import (
     seven_rooms,
     value,
 )
+from .small_ontologies import A, B, C, P, base, differ, i, is_a, j, k, m, rel, same
 
 
 def test_urgency_is_explained_by_its_calculation() -> None:
@@ -235,3 +238,48 @@ def test_a_text_with_the_mark_of_anonymous_individuals_is_a_text() -> None:
     kb.reason()
     assert kb.explain(above) is not None
     assert kb.entails(DataPropertyAssertion(n('e'), n('j'), Literal('a_:b'))) is False
+
+
+def test_the_difference_of_two_is_explained_itself_and_that_of_more_by_pairs() -> None:
+    kb = base(
+        DisjointClasses((A, B)), is_a(A, i), is_a(B, j), differ(i, k), differ(j, k), is_a(C, m)
+    )
+    explanation = kb.explain(differ(i, j))
+    assert explanation is not None
+    assert explanation.tree().splitlines() == [
+        'x:i is different from x:j  [by x:A DisjointWith x:B]',
+        '  x:i is x:A  [asserted]',
+        '  x:j is x:B  [asserted]',
+    ]
+    explanation = kb.explain(differ(i, j, k))
+    assert explanation is not None
+    assert explanation.tree().splitlines() == [
+        'x:i, x:j, x:k are all different  [by each differs from each other one]',
+        '  x:i is different from x:j  [by x:A DisjointWith x:B]',
+        '    x:i is x:A  [asserted]',
+        '    x:j is x:B  [asserted]',
+        '  x:i is different from x:k  [by x:i, x:k are all different]',
+        '  x:j is different from x:k  [by x:j, x:k are all different]',
+    ]
+    assert kb.explain(differ(i, m)) is None
+    assert kb.explain(differ(i, j, m)) is None
+
+
+def test_the_sameness_of_two_is_explained_itself_and_that_over_others_by_steps() -> None:
+    kb = base(same(i, j), same(j, k), is_a(C, m))
+    explanation = kb.explain(same(i, k))
+    assert explanation is not None
+    assert explanation.tree().splitlines() == [
+        'x:i, x:k are the same  [by the same individual under another name]',
+        '  x:i is the same as x:j  [asserted]',
+        '  x:j is the same as x:k  [asserted]',
+    ]
+    assert kb.explain(same(i, m)) is None
+    assert kb.explain(same(i, j, m)) is None
+    kb = base(FunctionalObjectProperty(P), rel(P, i, j), rel(P, i, k))
+    explanation = kb.explain(same(j, k))
+    assert explanation is not None
+    assert (explanation.fact_text, explanation.because) == (
+        'x:j is the same as x:k',
+        'x:p is functional',
+    )

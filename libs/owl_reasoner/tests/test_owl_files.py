@@ -27,10 +27,11 @@ from owl_reasoner.owl.axioms import (
     Declaration,
     DifferentIndividuals,
     Import,
+    ObjectPropertyAssertion,
     Rule,
     SubClassOf,
 )
-from owl_reasoner.owl.expressions import Literal
+from owl_reasoner.owl.expressions import Literal, ObjectSomeValuesFrom, ObjectUnionOf
 from owl_reasoner.owl.vocabulary import OWL, RDF, RDFS, SWRL, THING, XSD
 
 from .patrol_map import (
@@ -571,3 +572,90 @@ def test_a_rule_is_saved_without_what_has_no_name() -> None:
     read = read_ontology(text.encode(), IRI)
     assert read.unsupported == ['an annotation on a rule is not kept']
     assert read_ontology(ontology_bytes(read.axioms, IRI), IRI).unsupported == []
+
+
+WRITTEN = f"""<?xml version="1.0" encoding="utf-8"?>
+<rdf:RDF
+     xmlns="http://o/o#"
+     xmlns:e="x:"
+     xmlns:ns1="http://y/a#"
+     xmlns:ns2="http://z/"
+     xmlns:owl="{OWL}"
+     xmlns:rdf="{RDF}"
+     xmlns:rdfs="{RDFS}"
+     xmlns:swrl="{SWRL}"
+     xmlns:xsd="{XSD}"
+     xml:base="http://o/o#">
+
+    <owl:Ontology rdf:about="http://o/o#"/>
+
+    <owl:Class rdf:about="x:A">
+        <rdfs:subClassOf>
+            <owl:Class>
+                <owl:unionOf rdf:parseType="Collection">
+                    <rdf:Description rdf:about="x:B"/>
+                    <owl:Restriction>
+                        <owl:onProperty rdf:resource="x:p"/>
+                        <owl:someValuesFrom rdf:resource="x:C"/>
+                    </owl:Restriction>
+                </owl:unionOf>
+            </owl:Class>
+        </rdfs:subClassOf>
+    </owl:Class>
+
+    <e:B rdf:about="x:i">
+        <rdf:type rdf:resource="x:4"/>
+        <e:p rdf:nodeID="shared"/>
+        <ns1:d rdf:datatype="{XSD}integer">5</ns1:d>
+        <ns2:e xml:lang="en">t&lt;</ns2:e>
+    </e:B>
+
+    <rdf:Description rdf:about="x:j">
+        <e:p rdf:nodeID="shared"/>
+        <e:p>
+            <e:C/>
+        </e:p>
+    </rdf:Description>
+
+    <rdf:Description rdf:nodeID="one">
+        <e:p rdf:nodeID="other"/>
+    </rdf:Description>
+
+    <rdf:Description rdf:nodeID="other">
+        <e:p rdf:nodeID="one"/>
+    </rdf:Description>
+
+    <owl:Class rdf:about="x:B"/>
+
+    <owl:ObjectProperty rdf:about="x:p"/>
+
+    <owl:Class rdf:about="x:C"/>
+
+    <owl:Class rdf:about="x:4"/>
+
+    <owl:DatatypeProperty rdf:about="http://y/a#d"/>
+
+    <owl:DatatypeProperty rdf:about="http://z/e"/>
+
+</rdf:RDF>
+"""
+
+
+def test_rdf_xml_nests_what_is_used_once_and_names_what_is_shared() -> None:
+    either = ObjectUnionOf(('x:B', ObjectSomeValuesFrom('x:p', 'x:C')))
+    axioms: list[Axiom] = [
+        Declaration('class', 'x:A'),
+        SubClassOf('x:A', either),
+        ClassAssertion('x:4', 'x:i'),
+        ClassAssertion('x:B', 'x:i'),
+        ObjectPropertyAssertion('x:p', 'x:i', '_:shared'),
+        ObjectPropertyAssertion('x:p', 'x:j', '_:shared'),
+        ObjectPropertyAssertion('x:p', 'x:j', '_:once'),
+        ClassAssertion('x:C', '_:once'),
+        ObjectPropertyAssertion('x:p', '_:one', '_:other'),
+        ObjectPropertyAssertion('x:p', '_:other', '_:one'),
+        DataPropertyAssertion('http://y/a#d', 'x:i', Literal('5', XSD + 'integer')),
+        DataPropertyAssertion('http://z/e', 'x:i', Literal('t<', RDF + 'langString', 'en')),
+    ]
+    prefixes = {'e': 'x:', '9': 'http://y/a#', 'xmlq': 'http://z/'}
+    assert ontology_bytes(axioms, 'http://o/o#', prefixes=prefixes).decode() == WRITTEN

@@ -15,9 +15,11 @@ import pytest
 from owlready2 import AllDisjoint, FunctionalProperty, Imp, Not, SymmetricProperty, Thing
 
 from owl_reasoner import KnowledgeBase, sync_reasoner_native
-from owl_reasoner.owl.axioms import Axiom, Declaration
+from owl_reasoner.owl.axioms import Axiom, DataPropertyAssertion, Declaration
+from owl_reasoner.owl.expressions import Literal
+from owl_reasoner.owl.vocabulary import OWL, RDF, XSD
 from owl_reasoner.owlready import reasoning
-from owl_reasoner.owlready.quads import OntologyWriter, contexts_of, read_axioms
+from owl_reasoner.owlready.quads import OntologyWriter, contexts_of, quads_of, read_axioms
 from owl_reasoner.reasoner.budget import ReasoningBudgetError
 
 from .random_ontologies import RandomOntology
@@ -122,6 +124,53 @@ def test_a_further_call_follows_the_changes_and_takes_back_what_follows_no_more(
     assert shop.world.graph.db.total_changes == before, 'nothing changed, nothing is written'
 
 
+def test_a_further_call_follows_changes_of_classes(shop: Shop) -> None:
+    onto = shop.onto
+    sync_reasoner_native(shop.world)
+    onto.Impossible.is_a = [onto.Drug]
+    sync_reasoner_native(shop.world)
+    assert onto.Impossible.equivalent_to == []
+    assert list(shop.world.inconsistent_classes()) == []
+    with onto:
+
+        class Ware(Thing):
+            pass
+
+        onto.Contained.is_a = [Ware]
+        onto.Drug.is_a = [onto.Contained]
+    sync_reasoner_native(shop.world)
+    assert shop.box.is_a == [onto.Contained]
+    assert onto.Drug.is_a == [onto.Contained]
+    assert onto.Impossible.is_a == [onto.Drug]
+    with onto:
+        onto.Impossible.is_a = [onto.Drug, Not(onto.Contained)]
+    sync_reasoner_native(shop.world)
+    assert owlready2.Nothing in onto.Impossible.equivalent_to
+
+
+def test_a_declaration_in_the_quads_alone_is_no_fact_about_an_individual(shop: Shop) -> None:
+    def say(subject: str, predicate: str, value: str) -> None:
+        names = (IRI + subject, predicate, value)
+        shop.onto._add_obj_triple_raw_spo(*map(shop.world._abbreviate, names))
+
+    def held() -> set[Axiom]:
+        kb = next(iter(reasoning._SESSIONS[shop.world].values()))._kb
+        assert kb is not None
+        return set(kb.axioms())
+
+    sync_reasoner_native(shop.world)
+    before = held()
+    say('Fresh', RDF + 'type', OWL + 'Class')
+    sync_reasoner_native(shop.world)
+    assert held() - before == {Declaration('class', IRI + 'Fresh')}
+    say('near', RDF + 'type', OWL + 'SymmetricProperty')
+    say('box', IRI + 'near', IRI + 'aspirin')
+    say('box', RDF + 'type', IRI + 'Fresh')
+    sync_reasoner_native(shop.world)
+    assert shop.world['http://example.org/o#Fresh'] in shop.box.is_a
+    assert shop.aspirin.near == [shop.box]
+
+
 def test_a_contradiction_is_an_error_that_says_why_and_can_be_mended(shop: Shop) -> None:
     with shop.onto:
 
@@ -206,6 +255,36 @@ def test_axioms_come_back_from_a_world_as_they_were(seed: int) -> None:
     lost = [a for a in axioms if a not in kept and not isinstance(a, Declaration)]
     assert KnowledgeBase(IRI, found).reason() == KnowledgeBase(IRI, axioms).reason()
     assert not lost
+
+
+@pytest.mark.parametrize(
+    ('lexical', 'datatype', 'stored'),
+    [
+        ('7', 'integer', 7),
+        (str(2**63 - 1), 'integer', 2**63 - 1),
+        (str(2**63), 'integer', str(2**63)),
+        (str(-(2**63)), 'long', -(2**63)),
+        (str(-(2**63) - 1), 'integer', str(-(2**63) - 1)),
+        ('few', 'int', 'few'),
+        ('0.5', 'double', 0.5),
+        ('0.00000012', 'decimal', 1.2e-07),
+        ('-12000000000000000000000', 'decimal', -1.2e22),
+        ('2.50', 'decimal', 2.5),
+        ('INF', 'double', 'INF'),
+        ('NaN', 'float', 'NaN'),
+        ('true', 'boolean', 'true'),
+        ('5', 'string', '5'),
+    ],
+)
+def test_a_value_is_stored_as_owlready2_does_and_fits_into_its_column(
+    lexical: str, datatype: str, stored: object
+) -> None:
+    axiom = DataPropertyAssertion(IRI + 'd', IRI + 'i', Literal(lexical, XSD + datatype))
+    world = written([axiom])
+    ((*_, value, _),) = (quad for quad in quads_of(world, contexts_of(world)) if len(quad) == 4)
+    assert (value, type(value)) == (stored, type(stored))
+    (found,) = (a for a in read_axioms(world, contexts_of(world)).axioms if type(a) is type(axiom))
+    assert found == axiom or (lexical, found.literal.lexical) == ('2.50', '2.5')
 
 
 def differences(world: Any) -> dict[str, set[Any]]:

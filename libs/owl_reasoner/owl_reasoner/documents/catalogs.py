@@ -21,20 +21,20 @@ class _Reader(XmlReader):
     def __init__(self, data: bytes, folder: Path) -> None:
         super().__init__(data)
         self.found: dict[str, Path] = {}
-        self._bases = [folder]
+        self._bases: list[Path | None] = [folder]
 
     def namespace(self, prefix: str | None, iri: str | None) -> None:
         """Take a namespace; only that of catalogs matters."""
 
     def start(self, name: str, attributes: dict[str, str]) -> None:
         base = self._bases[-1]
-        if (stem := _path(attributes.get(_BASE, ''))) is not None:
-            base = base / stem
+        if reference := attributes.get(_BASE):
+            base = _located(reference, base)
         self._bases.append(base)
-        if name == _NAMESPACE + 'uri' and 'name' in attributes:
-            target = _path(attributes.get('uri', ''))
+        if name == _NAMESPACE + 'uri' and 'name' in attributes and attributes.get('uri'):
+            target = _located(attributes['uri'], base)
             if target is not None:
-                self.found.setdefault(attributes['name'], base / target)
+                self.found.setdefault(attributes['name'], target)
 
     def end(self, name: str) -> None:
         self._bases.pop()
@@ -43,10 +43,15 @@ class _Reader(XmlReader):
         """Text says nothing."""
 
 
-def _path(reference: str) -> str | None:
-    """Return the path of a relative reference or a file IRI; None for anything else."""
+def _located(reference: str, base: Path | None) -> Path | None:
+    """Return where a relative reference or a file IRI leads; None where that is no file.
+
+    `base` is None where it is no folder of this machine, but one of the web.
+    """
     parts = urlsplit(reference)
-    return unquote(parts.path) if reference and parts.scheme in ('', 'file') else None
+    if parts.scheme not in ('', 'file') or (base is None and not parts.scheme):
+        return None
+    return (base or Path()) / unquote(parts.path)
 
 
 def catalog_entries(catalog: Path) -> dict[str, Path]:

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Container, Iterable, Iterator
+from decimal import Decimal
 from typing import Any, TypeAlias
 
 from owl_reasoner.documents.mapping import Mapping
@@ -68,7 +69,8 @@ def stored_value(literal: Literal) -> int | float | str:
 def lexical_form(value: object, datatype: str) -> str:
     """Return the text of a stored value."""
     if isinstance(value, float) and datatype == XSD + 'decimal':
-        return f'{value:f}'.rstrip('0').rstrip('.') if 'e' in repr(value) else repr(value)
+        # A decimal has no exponent.
+        return format(Decimal(repr(value)), 'f')
     if isinstance(value, bool):
         return 'true' if value else 'false'
     return str(value)

@@ -127,7 +127,10 @@ class Reasons:
                 return None
             proofs = [engine.proofs.find((engine.program.different, *pair)) for pair in pairs]
             parts = [self._explained(proof) for proof in proofs if proof is not None]
-            return parts[0] if len(parts) == 1 else self._joined(axiom_text(axiom), parts)
+            if len(parts) == 1:
+                return parts[0]
+            because = 'each differs from each other one'
+            return Explanation(axiom_text(axiom), 'axiom', because, tuple(parts))
         fact = engine.reader.fact_of(axiom)
         if fact is None or not fact[0].holds(fact):
             return None
