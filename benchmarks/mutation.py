@@ -491,9 +491,9 @@ class Server:
             print('fail without a fault, left out:', ', '.join(self.reach.failing), flush=True)
         for mutant in self.mutants:
             codes = changed_functions(mutant)
-            if codes is None:
-                continue
             tests = self.reach.tests(mutant.module, [mutant.line])
+            if codes is None or (not tests and run_at_import(mutant, codes)):
+                continue
             for (_, first), code in () if tests else codes.items():
                 last = max(line for *_, line in code.co_lines() if line is not None)
                 tests |= self.reach.tests(mutant.module, range(first + 1, last + 1))
@@ -711,6 +711,23 @@ def changed_functions(mutant: Mutant) -> dict[tuple[str, int], CodeType] | None:
 
     top, top_changed = (compile(each, str(mutant.path), 'exec') for each in (source, changed))
     return codes if compare(top, top_changed, True) else None
+
+
+def run_at_import(mutant: Mutant, codes: Iterable[tuple[str, int]]) -> bool:
+    """Tell whether the module names a function that a fault changes in what runs at import.
+
+    A fault in a function that only makes tables of the module is noticed by a new import alone.
+    """
+    tree = ast.parse(mutant.sources()[0])
+    functions = {node.name: node for node in tree.body if isinstance(node, ast.FunctionDef)}
+    pending: list[ast.stmt] = [node for node in tree.body if node not in functions.values()]
+    named: set[str] = set()
+    while pending:
+        for node in ast.walk(pending.pop()):
+            if isinstance(node, ast.Name) and node.id in functions and node.id not in named:
+                named.add(node.id)
+                pending.append(functions[node.id])
+    return any(name in named for name, _ in codes)
 
 
 def own(code: CodeType) -> tuple[object, ...]:
