@@ -192,6 +192,18 @@ def test_what_is_empty_says_so(hub: Hub, viewer: Viewer) -> None:
     assert not visible(viewer, '#map-section [data-without]')
 
 
+def test_each_link_of_the_head_leads_to_what_is_shown(hub: Hub, viewer: Viewer) -> None:
+    show(hub, viewer, 'begins')
+    viewer.size(*PHONE, dark=False)
+    links = viewer.js(
+        """return [...document.querySelectorAll("header nav a[href^='#']")]
+        .filter((each) => each.checkVisibility()).map((each) => each.getAttribute('href'))"""
+    )
+    assert '#map-section' in links
+    assert [each for each in links if not visible(viewer, each)] == []
+    viewer.size(*DESK, dark=False)
+
+
 def test_an_event_has_its_time_of_the_day_in_old_recordings_too(hub: Hub, viewer: Viewer) -> None:
     show(hub, viewer, 'begins')
     noon = time.mktime((2026, 1, 1, 12, 0, 0, 0, 0, -1))

@@ -33,7 +33,7 @@ export class Watching {
     if (document.hidden && Notification?.permission !== 'granted') return;
     const found = await ask('sightings', {});
     if (!found.ok) return;
-    $('watching-section').hidden = !found.watching;
+    $('watching-section').hidden = $('watching-link').hidden = !found.watching;
     const text = JSON.stringify(found);
     if (text === this.text) return;
     this.text = text;
