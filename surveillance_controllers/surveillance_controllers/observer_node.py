@@ -99,11 +99,9 @@ from surveillance_runtime.qos import SENSOR_QOS
 from surveillance_runtime.robot_arm import ARM
 from surveillance_runtime.robot_base import robot_radius
 from surveillance_runtime.stamp_offset import StampOffset
-from surveillance_runtime.stamped_readings import StampedReadings
+from surveillance_runtime.stamped_readings import SAME_TIME, OdometryStamps, StampedReadings
 from surveillance_runtime.state_topics import OwnedTopic, StateSubscription
 
-SAME_TIME = 0.02
-"""A pose belongs to the scan whose stamp is so near, seconds."""
 NEAR_TIME = 0.5
 """By the odometry, a pose tells of a scan whose stamp is so near, seconds."""
 ASSESS_PERIOD, PICTURE_PERIOD, KEEP_PERIOD = 2.0, 2.0, 20.0
@@ -313,7 +311,7 @@ class Observer(PatrolNode):
             self.get_logger().info(f'watching: {rule.words()}')
         self._scans: deque[tuple[float, Scan]] = deque(maxlen=10)
         self._poses: deque[tuple[float, PlanarPose]] = deque(maxlen=5)
-        self._odometry: deque[tuple[float, PlanarPose]] = deque(maxlen=50)
+        self._odometry = OdometryStamps[PlanarPose](50)
         self._readings = OdometryBuffer()
         self._odom_in_map: PlanarPose | None = None
         # Where base and arm stood, by stamps: on the map, by the odometry, and the joints of each
@@ -460,10 +458,9 @@ class Observer(PatrolNode):
             self._poses.append((stamp, pose))
             self._estimate = serialized
             self._standing.add(stamp or self._now(), pose)
-            for measured, odometry in self._odometry:
-                if abs(measured - stamp) <= SAME_TIME:
-                    # map <- odom = (map <- base) (base <- odom)
-                    self._odom_in_map = composed(pose, relative(odometry, (0.0, 0.0, 0.0)))
+            if (odometry := self._odometry.at(stamp)) is not None:
+                # map <- odom = (map <- base) (base <- odom)
+                self._odom_in_map = composed(pose, relative(odometry, (0.0, 0.0, 0.0)))
             self._pair()
 
     def _on_fleet(self, message: FleetRobot) -> None:
@@ -491,8 +488,7 @@ class Observer(PatrolNode):
     def _on_odometry(self, pose: PlanarPose, measured: float) -> None:
         self._odometry_standing.add(measured, pose)
         self._readings.add(measured, pose)
-        # `amcl_pose` has the node's clock, or the driver's, as who localises likes it.
-        self._odometry += [(each, pose) for each in {self._odometer.stream.stamp, measured}]
+        self._odometry.add(pose, self._odometer.stream.stamp, measured)
         self._pair()
 
     def _pair(self) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -42,7 +41,7 @@ from surveillance_runtime.qos import SENSOR_QOS
 from surveillance_runtime.robot_arm import ARM, REST_PATIENCE, Arm, Array
 from surveillance_runtime.settled_frames import SettledFrames
 from surveillance_runtime.stamp_offset import StampOffset
-from surveillance_runtime.stamped_readings import StampedReadings
+from surveillance_runtime.stamped_readings import OdometryStamps, StampedReadings
 from surveillance_runtime.state_topics import OwnedTopic, StateSubscription
 
 _POSES = {
@@ -54,8 +53,6 @@ _POSES = {
 _FAILURES = (ArmMotionError, ValueError)
 MAP = 'map'
 KEPT_ODOMETRY = 100
-SAME_TIME = 0.02
-"""A pose on the map belongs to the odometry whose stamp is so near, seconds."""
 DRIFTED = 3.0
 """Odometry alone is good for so far, metres: then two readings of one panel look like two."""
 
@@ -153,7 +150,7 @@ class ArmController(PatrolNode):
         self._read = SettledFrames(self)
         self._fused, self._fused_in = FusedPositions(), ''
         # Where the odometry began on the map, as who localises tells of the same stamps.
-        self._odometry: deque[tuple[float, np.ndarray]] = deque(maxlen=KEPT_ODOMETRY)
+        self._odometry = OdometryStamps[np.ndarray](KEPT_ODOMETRY)
         self._odom_in_map: np.ndarray | None = None
         self._doubt: tuple[float, float] | None = None
         self._map_frame = MAP
@@ -189,12 +186,8 @@ class ArmController(PatrolNode):
         self._base = frame, base
         self._driven += float(np.linalg.norm(base[:3, 3] - self._last_at))
         self._last_at = base[:3, 3]
-        stamp, measured = (
-            seconds_of(message.header.stamp),
-            self._measured(message, self._base_stamps),
-        )
-        # `amcl_pose` has the node's clock, or the driver's, as who localises likes it.
-        self._odometry += [(each, base) for each in {stamp, measured}]
+        measured = self._measured(message, self._base_stamps)
+        self._odometry.add(base, seconds_of(message.header.stamp), measured)
         self._bases.add(measured, base[:3].ravel().tolist())
 
     def _measured(self, message: JointState | Odometry, stamps: StampOffset) -> float:
@@ -211,11 +204,9 @@ class ArmController(PatrolNode):
         except ValueError as error:
             self.get_logger().warn(f'amcl_pose: {error}', throttle_duration_sec=60.0)
             return
-        stamp = seconds_of(message.header.stamp)
         self._map_frame = message.header.frame_id or MAP
-        for measured, base in self._odometry:
-            if abs(measured - stamp) <= SAME_TIME:
-                self._odom_in_map, self._doubt = on_map @ np.linalg.inv(base), doubt
+        if (base := self._odometry.at(seconds_of(message.header.stamp))) is not None:
+            self._odom_in_map, self._doubt = on_map @ np.linalg.inv(base), doubt
 
     def _fixed(self, frame: str) -> tuple[str, np.ndarray, tuple[float, float] | None]:
         """Return the frame in which markers hang still, how the odometry lies in it, its doubt.

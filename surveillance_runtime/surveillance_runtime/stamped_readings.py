@@ -12,6 +12,7 @@ import math
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Generic, TypeVar
 
 LATE = 0.5
 """A reading that is older than the one before by this much, seconds, or less came late; by more,
@@ -23,6 +24,10 @@ LONGEST_GAP = 5.0
 KEPT = 60.0
 """For so long readings are kept, seconds."""
 _MOST_RESTS = 4000
+SAME_TIME = 0.02
+"""Two stamps that are so near are of the same moment, seconds."""
+
+_Where = TypeVar('_Where')
 
 
 @dataclass
@@ -104,3 +109,28 @@ class StampedReadings:
             if not abs(apart) <= self._within:
                 return False
         return True
+
+
+class OdometryStamps(Generic[_Where]):
+    """The last odometry by its stamps, for a pose on the map that is told of the same moment.
+
+    The two together tell where the odometry's frame lies on the map. `amcl_pose` is stamped by the
+    node's clock, or by the driver's, as who localises likes it: so a reading counts under both.
+
+    Args:
+        most: So many stamps are kept.
+    """
+
+    def __init__(self, most: int) -> None:
+        self._readings: deque[tuple[float, _Where]] = deque(maxlen=most)
+
+    def add(self, where: _Where, stamp: float, measured: float) -> None:
+        """Take a reading: its own stamp, and when it was made by the node's clock, seconds."""
+        self._readings += [(each, where) for each in {stamp, measured}]
+
+    def at(self, stamp: float) -> _Where | None:
+        """Return the latest reading of a moment; None: there is none."""
+        for each, where in reversed(self._readings):
+            if abs(each - stamp) <= SAME_TIME:
+                return where
+        return None

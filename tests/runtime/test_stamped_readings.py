@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from surveillance_runtime.stamped_readings import StampedReadings
+from surveillance_runtime.stamped_readings import SAME_TIME, OdometryStamps, StampedReadings
 
 
 @pytest.fixture
@@ -86,3 +86,15 @@ def test_it_is_known_of_which_times_readings_tell_whether_it_moved_or_not(driven
     assert driven.tell_of(4.5, 8.0)
     assert driven.tell_of(19.0, 19.1)
     assert not StampedReadings().tell_of(0.0, 0.0)
+
+
+def test_odometry_belongs_to_a_pose_with_either_of_its_stamps_the_latest_first() -> None:
+    odometry = OdometryStamps[str](4)
+    odometry.add('before', 9.99, 9.99)
+    odometry.add('now', 10.0, 70.0)
+    assert odometry.at(10.0 - SAME_TIME / 4) == odometry.at(70.0) == 'now'
+    assert odometry.at(9.99 - 0.75 * SAME_TIME) == 'before'
+    assert odometry.at(10.0 + 2 * SAME_TIME) is None
+    for later in (20.0, 30.0):
+        odometry.add('later', later, later + 60.0)
+    assert odometry.at(10.0) is None
