@@ -49,7 +49,9 @@ from surveillance_ontology.event_facts import EventFact, EventOntology, Sighting
 from surveillance_ontology.patrol_ontology import LONGEST_THRESHOLD, ROBOT
 from surveillance_perception.conversions import (
     camera_from_ros,
+    doubt_from,
     image_from_ros,
+    matrix_of,
     seen_marker_from_ros,
 )
 from surveillance_perception.marker_registry import read_registry
@@ -712,11 +714,7 @@ class Observer(PatrolNode):
         if ARM.names not in self._joints:
             return None
         x, y, yaw, *joints = viewpoint
-        base = np.eye(4)
-        cosine, sine = math.cos(yaw), math.sin(yaw)
-        base[:2, :2] = [[cosine, -sine], [sine, cosine]]
-        base[:2, 3] = x, y
-        return base @ np.asarray(ARM.camera_frame(joints))
+        return matrix_of((x, y, yaw)) @ np.asarray(ARM.camera_frame(joints))
 
     def _camera_at(self, viewpoint: Viewpoint) -> _CameraAt | None:
         """Return where the camera is, and how sure that is; None: nobody says."""
@@ -724,14 +722,11 @@ class Observer(PatrolNode):
         if pose is None or self._lens is None or not self._estimate:
             return None
         estimate = deserialize_message(self._estimate, PoseWithCovarianceStamped)
-        covariance = estimate.pose.covariance.reshape(6, 6)
-        if not np.isfinite(covariance).all():
+        try:
+            doubt = doubt_from(estimate)
+        except ValueError:
             return None  # who localises does not tell how sure it is
-        # In the direction in which it is least sure: in a corridor, along it.
-        spread = float(np.linalg.eigvalsh(covariance[:2, :2])[-1]), float(covariance[5, 5])
-        deviation, turn = (
-            math.sqrt(max(each, least**2)) for each, least in zip(spread, LEAST_DOUBT, strict=True)
-        )
+        deviation, turn = map(max, doubt, LEAST_DOUBT)
         return _CameraAt(pose, self._lens, deviation, turn)
 
     async def _on_command(self, request: Any, response: Any) -> Any:

@@ -35,7 +35,7 @@ from surveillance_perception.marker_registry import MarkedPlace
 from surveillance_perception.observation.hung_markers import SeenMarker
 from surveillance_perception.stream.encodings import image_of_pixels, printable
 from surveillance_perception.stream.image_files import ImageArray, decode_image
-from surveillance_runtime.conversions import pose_from
+from surveillance_runtime.conversions import PlanarPose, pose_from
 
 if TYPE_CHECKING:  # the detector behind it takes 0.2 s to import: one node needs it
     from marker_detection.marker_stream import Sighting
@@ -315,22 +315,39 @@ def pose_on_map(
     """Return the transform (4, 4) from base_link to the map, and how sure that is.
 
     Returns:
-        The transform, and standard deviations: metres, in the direction in which it is least
-        sure, and rad.
+        The transform, and what `doubt_from` says.
 
     Raises:
         ValueError: A number is not finite, or the orientation is zero.
     """
-    x, y, yaw = pose_from(message.pose.pose)
+    return matrix_of(pose_from(message.pose.pose)), doubt_from(message)
+
+
+def matrix_of(pose: PlanarPose) -> npt.NDArray[np.float64]:
+    """Return the transform (4, 4) from the frame of a pose in the plane."""
+    x, y, yaw = pose
     cosine, sine = math.cos(yaw), math.sin(yaw)
-    pose = np.eye(4)
-    pose[:2, :2] = [[cosine, -sine], [sine, cosine]]
-    pose[:2, 3] = x, y
+    matrix = np.eye(4)
+    matrix[:2, :2] = [[cosine, -sine], [sine, cosine]]
+    matrix[:2, 3] = x, y
+    return matrix
+
+
+def doubt_from(message: PoseWithCovarianceStamped) -> tuple[float, float]:
+    """Return how sure who localises is.
+
+    Returns:
+        Standard deviations: metres, in the direction in which it is least sure (in a corridor,
+        along it), and rad.
+
+    Raises:
+        ValueError: A number is not finite: it does not tell.
+    """
     covariance = np.asarray(message.pose.covariance, float).reshape(6, 6)
     if not np.isfinite(covariance).all():
         raise ValueError('the covariance must be finite')
     along = float(np.linalg.eigvalsh(covariance[:2, :2])[-1])
-    return pose, (math.sqrt(max(0.0, along)), math.sqrt(max(0.0, float(covariance[5, 5]))))
+    return math.sqrt(max(0.0, along)), math.sqrt(max(0.0, float(covariance[5, 5])))
 
 
 def marked_place_to_ros(place: MarkedPlace, response: RoomInformation.Response) -> None:
