@@ -102,9 +102,7 @@ class WatchRule:
 
     def broken_by(self, seen: Observation, moment: datetime) -> bool:
         """Tell whether an observation is otherwise than this rule wants, at a local time."""
-        if seen.kind != self.kind or (self.subject and seen.subject != self.subject):
-            return False
-        if self.places and seen.place not in self.places:
+        if seen.kind != self.kind or not self.is_about(seen.subject, seen.place):
             return False
         if seen.confidence < self.confidence or seen.state == self.wanted:
             return False
