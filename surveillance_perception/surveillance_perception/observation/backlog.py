@@ -86,9 +86,9 @@ FEWEST = 5
 """So many of a source must have come, over half that time, before it is judged."""
 MUCH = 0.5
 """What costs such a part of a source is worth a word; less than half of that ends it."""
-
-SILENT = 20.0
-"""Seconds without any of a source that is there, after which that is told."""
+SILENT, STEADILY = 20.0, 1.0
+"""Seconds without any of a source that is there, after which that is told; and it is over when one
+came within the last second: one that comes now and then does not begin and end it each time."""
 
 NONE_CAME = 'none came'
 DROPPED = 'dropped'
@@ -97,7 +97,7 @@ UNREAD = 'unread'
 LATE = 'late'
 
 WORDS: Mapping[tuple[str, str], str] = {
-    ('pictures', NONE_CAME): 'came for 20 s or longer, although there is a camera',
+    ('pictures', NONE_CAME): f'came for {SILENT:g} s or longer, although there is a camera',
     ('pictures', DROPPED): 'were left out: this machine is too busy to look at them',
     ('pictures', NO_POSE): (
         'count for little: nobody told where the camera was when they were taken '
@@ -159,7 +159,7 @@ class LostSight:
             now = self._now()
             for source, since in self._since.items():
                 key = source, NONE_CAME
-                if now - since >= (1.0 if key in self._said else SILENT):
+                if now - since >= (STEADILY if key in self._said else SILENT):
                     found[key] = f'no {source} {WORDS[key]}'
             for source, taken in self._taken.items():
                 while taken and now - taken[0].at > WINDOW:
