@@ -675,8 +675,8 @@ class Observer(PatrolNode):
         """
         standing = self._odometry_standing or self._standing
         return not self._poses or (
-            standing.tell_of(first, last)
-            and all(each.tell_of(first, last) for each in self._joints_of_camera())
+            standing.covers(first, last)
+            and all(each.covers(first, last) for each in self._joints_of_camera())
         )
 
     def _viewpoint(self, first: float, last: float) -> Viewpoint | None:

@@ -87,7 +87,7 @@ class StampedReadings:
                 return rest.at if rest.first < rest.last and last <= known else None
         return None
 
-    def tell_of(self, first: float, last: float) -> bool:
+    def covers(self, first: float, last: float) -> bool:
         """Tell whether readings cover a time, from one stamp to another, in motion or at rest."""
         if not self._rests or last > self._rests[-1].last + AHEAD:
             return False

@@ -77,15 +77,15 @@ def test_readings_of_a_drive_of_hours_are_bounded():
 
 
 def test_it_is_known_of_which_times_readings_tell_whether_it_moved_or_not(driven):
-    assert driven.tell_of(3.0, 3.0)
-    assert driven.tell_of(1.5, 9.1)
-    assert not driven.tell_of(-1.0, 1.0)
-    assert not driven.tell_of(8.0, 9.5)
+    assert driven.covers(3.0, 3.0)
+    assert driven.covers(1.5, 9.1)
+    assert not driven.covers(-1.0, 1.0)
+    assert not driven.covers(8.0, 9.5)
     driven.add(19.0, (1.0, 0.0, 0.0))
-    assert not driven.tell_of(8.0, 18.0)
-    assert driven.tell_of(4.5, 8.0)
-    assert driven.tell_of(19.0, 19.1)
-    assert not StampedReadings().tell_of(0.0, 0.0)
+    assert not driven.covers(8.0, 18.0)
+    assert driven.covers(4.5, 8.0)
+    assert driven.covers(19.0, 19.1)
+    assert not StampedReadings().covers(0.0, 0.0)
 
 
 def test_odometry_belongs_to_a_pose_with_either_of_its_stamps_the_latest_first() -> None:
