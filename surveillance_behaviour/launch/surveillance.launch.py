@@ -117,6 +117,7 @@ def _nodes_of(part: TeamPart, given: Mapping[str, str], config: Path, folder: Pa
             behaviour,
             place=at,
             robot=robot,
+            watched=bool(given['watch']),
             chosen=part.entries,
             files=[Path(given['params'])] if given['params'] else [],
             options=[

@@ -22,6 +22,7 @@ from surveillance_runtime.configuration import Configuration, file_layer
 from surveillance_runtime.files import FileError
 from surveillance_runtime.node_table import BEHAVIOURS, MODES, find, select
 from surveillance_runtime.parameters import ParameterError
+from surveillance_runtime.run_parameters import WATCHED_STAY
 from tests.launch_stand_ins import Argument, Configured
 from tests.launcher.conftest import ROOT
 
@@ -113,6 +114,14 @@ def test_the_users_place_parameters_record_and_namespace_reach_the_nodes(start, 
     assert by_name['mission_recorder']['folder'] == str(tmp_path / 'it' / 'recording')
     assert 33 in [values.get('urgency_threshold') for values in by_name.values()]
     assert 'office.yaml' in Path(nodes[1].parameters[0]).read_text()
+
+
+def test_a_robot_that_watches_stays_as_long_as_with_launch_py(start, tmp_path):
+    rules = tmp_path / 'watch.yaml'
+    nodes = {node.name: settings(node) for node in start(watch=str(rules))}
+    merged = configuration(ROOT / 'config', Run(watch=rules))
+    stay = merged.resolve('robot_behavior')['exploration_seconds'].value
+    assert nodes['robot_behavior']['exploration_seconds'] == stay == WATCHED_STAY
 
 
 @pytest.mark.parametrize(
