@@ -95,6 +95,7 @@ def test_a_state_that_heeds_a_preempt_is_not_asked_again():
             self.begun.release()
             self.wait(60.0)
             self.service_preempt()
+            self.begun.release()
             cleaned.append(self.wait(5.0))
             return 'preempted'
 
@@ -105,8 +106,7 @@ def test_a_state_that_heeds_a_preempt_is_not_asked_again():
     began(state)
     clock.until_sleeping()
     root.request_preempt()
-    while state.preempt_requested() or not clock._sleepers:
-        pass
+    began(state)  # to clean up
     clock.until_sleeping()
     for machine in machines:
         machine.request_preempt()
@@ -120,11 +120,12 @@ def test_a_state_that_heeds_a_preempt_is_not_asked_again():
 @pytest.mark.parametrize('by_deadline', [False, True])
 def test_nothing_is_asked_of_a_container_after_it_was_left_behind(by_deadline):
     """Its next execution is not preempted by the request that the first one ignored."""
-    deaf = Deaf(['done'])
+    clock, deaf = FakeClock(), Deaf(['done'])
     inner = fsm.StateMachine(['done', 'preempted'])
     inner.userdata.key = 0
     inner.add_state('DEAF', deaf)
     root = fsm.StateMachine(['done', 'preempted', 'late'])
+    root.set_clock(clock)
     if by_deadline:
         root.add_state('INNER', inner, {'timeout': 'late'}, deadline=0.05)
     else:
@@ -133,7 +134,10 @@ def test_nothing_is_asked_of_a_container_after_it_was_left_behind(by_deadline):
     run = Background(root)
     began(deaf)
     inner.request_preempt()
-    if not by_deadline:
+    if by_deadline:
+        clock.until_sleeping()
+        clock.advance(0.05)
+    else:
         root.request_preempt()
     assert run.result() == ('late' if by_deadline else 'preempted')
     assert not inner.preempt_requested()
