@@ -142,9 +142,9 @@ class Classification:
                 if isinstance(only, PredicateAtom) and head.predicate.kind == 'class':
                     # A domain or range holds of all whom the property relates, not of those alone
                     # that it relates to themselves or to a certain individual.
-                    apart = {term for term in only.terms if isinstance(term, int)}
-                    at = only.terms.index(y) if y in apart else -1
-                    if len(apart) == len(only.terms) and (only.predicate, at) in places:
+                    variables = {term for term in only.terms if isinstance(term, int)}
+                    at = only.terms.index(y) if y in variables else -1
+                    if len(variables) == len(only.terms) and (only.predicate, at) in places:
                         found.add(head.predicate)
         return found - {program.thing}
 
