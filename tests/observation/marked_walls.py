@@ -31,15 +31,25 @@ def bare() -> np.ndarray:
     return np.asarray(np.clip(noise, 0, 255), np.uint8)
 
 
+def camera_pose(
+    x: float, y: float, yaw: float, height: float = 1.0, pitch: float = 0.0
+) -> np.ndarray:
+    """Return the pose (4, 4) of a camera that looks along the floor, or downwards by a pitch."""
+    cosine, sine = np.cos(yaw), np.sin(yaw)
+    turn = np.array([[cosine, -sine, 0], [sine, cosine, 0], [0, 0, 1]])
+    cosine, sine = np.cos(pitch), np.sin(pitch)
+    tilt = np.array([[cosine, 0, sine], [0, 1, 0], [-sine, 0, cosine]])
+    pose = np.eye(4)
+    pose[:3, :3] = turn @ tilt @ _OPTICAL
+    pose[:3, 3] = x, y, height
+    return pose
+
+
 def camera(
     y: float = 0.0, yaw: float = 0.0, deviation: float = 0.02, turn: float = 0.01
 ) -> CameraView:
     """Return a camera that stands somewhere along the wall, or says that it does."""
-    pose = np.eye(4)
-    cosine, sine = np.cos(yaw), np.sin(yaw)
-    pose[:3, :3] = np.array([[cosine, -sine, 0], [sine, cosine, 0], [0, 0, 1]]) @ _OPTICAL
-    pose[:3, 3] = 0.0, y, 1.0
-    return CameraView(pose, _MATRIX, deviation, turn)
+    return CameraView(camera_pose(0.0, y, yaw), _MATRIX, deviation, turn)
 
 
 def seen_at(number: int, left: float, top: float) -> SeenMarker:

@@ -28,6 +28,8 @@ from surveillance_perception.observation.watch_rules import (
 from surveillance_perception.observation.ways import BlockedWay, Ways
 from surveillance_runtime.place.occupancy_grid import Grid
 
+from .marked_walls import camera_pose
+
 THING = Observation(Kind.OBJECT, 'appeared', 'R1', position=(1.0, 2.0), confidence=0.8, stamp=100.0)
 WALKER = Observation(Kind.PERSON, 'seen', 'R1', position=(1.0, 2.0), confidence=0.8, stamp=100.0)
 NOON = datetime(2026, 11, 25, 12, 0)  # a Wednesday
@@ -394,14 +396,9 @@ def test_what_is_met_at_another_robot_is_that_robot_for_three_seconds() -> None:
 LENS = np.array([[200.0, 0.0, 160.0], [0.0, 200.0, 120.0], [0.0, 0.0, 1.0]])
 
 
-def view(height: float = 1.0, pitch: float = 0.0) -> CameraView:
-    """Return a camera at (1, 1) that looks along x."""
-    forward = np.array([math.cos(pitch), 0.0, math.sin(pitch)])
-    right = np.array([0.0, -1.0, 0.0])
-    pose = np.eye(4)
-    pose[:3, 0], pose[:3, 1], pose[:3, 2] = right, np.cross(forward, right), forward
-    pose[:3, 3] = 1.0, 1.0, height
-    return CameraView(pose, LENS, 0.02, 0.01)
+def view(pitch: float = 0.0) -> CameraView:
+    """Return a camera at (1, 1) that looks along x, or downwards by a pitch."""
+    return CameraView(camera_pose(1.0, 1.0, 0.0, pitch=pitch), LENS, 0.02, 0.01)
 
 
 def box_of(distance: float, y: float, foot: float = 0.0, head: float = 1.7) -> tuple[int, ...]:
@@ -431,7 +428,7 @@ def test_a_person_stands_where_the_lidar_meets_what_is_as_tall() -> None:
     assert person_at(thing(5.0, 0.5), box) is None, 'aside'
     assert person_at(thing(5.0, 1.5, 1), box) is None, 'one end is nothing'
     assert person_at(np.zeros((0, 2)), box) is None
-    assert person_at(thing(5.0, 1.5), box, pitch=-1.5) is None, 'it looks down'
+    assert person_at(thing(5.0, 1.5), box, pitch=1.5) is None, 'it looks down'
 
 
 def test_two_that_stand_apart_are_two_and_the_nearer_counts() -> None:

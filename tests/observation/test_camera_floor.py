@@ -11,21 +11,16 @@ from surveillance_perception.observation.camera_floor import CameraFloor
 from surveillance_perception.observation.hung_markers import CameraView
 from surveillance_runtime.place.occupancy_grid import Grid
 
+from .marked_walls import camera_pose
+
 SIZE = 240, 320
 LENS = np.array([[277.0, 0.0, 160.0], [0.0, 277.0, 120.0], [0.0, 0.0, 1.0]])
 """A field of view of 60 degrees."""
 
 
-def camera(x: float, y: float, yaw: float, height: float = 1.0, pitch: float = 0.0) -> CameraView:
+def camera(x: float, y: float, yaw: float, pitch: float = 0.0) -> CameraView:
     """Return a camera that looks along the floor, or downwards by a pitch, rad."""
-    ahead = np.array(
-        [math.cos(pitch) * math.cos(yaw), math.cos(pitch) * math.sin(yaw), -math.sin(pitch)]
-    )
-    right = np.array([math.sin(yaw), -math.cos(yaw), 0.0])
-    pose = np.eye(4)
-    pose[:3, :3] = np.stack([right, np.cross(ahead, right), ahead], axis=1)
-    pose[:3, 3] = x, y, height
-    return CameraView(pose, LENS, 0.02, 0.01)
+    return CameraView(camera_pose(x, y, yaw, pitch=pitch), LENS, 0.02, 0.01)
 
 
 def hall() -> Grid:

@@ -26,7 +26,7 @@ from surveillance_perception.observation.watcher import Look, Watcher
 from surveillance_perception.observation.ways import Ways
 from surveillance_runtime.place.occupancy_grid import Grid
 
-from .marked_walls import camera, hang, seen_at, wall
+from .marked_walls import camera, camera_pose, hang, seen_at, wall
 
 RULES = """
 - object: none
@@ -809,11 +809,8 @@ def test_a_covered_camera_is_told_once():
 
 def looks_ahead(at: tuple[float, float], yaw: float) -> CameraView:
     """Return a camera of 80 degrees that looks along the floor."""
-    ahead, right = [math.cos(yaw), math.sin(yaw), 0], [math.sin(yaw), -math.cos(yaw), 0]
-    pose = np.eye(4)
-    pose[:3, :3] = np.stack([right, [0, 0, -1], ahead], axis=1)
-    pose[:3, 3] = *at, 1.0
-    return CameraView(pose, np.array([[190.0, 0, 160], [0, 190.0, 120], [0, 0, 1]]), 0.02, 0.01)
+    lens = np.array([[190.0, 0, 160], [0, 190.0, 120], [0, 0, 1]])
+    return CameraView(camera_pose(*at, yaw), lens, 0.02, 0.01)
 
 
 def stay(watch: Round, picture: np.ndarray, sides: int, *, is_posed: bool = True) -> None:
@@ -827,7 +824,7 @@ def stay(watch: Round, picture: np.ndarray, sides: int, *, is_posed: bool = True
     watch.watcher.arrive('', watch.time)
 
 
-DARK_WITH_A_LIT_DOORWAY = np.where(np.arange(320) % 320 < 80, texture()[:240, :320], 3)
+DARK_WITH_A_LIT_DOORWAY = np.where(np.arange(320) < 80, texture()[:240, :320], 3)
 
 
 @pytest.mark.parametrize(
