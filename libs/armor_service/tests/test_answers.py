@@ -165,7 +165,7 @@ def test_what_is_quick_is_done_at_once_and_all_else_is_left(
     with ref.lock:
         thread = threading.Thread(target=lambda: found.append(at_once(request('QUERY IND', 'R1'))))
         thread.start()
-        thread.join()
+        thread.join(60.0)
     assert found == [None], 'it would have to wait'
     ref.opened = False
     assert at_once(request('QUERY IND', 'R1')) is None

@@ -15,6 +15,11 @@ from armor_service.protocol import StoreError
 from armor_service.store import Journal
 
 
+def full(*_: object) -> None:
+    """Stand for a call that finds the disk full."""
+    raise OSError(28, 'No space left on device')
+
+
 def reopened(directory: Path) -> list[object]:
     journal = Journal(directory)
     try:
@@ -145,9 +150,6 @@ def test_only_one_process_at_a_time(tmp_path: Path) -> None:
 def test_a_write_that_fails_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     journal = Journal(tmp_path)
     journal.append([1])
-
-    def full(_: int) -> None:
-        raise OSError(28, 'No space left on device')
 
     with monkeypatch.context() as patch:
         patch.setattr(os, 'fdatasync', full)
@@ -376,9 +378,6 @@ def test_damage_that_cannot_be_put_aside_is_told_and_costs_no_more(
     with (tmp_path / 'journal-0.log').open('ab') as file:
         file.write(b'no record\n')
 
-    def full(*_: object) -> None:
-        raise OSError(28, 'No space left on device')
-
     with monkeypatch.context() as patch:
         patch.setattr(shutil, 'copyfile', full)
         journal = Journal(tmp_path)
@@ -403,9 +402,6 @@ def test_a_snapshot_that_cannot_be_written_leaves_the_journal(
 ) -> None:
     journal = Journal(tmp_path)
     journal.append([1])
-
-    def full(*_: object) -> None:
-        raise OSError(28, 'No space left on device')
 
     with monkeypatch.context() as patch:
         patch.setattr(os, 'fsync', full)
