@@ -56,18 +56,18 @@ from surveillance_perception.conversions import (
 )
 from surveillance_perception.marker_registry import read_registry
 from surveillance_perception.observation.answers import answered
-from surveillance_perception.observation.backlog import (
-    DROPPED,
-    LATE,
-    NO_POSE,
-    UNREAD,
-    Backlog,
-    LostSight,
-)
+from surveillance_perception.observation.backlog import Backlog
 from surveillance_perception.observation.day_book import DayBook
 from surveillance_perception.observation.events import Event, EventBook, EventState
 from surveillance_perception.observation.evidence import EvidenceStore
 from surveillance_perception.observation.hung_markers import CameraView, SeenMarker
+from surveillance_perception.observation.lost_sight import (
+    DROPPED,
+    LATE,
+    NO_POSE,
+    UNREAD,
+    LostSight,
+)
 from surveillance_perception.observation.marker_checks import MarkerChecks
 from surveillance_perception.observation.observations import Kind, Observation
 from surveillance_perception.observation.other_robots import OtherRobots
@@ -883,8 +883,10 @@ class Observer(PatrolNode):
             self._complain(self._kept.write(state))
 
     def _restore(self, kept: Mapping[str, Any]) -> None:
+        days = DayBook(datetime.fromtimestamp)
+        days.restore(kept['days'])
         self._watcher.restore(kept)
-        self._days.restore(kept.get('days', {}))
+        self._days = days
 
     def _on_observation(self, seen: Observation) -> None:
         self._days.take(seen)

@@ -117,6 +117,8 @@ def replace_text(path: Path, text: str) -> None:
 class KeptFile:
     """A small JSON object that a node keeps for whoever comes after it.
 
+    A file that could not be read is kept aside, as `NAME.unread`, before another is written.
+
     Args:
         path: The file; empty: nothing is kept.
         loss: Ends each line about a file that cannot be read: what that means.
@@ -129,6 +131,7 @@ class KeptFile:
         self._path = Path(os.path.expanduser(path)) if path else None
         self._loss = loss
         self._written = ''
+        self._is_unread = False
 
     @classmethod
     def of_record(cls, record: str, ending: str) -> KeptFile:
@@ -155,24 +158,44 @@ class KeptFile:
             found = read_json(self._path, self.LARGEST) if self._path is not None else None
             if found is not None:
                 take(found)
+            return ''
         except FileError as error:
-            return f'{error}; {self._loss}'
+            problem = str(error)
         except KeyError as error:
-            return f'{self._path}: expected {error} in it; {self._loss}'
+            problem = f'{self._path}: expected {error} in it'
         except (ValueError, IndexError, TypeError, AttributeError) as error:
-            return f'{self._path}: does not fit: {error}; {self._loss}'
-        return ''
+            problem = f'{self._path}: does not fit: {error}'
+        self._is_unread = True
+        return f'{problem}; {self._loss}'
 
     def write(self, content: Mapping[str, Any]) -> str:
         """Write the file in one piece if that changes it; return why it is not written, or ''."""
         text = json.dumps(content) + '\n'
         if self._path is not None and text != self._written:
             try:
+                if self._is_unread:
+                    keep_aside(self._path)
+                    self._is_unread = False
                 replace_text(self._path, text)
             except OSError as error:
                 return in_one_line(error)
             self._written = text
         return ''
+
+
+def keep_aside(path: Path) -> None:
+    """Call a file `NAME.unread`, or the first of `.unread2`, `.unread3` ... that there is not.
+
+    Args:
+        path: The file, or a link to it, which stays. What is no regular file stays, too.
+
+    Raises:
+        OSError: It cannot be renamed.
+    """
+    file = path.resolve()
+    if file.is_file():
+        names = (file.with_name(f'{file.name}.unread{each}') for each in ('', *range(2, 1000)))
+        file.rename(next(name for name in names if not os.path.lexists(name)))
 
 
 class LineFile:

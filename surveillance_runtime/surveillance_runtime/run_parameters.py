@@ -62,9 +62,9 @@ def run_layers(
     config: Path,
     behaviour: str,
     *,
+    watched: bool,
     place: Path | None = None,
     robot: ProfileFile | None = None,
-    watched: bool = False,
     chosen: Iterable[Entry] = (),
     files: Iterable[Path] = (),
     options: Iterable[Entry] = (),
@@ -74,9 +74,9 @@ def run_layers(
     Args:
         config: The folder with `parameters.yaml` and the places.
         behaviour: One of `node_table.BEHAVIOURS`.
+        watched: Whether the robot looks at the rooms.
         place: The file of the place, None for the behaviour's own.
         robot: The robot's profile; None: the nodes' defaults, which are the built-in robot.
-        watched: Whether the robot looks at the rooms.
         chosen: What the run chooses where the user says nothing, as the folders that it writes to.
         files: The user's parameter files; a later one wins.
         options: What options say as parameters.

@@ -29,8 +29,8 @@ from surveillance_interfaces.msg import (
     RobotPlace,
 )
 from surveillance_interfaces.srv import ConsoleCommand
-from surveillance_perception.observation.backlog import LostSight
 from surveillance_perception.observation.hung_markers import HungSpot
+from surveillance_perception.observation.lost_sight import LostSight
 from surveillance_runtime.conversions import map_from
 from surveillance_runtime.incidents import Cause
 from surveillance_runtime.node import PatrolNode

@@ -132,11 +132,11 @@ def test_the_users_file_comes_after_the_projects_and_the_launchers_own_last(tmp_
     own = tmp_path / 'own.yaml'
     own.write_text('/**: {ros__parameters: {}}')
     place = CONFIG / 'office.yaml'
-    layers = run_layers(CONFIG, 'surveillance', place=place, files=[own])
+    layers = run_layers(CONFIG, 'surveillance', watched=False, place=place, files=[own])
     sources = [Path(layer.source).name for layer in layers]
     assert sources == ['parameters.yaml', 'office.yaml', 'this run', 'own.yaml', 'options']
     robot = read_profile(CONFIG / 'robots' / 'turtlebot4.yaml')
-    layers = run_layers(CONFIG, 'surveillance', place=place, robot=robot)
+    layers = run_layers(CONFIG, 'surveillance', watched=False, place=place, robot=robot)
     assert [Path(layer.source).name for layer in layers][1:3] == ['turtlebot4.yaml', 'office.yaml']
 
 

@@ -169,6 +169,10 @@ def test_it_outlives_a_restart_and_refuses_what_is_none(hung):
     with pytest.raises((ValueError, TypeError)):
         again.restore(kept)
     assert again.position_of(14) is not None
+    for other in ({'14': kept['spots']['14']}, {'spots': {}}, {'spots': [], 'accepted': 3}):
+        with pytest.raises((KeyError, TypeError)):
+            again.restore(other)
+    assert again.position_of(14) is not None
 
 
 @pytest.mark.parametrize('at', [(0.0, 2.0, 1.0), (-2.0, 0.0, 1.0)])

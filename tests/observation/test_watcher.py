@@ -7,6 +7,7 @@ import math
 from datetime import UTC, datetime
 from functools import lru_cache
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -944,6 +945,37 @@ def test_evidence_keeps_the_most_severe_and_newest_within_its_bound(tmp_path: Pa
     assert names[0] not in left
     assert sum(each.stat().st_size for each in tmp_path.iterdir()) <= 40_000
     assert EvidenceStore(tmp_path).total == store.total
+
+
+@pytest.mark.parametrize(
+    ('name', 'value', 'words'),
+    [
+        ('look', None, 'int'),
+        ('normal', {'shape': [2, 2], 'occupied': 'eA==', 'free': 'eA=='}, 'a layer of the map'),
+        ('doubts', {'x': 1.0}, 'x'),
+        ('hung', {'14': {}}, 'accepted'),
+        ('views', {'next': 1}, 'views'),
+        ('habits', {'door D1': [1.0]}, 'a periodic model of 1 numbers'),
+        ('book', {'events': []}, 'normal'),
+    ],
+)
+def test_a_state_of_which_a_part_does_not_fit_is_refused_and_nothing_of_it_taken(
+    tmp_path: Path, name: str, value: Any, words: str
+):
+    watch = Round(views=tmp_path)
+    watch.visit('R1', HERE)
+    watch.visit('R1', HERE, boxes=[(1.5, 1.5, 0.15)])
+    watch.watcher.picture(texture(), (1.0, 1.0, 0.5), 1.0, None)
+    state = json.loads(json.dumps(watch.watcher.state()))
+    again = Round(views=tmp_path)
+    begun = again.watcher.state()
+    with pytest.raises((ValueError, KeyError, TypeError), match=words):
+        again.watcher.restore({**state, name: value})
+    with pytest.raises(KeyError, match=name):
+        again.watcher.restore({key: each for key, each in state.items() if key != name})
+    assert again.watcher.state() == begun
+    again.watcher.restore(state)
+    assert json.loads(json.dumps(again.watcher.state())) == state
 
 
 @pytest.mark.parametrize('spot', [(1000.0, 2.0), (-1000.0, -1000.0)])

@@ -202,6 +202,31 @@ def test_a_kept_file_that_is_damaged_is_one_line(tmp_path: Path, content: str, w
     assert taken == []
 
 
+def test_a_kept_file_that_cannot_be_read_is_kept_aside_at_a_write(
+    tmp_path: Path,
+) -> None:
+    path = tmp_path / 'kept.json'
+    (tmp_path / 'link.json').symlink_to(path)
+    for content in ('one', 'two', 'three'):
+        path.write_text(content)
+        kept = KeptFile(str(tmp_path / 'link.json'), 'starting without it')
+        assert kept.read(lambda found: None)
+        assert path.read_text() == content, 'nothing is moved that is not replaced'
+        assert [kept.write({'level': level}) for level in (7, 8)] == ['', '']
+    assert {each.name: each.read_text().strip() for each in tmp_path.iterdir()} == {
+        'kept.json': '{"level": 8}',
+        'link.json': '{"level": 8}',
+        'kept.json.unread': 'one',
+        'kept.json.unread2': 'two',
+        'kept.json.unread3': 'three',
+    }
+    assert (tmp_path / 'link.json').is_symlink()
+    kept = KeptFile(str(path))
+    assert kept.read(lambda found: None) == ''
+    assert kept.write({'level': 9}) == ''
+    assert len(list(tmp_path.iterdir())) == 5, 'one that was read is replaced'
+
+
 def test_what_is_kept_is_found_and_a_file_that_cannot_be_written_is_told(tmp_path: Path) -> None:
     taken: list[int] = []
     assert KeptFile.of_record(str(tmp_path / 'new' / 'm.jsonl'), '.level').write({'level': 7}) == ''

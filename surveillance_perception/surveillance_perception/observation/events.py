@@ -284,7 +284,7 @@ class EventBook:
         events = [Event.from_json(each) for each in values['events']]
         normal = [Observation.from_json(each) for each in values['normal']]
         following = int(values['next'])
-        quiet = {int(each) for each in values.get('quiet', ())}
+        quiet = {int(each) for each in values['quiet']}
         self._events = {each.number: each for each in events}
         self._normal, self._next = {}, following
         for each in normal:

@@ -94,9 +94,11 @@ class PeriodicState:
         Raises:
             ValueError, TypeError: It is something else.
         """
-        count, first, last, total, *sums = map(float, numbers)
-        if len(sums) != 4 * len(HARMONICS) or not all(map(math.isfinite, (first, last, *sums))):
+        if len(numbers) != 4 + 4 * len(HARMONICS):
             raise ValueError(f'a periodic model of {len(numbers)} numbers')
+        count, first, last, total, *sums = map(float, numbers)
+        if not all(map(math.isfinite, (count, first, last, total, *sums))):
+            raise ValueError('a periodic model of numbers that are not finite')
         waves = [complex(*pair) for pair in zip(sums[::2], sums[1::2], strict=True)]
         half = len(HARMONICS)
         return cls(int(count), first, last, total, waves[:half], waves[half:])

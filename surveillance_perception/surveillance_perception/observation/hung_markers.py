@@ -583,11 +583,11 @@ class HungMarkers:
             ValueError, KeyError, TypeError: It is something else; nothing is changed then.
         """
         found, accepted = {}, set()
-        for number, where in values.get('accepted', {}).items():
+        for number, where in dict(values['accepted']).items():
             given = self._given.get(int(number))
             if given is not None and np.allclose(given, _array(where, 3)):
                 accepted.add(int(number))
-        for number, each in values.get('spots', {}).items():
+        for number, each in dict(values['spots']).items():
             found[int(number)] = _Spot(
                 float(each['side']),
                 _array(each['position'], 3),

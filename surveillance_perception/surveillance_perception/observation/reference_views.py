@@ -186,9 +186,7 @@ class ReferenceViews:
             if picture is not None:
                 viewpoint = tuple(map(float, each['viewpoint']))
                 view = ReferenceView(name, viewpoint, picture, float(each['stamp']))
-                view.doors = {
-                    str(door): str(is_) for door, is_ in dict(each.get('doors', ())).items()
-                }
+                view.doors = {str(door): str(is_) for door, is_ in dict(each['doors']).items()}
                 found.append(view)
         following = int(values['next'])
         self._views, self._next = found, following

@@ -8,6 +8,7 @@ rules say what of it matters. A thing must be seen in two assessments before it 
 from __future__ import annotations
 
 import base64
+import contextlib
 import math
 import zlib
 from collections import deque
@@ -985,14 +986,23 @@ class Watcher:
         """Take what `state` gave.
 
         Raises:
-            ValueError, KeyError, TypeError: It is something else.
+            ValueError, KeyError, TypeError: It is something else; nothing is changed then.
         """
         look, normal = int(kept['look']), dict(kept['normal'])
-        doubts = {int(each): float(until) for each, until in kept.get('doubts', {}).items()}
-        self._markers.restore(kept.get('hung', {}))
-        self._views.restore(kept.get('views', {'views': [], 'next': 1}))
-        self._habits.restore(kept.get('habits', {}))
-        self.book.restore(kept['book'])
+        doubts = {int(each): float(until) for each, until in dict(kept['doubts']).items()}
+        if normal:
+            _masks(normal)
+        with contextlib.ExitStack() as undo:
+            # A part that does not fit gives back what the parts before it had.
+            for part, name in (
+                (self._markers, 'hung'),
+                (self._views, 'views'),
+                (self._habits, 'habits'),
+                (self.book, 'book'),
+            ):
+                undo.callback(part.restore, part.to_json())
+                part.restore(kept[name])
+            undo.pop_all()
         self._look, self._kept, self._doubts = look, normal, doubts
         if self._grid is not None and normal:
             self._normal = _unpacked(normal, self._grid)
@@ -1035,11 +1045,26 @@ def _unpacked(values: Mapping[str, Any], grid: Grid) -> FloorView | None:
         list(grid.origin),
     ):
         return None
+    occupied, free = _masks(values)
+    return FloorView(grid, occupied, free, np.zeros_like(free))
+
+
+def _masks(values: Mapping[str, Any]) -> tuple[Mask, Mask]:
+    """Return which cells of a packed layer are occupied and which are free.
+
+    Raises:
+        ValueError, KeyError, TypeError: It is something else.
+    """
+    rows, columns = map(int, values['shape'])
 
     def mask(text: str) -> Mask:
-        data = np.frombuffer(zlib.decompress(base64.b64decode(text)), np.uint8)
-        cells = np.unpackbits(data, count=grid.cells.size).reshape(grid.cells.shape)
-        return np.asarray(cells, np.bool_)
+        try:
+            data = zlib.decompress(base64.b64decode(text))
+        except zlib.error as error:
+            raise ValueError(f'a layer of the map: {error}') from None
+        cells = np.unpackbits(np.frombuffer(data, np.uint8), count=rows * columns)
+        if len(data) != -(-rows * columns // 8):
+            raise ValueError(f'a layer of the map of {len(data)} bytes, not {rows} by {columns}')
+        return np.asarray(cells.reshape(rows, columns), np.bool_)
 
-    occupied, free = mask(values['occupied']), mask(values['free'])
-    return FloorView(grid, occupied, free, np.zeros_like(free))
+    return mask(values['occupied']), mask(values['free'])
