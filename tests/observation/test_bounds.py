@@ -307,8 +307,14 @@ def test_the_model_of_a_week_is_the_mean_and_the_strongest_waves() -> None:
         assert state.probability(stamp) == pytest.approx(min(0.98, max(0.02, expected)), abs=1e-6)
     again = PeriodicState.from_json(state.to_json())
     assert again == state
-    for wrong in (state.to_json()[:-1], [*state.to_json()[:-1], math.nan]):
-        with pytest.raises(ValueError, match=r'a periodic model of (115 numbers|numbers that are not finite)'):
+    numbers = state.to_json()
+    for wrong, words in (
+        (numbers[:-1], 'a periodic model of 115 numbers'),
+        ([*numbers, 0.0], 'a periodic model of 117 numbers'),
+        ([*numbers[:-1], math.nan], 'numbers that are not finite'),
+        ([math.inf, *numbers[1:]], 'numbers that are not finite'),
+    ):
+        with pytest.raises(ValueError, match=words):
             PeriodicState.from_json(wrong)
 
 
