@@ -270,6 +270,8 @@ class Localiser:
         if winner is not None:
             self.jumps += 1
             corrected, agreement = winner
+            # Also where it does not explain enough to be sure of.
+            self.pose = corrected
         self._judge(corrected, agreement, thin, now)
         return True
 
@@ -320,9 +322,9 @@ class Localiser:
         if best is None:
             return None
         winner, explained = best
+        self._rivals.remove(winner)
         for rival in self._rivals:
             rival.lead -= winner.lead
-        self._rivals.remove(winner)
         self._rivals.append(_Rival(present, -winner.lead))
         return winner.pose, explained
 
