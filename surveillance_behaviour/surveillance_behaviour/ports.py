@@ -216,11 +216,13 @@ class Check:
         name: Names it in the record, `marker 21`.
         point: Where it is.
         look_from: From where it is to be seen well; None: from the place's own point.
+        is_open: Whether it was looked at, and what that means is not settled.
     """
 
     name: str
     point: Point
     look_from: Point | None = None
+    is_open: bool = False
 
 
 class Looking(Protocol):

@@ -483,3 +483,36 @@ def test_at_a_check_the_robot_stands_until_enough_pictures_were_looked_at(period
     run.until(200.0)
     first, following = faced[0], faced[1]
     assert following - 2.0 - first == pytest.approx(stands, abs=0.51)
+
+
+def test_a_check_that_is_not_settled_comes_first_three_times_and_then_takes_its_turn():
+    run = Watched('surveillance', exploration_seconds=12.0)
+    run.looking.arm = True
+    below, above = (0.0, -2.0, 0.0), (20.0, 18.0, 0.0)
+    run.looking.asked = {'C1': [Check('marker 21', below), Check('marker 22', above, is_open=True)]}
+    run.until(900.0)
+    order = [side for where, side in run.looking.sides if where == 'C1' and side in (45, 225)]
+    assert order[:7] == [45, 45, 45, 225, 45, 225, 45]
+
+
+def test_at_a_check_the_robot_stands_until_it_is_settled():
+    run = Watched('surveillance', exploration_seconds=60.0)
+    run.looking.arm = True
+    here = (20.0, 8.0, 0.0)
+
+    def checks(place: str) -> Sequence[Check]:
+        is_open = 0.0 < run.world.clock.time - run.looking.faced_at < 9.0
+        return [Check('marker 21', here, is_open=is_open)] if place == 'C1' else []
+
+    run.looking.checks = checks  # type: ignore[method-assign]
+    stood: list[float] = []
+    turned = run.looking.face
+
+    def face(bearing: float, interrupt: Interrupt) -> None:
+        stood.append(run.world.clock.time - run.looking.faced_at)
+        turned(bearing, interrupt)
+
+    run.looking.face = face  # type: ignore[method-assign]
+    run.until(200.0)
+    first = next(n for n, (where, _) in enumerate(run.looking.sides) if where == 'C1')
+    assert stood[first + 1] == pytest.approx(9.0, abs=0.51)

@@ -146,6 +146,28 @@ def test_one_picture_alone_tells_nothing_and_a_marker_that_is_read_ends_the_row(
         assert [each.state for each in markers.take(picture, camera(), [seen], 2)] == ['here']
 
 
+def test_what_was_looked_at_and_not_read_is_open_until_it_is_settled():
+    markers, picture, seen = learned(wall)
+
+    def is_open(shown: np.ndarray, read: list[SeenMarker], clear: bool = True) -> bool:
+        markers.take(shown, camera(), read, 2, lambda _: clear)
+        (spot,) = markers.spots()
+        return spot.is_open
+
+    there = hang(moved := wall(), 14, LEFT + 60, TOP)
+    assert not is_open(picture, [seen])
+    assert is_open(wall(), [], clear=False), 'somebody stands before it'
+    assert not is_open(picture, [seen])
+    assert [is_open(wall(), []) for _ in range(AGREED)] == [True] * (AGREED - 1) + [False]
+    assert not is_open(wall(), [], clear=False), 'it was told'
+    assert not is_open(picture, [seen])
+    assert [is_open(moved, [there]) for _ in range(2)] == [True, False]
+    assert not is_open(picture, [seen]), 'it is back'
+    assert is_open(wall(), [])
+    markers.accept(14)
+    assert not markers.spots()
+
+
 def test_what_a_person_calls_normal_is_how_it_hangs():
     markers, _, _ = learned(wall)
     moved = wall()

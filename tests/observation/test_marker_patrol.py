@@ -149,6 +149,7 @@ class Patrol:
                 each.name,
                 (*each.at, 0.0),
                 None if each.look_from is None else (*each.look_from, 0.0),
+                each.is_open,
             )
             for each in self.checks_of.of(self.watcher.spots())
             if each.place == place

@@ -12,16 +12,17 @@ looked at in the record once a picture of it was looked at, not when the camera 
 from __future__ import annotations
 
 import math
-from collections import deque
-from collections.abc import Sequence
+from collections import Counter, deque
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 
 from state_machines import Interrupt
 from state_machines.clock import elapsed_of
 from state_machines.exceptions import CallError, CallInterruptedError
 from surveillance_behaviour.mission.mission import Mission
 from surveillance_behaviour.mission.mission_log import side_name, stand_name
-from surveillance_behaviour.ports import Doubt, Looking, Point
+from surveillance_behaviour.ports import Check, Doubt, Looking, Point
 
 SETTLE = 4.0
 """Seconds for which the robot stands at a viewpoint, so that sweeps and pictures are compared."""
@@ -33,7 +34,10 @@ CHECK_DWELL, CHECK_PICTURES = 5.5, 3
 """At a check it stands so long, seconds, and for so many pictures, which must agree where a marker
 hangs, and that it is gone."""
 LONGEST_DWELL = 13.5
-"""And so long where too few pictures of that side were looked at, and there is time, seconds."""
+"""And so long where too few pictures of that side were looked at, or what a check found is not
+settled, and there is time, seconds."""
+MOST_INSISTED = 3
+"""A check that is not settled comes before the others so many times in a row."""
 LEAST_STAY = 12.0
 """A shorter stay has no time for a side, seconds."""
 VIEW = math.pi / 2
@@ -92,6 +96,7 @@ class RoomLook:
         self._mission = mission
         self._moves = {True: ARM_MOVE, False: BASE_MOVE}
         self._looked_again: deque[int] = deque(maxlen=MOST_DOUBTS)
+        self._insisted: Counter[tuple[str, str]] = Counter()
         self._short: set[str] = set()
         self._said_short = False
         self._elapsed = elapsed_of(mission.clock)
@@ -217,12 +222,14 @@ class RoomLook:
     def _look_at_checks(self, looking: Looking, stay: _Stay, interrupt: Interrupt) -> None:
         """Look at what the rules ask for, what waits longest first, for half of the time.
 
-        Where there is no time for more than one thing, it is a check in every other stay.
+        What was looked at and is not settled comes before that. Where there is no time for more
+        than one thing, it is a check in every other stay.
         """
         mission = self._mission
         place, has_arm = mission.place, looking.has_arm()
         checks = sorted(
-            looking.checks(place), key=lambda each: mission.looked.rank(place, each.name)
+            looking.checks(place),
+            key=lambda each: (not self._insists(each), mission.looked.rank(place, each.name)),
         )
         if not checks or looking.sees_around() or not (has_arm or stay.drives):
             return
@@ -230,7 +237,8 @@ class RoomLook:
         one = self._moves[has_arm] + CHECK_DWELL
         left = stay.end - self._elapsed() - spare
         names = {each.name for each in checks}
-        if left < 2.0 * one and mission.looked.latest(place) in names:
+        is_turn = mission.looked.latest(place) not in names or self._insists(checks[0])
+        if left < 2.0 * one and not is_turn:
             return
         half = self._elapsed() + left / 2.0
         for check in checks:
@@ -250,14 +258,33 @@ class RoomLook:
                 looking.drive(point, interrupt)
                 here = looking.position() or point
             bearing = math.atan2(check.point[1] - here[1], check.point[0] - here[0])
+            key = place, check.name
+            self._insisted[key] = self._insisted[key] + 1 if check.is_open else 0
             seen = self._face(
-                looking, stay, bearing, stay.end - spare, interrupt, CHECK_DWELL, CHECK_PICTURES
+                looking,
+                stay,
+                bearing,
+                stay.end - spare,
+                interrupt,
+                CHECK_DWELL,
+                partial(self._is_checked, looking, check.name),
             )
             mission.looked.note(place, check.name)
             if seen:
                 stay.checks.append(check.name)
                 self._note_explored(check=check.name)
             self.verify(interrupt)
+
+    def _insists(self, check: Check) -> bool:
+        """Tell whether a check comes before those that wait longer."""
+        key = self._mission.place, check.name
+        return check.is_open and self._insisted[key] < MOST_INSISTED
+
+    def _is_checked(self, looking: Looking, name: str, pictures: int) -> bool:
+        """Tell whether so many pictures are enough for a check, and what they show is settled."""
+        now = looking.checks(self._mission.place)
+        is_open = any(each.name == name and each.is_open for each in now)
+        return pictures >= CHECK_PICTURES and not is_open
 
     def _aim_ahead(self, looking: Looking, stay: _Stay, interrupt: Interrupt) -> None:
         """Have the arm look ahead, if it looks elsewhere."""
@@ -273,9 +300,9 @@ class RoomLook:
         latest: float,
         interrupt: Interrupt,
         dwell: float = DWELL,
-        pictures: int = 1,
+        is_enough: Callable[[int], bool] = bool,
     ) -> bool:
-        """Turn the camera to a bearing, and stand until pictures of it were looked at.
+        """Turn the camera to a bearing, and stand until enough pictures of it were looked at.
 
         Returns:
             Whether one was: within the dwell, or a little later if there is time until `latest`.
@@ -290,7 +317,7 @@ class RoomLook:
             if not self._mission.clock.sleep(seconds, interrupt):
                 raise CallInterruptedError
             seen, now = looking.saw(bearing), self._elapsed()
-            if seen >= pictures or now + POLL > min(latest, faced + LONGEST_DWELL):
+            if is_enough(seen) or now + POLL > min(latest, faced + LONGEST_DWELL):
                 return seen > 0
             seconds = POLL
 

@@ -239,6 +239,7 @@ class RosLooking:
                     str(each['name']),
                     _point(each['at']),
                     None if each.get('from') is None else _point(each['from']),
+                    bool(each.get('open')),
                 )
                 for each in some
             ]

@@ -208,12 +208,15 @@ class HungSpot:
         facing: Where it looks to, map frame, rad; of one that was read in passing, from where
             that was. None: it was never read.
         side: Of its black square, metres; 0: not known.
+        is_open: Whether it was not read when its spot was in view last, and what that means is not
+            settled.
     """
 
     number: int
     position: tuple[float, float, float]
     facing: float | None
     side: float
+    is_open: bool = False
 
 
 @dataclass(frozen=True)
@@ -330,6 +333,8 @@ class HungMarkers:
         self._in_a_row: dict[int, tuple[str, int]] = {}
         self._away: dict[int, _Away] = {}
         self._gone: set[int] = set()
+        # Those that were not read where they hang, and nobody knows why as yet.
+        self._open: set[int] = set()
         self._glanced: dict[int, HungSpot] = {}
         self._read_at: dict[int, int] = {}
 
@@ -366,6 +371,7 @@ class HungMarkers:
                 _plain(spot.position),
                 None if not spot.aspects else _facing(spot.aspects[-1].rotation),
                 spot.side,
+                number in self._open,
             )
             for number, spot in self._spots.items()
         }
@@ -376,6 +382,7 @@ class HungMarkers:
         away = self._away.pop(number, None)
         spot = self._spots.pop(number, None)
         self._gone.discard(number)
+        self._open.discard(number)
         self._in_a_row.pop(number, None)
         if number in self._given:
             self._accepted.add(number)
@@ -446,6 +453,7 @@ class HungMarkers:
         else:
             if self._in_a_row.get(number, ('', 0))[0] == 'missing':
                 del self._in_a_row[number]
+            self._note_open(number, number not in self._gone)
             return None
         before, count = self._in_a_row.get(number, ('', 0))
         count = count + 1 if before == state else 1
@@ -455,7 +463,15 @@ class HungMarkers:
         else:
             known = self._away.get(number)
             agreed = count >= READ and (known is None or known.read >= READ)
-        return self._settled(number, spot, state, agreed, look)
+        found = self._settled(number, spot, state, agreed, look)
+        self._note_open(number, here is None and found is None and number not in self._gone)
+        return found
+
+    def _note_open(self, number: int, is_open: bool) -> None:
+        if is_open:
+            self._open.add(number)
+        else:
+            self._open.discard(number)
 
     def _begin(
         self, number: int, spot: _Spot | None, some: Sequence[SeenMarker], shown: _Shown, look: int

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from surveillance_perception.observation.hung_markers import HungSpot
@@ -36,12 +36,14 @@ class MarkerCheck:
         place: Where it hangs.
         at: Where on the map, metres.
         look_from: From where it is read; None: from the place's own point, or as well as may be.
+        is_open: Whether it was looked at and not read, and what that means is not settled.
     """
 
     name: str
     place: str
     at: Spot
     look_from: Spot | None
+    is_open: bool = False
 
     def to_json(self) -> dict[str, Any]:
         """Return it as plain values, without the place."""
@@ -49,6 +51,7 @@ class MarkerCheck:
             'name': self.name,
             'at': [round(each, 2) for each in self.at],
             'from': None if self.look_from is None else [round(each, 2) for each in self.look_from],
+            'open': self.is_open,
         }
 
 
@@ -73,8 +76,8 @@ class MarkerChecks:
 
     def of(self, spots: Sequence[HungSpot]) -> list[MarkerCheck]:
         """Return how some markers are to be looked at, those that a rule asks for."""
-        found = {}
-        for spot in spots:
+        found, is_open = {}, {each.number: each.is_open for each in spots}
+        for spot in (replace(each, is_open=False) for each in spots):
             known = self._checks.get(spot.number)
             if known is not None and known[0] == spot:
                 found[spot.number] = known
@@ -85,7 +88,7 @@ class MarkerChecks:
             if check is not None:
                 found[spot.number] = spot, check
         self._checks = found
-        return [check for _, check in found.values()]
+        return [replace(found[n][1], is_open=is_open[n]) for n in found]
 
     def _is_good(self, known: MarkerCheck, now: MarkerCheck, spot: HungSpot) -> bool:
         """Tell whether a check that was told before serves for a spot as it is known now."""
