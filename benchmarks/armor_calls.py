@@ -31,8 +31,10 @@ from typing import Any, cast
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
-IRI = 'http://bnc/exp-rob-lab/2022-23'
-ONTOLOGY = ROOT / 'surveillance_ontology' / 'surveillance_ontology' / 'data' / 'surveillance.owl'
+
+from benchmarks.patrol_facts import IRI, SCHEMA, Patrol, schema
+from owl_reasoner import write_ontology
+
 PLACE = ROOT / 'config' / 'seven_rooms.yaml'
 PLACES = (7, 10_000)
 """Sizes of the maps of which a whole visit is measured."""
@@ -176,12 +178,9 @@ def _service_rows(label: str, store: Any, rounds: int, *, worlds: bool = False) 
 
 
 class MappedVisit:
-    """A visit on a generated map (`benchmarks/ontology.py`), as one list of directives."""
+    """A visit on a generated map (`benchmarks/patrol_facts.py`), as one list of directives."""
 
     def __init__(self, client: Any, places: int, folder: Path) -> None:
-        from benchmarks.ontology import Patrol, schema
-        from owl_reasoner import write_ontology
-
         self._client, self._patrol = client, Patrol(places)
         file = folder / f'{places}.nt'
         write_ontology([*schema(), *self._patrol.assertions()], IRI, file, 'ntriples')
@@ -308,7 +307,7 @@ def under_load(seconds: float, axioms: int) -> list[Row]:
     found: list[Row] = []
     try:
         client = ArmorClient(node, 'benchmark', 'surveillance', timeout=60.0)
-        client.utils.load_ref_from_file(str(ONTOLOGY), IRI)
+        client.utils.load_ref_from_file(str(SCHEMA), IRI)
         client.manipulation.add_ind_to_class('R1', 'ROOM')
 
         def ask() -> Any:

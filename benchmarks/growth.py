@@ -24,7 +24,7 @@ ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 
-from ontology import IRI, Patrol, schema
+from patrol_facts import IRI, Patrol, schema
 from tables import table
 
 from libs.owl_reasoner.tests.java_reasoner import JavaReasoner, JavaReasonerError, absent
