@@ -589,7 +589,9 @@ class _Command:
         self._wheels = environment.wheels
         if self._wheels is not None:  # the builds, which pip isolates, hear it in this way alone
             environ |= {'PIP_NO_INDEX': '1', 'PIP_FIND_LINKS': str(self._wheels)}
-        if _KEPT_IN in environ:  # pip builds in temporary folders: what it left there would stay
+        # pip builds in temporary folders, whose compiled modules would stay in the folder of those
+        # that are kept. Its own lie beside it, where Python does not look while that folder is set.
+        if environ.pop(_KEPT_IN, None):
             environ['PYTHONDONTWRITEBYTECODE'] = '1'
         self._process = subprocess.Popen(
             words,

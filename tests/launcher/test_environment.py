@@ -299,18 +299,26 @@ def test_on_a_full_disk_nobody_writes_compiled_modules_that_would_be_cut_off(tmp
     assert given.pop('PYTHONDONTWRITEBYTECODE') == '1'
 
 
-def test_what_a_set_up_runs_leaves_no_compiled_modules_of_its_folders(tmp_path, monkeypatch):
+def test_what_a_set_up_runs_leaves_no_compiled_modules_and_finds_those_of_pip(
+    tmp_path, monkeypatch
+):
     (tmp_path / 'module.py').write_text('VALUE = 1\n')
     monkeypatch.delenv('PYTHONDONTWRITEBYTECODE', raising=False)
     monkeypatch.setenv('PYTHONPYCACHEPREFIX', str(tmp_path / 'kept'))
     lock = os.open(tmp_path, os.O_RDONLY)
     try:
-        words = [sys.executable, '-c', 'import module']
+        code = (
+            'import module, pathlib\n'
+            "beside = pathlib.Path('__pycache__').absolute()\n"
+            'assert pathlib.Path(module.__cached__).parent == beside'
+        )
+        words = [sys.executable, '-c', code]
         with _Command(Environment(tmp_path), words, lock) as command, Step(1, 1, 'import') as step:
             command.watch(step)
     finally:
         os.close(lock)
     assert not (tmp_path / 'kept').exists()
+    assert not (tmp_path / '__pycache__').exists()
 
 
 def test_the_processes_of_a_test_run_share_compiled_modules(tmp_path, monkeypatch):
