@@ -319,3 +319,23 @@ def test_a_colour_between_two_is_in_their_proportion() -> None:
         '#64c8ff',
         '#64c8ff',
     ]
+
+
+@pytest.mark.parametrize(
+    ('outline', 'tinted'),
+    [
+        ([(1.0, 1.0), (2.0, 1.0), (2.0, 2.0), (1.0, 2.0)], {(1.5, 1.5)}),
+        ([(-1e6, -1e6), (1e6, -1e6), (1e6, 2.0), (-1e6, 2.0)], {(1.5, 1.5), (3.5, 0.5)}),
+        ([(-9.0, 1.0), (-8.0, 1.0), (-8.0, 2.0)], set()),
+    ],
+)
+def test_a_zone_is_tinted_as_far_as_it_is_in_the_picture(
+    outline: list[tuple[float, float]], tinted: set[tuple[float, float]]
+) -> None:
+    canvas = Canvas((0.0, 0.0, 4.0, 4.0), 20.0, (5, 5, 5, 5), 'white')
+    canvas.tint(outline, '#000000', 0.5)
+    picture = canvas.finished()
+    for point in ((1.5, 1.5), (3.5, 0.5), (3.5, 3.5)):
+        x, y = canvas.at(point)
+        shade = 127 if point in tinted else 255
+        assert picture.getpixel((int(x), int(y))) == pytest.approx((shade,) * 3, abs=1)

@@ -433,11 +433,17 @@ class Canvas:
 
     def tint(self, outline: Iterable[Sequence[float]], colour: str, opacity: float) -> None:
         """Fill a polygon given in metres so that what is below shows through."""
-        mask = Image.new('L', self._image.size)
         corners = [self._fine(self.at(point)) for point in outline]
-        ImageDraw.Draw(mask).polygon(corners, fill=round(255 * opacity))
-        paint = Image.new('RGB', self._image.size, ImageColor.getrgb(colour))
-        self._image.paste(paint, mask=mask)
+        # Only what lies around the polygon is touched: a picture has many of them.
+        left, top = (max(0, math.floor(min(each))) for each in zip(*corners, strict=True))
+        ends = (math.ceil(max(each)) + 1 for each in zip(*corners, strict=True))
+        right, bottom = map(min, ends, self._image.size)
+        if right <= left or bottom <= top:
+            return  # it lies beside the picture
+        mask = Image.new('L', (right - left, bottom - top))
+        shifted = [(x - left, y - top) for x, y in corners]
+        ImageDraw.Draw(mask).polygon(shifted, fill=round(255 * opacity))
+        self._image.paste(ImageColor.getrgb(colour), (left, top), mask)
 
     def box(self, left: float, top: float, right: float, bottom: float, colour: str) -> None:
         """Fill a rectangle given in points."""
@@ -477,18 +483,19 @@ class Canvas:
             resolution: Side of a cell, metres.
             colours: One for each value from 1.
         """
-        rows, columns = values.shape
         left, bottom = self._fine(self.at(origin))
         side = resolution * self.scale * _FINE
         wide, high = self._image.size
-        # Each fine pixel is what the cell is that its middle lies in.
-        column = np.floor((np.arange(wide) + 0.5 - left) / side).astype(np.intp)
-        row = np.floor((bottom - np.arange(high) - 0.5) / side).astype(np.intp)
-        here = values[np.clip(row, 0, rows - 1)[:, None], np.clip(column, 0, columns - 1)[None, :]]
-        on_map = ((row >= 0) & (row < rows))[:, None] & ((column >= 0) & (column < columns))
+        north = values[::-1]  # row 0 of a picture is in the north
+        top = bottom - len(north) * side
         palette = np.array([(0, 0, 0), *map(ImageColor.getrgb, colours)], np.uint8)
-        mask = ((here > 0) & on_map).astype(np.uint8) * np.uint8(255)
-        self._image.paste(Image.fromarray(palette[here]), mask=Image.fromarray(mask))
+        # Each fine pixel is what the cell is that its middle lies in.
+        to_cells = (1 / side, 0.0, -left / side, 0.0, 1 / side, -top / side)
+        paint, mask = (
+            Image.fromarray(each).transform((wide, high), Image.Transform.AFFINE, to_cells)
+            for each in (palette[north], (north > 0).astype(np.uint8) * np.uint8(255))
+        )
+        self._image.paste(paint, mask=mask)
 
     def arc(
         self,
@@ -547,14 +554,16 @@ class Canvas:
             thick = max(1, round(width))
             cv2.polylines(once, [fixed], False, 255, thick, cv2.LINE_AA, shift=4)
             count += once.astype(np.float32) / 255
+        if not count.any():
+            return
         share = 1.0 - (1.0 - opacity) ** count
-        mask = Image.fromarray((share * 255).astype(np.uint8)).resize(self._image.size)
-        paint = Image.new('RGB', self._image.size, ImageColor.getrgb(colour))
-        self._image.paste(paint, mask=mask)
+        coarse = Image.fromarray((share * 255).astype(np.uint8))
+        mask = coarse.resize(self._image.size, Image.Resampling.BOX)
+        self._image.paste(ImageColor.getrgb(colour), (0, 0), mask)
 
     def finished(self) -> Image.Image:
         """Return the picture."""
-        return self._image.resize(self.size, Image.Resampling.LANCZOS)
+        return self._image.reduce(_FINE)
 
     @staticmethod
     def _fine(point: Point) -> Point:
