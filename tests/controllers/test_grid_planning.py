@@ -13,6 +13,8 @@ from skimage.graph import MCP_Geometric
 
 from surveillance_controllers import geometry
 from surveillance_controllers.planning.grid_planning import (
+    _corners,
+    _poses_along,
     GridPlanner,
     NoPathError,
     PlanningParameters,
@@ -300,3 +302,297 @@ def test_a_way_round_a_slow_zone_is_taken_where_it_is_faster() -> None:
 
     assert through(0.5) == pytest.approx(2.0, abs=0.1)
     assert through(0.1) < 0.2, 'a corner at most'
+
+
+def scattered(seed: int) -> Grid:
+    """Return a map of 2.4 m x 3 m of some blocks, a part unknown, its corner at (-1, 2)."""
+    draw = np.random.default_rng(seed)
+    cells = np.zeros((24, 30), np.int8)
+    for _ in range(3):
+        row, column = (int(draw.integers(0, size)) for size in (20, 26))
+        cells[row : row + 2, column : column + 3] = 100
+    cells[:3, :2] = -1
+    return Grid(cells, 0.1, (-1.0, 2.0))
+
+
+SLOW = {'slow_zones': {'S': [0.2, 0.05, 2.05, 0.85, 2.05, 0.85, 3.15, 0.05, 3.15]}}
+BARRED = {'keep_out_zones': {'K': [1.45, 3.55, 1.75, 3.55, 1.75, 3.85, 1.45, 3.85]}}
+
+
+@pytest.mark.parametrize('seed', range(4))
+def test_what_each_cell_costs_is_what_its_distances_say(seed: int) -> None:
+    grid, draw = scattered(seed), np.random.default_rng(seed)
+    robot = PlanningParameters(radius=0.11, margin=0.08, comfort=0.35, aversion=2.0, waiting=50.0)
+    planner = GridPlanner(grid, robot, zones=zones_from(SLOW | BARRED))
+    points = draw.uniform((-0.9, 2.1), (1.9, 4.3), (6, 2))
+    stay = np.arange(6) % 2 == 0
+    door = (-0.5, 4.0, 0.3, 4.0)
+    planner.set_obstacles(np.array([[1.0, 3.0]]))
+    planner.set_closed({'D': door})
+    planner.set_obstacles(points, stay)
+
+    def cells_at(places: np.ndarray) -> set[tuple[int, int]]:
+        return {(math.floor((y - 2) / 0.1), math.floor((x + 1) / 0.1)) for x, y in places}
+
+    along = np.linspace(door[:2], door[2:], 60)
+    walls = {tuple(each) for each in np.argwhere(grid.cells != 0).tolist()}
+    barred = {
+        (row, column)
+        for row, column in np.ndindex(grid.cells.shape)
+        if 24 <= column <= 27 and 15 <= row <= 18
+    }
+    firm = walls | barred | cells_at(points[stay]) | cells_at(along)
+    loose = firm | cells_at(points[~stay])
+
+    def spare(row: int, column: int, cells: set[tuple[int, int]]) -> float:
+        gap = 0.1 * min(math.hypot(row - r, column - c) for r, c in cells) - 0.05
+        return gap - 0.11 - 0.08
+
+    def price(room: float) -> float:
+        return 1 + 2.0 * min(max(1 - room / 0.35, 0), 1) ** 2
+
+    counted = 0
+    for row, column in np.ndindex(grid.cells.shape):
+        slower = 3.0 if 10 <= column <= 18 and row <= 11 else 1.0
+        room, firm_room = spare(row, column, loose), spare(row, column, firm)
+        if min(abs(room), abs(firm_room)) < 1e-6:
+            continue
+        if room > 0:
+            expected = price(room) * slower
+        else:
+            expected = 50.0 * price(firm_room) * slower if firm_room > 0 else -1.0
+        assert planner.cost[row, column] == pytest.approx(expected, rel=1e-4)
+        counted += 1
+    assert counted > 500
+
+
+@pytest.mark.parametrize('seed', range(3))
+def test_a_straight_line_costs_what_its_samples_cost(seed: int) -> None:
+    grid, draw = scattered(seed), np.random.default_rng(seed)
+    planner = GridPlanner(grid, PlanningParameters(radius=0.1, margin=0.08))
+    infinite = 0
+    for _ in range(30):
+        begin, end = draw.uniform((-0.9, 2.1), (1.9, 4.3), (2, 2))
+        length = math.dist(begin, end)
+        count = math.ceil(length / 0.05) + 1
+        samples = [begin + (end - begin) * n / (count - 1) for n in range(count)]
+        costs = [float(planner.cost[int((y - 2) / 0.1), int((x + 1) / 0.1)]) for x, y in samples]
+        found = planner._price(begin, end)
+        if any(cost < 0 for cost in costs[1:-1]):
+            assert math.isinf(found)
+            infinite += 1
+        else:
+            assert found == pytest.approx(sum(map(abs, costs)) / count * length)
+    assert 0 < infinite < 30
+    here = grid.centre_of(12, 15)
+    assert planner._price(np.array(here), np.array(here)) == 0.0
+
+
+@pytest.mark.parametrize('seed', range(6))
+def test_a_path_costs_hardly_more_than_the_cheapest_of_the_grid(seed: int) -> None:
+    grid = scattered(seed)
+    planner = GridPlanner(grid, PlanningParameters(radius=0.06, margin=0.08, comfort=0.3))
+    start, goal = np.array([1.65, 2.35]), np.array([-0.65, 4.05])
+    path = planner.plan(start, goal)
+    search = MCP_Geometric(np.where(planner.cost > 0, planner.cost, -1))
+    ends = [(int((y - 2) / 0.1), int((x + 1) / 0.1)) for x, y in (start, goal)]
+    costs, _ = search.find_costs([ends[0]], [ends[1]])
+    cheapest = 0.1 * float(costs[ends[1]])
+    paid = sum(planner._price(a, b) for a, b in zip(path, path[1:], strict=False))
+    assert paid <= 1.06 * cheapest
+    # Rounded: it nowhere turns by much at once.
+    ways = np.diff(path, axis=0)
+    ways = ways[np.hypot(*ways.T) > 1e-6]
+    turns = np.diff(np.unwrap(np.arctan2(ways[:, 1], ways[:, 0])))
+    assert np.abs(turns).max(initial=0.0) < 0.8
+
+
+def test_a_corner_is_rounded_by_a_curve_from_arm_to_arm() -> None:
+    grid = Grid(np.zeros((60, 60), np.int8), 0.05)
+    planner = GridPlanner(grid, PlanningParameters(radius=0.1, corner=0.41))
+    path = np.array([[0.5, 0.5], [1.5, 0.5], [1.5, 0.9]])
+    found = planner._rounded(path)
+    # Half of the shorter arm, and what rounding may take of the longer one.
+    entry, corner, leave = np.array([1.09, 0.5]), path[1], np.array([1.5, 0.7])
+    assert found[0] == pytest.approx(path[0])
+    assert found[1] == pytest.approx(entry)
+    assert found[-2] == pytest.approx(leave)
+    assert found[-1] == pytest.approx(path[2])
+    count = 2 * math.ceil(0.61 / 0.05) + 1
+    share = np.array([*range(0, count - 1, count // 6), count - 1])[:, None] / (count - 1)
+    curve = (1 - share) ** 2 * entry + 2 * share * (1 - share) * corner + share**2 * leave
+    assert found[1:-1] == pytest.approx(curve)
+    assert planner._rounded(path[:2]) == pytest.approx(path[:2])
+    # What is in the way of the curve makes it smaller, or leaves the corner as it is.
+    planner.set_obstacles([(1.32, 0.72)])
+    smaller = planner._rounded(path)
+    assert smaller[1] == pytest.approx([1.295, 0.5])
+    assert smaller[-2] == pytest.approx([1.5, 0.6])
+    planner.set_obstacles([(1.45, 0.55)])
+    assert planner._rounded(path) == pytest.approx(path)
+
+
+def test_where_a_path_of_cells_turns() -> None:
+    steps = np.array([[0, 0], [1, 0], [2, 0], [3, 1], [4, 2], [4, 3]]) * 0.05
+    assert _corners(steps).tolist() == [0, 2, 4, 5]
+    assert _corners(steps[:3]).tolist() == [0, 2]
+    assert _corners(steps[:2]).tolist() == [0, 1]
+    assert _corners(steps[:1]).tolist() == [0]
+
+
+def test_along_a_path_a_robot_looks_ahead_and_turns_at_its_corners() -> None:
+    path = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 0.0], [1.0, 0.5]])
+    poses = _poses_along(path, 0.4)
+    first = [(0.0, 0.0, 0.0), (1 / 3, 0.0, 0.0), (2 / 3, 0.0, 0.0), (1.0, 0.0, 0.0)]
+    turns = [(1.0, 0.0, math.pi / 2 * n / 16) for n in range(17)]
+    last = [(1.0, y, math.pi / 2) for y in (0.0, 0.25, 0.5)]
+    assert poses == pytest.approx(np.array([*first, *turns, *last]))
+    assert _poses_along(path[1:3], 0.4).shape == (0, 3)
+    back = _poses_along(np.array([[0.0, 0.0], [-1.0, 0.1], [-2.0, 0.0]]), 9.0)
+    assert np.abs(np.diff(np.unwrap(back[:, 2]))).max() < 0.11, 'over the half circle the short way'
+
+
+def test_where_a_long_robot_touches_something_cells_become_dear_until_the_search_ends() -> None:
+    grid = Grid(np.zeros((40, 60), np.int8), 0.05)
+    long = (0.5, 0.1, -0.5, 0.1, -0.5, -0.1, 0.5, -0.1)
+    planner = GridPlanner(grid, PlanningParameters(footprint=long, margin=0.04))
+    path = np.array([[0.6, 1.025], [1.5, 1.025], [1.5, 1.4]])
+    assert planner._touches(path) is None
+    planner.set_obstacles([(1.83, 1.3)])
+    # Turning at the corner its rear or its front swings over the obstacle.
+    touched = planner._touches(path)
+    assert touched is not None
+    assert touched == pytest.approx([1.5, 1.025])
+    assert planner._touches(path[:1]) is None
+    planner.set_obstacles([(1.262, 1.062)])
+    touched = planner._touches(path)
+    assert touched is not None
+    # Its front is 0.5 m ahead of it, and what it meets is as large as its cell.
+    assert touched == pytest.approx([0.75, 1.025], abs=0.051)
+    planner.set_obstacles([])
+    before = planner.cost.copy()
+    window, old = planner._made_dear(np.array([1.01, 0.02]))
+    assert (old == before[window]).all()
+    for row, column in np.ndindex(grid.cells.shape):
+        near = (row - 0) ** 2 + (column - 20) ** 2 <= 4
+        dear = 30.0 if near and before[row, column] > 0 else 0.0
+        assert planner.cost[row, column] == pytest.approx(before[row, column] + dear)
+
+
+def test_cells_around_one_come_nearest_first() -> None:
+    planner = GridPlanner(Grid(np.zeros((10, 12), np.int8), 0.1), PlanningParameters(radius=0.1))
+    wanted = np.zeros((10, 12), np.bool_)
+    for cell in [(2, 2), (2, 4), (5, 5), (1, 1), (4, 3), (9, 11), (2, 5), (0, 0)]:
+        wanted[cell] = True
+    found = list(planner._cells_around((2, 2), 0.3, wanted))
+    assert found == [(2, 2), (1, 1), (2, 4), (4, 3), (0, 0), (2, 5)]
+    assert list(planner._cells_around((0, 11), 0.29, wanted)) == []
+
+
+UNKNOWN = np.zeros((80, 161), np.int8)
+UNKNOWN[40:, :80] = -1
+
+
+@pytest.mark.parametrize(
+    ('obstacles', 'closed', 'goal', 'text'),
+    [
+        (
+            [(3.0, 2.0)],
+            {},
+            (3.1, 2.0),
+            None,
+        ),
+        (
+            [],
+            {'D2': (6.0, 0.0, 6.0, 4.0)},
+            (7.0, 2.0),
+            'no path from (1.00, 1.00) to (7.00, 2.00): the closed door D2 is in the way',
+        ),
+        (
+            [],
+            {},
+            (9.0, 1.0),
+            'the goal (9.00, 1.00) lies outside of the map, which goes from (0.00, 0.00) to '
+            '(8.05, 4.00)',
+        ),
+        (
+            [],
+            {},
+            (0.16, 1.0),
+            'the goal (0.16, 1.00) is 0.12 m from a wall: expected at least 0.25 m',
+        ),
+    ],
+)
+def test_why_there_is_no_path_is_said_in_one_line(
+    obstacles: list[tuple[float, float]],
+    closed: dict[str, tuple[float, float, float, float]],
+    goal: tuple[float, float],
+    text: str | None,
+) -> None:
+    planner = GridPlanner(two_rooms(), ROBOT, {'D1': (4.02, 1.5, 4.02, 2.5)})
+    planner.set_obstacles(obstacles)
+    planner.set_closed(closed)
+    if text is None:
+        assert len(planner.plan((1, 1), goal)) >= 2
+        return
+    with pytest.raises(NoPathError) as caught:
+        planner.plan((1, 1), goal)
+    assert str(caught.value) == text
+
+
+def test_where_the_map_is_unknown_is_said() -> None:
+    planner = GridPlanner(Grid(UNKNOWN, RESOLUTION), ROBOT)
+    with pytest.raises(NoPathError) as caught:
+        planner.plan((1, 1), (1, 3))
+    assert str(caught.value) == 'the goal (1.00, 3.00) lies where the map is unknown'
+
+
+@pytest.mark.parametrize(
+    ('start', 'leaves'), [((0.2, 1.0), True), ((1.0, 0.1), True), ((0.07, 0.07), True)]
+)
+def test_who_stands_too_near_to_a_wall_leaves_it_straight(
+    start: tuple[float, float], leaves: bool
+) -> None:
+    planner = GridPlanner(two_rooms(), ROBOT)
+    path = planner.plan(start, (3, 2))
+    assert path[0] == pytest.approx(start)
+    gaps = [float(planner.clearance(point)[0]) for point in geometry.equally_spaced(path[:2], 0.02)]
+    assert all(later > gap - 0.013 for gap, later in zip(gaps, gaps[1:], strict=False)) is leaves
+    assert gaps[-1] >= ROBOT.radius + ROBOT.margin - 0.03
+
+
+def test_who_stands_between_obstacles_without_a_way_out_is_told_so() -> None:
+    planner = GridPlanner(two_rooms(), ROBOT)
+    ring = [(1 + 0.2 * math.cos(a), 1 + 0.2 * math.sin(a)) for a in np.linspace(0, 6.2, 40)]
+    planner.set_obstacles(ring)
+    with pytest.raises(NoPathError) as caught:
+        planner.plan((1, 1), (3, 2))
+    assert 'the start (1.00, 1.00) is 0.' in str(caught.value)
+    assert str(caught.value).endswith('expected at least 0.25 m')
+    planner.set_obstacles(ring, np.zeros(len(ring), np.bool_))
+    assert planner.plan((1, 1), (3, 2))[0] == pytest.approx((1, 1)), 'they may leave'
+
+
+def test_who_stands_in_a_keep_out_zone_is_let_out_past_what_else_is_known() -> None:
+    grid = Grid(np.zeros((80, 160), np.int8), RESOLUTION)
+    zones = zones_from(
+        {'keep_out_zones': {'Z': [3, 1, 5, 1, 5, 3, 3, 3], 'Y': [5.3, 0, 5.6, 0, 5.6, 3, 5.3, 3]}}
+    )
+    planner = GridPlanner(grid, ROBOT, zones=zones)
+    planner.set_obstacles([(5.0, 3.4), (2.0, 2.0)], np.array([True, False]))
+    planner.set_closed({'D': (5.5, 3.0, 5.5, 3.3)})
+    path = geometry.equally_spaced(planner.plan((4.8, 2.0), (7, 2)), 0.02)
+    assert zones.keep_out['Y'].contains(path).sum() == 0
+    assert np.hypot(*(path - (5.0, 3.4)).T).min() >= ROBOT.radius
+    assert (path[:, 1] > 3.3 + ROBOT.radius).any(), 'past the closed door'
+    inside = zones.keep_out['Z'].contains(path).sum() * 0.02
+    assert inside < 1.3
+
+
+def test_on_a_map_without_any_wall_all_is_free() -> None:
+    planner = GridPlanner(Grid(np.zeros((40, 40), np.int8), RESOLUTION), ROBOT)
+    path = planner.plan((0.51, 0.52), (1.5, 1.4))
+    assert path == pytest.approx(np.array([(0.51, 0.52), (1.5, 1.4)]))
+    assert planner.is_free(path)
+    assert not planner.is_free([(0.5, 0.5), (2.1, 0.5)]), 'off the map'
+    assert np.isinf(planner.clearance(path)).all()

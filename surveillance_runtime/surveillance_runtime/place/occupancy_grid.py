@@ -149,9 +149,13 @@ class Grid:
         up, right = row - low_row, column - low_column
         high_row = np.minimum(low_row + 1, rows - 1)
         high_column = np.minimum(low_column + 1, columns - 1)
-        south = field[low_row, low_column] * (1 - right) + field[low_row, high_column] * right
-        north = field[high_row, low_column] * (1 - right) + field[high_row, high_column] * right
-        return np.asarray(south * (1 - up) + north * up, dtype=float)
+        south_west = field[low_row, low_column]
+        with np.errstate(invalid='ignore'):
+            south = south_west * (1 - right) + field[low_row, high_column] * right
+            north = field[high_row, low_column] * (1 - right) + field[high_row, high_column] * right
+            values = south * (1 - up) + north * up
+        # Distances to what the map has nothing of are infinite, also where they have no weight.
+        return np.where(np.isinf(south_west), np.inf, values)
 
 
 def distance_to(mask: NDArray[np.bool_], resolution: float) -> NDArray[np.float32]:
