@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -13,11 +14,11 @@ from skimage.graph import MCP_Geometric
 
 from surveillance_controllers import geometry
 from surveillance_controllers.planning.grid_planning import (
-    _corners,
-    _poses_along,
     GridPlanner,
     NoPathError,
     PlanningParameters,
+    _corners,
+    _poses_along,
 )
 from surveillance_runtime.place.occupancy_grid import Grid, distance_to, drawn_lines, with_walls
 from surveillance_runtime.place.zones import zones_from
@@ -398,7 +399,7 @@ def test_a_path_costs_hardly_more_than_the_cheapest_of_the_grid(seed: int) -> No
     ends = [(int((y - 2) / 0.1), int((x + 1) / 0.1)) for x, y in (start, goal)]
     costs, _ = search.find_costs([ends[0]], [ends[1]])
     cheapest = 0.1 * float(costs[ends[1]])
-    paid = sum(planner._price(a, b) for a, b in zip(path, path[1:], strict=False))
+    paid = sum(planner._price(a, b) for a, b in pairwise(path))
     assert paid <= 1.06 * cheapest
     # Rounded: it nowhere turns by much at once.
     ways = np.diff(path, axis=0)
@@ -557,7 +558,7 @@ def test_who_stands_too_near_to_a_wall_leaves_it_straight(
     path = planner.plan(start, (3, 2))
     assert path[0] == pytest.approx(start)
     gaps = [float(planner.clearance(point)[0]) for point in geometry.equally_spaced(path[:2], 0.02)]
-    assert all(later > gap - 0.013 for gap, later in zip(gaps, gaps[1:], strict=False)) is leaves
+    assert all(later > gap - 0.013 for gap, later in pairwise(gaps)) is leaves
     assert gaps[-1] >= ROBOT.radius + ROBOT.margin - 0.03
 
 

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 
 import numpy as np
 import pytest
+from scipy.optimize import least_squares
 from skimage.graph import MCP_Geometric
 
-from surveillance_controllers.exploration.evidence_grid import EvidenceGrid
+from surveillance_controllers.exploration.evidence_grid import HIT, PASSED, EvidenceGrid
 from surveillance_controllers.exploration.foreign_map import ForeignMap
 from surveillance_controllers.exploration.frontiers import (
     FrontierParameters,
@@ -17,7 +19,7 @@ from surveillance_controllers.exploration.frontiers import (
     travel_costs,
 )
 from surveillance_controllers.exploration.pose_graph import Edge, PoseGraph
-from surveillance_controllers.geometry import Pose, Scan, composed, relative
+from surveillance_controllers.geometry import Pose, Scan, angle_between, composed, relative
 from surveillance_runtime.place.occupancy_grid import Grid
 
 SIDE = 0.1
@@ -232,3 +234,103 @@ def test_a_foreign_map_is_due_once_and_says_what_is_missing() -> None:
     assert foreign.see(scan, (2.0, 0.0, 0.0))
     assert foreign.start == pytest.approx((5.0, 1.0, math.pi / 2)), 'the first one'
     assert foreign.pose((2.0, 0.0, 0.0)) == pytest.approx((5.0, 2.0, math.pi / 2))
+
+
+@pytest.mark.parametrize('seed', range(3))
+def test_a_scan_votes_for_the_cells_that_its_rays_pass_and_meet(seed: int) -> None:
+    draw = np.random.default_rng(seed)
+    angles = np.sort(np.concatenate([np.arange(-1.0, 0.6, 0.1), np.arange(1.2, 2.0, 0.1)]))
+    ranges = draw.uniform(0.5, 2.5, len(angles))
+    ranges[::5], ranges[3] = np.inf, np.nan
+    scan = Scan(angles, ranges, 2.0, (0.1, 0.0, 0.5))
+    pose = (0.93, -1.21, 0.4)
+    x, y, yaw = composed(pose, scan.mount)
+    grid = EvidenceGrid(0.1)
+    grid.add(pose, scan)
+
+    known = [(a, r) for a, r in zip(angles, ranges, strict=True) if not math.isnan(r)]
+    rays = [(a, r - 0.1 if r < 2.0 else 2.0) for a, r in known]
+    for (first, near), (second, far) in itertools.pairwise(known):
+        gap, between = second - first, min(near, far, 2.0) - 0.15
+        count = min(max(math.ceil(gap * between / 0.1), 1), 8)
+        if gap < 0.15:
+            rays += [(first + gap * part / count, between) for part in range(1, count)]
+
+    def cells(step: float) -> set[tuple[int, int]]:
+        """Return the cells that rays pass, looked at in such steps."""
+        return {
+            (math.floor((y + way * math.sin(a + yaw)) / 0.1),
+             math.floor((x + way * math.cos(a + yaw)) / 0.1))
+            for a, length in rays
+            for way in np.arange(0.0, max(length, 0.0) + 1e-9, step)
+        }  # fmt: skip
+
+    met = {
+        (math.floor((y + r * math.sin(a + yaw)) / 0.1),
+         math.floor((x + r * math.cos(a + yaw)) / 0.1))
+        for a, r in known
+        if r < 2.0
+    }  # fmt: skip
+    row, column = grid._corner
+    odds = {
+        (int(at[0]) + row, int(at[1]) + column): int(grid._odds[tuple(at)])
+        for at in np.argwhere(grid._odds)
+    }
+    assert {cell for cell, value in odds.items() if value == HIT} == met
+    passed = {cell for cell, value in odds.items() if value == PASSED}
+    assert passed | met == odds.keys()
+    assert cells(0.09) - met <= passed <= cells(0.002) - met
+    assert {tuple(at) for at in np.argwhere(grid._votes == 1)} == {
+        (cell[0] - row, cell[1] - column) for cell in odds
+    }
+
+
+def disagreeing(seed: int, doubtful: bool) -> PoseGraph:
+    """Return a graph of six poses whose measurements contradict each other somewhat."""
+    draw = np.random.default_rng(seed)
+    poses: list[Pose] = [(1.0, 2.0, 0.5)]
+    for _ in range(5):
+        poses.append(composed(poses[-1], (1.0, 0.2, 0.6)))
+    edges = []
+    for first, second in ((0, 1), (1, 2), (2, 3), (3, 4), (4, 5), (0, 3), (1, 4), (5, 0)):
+        x, y, turn = (relative(poses[first], poses[second]) + draw.normal(0, 0.05, 3)).tolist()
+        root = draw.normal(0, 3.0, (3, 3)) + 8.0 * np.eye(3)
+        edges.append(Edge(first, second, (x, y, turn), root @ root.T))
+    if doubtful:
+        x, y, turn = relative(poses[2], poses[5])
+        edges.append(Edge(2, 5, (x + 1.5, y, turn + 0.2), np.eye(3) * 90.0, may_be_wrong=True))
+    return PoseGraph(poses, edges)
+
+
+def errors(poses: np.ndarray, edges: list[Edge], scales: list[float]) -> np.ndarray:
+    """Return what edges are off by, in standard deviations."""
+    found = []
+    for edge, scale in zip(edges, scales, strict=True):
+        x, y, turn = relative(tuple(poses[edge.first]), tuple(poses[edge.second]))
+        off = np.array([x - edge.step[0], y - edge.step[1], angle_between(edge.step[2], turn)])
+        found.append(scale * np.linalg.cholesky(edge.information).T @ off)
+    return np.concatenate(found)
+
+
+@pytest.mark.parametrize('doubtful', [False, True])
+@pytest.mark.parametrize('seed', [0, 2, 3])
+def test_poses_agree_best_as_scipy_finds_it(seed: int, doubtful: bool) -> None:
+    graph = disagreeing(seed, doubtful)
+    before = np.array(graph.poses)
+    moved = graph.optimise()
+    found = np.array(graph.poses)
+    scales = [1.0] * len(graph.edges)
+    if doubtful:
+        # What dynamic covariance scaling leaves of the loop, by its error (phi is 12).
+        squared = float((errors(found, graph.edges[-1:], [1.0]) ** 2).sum())
+        scales[-1] = min(1.0, 24.0 / (12.0 + squared))
+        assert scales[-1] < 0.9
+
+    def off(free: np.ndarray) -> np.ndarray:
+        return errors(np.vstack([before[:1], free.reshape(-1, 3)]), graph.edges, scales)
+
+    best = least_squares(off, found[1:].ravel(), xtol=1e-12, ftol=1e-12).x.reshape(-1, 3)
+    assert found[0] == pytest.approx(before[0])
+    assert found[1:] == pytest.approx(best, abs=2e-4)
+    assert moved == pytest.approx(np.hypot(*(found - before)[:, :2].T).max())
+    assert moved > 0.01

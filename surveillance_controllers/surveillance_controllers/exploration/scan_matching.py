@@ -33,6 +33,8 @@ _SHARED = 4.0
 """Neighbouring points share the errors of their line: as many tell no more than one."""
 _THIN = 0.15
 """Points whose spread across the line exceeds this part of that along it lie on none."""
+_WIDE = 3
+"""In the first rounds points further from their line keep their weight."""
 
 
 @dataclass(frozen=True)
@@ -254,7 +256,7 @@ class Matcher:
             at, normals = nearest[near], self._seen.normals[nearest[near]]
             error = ((placed.points[near] - self._seen.points[at]) * normals).sum(axis=1)
             turned = placed.points[near] - (x, y)
-            spread = p.spread * (3.0 if number < 3 else 1.0)
+            spread = p.spread * (3.0 if number < _WIDE else 1.0)
             weight = 1.0 / (1.0 + (error / spread) ** 2) ** 2
             slope = np.column_stack(
                 [normals, normals[:, 1] * turned[:, 0] - normals[:, 0] * turned[:, 1]]
@@ -272,7 +274,7 @@ class Matcher:
             )
             change = np.clip(change, -0.1, 0.1)
             estimate += own @ change
-            if np.abs(change).max() < 1e-4:
+            if number >= _WIDE and np.abs(change).max() < 1e-4:
                 break
         x, y, yaw = estimate.tolist()
         return (x, y, math.remainder(yaw, math.tau)), information / _SHARED + held
