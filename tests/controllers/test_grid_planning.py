@@ -336,7 +336,7 @@ def test_what_each_cell_costs_is_what_its_distances_say(seed: int) -> None:
         return {(math.floor((y - 2) / 0.1), math.floor((x + 1) / 0.1)) for x, y in places}
 
     along = np.linspace(door[:2], door[2:], 60)
-    walls = {tuple(each) for each in np.argwhere(grid.cells != 0).tolist()}
+    walls = {(int(row), int(column)) for row, column in np.argwhere(grid.cells != 0)}
     barred = {
         (row, column)
         for row, column in np.ndindex(grid.cells.shape)

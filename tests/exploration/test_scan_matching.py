@@ -56,7 +56,8 @@ def test_points_on_walls_face_the_lidar_and_corners_are_left_out() -> None:
 def test_a_line_is_of_seven_neighbours_at_least(ranges: np.ndarray, kept: int) -> None:
     angles = (np.arange(len(ranges)) - 3) * 0.03
     straight = ranges / np.cos(angles)
-    found = surface_of(Scan(angles, np.where(ranges < 8, straight, np.inf), 8.0))
+    met = np.where(ranges < 8, straight, np.inf).astype(np.float64)
+    found = surface_of(Scan(angles.astype(np.float64), met, 8.0))
     assert len(found.points) == kept
     assert found.normals.shape == found.points.shape
     assert np.abs(found.normals - (-1.0, 0.0)).max(initial=0.0) < 1e-6

@@ -24,6 +24,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from enum import StrEnum
+from itertools import pairwise
 from typing import Any
 
 import cv2
@@ -404,7 +405,8 @@ def _common(
     names, values = names[order], values[order]
     starts = np.flatnonzero(np.diff(names, prepend=-1))
     medians = np.zeros((1024, 2), np.float32)
-    for begin, end in zip(starts, [*starts[1:], len(names)], strict=True):
+    # Where nothing is counted, there is no class.
+    for begin, end in pairwise([*starts, len(names)]):
         some = values[begin : end : max(1, (end - begin) // 400)]
         medians[names[begin]] = np.median(some, axis=0)
     return medians[classes]
