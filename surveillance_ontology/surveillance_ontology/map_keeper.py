@@ -179,7 +179,7 @@ class MapKeeper:
     def _take_kept(self, kept: dict[str, Any]) -> None:
         """Take the place as an earlier process left it."""
         edited = checked_names(edited_place(kept['edited']))
-        by_hand = frozenset(kept.get('by_hand', ()))
+        by_hand = frozenset(kept['by_hand'])
         if any(problem_in_name('kept', name) for name in by_hand):
             raise PlaceError(('by_hand',), 'expected names')
         if kept['described'] == self._described:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from datetime import datetime
+from datetime import datetime, timedelta
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +16,7 @@ from surveillance_simulation.camera.model import Camera, covered
 from surveillance_simulation.camera.mujoco_rendering import MujocoRenderer
 from surveillance_simulation.camera.rendering import Renderer
 from surveillance_simulation.robot.robot import PHYSICS_STEP, Robot
-from surveillance_simulation.staging import Stage, Times, check_script, read_script
+from surveillance_simulation.staging import Happening, Stage, Times, check_script, read_script
 
 from .places import camera_pose, two_rooms
 
@@ -300,3 +300,302 @@ def test_a_script_for_another_place_is_refused(tmp_path: Path) -> None:
     (tmp_path / 'stage.yaml').write_text('stage:\n  a: {at: 5 s, do: door D9 closed}')
     problem = check_script(Robot(two_rooms()), read_script(tmp_path / 'stage.yaml'))
     assert problem == "stage.a: door D9 closed: there is no door 'D9': expected 'D'"
+
+
+@pytest.mark.parametrize(
+    ('line', 'told'),
+    [
+        (
+            'door D ajar',
+            ('door', 'D', 'ajar', [3.0, 1.0], 'door D is ajar by 30 degrees'),
+        ),
+        ('door D ajar 12.5', ('door', 'D', 'ajar', [3.0, 1.0], 'door D is ajar by 12.5 degrees')),
+        ('door D closed', ('door', 'D', 'closed', [3.0, 1.0], 'door D is closed')),
+        ('door D open', ('door', 'D', 'open', [3.0, 1.0], 'door D is open')),
+        (
+            'barrel b 4.1239 0.5',
+            ('barrel', 'b', 'appeared', [4.124, 0.5], 'barrel b stands at (4.12, 0.50)'),
+        ),
+        ('box b 4 0.5', ('box', 'b', 'appeared', [4.0, 0.5], 'box b stands at (4.00, 0.50)')),
+        ('chair c 4 0.5', ('chair', 'c', 'appeared', [4.0, 0.5], 'chair c stands at (4.00, 0.50)')),
+        (
+            'person p 4 0.5 90',
+            ('person', 'p', 'appeared', [4.0, 0.5], 'person p stands at (4.00, 0.50)'),
+        ),
+        (
+            'walk p 4 0.5 5 0.5 5 1.5',
+            ('person', 'p', 'walks', [4.0, 0.5], 'person p walks about'),
+        ),
+        ('remove there', ('barrel', 'there', 'removed', [1.0, 0.5], 'barrel there is gone')),
+        (
+            'barrel there 1.2 0.6 0.1',
+            ('barrel', 'there', 'moved', [1.2, 0.6], 'barrel there stands at (1.20, 0.60)'),
+        ),
+        ('marker m1 gone', ('marker', '1', 'gone', [0.06, 1.0], 'marker m1 is gone')),
+        ('marker m1 broken', ('marker', '1', 'broken', [0.06, 1.0], 'marker m1 is broken')),
+        (
+            'marker m1 moved 5.94 1.5 1.1 180',
+            ('marker', '1', 'moved', [5.94, 1.5], 'marker m1 hangs at (5.94, 1.50)'),
+        ),
+        (
+            'marker m1 copy 5.94 1.5 1.1 180',
+            ('marker', '1', 'double', [5.94, 1.5], 'marker m1 hangs a second time at (5.94, 1.50)'),
+        ),
+        ('lamp A off', ('light', 'A', 'off', None, 'the lamp of A is off')),
+        ('lamp all on', ('light', 'all', 'on', None, 'the lamp of all is on')),
+        ('lamp B 0.25', ('light', 'B', '0.25', None, 'the lamp of B is 0.25')),
+        ('lens covered', ('view', 'lens', 'covered', None, 'the lens is covered')),
+        ('lens clear', ('view', 'lens', 'clear', None, 'the lens is clear')),
+    ],
+)
+def test_the_truth_says_of_each_line_what_was_done(line: str, told: tuple) -> None:
+    robot, truth = Robot(two_rooms()), list[str]()
+    robot.world.place_obstacle('there', 1.0, 0.5, 0.2)
+    kind, subject, state, where, text = told
+    assert Stage(robot, truth.append).do(line, 12.34567) == text
+    (written,) = map(json.loads, truth)
+    assert written.pop('position', None) == where
+    assert written == {
+        'at': 12.346,
+        'line': line,
+        'kind': kind,
+        'subject': subject,
+        'state': state,
+        'text': text,
+    }
+
+
+def test_what_is_staged_has_the_size_and_the_place_that_the_line_says() -> None:
+    world = staged(
+        'barrel b 4 0.5',
+        'barrel thick 4.5 0.5 0.35',
+        'box c 1 0.5',
+        'box flat 1.5 0.5 0.6',
+        'box high 2 0.5 0.4 1.1',
+        'chair d 5 1.5 90',
+        'person p 5 0.5 -90',
+        'lamp A 0.25',
+        'lamp B off',
+    ).world
+    sizes = {
+        name: (part.length, part.width, part.top)
+        for name, thing in world.things.items()
+        for part in thing.parts[:1]
+        if thing.kind in ('barrel', 'box')
+    }
+    assert sizes == {
+        'b': (0.4, 0.4, 0.8),
+        'thick': (0.7, 0.7, 0.8),
+        'c': (0.3, 0.3, 0.3),
+        'flat': (0.6, 0.6, 0.3),
+        'high': (0.4, 0.4, 1.1),
+    }
+    yaws = {name: math.degrees(each.yaw) for name, each in world.things.items()}
+    assert yaws == {name: {'d': 90.0, 'p': -90.0}.get(name, 0.0) for name in yaws}
+    assert world.lamps == {'A': 0.25, 'B': 0.0}
+    stage = Stage(Robot(world))
+    stage.do('lamp all on', 0.0)
+    assert world.lamps == {}
+    stage.do('lamp all 0.5', 0.0)
+    assert world.lamps == {'A': 0.5, 'B': 0.5}
+    stage.do('marker m1 copy 5.94 1.5 1.1 90', 0.0)
+    copied = world.panels['m1 copy'].marker
+    assert (copied.x, copied.y, copied.z, copied.yaw) == (5.94, 1.5, 1.1, math.pi / 2)
+    assert copied.size == world.panels['m1'].marker.size
+
+
+@pytest.mark.parametrize(
+    ('line', 'words'),
+    [
+        ('', "stage: got '', expected "),
+        ('door D', 'stage: got 1 words, expected door NAME open|closed|ajar [DEGREES]'),
+        ('door D open 30', "door D: got 'open 30', expected door NAME"),
+        ('door D ajar 30 40', "door D: got 'ajar 30 40', expected door NAME"),
+        ('barrel b 1 1 0.2 0.3', 'stage: got 5 words, expected barrel NAME X Y [RADIUS]'),
+        ('box b 1 1 0.2 0.3 0.4', 'stage: got 6 words, expected box NAME X Y [SIDE [HEIGHT]]'),
+        ('box b 1', 'stage: got 2 words, expected box NAME'),
+        ('box b 10001 1', "got '10001' for a number, expected box NAME"),
+        ('box b -1e5 1', "got '-1e5' for a number, expected box NAME"),
+        ('box b 10000 1', 'box b: expected a point in the place'),
+        ('walk p 1 1 2', 'stage: got 4 words, expected walk NAME X Y X Y'),
+        ('walk p 1 1 2 1 3', 'walk p: got 5 numbers, expected walk NAME X Y X Y'),
+        ('remove a b', 'stage: got 2 words, expected remove NAME'),
+        ('marker m1', 'stage: got 1 words, expected marker NAME'),
+        ('marker m1 whole 3', 'stage: got 3 words, expected marker NAME'),
+        ('marker m1 moved 1 1 1', 'stage: got 3 words, expected marker NAME'),
+        ('marker m1 moved 1 1 1 0 0', 'stage: got 5 words, expected marker NAME'),
+        ('lamp A', 'stage: got 1 words, expected lamp PLACE|all on|off|BRIGHTNESS'),
+        ('lamp A dim', "got 'dim' for a number, expected lamp PLACE"),
+        ('lamp A 2.01', "lamp of 'A': 2.01: expected 0 to 2, 1 is day"),
+        ('lens', 'stage: got 0 words, expected lens clear|covered'),
+    ],
+)
+def test_a_line_with_a_word_too_many_or_too_few_says_how_it_is_written(
+    line: str, words: str
+) -> None:
+    robot, truth = Robot(two_rooms()), list[str]()
+    stage = Stage(robot, truth.append)
+    with pytest.raises(PlaceError) as caught:
+        stage.do(line, 0.0)
+    assert words in str(caught.value)
+    assert truth == []
+    assert json.loads(stage.state())['lines'] == []
+
+
+def test_of_each_subject_the_last_line_is_kept_until_it_is_taken_away() -> None:
+    robot = Robot(two_rooms())
+    stage = Stage(robot)
+
+    def kept(*lines: str) -> list[str]:
+        for line in lines:
+            stage.do(line, 0.0)
+        return json.loads(stage.state())['lines']
+
+    assert kept('door D closed', 'barrel b 4 0.5', 'door D ajar') == [
+        'barrel b 4 0.5',
+        'door D ajar',
+    ]
+    assert kept('box b 4 0.7') == ['door D ajar', 'box b 4 0.7'], 'a thing of this name'
+    assert kept('remove b', 'lamp A off', 'lamp B off') == [
+        'door D ajar',
+        'lamp A off',
+        'lamp B off',
+    ]
+    assert kept('lamp all 0.5', 'lamp B on') == ['door D ajar', 'lamp all 0.5', 'lamp B on']
+    assert kept('lens covered', 'lens clear', 'lamp all on') == [
+        'door D ajar',
+        'lens clear',
+        'lamp all on',
+    ]
+    hung = ['marker m1 copy 5.94 1.5 1 180', 'marker m1 moved 0.06 1.5 1 0']
+    assert kept(*hung, hung[0])[-2:] == [hung[1], hung[0]]
+    stage.do('walk p 4 0.5 5 0.5', 0.0)
+    assert len(robot.walks) == 1
+    stage.forget('thing', 'p')
+    stage.forget('door', 'D')
+    stage.forget('door', 'D')
+    assert len(robot.walks) == 0
+    assert kept() == ['lens clear', 'lamp all on', hung[1], hung[0]]
+    stage.do('walk p 4 0.5 5 0.5', 0.0)
+    stage.do('person p 4 0.5', 0.0)
+    assert len(robot.walks) == 0, 'who stands walks no more'
+    stage.do('walk p 4 0.5 5 0.5', 0.0)
+    stage.do('remove p', 0.0)
+    assert len(robot.walks) == 0
+
+
+@pytest.mark.parametrize('kept', ['{}', '[]', '{"start": 1.0}', '{"start": "x", "lines": []}'])
+def test_a_stage_that_was_kept_otherwise_is_refused(kept: str) -> None:
+    with pytest.raises((ValueError, KeyError, TypeError)):
+        Stage(Robot(two_rooms())).restore(kept, 0.0)
+    with pytest.raises(ValueError, match='expected when it began'):
+        Stage(Robot(two_rooms())).restore('{"start": Infinity, "lines": []}', 0.0)
+    stage = Stage(Robot(two_rooms()))
+    stage.restore('{"start": 5.0, "lines": ["door D9 closed", "door D closed"]}', 9.0)
+    assert stage.start == 5.0
+    assert json.loads(stage.state())['lines'] == ['door D closed'], 'the other one is elsewhere'
+
+
+def test_what_a_script_cannot_do_is_said_and_the_rest_goes_on() -> None:
+    robot, truth = Robot(two_rooms()), list[str]()
+    script = [
+        Happening('first', Times(10.0), ('remove b', 'door D closed'), 5.0, ('door D open',)),
+        Happening('second', Times(12.0), ('lens covered',)),
+    ]
+    stage = Stage(robot, truth.append, script, 100.0)
+    assert stage.advance(109.999) == []
+    assert stage.advance(110.0) == [
+        "stage: remove b: there is no obstacle 'b', nor any other",
+        'door D is closed',
+    ]
+    assert stage.advance(114.9) == ['the lens is covered']
+    assert stage.advance(115.0) == ['door D is open']
+    assert stage.advance(1e6) == []
+    told = [json.loads(each) for each in truth]
+    assert [each['at'] for each in told] == [110.0, 110.0, 112.0, 115.0]
+    assert told[0] == {
+        'at': 110.0,
+        'line': 'remove b',
+        'refused': "there is no obstacle 'b', nor any other",
+    }
+    # Restored while it lasts, it ends in time; restored later, it is over.
+    for now, lines in ((113.0, ['door D is open']), (115.0, []), (200.0, [])):
+        later = Stage(Robot(two_rooms()), script=script, start=now)
+        later.restore(json.dumps({'start': 100.0, 'lines': []}), now)
+        assert later.advance(1e6) == lines
+
+
+EVERY = ['daily 00:00', 'daily 09:07', 'mon 00:30', 'sun 23:59', 'day 1 10:00', 'day 3 00:00']
+EVERY += ['day 12 18:45', '0 s', '95 min', '2.5 d', 'fri 12:00']
+
+
+@pytest.mark.parametrize('text', EVERY)
+@pytest.mark.parametrize('start', [datetime(2026, 3, 2, 9, 7), datetime(2026, 3, 6, 23, 59, 30)])
+def test_times_are_those_that_a_calendar_has(text: str, start: datetime) -> None:
+    """Beside a list of all minutes of four weeks that the words hold of."""
+    times, begun = Times.parse(text), start.timestamp()
+    words = text.split()
+    if words[1] in ('s', 'min', 'd'):
+        span = float(words[0]) * {'s': 1, 'min': 60, 'd': 86400}[words[1]]
+        moments = [begun + span]
+    else:
+        first = start.replace(hour=0, minute=0, second=0)
+        days = [first + timedelta(days=each) for each in range(-8, 29)]
+        hour, minute = map(int, words[-1].split(':'))
+        moments = [
+            day.replace(hour=hour, minute=minute).timestamp()
+            for number, day in enumerate(days, start=-7)
+            if (
+                words[0] == 'daily'
+                or (words[0] == 'day' and number == int(words[1]))
+                or words[0] == day.strftime('%a').lower()
+            )
+        ]
+    assert times.first(begun) == min((at for at in moments if at >= begun), default=math.inf)
+    rng = np.random.default_rng(1)
+    stamps = [begun + each for each in rng.uniform(0.0, 15 * 86400.0, 40).tolist()]
+    stamps += [at + each for at in moments[7:16] for each in (-0.5, 0.0, 0.5) if at + each >= begun]
+    for stamp in stamps:
+        expected = min((at for at in moments if at > stamp), default=math.inf)
+        assert times.after(stamp, begun) == expected
+        past = [at for at in moments if begun <= at <= stamp]
+        assert times.before(stamp, begun) == max(past, default=None)
+
+
+@pytest.mark.parametrize(
+    ('text', 'words'),
+    [
+        ('a: {at: 5 s, do: 3}', 'do: expected a line or a list of lines'),
+        ('a: {at: 5 s, do: [lens clear, 3]}', 'do: expected a line or a list of lines'),
+        ("a: {at: 5 s, do: ''}", "do: got '', expected "),
+        ('a: {at: 5 s, do: lens clear, then: lens covered}', "'for' and 'then' together"),
+        (
+            'a: {at: 5 s, do: lens clear, for: soon, then: lens covered}',
+            "for: got 'soon', expected",
+        ),
+        ('a: {at: 5 s, do: lens clear, for: 3 s, then: dark}', "then: got 'dark', expected"),
+        ('a: {do: lens clear}', "expected 'at'"),
+    ],
+)
+def test_each_key_of_a_script_is_checked(tmp_path: Path, text: str, words: str) -> None:
+    (tmp_path / 'stage.yaml').write_text(f'stage:\n  {text}\n')
+    with pytest.raises(FileError) as caught:
+        read_script(tmp_path / 'stage.yaml')
+    assert words in str(caught.value)
+    (tmp_path / 'stage.yaml').write_text(
+        'stage: {a: {at: 5 s, do: lens clear, for: 1.5 min, then: [lens covered, door D open]}}'
+    )
+    assert read_script(tmp_path / 'stage.yaml') == [
+        Happening('a', Times(5.0), ('lens clear',), 90.0, ('lens covered', 'door D open'))
+    ]
+
+
+def test_a_script_is_tried_as_it_will_be_carried_out() -> None:
+    def problem(*lines: str, then: tuple[str, ...] = ()) -> str:
+        return check_script(Robot(two_rooms()), [Happening('a', Times(1.0), lines, 1.0, then)])
+
+    assert problem('remove what another entry puts there', 'lens covered') == ''
+    assert problem('door D closed', 'walk p 1.0 1.0 5.0 1.0') == '', 'the door may be open then'
+    assert problem('lens covered', then=('lamp C on',)) == (
+        "stage.a: lamp C on: there is no place 'C': expected one of A, B"
+    )
