@@ -59,7 +59,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     """Mark each test by what it needs: nothing (unit), ROS nodes (nodes), a whole mission.
 
     Several processes begin with the files that take longest, those that start processes or whole
-    missions, and end at about the same time.
+    missions or say so (`early`), and end at about the same time.
     """
     kinds = ('mission', 'nodes', 'unit')
     dearest: dict[Path, int] = {}
@@ -73,7 +73,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         else:
             kind = 2
         item.add_marker(kinds[kind])
-        dear = 0 if fixtures & PROCESS_FIXTURES else kind
+        dear = 0 if fixtures & PROCESS_FIXTURES or item.get_closest_marker('early') else kind
         dearest[item.path] = min(dear, dearest.get(item.path, dear))
     if hasattr(config, 'workerinput'):
         items.sort(key=lambda item: (dearest[item.path], item.path))

@@ -6,6 +6,7 @@ import tempfile
 import threading
 from pathlib import Path
 
+import pytest
 from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import (
@@ -24,6 +25,8 @@ from surveillance_behaviour.mission.mission import MissionSettings
 from surveillance_behaviour.mission.mission_log import MissionRecord, read
 
 from .scripted_world import World
+
+pytestmark = pytest.mark.early
 
 CALLS = [
     'snapshot',

@@ -15,6 +15,8 @@ from surveillance_behaviour.mission.mission_log import (
 from .machine_runs import CALLS, Killed, Run, settings, visited
 from .scripted_world import POSITIONS, SEVEN_ROOMS, World
 
+pytestmark = pytest.mark.early
+
 
 def test_an_hour_of_patrol_reaches_all_places_and_charges_in_time(machine: str) -> None:
     world = World(draw=0.8)

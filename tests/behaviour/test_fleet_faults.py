@@ -9,6 +9,8 @@ import pytest
 
 from .fleet_faults import HEARD_WITHIN, ONTOLOGY, Fleet
 
+pytestmark = pytest.mark.early
+
 
 def judged(fleet: Fleet) -> list[str]:
     fleet.settle()

@@ -16,6 +16,8 @@ from surveillance_behaviour.machines.patrol_machine import Recharge
 from .machine_runs import CALLS, Run, settings
 from .scripted_world import World, fails, started_again
 
+pytestmark = pytest.mark.early
+
 WAYS = {
     'surveillance': [
         ('INITIALIZATION', 'initialized'),

@@ -14,6 +14,8 @@ from surveillance_behaviour.ports import Point
 from .machine_runs import CALLS, Run, visited
 from .scripted_world import POSITIONS, SEVEN_ROOMS, World, fails, started_again
 
+pytestmark = pytest.mark.early
+
 
 @pytest.mark.parametrize(('times', 'over'), [(2, 100.0), (20, 1100.0)])
 @pytest.mark.parametrize(('name', 'call'), [(m, c) for m, calls in CALLS.items() for c in calls])

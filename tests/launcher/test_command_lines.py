@@ -5,7 +5,11 @@ from __future__ import annotations
 import subprocess
 import sys
 
+import pytest
+
 from tests.launcher.conftest import ROOT
+
+pytestmark = pytest.mark.early
 
 
 def test_each_value_of_a_command_line_takes_effect_or_costs_one_line():

@@ -15,6 +15,8 @@ import pytest
 from launcher.environment import LIBRARIES, PACKAGES, requirements
 from tests.launcher.conftest import ROOT
 
+pytestmark = pytest.mark.early
+
 # Names under which distributions are imported, where they differ.
 DISTRIBUTIONS = {
     'cv2': 'opencv-python-headless',

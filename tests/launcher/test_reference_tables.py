@@ -19,6 +19,8 @@ from surveillance_runtime.configuration import SCHEMA, read_schema
 from surveillance_runtime.discovery import LAST_DOMAIN
 from tests.launcher.conftest import ROOT
 
+pytestmark = pytest.mark.early
+
 SURVEY = """
 import json, sys
 from launcher.reference_tables import interfaces_page, survey

@@ -12,6 +12,8 @@ import pytest
 from surveillance_perception.observation.floor import Change, FloorView, FloorVisit, changes
 from surveillance_runtime.place.occupancy_grid import Grid
 
+pytestmark = pytest.mark.early
+
 RESOLUTION = 0.05
 
 

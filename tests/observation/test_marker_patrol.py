@@ -41,6 +41,8 @@ from surveillance_simulation.world.world import read_world
 
 from .marked_walls import camera_pose
 
+pytestmark = pytest.mark.early
+
 PLACE = Path(__file__).parents[2] / 'config' / 'patrol_world.yaml'
 HEIGHT, SIDE = 0.9, 0.2
 SPEED, TURN = 0.5, 2.0

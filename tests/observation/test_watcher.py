@@ -29,6 +29,8 @@ from surveillance_runtime.place.occupancy_grid import Grid
 
 from .marked_walls import camera, camera_pose, hang, seen_at, wall
 
+pytestmark = pytest.mark.early
+
 RULES = """
 - object: none
 - door: D1

@@ -15,6 +15,8 @@ from surveillance_runtime.place.occupancy_map import write_map
 from surveillance_runtime.place.plan_grid import draw
 from surveillance_runtime.place.regions import Regions
 
+pytestmark = pytest.mark.early
+
 CONFIG = Path(__file__).parents[2] / 'config'
 
 

@@ -17,6 +17,8 @@ from surveillance_operator import map_command
 from surveillance_runtime.place.drawing import Canvas, blend, draw_place
 from surveillance_simulation.world.world import read_world
 
+pytestmark = pytest.mark.early
+
 CONFIG = Path(__file__).parents[2] / 'config'
 
 

@@ -25,6 +25,8 @@ sys.path.insert(0, str(CONFIG.parent / 'benchmarks'))
 
 import navigation
 
+pytestmark = pytest.mark.early
+
 RADIUS = 0.22
 DOORS = ('D1', 'D2', 'D3', 'D4', 'D5', 'D6', 'D7')
 PLAN = read_world(CONFIG / 'seven_rooms.yaml').plan

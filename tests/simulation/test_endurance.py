@@ -5,10 +5,14 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
+import pytest
+
 ROOT = Path(__file__).parents[2]
 sys.path.insert(0, str(ROOT / 'benchmarks'))
 
 import endurance  # noqa: E402
+
+pytestmark = pytest.mark.early
 
 
 def test_minutes_of_trouble_cost_neither_collisions_nor_the_way_home() -> None:
