@@ -106,9 +106,9 @@ class Derivation:
         return False
 
     def _is_below(self, sub: str, sup: str) -> bool:
-        if sup == NOTHING:
-            known = self.classification
-            return known is not None and known.is_impossible(sub)
+        known = self.classification
+        if known is not None and known.is_impossible(sub):
+            return True
         return sup in (sub, THING, *self.superclasses(sub))
 
     def superclasses(self, cls: str) -> set[str]:
@@ -116,6 +116,8 @@ class Derivation:
         known, engine = self.classification, self.usable
         if known is None:
             return set()
+        if known.is_impossible(cls):
+            return self._classes() - {cls, THING}
         found = known.superclasses(cls)
         if engine is not None:
             # What is one individual at most is below all that the individual belongs to.
@@ -135,7 +137,8 @@ class Derivation:
         known = self.classification
         if known is None:
             return set()
-        found = self._classes() if cls == THING else known.subclasses(cls)
+        is_above_all = cls == THING or cls in known.superclasses(THING)
+        found = self._classes() if is_above_all else known.subclasses(cls)
         if known.within and cls != THING:
             found.update(name for name in known.within if cls in self.superclasses(name))
         if self._told.schema_changed or cls == THING:

@@ -31,7 +31,26 @@ from .patrol_map import (
     seven_rooms,
     value,
 )
-from .small_ontologies import A, B, C, P, base, differ, i, is_a, j, k, m, rel, same
+from .small_ontologies import (
+    A,
+    B,
+    C,
+    P,
+    Q,
+    S,
+    T,
+    base,
+    differ,
+    has,
+    i,
+    is_a,
+    j,
+    k,
+    m,
+    num,
+    rel,
+    same,
+)
 
 
 def test_urgency_is_explained_by_its_calculation() -> None:
@@ -283,3 +302,47 @@ def test_the_sameness_of_two_is_explained_itself_and_that_over_others_by_steps()
         'x:j is the same as x:k',
         'x:p is functional',
     )
+
+
+def test_what_makes_both_ends_of_a_link_the_same_is_told_once() -> None:
+    kb = base(same(i, j), rel(P, j, j))
+    explanation = kb.explain(rel(P, i, i))
+    assert explanation is not None
+    assert explanation.tree().splitlines() == [
+        'x:i x:p x:i  [by the same individual under another name]',
+        '  x:j x:p x:j  [asserted]',
+        '  x:i is the same as x:j  [asserted]',
+    ]
+
+
+def test_one_premise_that_makes_two_the_same_is_told_once() -> None:
+    kb = base(
+        FunctionalObjectProperty(P),
+        SubObjectPropertyOf(Q, P),
+        rel(P, i, i),
+        rel(Q, i, j),
+        is_a(A, j),
+    )
+    explanation = kb.explain(is_a(A, i))
+    assert explanation is not None
+    lines = explanation.tree().splitlines()
+    assert len(set(lines)) == len(lines)
+
+
+def test_a_value_is_told_as_it_is_asserted_of_the_same_individual() -> None:
+    """Another individual has the same number as a value of another datatype."""
+    one, other = num(5, 'unsignedInt'), num(5, 'long')
+    for first, second in ((j, i), (i, j)):
+        kb = base(
+            has(S, first, one if first == j else other),
+            has(S, second, other if second == i else one),
+            SubDataPropertyOf(S, T),
+        )
+        for individual, literal, text in ((i, other, '5'), (j, one, '"5"^^unsignedInt')):
+            explanation = kb.explain(has(T, individual, num(5)))
+            assert explanation is not None
+            assert explanation.tree().splitlines() == [
+                f'{individual} x:t {text}  [by x:s SubPropertyOf x:t]',
+                f'  {individual} x:s {text}  [asserted]',
+            ]
+            assert explanation.sources()[1:] == (has(S, individual, literal),)

@@ -200,6 +200,28 @@ def test_a_class_that_only_an_assertion_names_is_below_thing() -> None:
     assert kb.subclasses(THING) == {B, C, D}
 
 
+@pytest.mark.parametrize(
+    'everybody', [SubClassOf(THING, A), SubClassOf(ObjectComplementOf(C), A), None]
+)
+def test_a_class_that_only_an_assertion_names_is_below_what_everybody_is(
+    everybody: Axiom | None,
+) -> None:
+    kb = base(*([everybody] if everybody else []), SubClassOf(C, A), is_a(B, i), is_a(D, i))
+    assert kb.superclasses(B) == ({A} if everybody else set())
+    assert kb.subclasses(A) - {THING} == ({B, C, D} if everybody else {C})
+    assert kb.subclasses(B) == set()
+
+
+def test_a_class_that_can_have_no_member_is_below_one_that_only_an_assertion_names() -> None:
+    kb = base(SubClassOf(A, NOTHING), is_a(B, i))
+    assert kb.superclasses(A) == {B}
+    assert kb.subclasses(B) == {A}
+    for sup, holds in ((B, True), (NOTHING, True), (C, True)):
+        assert kb.holds(SubClassOf(A, sup)) is holds
+    assert not kb.holds(SubClassOf(B, A))
+    assert not kb.holds(SubClassOf(B, NOTHING))
+
+
 def test_a_class_that_can_have_no_member_is_below_all() -> None:
     kb = base(
         *(Declaration('class', name) for name in (A, B, C)),

@@ -77,6 +77,11 @@ class Explanation:
         return f'{self.fact_text} because {listed} ({self.because})'
 
 
+def _once(parts: list[Explanation]) -> tuple[Explanation, ...]:
+    """Return explanations without repeats: what serves twice is told once."""
+    return tuple(dict.fromkeys(parts))
+
+
 _SIGNS = {
     'add': '+',
     'subtract': '-',
@@ -130,7 +135,7 @@ class Reasons:
             if len(parts) == 1:
                 return parts[0]
             because = 'each differs from each other one'
-            return Explanation(axiom_text(axiom), 'axiom', because, tuple(parts))
+            return Explanation(axiom_text(axiom), 'axiom', because, _once(parts))
         fact = engine.reader.fact_of(axiom)
         if fact is None or not fact[0].holds(fact):
             return None
@@ -174,7 +179,7 @@ class Reasons:
         for premise in proof.premises:
             premises += self._premise(premise)
         origin = proof.origin
-        unique = tuple(dict.fromkeys(premises))
+        unique = _once(premises)
         if isinstance(origin, Rule):
             name = f'the rule {origin.label}' if origin.label else f'the rule {axiom_text(origin)}'
             reason = self.calculation(origin, proof)
@@ -212,7 +217,7 @@ class Reasons:
         if predicate.kind == 'class':
             return ax.ClassAssertion(name, fact[1])
         if predicate.kind == 'data':
-            return ax.DataPropertyAssertion(name, fact[1], self._view.literal(fact[2]))
+            return ax.DataPropertyAssertion(name, fact[1], self._literal(fact))
         return ax.ObjectPropertyAssertion(name, fact[1], fact[2])
 
     def _premise(self, proof: Proof) -> list[Explanation]:
@@ -284,10 +289,10 @@ class Reasons:
         kind = 'rule' if isinstance(merge.origin, Rule) else 'axiom'
         because = axiom_text(merge.origin) if merge.origin else 'at most one is allowed'
         origin = () if merge.origin is None else (merge.origin,)
-        return Explanation(text, kind, because, tuple(premises), axioms=origin)
+        return Explanation(text, kind, because, _once(premises), axioms=origin)
 
     def _joined(self, text: str, parts: list[Explanation]) -> Explanation:
-        return Explanation(text, 'axiom', 'the same individual under another name', tuple(parts))
+        return Explanation(text, 'axiom', 'the same individual under another name', _once(parts))
 
     # --- words ---
 
@@ -305,8 +310,23 @@ class Reasons:
             return f'{subject} is {expression_text(name) if name is not None else predicate.name}'
         name = local_name(predicate.name)
         if predicate.kind == 'data':
-            return f'{subject} {name} {literal_text(self._view.literal(fact[2]))}'
+            return f'{subject} {name} {literal_text(self._literal(fact))}'
         return f'{subject} {name} {local_name(fact[2])}'
+
+    def _literal(self, fact: Fact) -> ex.Literal:
+        """Return the value of a fact as an assertion about the same individual writes it, else as
+        any does.
+        """
+        engine = self._engine
+        for name in sorted(engine.equality.same(fact[1])):
+            for axiom in engine.told.mentioning(name):
+                if (
+                    isinstance(axiom, ax.DataPropertyAssertion)
+                    and axiom.subject == name
+                    and engine.reader.value(axiom.literal) == fact[2]
+                ):
+                    return axiom.literal
+        return self._view.literal(fact[2])
 
     def calculation(self, rule: Rule, proof: Proof) -> str:
         """Return the rule's built-ins with the values they were applied to, '' for a rule
@@ -323,7 +343,7 @@ class Reasons:
             for fact in facts:
                 if fact[0].expression == source.prop and source.second not in values:
                     values[source.second] = fact[2]
-                    shown = f'{local_name(source.prop)} {literal_text(self._view.literal(fact[2]))}'
+                    shown = f'{local_name(source.prop)} {literal_text(self._literal(fact))}'
                     # With several robots it matters whose value it is.
                     several = fact[1] not in proof.fact[1:] and len(fact[0].succ) > 1
                     texts[source.second] = f'{local_name(fact[1])} {shown}' if several else shown

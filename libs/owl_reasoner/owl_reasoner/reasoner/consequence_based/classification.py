@@ -167,10 +167,13 @@ class Classification:
     # --- class hierarchy ---
 
     def superclasses(self, cls: str) -> set[str]:
-        """Named classes strictly above; of a class that can have no members, every other class."""
+        """Named classes strictly above; of a class that can have no members, every other class.
+
+        One that no axiom about classes names is below what owl:Thing is below.
+        """
         if cls in self._impossible:
             return {name for name in self._above if name not in (cls, THING)}
-        return set(self._above.get(cls, ())) - {cls}
+        return set(self._above.get(cls, self._above[THING])) - {cls}
 
     def subclasses(self, cls: str) -> set[str]:
         """Named classes strictly below, those that can have no members included."""
