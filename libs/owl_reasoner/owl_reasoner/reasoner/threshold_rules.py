@@ -206,6 +206,7 @@ class ThresholdIndex:
         # New keys are put in their places when a reach asks for them: at a start all come at once,
         # and one sort serves them.
         self._unsorted: list[tuple[Any, Row]] = []
+        self._fresh_reaches: list[Row] = []
         self._lost: set[tuple[bool, Row]] = set()
         self._emitted: Any = None
         origin = clause.origin
@@ -256,21 +257,26 @@ class ThresholdIndex:
     def _gain_reach(self, *row: Any) -> None:
         if row in self._reaching or row in self._odd_reaches:
             return
+        # Compared by `flush` alone: it is known early, when keys may still be about to go.
+        self._fresh_reaches.append(row)
         reach = self._reach_of(row)
         if reach is None:
             self._odd_reaches.add(row)
-            for keyed in (*self._keyed, *self._odd_keys):
-                if self._satisfied(keyed, row):
-                    self._emit(keyed)
             return
         self._reaching[row] = reach
         insort(self._reaches, (reach, row))
-        for keyed in self._odd_keys:
-            if self._satisfied(keyed, row):
-                self._emit(keyed)
 
     def flush(self) -> None:
-        """Emit what the greatest reach newly covers."""
+        """Emit what the greatest reach, and each new one that is compared by itself, covers."""
+        for row in self._fresh_reaches:
+            if row in self._odd_reaches:
+                others: tuple[Row, ...] = (*self._keyed, *self._odd_keys)
+            else:
+                others = tuple(self._odd_keys) if row in self._reaching else ()
+            for keyed in others:
+                if self._satisfied(keyed, row):
+                    self._emit(keyed)
+        self._fresh_reaches.clear()
         if not self._reaches:
             return
         reach = self._reaches[-1][0]
