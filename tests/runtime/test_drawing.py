@@ -13,10 +13,19 @@ import numpy as np
 import pytest
 
 from surveillance_runtime.place import read_place_file
-from surveillance_runtime.place.drawing import Canvas, Run, blend, draw_place
+from surveillance_runtime.place.drawing import (
+    Canvas,
+    Run,
+    _between,
+    _dashes,
+    blend,
+    draw_place,
+)
 from surveillance_runtime.place.floor_plan import FloorPlan
 from surveillance_runtime.place.regions import Regions
 from surveillance_runtime.place.zones import zones_from
+
+from . import drawn_calls
 
 CONFIG = Path(__file__).parents[2] / 'config'
 Box = tuple[float, float, float, float]
@@ -339,3 +348,131 @@ def test_a_zone_is_tinted_as_far_as_it_is_in_the_picture(
         x, y = canvas.at(point)
         shade = 127 if point in tinted else 255
         assert picture.getpixel((int(x), int(y))) == pytest.approx((shade,) * 3, abs=1)
+
+
+@pytest.mark.parametrize('picture', drawn_calls.PICTURES)
+def test_a_picture_is_drawn_as_it_was(picture: str) -> None:
+    """Layout is a matter of many small numbers: what changes them is to be looked at.
+
+    `python -m tests.runtime.drawn_calls` takes what is drawn now.
+    """
+    before = (drawn_calls.RECORDS / f'{picture}.txt').read_text('utf-8').splitlines()
+    assert drawn_calls.recorded(*drawn_calls.PICTURES[picture]) == before
+
+
+def colours(canvas: Canvas) -> np.ndarray:
+    return np.asarray(canvas.finished()).astype(int)
+
+
+def plain_canvas() -> Canvas:
+    """Return a white canvas of 10 by 5 metres from (-2, 1), 10 points a metre, with margins."""
+    return Canvas((-2.0, 1.0, 8.0, 6.0), 10.0, (10, 20, 30, 40), '#ffffff')
+
+
+def covered(canvas: Canvas, colour: tuple[int, int, int]) -> tuple[int, int, int, int, int]:
+    """Return left, top, right, bottom edge and count of the points of a colour."""
+    rows, columns = np.nonzero((np.abs(colours(canvas) - colour) < 40).all(axis=2))
+    return (
+        int(columns.min()), int(rows.min()), int(columns.max()) + 1, int(rows.max()) + 1, len(rows),
+    )  # fmt: skip
+
+
+def test_a_canvas_has_margins_and_its_points_are_tens_of_a_metre() -> None:
+    canvas = plain_canvas()
+    assert canvas.size == (100 + 10 + 30, 50 + 20 + 40)
+    assert canvas.at((-2.0, 6.0)) == (10.0, 20.0)
+    assert canvas.at((0.0, 2.5)) == (30.0, 55.0)
+    assert (colours(canvas) == 255).all()
+    odd = Canvas((0.0, 0.0, 1.01, 2.04), 10.0, (0, 0, 0, 0), '#000000')
+    assert odd.size == (11, 21)
+
+
+def test_shapes_lie_where_they_are_drawn() -> None:
+    canvas = plain_canvas()
+    canvas.box(20, 30, 40, 50, '#ff0000')
+    left, top, right, bottom, count = covered(canvas, (255, 0, 0))
+    assert (left, top) == (20, 30)
+    assert right - 40 in (0, 1)
+    assert bottom - 50 in (0, 1)
+    assert count == (right - left) * (bottom - top)
+    canvas = plain_canvas()
+    canvas.polygon([(0.0, 2.0), (2.0, 2.0), (2.0, 4.0)], '#0000ff')
+    left, top, right, bottom, count = covered(canvas, (0, 0, 255))
+    assert (left, top, right, bottom) == pytest.approx((30, 40, 50, 60), abs=1)
+    assert count == pytest.approx(200, abs=25)
+    canvas = plain_canvas()
+    canvas.disc((1.0, 3.0), 12.0, '#00ff00')
+    left, top, right, bottom, count = covered(canvas, (0, 255, 0))
+    assert (left, top, right, bottom) == pytest.approx((28, 38, 52, 62), abs=1)
+    assert count == pytest.approx(math.pi * 144, rel=0.08)
+    canvas = plain_canvas()
+    canvas.arc((1.0, 3.0), 1.0, 0.0, math.pi / 2, '#000000', 2.0)
+    left, top, right, bottom, _ = covered(canvas, (0, 0, 0))
+    assert (left, top, right, bottom) == pytest.approx((40, 40, 51, 50), abs=2)
+
+
+def test_a_tint_lets_through_what_is_below() -> None:
+    canvas = plain_canvas()
+    canvas.tint([(0.0, 2.0), (4.0, 2.0), (4.0, 4.0), (0.0, 4.0)], '#ff0000', 0.4)
+    assert colours(canvas)[50, 50].tolist() == pytest.approx([255, 153, 153], abs=2)
+    assert colours(canvas)[30, 50].tolist() == [255, 255, 255]
+
+
+def test_a_line_is_as_wide_as_it_says_and_dashed_where_it_is_asked_to() -> None:
+    canvas = plain_canvas()
+    canvas.line([(0.0, 3.0), (6.0, 3.0)], '#000000', 4.0)
+    left, top, right, bottom, _ = covered(canvas, (0, 0, 0))
+    assert (left, right) == pytest.approx((30, 90), abs=1)
+    assert bottom - top == pytest.approx(4, abs=1)
+    canvas = plain_canvas()
+    canvas.line([(0.0, 3.0), (6.0, 3.0)], '#000000', 4.0, dash=(6, 4))
+    row = colours(canvas)[50, 30:90, 0] < 128
+    assert row.sum() == pytest.approx(36, abs=7)
+    assert (np.abs(np.diff(row.astype(int))) > 0).sum() in (11, 12)
+    assert _dashes([(0.0, 0.0), (10.0, 0.0), (10.0, 3.0)], 4.0, 3.0) == [
+        [(0.0, 0.0), (4.0, 0.0)],
+        [(7.0, 0.0), (10.0, 0.0)],
+        [(10.0, 0.0), (10.0, 3.0)],
+    ]
+    assert _between((1.0, 2.0), (3.0, 6.0), 0.25) == (1.5, 3.0)
+
+
+def test_cells_of_a_map_are_filled_by_their_values() -> None:
+    canvas = plain_canvas()
+    values = np.zeros((4, 6), np.uint8)
+    values[0, 0], values[3, 5], values[1, 2] = 1, 2, 2
+    canvas.raster(values, (0.0, 2.0), 0.5, ['#ff0000', '#0000ff'])
+    picture = colours(canvas)
+    for row, column in np.ndindex(4, 6):
+        x, y = canvas.at((0.25 + 0.5 * column, 2.25 + 0.5 * row))
+        expected = {0: [255] * 3, 1: [255, 0, 0], 2: [0, 0, 255]}[int(values[row, column])]
+        assert picture[int(y), int(x)].tolist() == pytest.approx(expected, abs=3)
+    assert covered(canvas, (255, 0, 0))[:4] == pytest.approx((30, 55, 35, 60), abs=1)
+    assert (picture[:, 62:] == 255).all(), 'off the map nothing is filled'
+    assert (picture[62:] == 255).all()
+
+
+def test_where_many_ways_lie_the_colour_is_stronger() -> None:
+    canvas = plain_canvas()
+    way = [(0.0, 3.0), (6.0, 3.0)]
+    canvas.traces([way, way, [(3.0, 2.0), (3.0, 5.0)]], '#000000', 3.0, 0.5)
+    picture = colours(canvas)
+    assert picture[50, 40, 0] == pytest.approx(64, abs=12)
+    assert picture[35, 60, 0] == pytest.approx(128, abs=12)
+    assert picture[50, 60, 0] == pytest.approx(32, abs=12)
+    assert picture[40, 40, 0] == 255
+
+
+def test_a_sign_is_as_wide_as_its_text_and_round_where_that_is_short() -> None:
+    for text, wide in (('R1', None), ('a long name', True)):
+        canvas = plain_canvas()
+        canvas.pill((70.0, 50.0), text, 10.0, '#0000ff')
+        left, top, right, bottom, _ = covered(canvas, (0, 0, 255))
+        high = 17.5
+        expected = max(high, canvas.text_width(text, 10.0) + 11.0)
+        assert right - left == pytest.approx(expected, abs=2)
+        assert bottom - top == pytest.approx(high, abs=2)
+        assert (left + right) / 2 == pytest.approx(70, abs=1)
+        assert (top + bottom) / 2 == pytest.approx(50, abs=1)
+        assert wide is None or right - left > 2 * high
+        assert (colours(canvas)[top:bottom, left:right] > 200).all(axis=2).sum() > 8, 'the text'
