@@ -171,9 +171,9 @@ def test_what_a_mission_waits_for_is_named(
     def told(text: str) -> bool:
         return any(text in line for line in said)
 
-    graph.until(lambda: told('/map: nobody publishes it'), timeout=20.0)
+    graph.until(lambda: told('/map: nobody publishes it'))
     assert told('the nearest that is there is /office/map')
-    graph.until(lambda: told('/front: nobody publishes it (sensor_msgs/LaserScan'), timeout=10.0)
+    graph.until(lambda: told('/front: nobody publishes it (sensor_msgs/LaserScan'))
 
 
 COMMAND = Awaited('topics.command', '/cmd_vel', 'geometry_msgs/Twist', False, 'to drive')

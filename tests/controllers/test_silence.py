@@ -85,7 +85,7 @@ def test_a_lidar_that_is_of_no_use_from_the_beginning_is_told_with_the_reason(
         lidar.streams['scan'].heard_at = None
         return any('/scan: what comes is of no use: ' in line for line in said)
 
-    graph.until(told, timeout=20.0)
+    graph.until(told)
     reason = 'less than 5% of the rays' if fault == 'covered' else REPEATED
     assert any(reason in line for line in said)
     assert len(seen) == (0 if fault == 'covered' else 1)

@@ -5,10 +5,12 @@ from __future__ import annotations
 import os
 import sys
 
+from launcher import supervisor as module
 from launcher.log_merge import MergedLog
 from launcher.supervisor import Program, Supervisor
 
 seconds = float(os.environ['SECONDS_TO_RUN']) if 'SECONDS_TO_RUN' in os.environ else None
+module.STOP_AT_MOST = float(os.environ.get('STOP_AT_MOST', module.STOP_AT_MOST))
 at_once = int(os.environ.get('AT_ONCE', '0'))
 programs = []
 for argument in sys.argv[1:]:

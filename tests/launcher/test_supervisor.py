@@ -9,10 +9,12 @@ from pathlib import Path
 
 import pytest
 
-from launcher.supervisor import EXIT_CUT, STOP_AGAIN_AFTER, STOP_AT_MOST, STOP_WITHIN, describe_exit
+from launcher.supervisor import EXIT_CUT, STOP_AGAIN_AFTER, STOP_WITHIN, describe_exit
 from tests.launcher.conftest import ROOT, USER_ENVIRON, gone
 
 DRIVER = str(Path(__file__).with_name('supervised.py'))
+PATIENT = {**USER_ENVIRON, 'STOP_AT_MOST': '240'}
+"""Where nothing is killed for want of time, however busy the machine is."""
 WAIT = 'import signal; print("up", flush=True); signal.pause()'
 STUBBORN = (
     'import signal\n'
@@ -42,13 +44,13 @@ def test_a_stop_signal_ends_all_and_counts_as_wanted(start, number):
 
 
 def test_a_child_that_heeds_no_signal_and_does_nothing_is_killed(start):
-    launch = start(DRIVER, f'deaf={STUBBORN}', f'grown={PARENT}')
+    launch = start(DRIVER, f'deaf={STUBBORN}', f'grown={PARENT}', environ=PATIENT)
     deaf = int(launch.until(r'started deaf \(process (\d+)\)')[1])
     launch.until(r'deaf +\| up')
     grandchild = int(launch.until(r'grandchild (\d+)')[1])
     code, seconds = launch.end(signal.SIGINT)
     assert code == 0
-    assert 2 < seconds < STOP_AT_MOST
+    assert 2 < seconds < 200
     assert gone([deaf, grandchild])
     assert 'deaf did not end in time: killed' in '\n'.join(launch.lines)
     assert 'Traceback' not in '\n'.join(launch.lines)
@@ -99,7 +101,7 @@ def test_a_child_that_still_works_at_a_stop_is_waited_for(start):
         'while time.monotonic() < end: pass\n'
         'print("all is written", flush=True)'
     )
-    launch = start(DRIVER, f'slow={last_words}')
+    launch = start(DRIVER, f'slow={last_words}', environ=PATIENT)
     launch.until(r'slow +\| up')
     assert launch.end(signal.SIGINT)[0] == 0
     assert 'all is written' in '\n'.join(launch.lines)
@@ -107,7 +109,7 @@ def test_a_child_that_still_works_at_a_stop_is_waited_for(start):
 
 
 def test_another_ctrl_c_ends_at_once_but_not_the_echo_of_the_first(start):
-    launch = start(DRIVER, f'deaf={WORKING}')
+    launch = start(DRIVER, f'deaf={WORKING}', environ=PATIENT)
     launch.until(r'deaf +\| up')
     for _ in range(2):
         launch.process.send_signal(signal.SIGINT)
@@ -116,7 +118,7 @@ def test_another_ctrl_c_ends_at_once_but_not_the_echo_of_the_first(start):
         launch.process.wait(2 * STOP_AGAIN_AFTER)
     code, seconds = launch.end(signal.SIGINT)
     assert code == 0
-    assert seconds < 0.8 * STOP_AT_MOST
+    assert seconds < 200
     assert 'Traceback' not in '\n'.join(launch.lines)
 
 

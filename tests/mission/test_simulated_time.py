@@ -47,7 +47,7 @@ def test_a_sleep_that_begins_while_time_moves_ends_in_time(
     ]
     for thread in threads:
         thread.start()
-    graph.until(lambda: not any(thread.is_alive() for thread in threads), timeout=20.0)
+    graph.until(lambda: not any(thread.is_alive() for thread in threads))
     assert driver.error is None
 
 

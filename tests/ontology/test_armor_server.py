@@ -88,8 +88,8 @@ def test_a_client_that_nobody_spins_says_so(graph: Any) -> None:
 
 def test_a_blocking_call_in_a_callback_says_so(graph: Any) -> None:
     graph.add(ArmorServer)
+    ArmorClient(graph.node, 'test', 'map', timeout=60.0).utils.get_all_refs()
     armor = ArmorClient(graph.node, 'test', 'map', timeout=0.3)
-    armor.utils.get_all_refs()
     said: list[str] = []
 
     def callback() -> None:

@@ -5,32 +5,21 @@ Tests without it come first, and those in the browser last, which draws for as l
 
 from __future__ import annotations
 
-import contextlib
 import os
 import signal
-import socket
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
 
-from surveillance_runtime.discovery import LAST_DOMAIN
 from surveillance_runtime.testing import claim_domain
 from tests.launcher.conftest import ROOT, Started
 from tests.operator.browser import CHROMIUM, DESK, DRIVER, MISSING, PHONE, Viewer
+from tests.operator.ports import free_port
 from tests.operator.terminal import Terminal
 
 LAUNCH = [str(ROOT / '.venv/bin/python'), str(ROOT / 'launch.py')]
 Open = Callable[..., Terminal]
-
-
-def free_port(domain: int) -> int:
-    """Return a port that nobody else asks for: of the domain, and none that clients are given."""
-    for port in range(20000 + domain, 32768, LAST_DOMAIN + 1):
-        with contextlib.suppress(OSError), socket.socket() as free:
-            free.bind(('127.0.0.1', port))
-            return port
-    raise RuntimeError('no port is free')
 
 
 @pytest.fixture(scope='module')

@@ -7,7 +7,6 @@ import json
 import logging
 import os
 import shutil
-import socket
 import subprocess
 import threading
 import time
@@ -29,6 +28,7 @@ from surveillance_operator.notify.settings import read_notify_file, sink_from
 from surveillance_operator.notify.sinks import sink_of
 from surveillance_runtime.files import FileError
 from surveillance_runtime.incidents import Call, Cause, Incident, Severity
+from tests.operator.ports import await_listening, free_port
 
 SECRET = 'hunter2hunter2'
 
@@ -117,12 +117,6 @@ def test_a_webhook_that_does_not_take_it_says_so_and_is_not_followed(
     assert len(hook.posts) == 1
 
 
-def free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(('127.0.0.1', 0))
-        return int(probe.getsockname()[1])
-
-
 def test_nobody_there_is_one_line_without_the_address(tmp_path: Path) -> None:
     (tmp_path / 'url').write_text(f'http://127.0.0.1:{free_port()}/{SECRET}')
     deliver = sink_of(sink_from('a', {'webhook_file': str(tmp_path / 'url')}))
@@ -144,7 +138,7 @@ def test_an_email_has_text_picture_and_an_identity(
             received.append(envelope)
             return '250 kept'
 
-    controller = smtp.Controller(Keep(), hostname='127.0.0.1', port=free_port())
+    controller = smtp.Controller(Keep(), hostname='127.0.0.1', port=free_port(), ready_timeout=60.0)
     controller.start()
     try:
         settings = sink_from(
@@ -182,6 +176,7 @@ def test_an_email_that_the_server_refuses_says_why_without_the_password(
         object(),
         hostname='127.0.0.1',
         port=free_port(),
+        ready_timeout=60.0,
         authenticator=refuse,
         auth_require_tls=False,
         auth_required=True,
@@ -226,11 +221,7 @@ def broker(tmp_path: Path) -> Iterator[tuple[int, Path]]:
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
     )
-    deadline = time.monotonic() + 10.0
-    while time.monotonic() < deadline:
-        with socket.socket() as probe:
-            if probe.connect_ex(('127.0.0.1', port)) == 0:
-                break
+    await_listening(port, process)
     yield port, tmp_path
     process.terminate()
     process.wait()
@@ -258,10 +249,10 @@ def test_a_broker_hands_on_what_is_published_and_refuses_a_wrong_password(
     listener.on_message = keep
     listener.connect('127.0.0.1', port)
     listener.loop_start()
-    assert ready.wait(10.0)
+    assert ready.wait(60.0)
     entry = {'mqtt': f'mqtt://127.0.0.1:{port}', 'topic': 'patrol/incidents', 'user': 'robot'}
     sink_of(sink_from('b', {**entry, 'password_file': str(folder / 'password')}))(news())
-    assert came.wait(10.0)
+    assert came.wait(60.0)
     listener.disconnect()
     listener.loop_stop()
     assert json.loads(messages[0].payload)['text'] == '3: door D1 is ajar in C1'
@@ -346,12 +337,12 @@ def test_one_sink_that_hangs_does_not_hold_up_another(tmp_path: Path) -> None:
     hang, told = threading.Event(), threading.Event()
 
     def slow(_: News) -> None:
-        hang.wait(30.0)
+        hang.wait(60.0)
 
     outbox = Outbox(tmp_path, {'slow': slow, 'quick': lambda _: told.set()})
     outbox.start()
     outbox.put(news(at=time.time()))
-    assert told.wait(10.0)
+    assert told.wait(60.0)
     assert outbox.waiting()['slow'] == 1
     hang.set()
     outbox.close()

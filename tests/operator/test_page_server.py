@@ -142,7 +142,7 @@ def test_a_request_that_fails_costs_one_line_and_one_answer(page: Page) -> None:
     status, text = ask(page, 'GET', '/ask/broken?place=R1')
     assert status == 500
     assert 'Traceback' not in text
-    with socket.create_connection(('127.0.0.1', page.port), timeout=30) as raw:
+    with socket.create_connection(('127.0.0.1', page.port), timeout=60) as raw:
         raw.sendall(b'\x16\x03\x01 no HTTP at all\r\n\r\n')
         assert raw.recv(100).startswith(b'HTTP/1.1 400')
     assert len(told) == 2

@@ -15,6 +15,7 @@ import pytest
 
 from surveillance_operator.page.hub import Hub
 from surveillance_operator.page.server import Page
+from tests.operator.ports import await_listening, free_port
 
 PROXY = Path(__file__).parents[2] / 'docs' / 'proxy'
 NAME = 'robot.example.org'
@@ -61,9 +62,7 @@ def proxied(
     done.clear()
     page = Page(Hub(), questions={}, actions={'door': door}, port=0, token='secret', origin=ORIGIN)
     page.start()
-    with socket.socket() as free:
-        free.bind(('127.0.0.1', 0))
-        port = free.getsockname()[1]
+    port = free_port()
     text = (PROXY / request.param).read_text()
     text = text.replace('/etc/ssl', str(certificate)).replace(
         '127.0.0.1:8080', f'127.0.0.1:{page.port}'
@@ -83,24 +82,14 @@ def proxied(
             page.stop()
 
 
-def await_listening(port: int, process: subprocess.Popen[bytes]) -> None:
-    """Wait until somebody takes connections; each refusal takes a moment of its own."""
-    for _ in range(20_000):
-        assert process.poll() is None, 'the proxy has ended'
-        with socket.socket() as asking:
-            if asking.connect_ex(('127.0.0.1', port)) == 0:
-                return
-    raise AssertionError('the proxy does not listen')
-
-
 def ask(
     port: int, method: str, path: str, body: str = '', **headers: str
 ) -> tuple[int, str, http.client.HTTPMessage]:
     context = ssl.create_default_context()
     context.check_hostname = False
     context.verify_mode = ssl.CERT_NONE
-    with socket.create_connection(('127.0.0.1', port), timeout=30) as plain:
-        connection = http.client.HTTPConnection(NAME, port, timeout=30)
+    with socket.create_connection(('127.0.0.1', port), timeout=60) as plain:
+        connection = http.client.HTTPConnection(NAME, port, timeout=60)
         connection.sock = context.wrap_socket(plain, server_hostname=NAME)
         connection.request(method, path, body, {'Host': f'{NAME}:{port}', **headers})
         answer = connection.getresponse()
