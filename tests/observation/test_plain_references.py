@@ -29,6 +29,8 @@ from surveillance_perception.observation.hung_markers import (
     _laid,
 )
 from surveillance_perception.observation.motion import WalkFinder, _steadiness, _things, _walk
+from surveillance_perception.observation.privacy import MARGIN, _inside
+from surveillance_perception.observation.reference_views import SAME_VIEW, _overlap, same_view
 from surveillance_perception.observation.views import Sight
 from surveillance_runtime.place.occupancy_grid import Grid
 
@@ -811,3 +813,46 @@ def test_foreign_pixels_are_those_of_another_surface_and_not_of_another_light(ga
     few[:10, :10] = True
     assert _foreign(before, lit, few, gain) == 100.0, 'too little to judge by'
     assert _foreign(before, np.zeros_like(before), judged, gain) > 0.9 * judged.sum()
+
+
+@pytest.mark.parametrize(
+    ('other', 'same'),
+    [
+        ((1.0, 2.0, 0.5, 0.1), True),
+        ((1.0 + SAME_VIEW[0] - 0.001, 2.0, 0.5, 0.1), True),
+        ((1.0, 2.0 - SAME_VIEW[0] - 0.001, 0.5, 0.1), False),
+        ((1.0, 2.0, 0.5 + SAME_VIEW[1] - 0.001 - math.tau, 0.1), True),
+        ((1.0, 2.0, 0.5 - SAME_VIEW[1] - 0.001, 0.1), False),
+        ((1.0, 2.0, 0.5, 0.1 + SAME_VIEW[1] + 0.001), False),
+        ((1.0, 2.0, 0.5), False),
+        ((1.0, 2.0, 0.5, 0.1, 0.0), False),
+    ],
+)
+def test_two_viewpoints_show_the_same_within_a_way_and_a_turn(
+    other: tuple[float, ...], same: bool
+) -> None:
+    assert same_view((1.0, 2.0, 0.5, 0.1), other) is same
+    assert same_view(other, (1.0, 2.0, 0.5, 0.1)) is same
+
+
+def test_parts_overlap_by_their_common_area_of_the_whole() -> None:
+    assert _overlap((0, 0, 4, 4), (2, 2, 4, 4)) == pytest.approx(4 / 28)
+    assert _overlap((0, 0, 4, 4), (4, 0, 4, 4)) == 0.0
+    assert _overlap((0, 0, 4, 4), (9, 9, 4, 4)) == 0.0
+    assert _overlap((1, 1, 3, 2), (1, 1, 3, 2)) == 1.0
+    assert _overlap((0, 0, 0, 0), (0, 0, 0, 0)) == 0.0
+
+
+def test_a_person_is_blurred_with_a_margin_up_to_the_edge_of_the_picture() -> None:
+    assert _inside((100, 50, 40, 20), 300, 400) == (
+        round(100 - MARGIN * 40),
+        round(50 - MARGIN * 20),
+        round(100 + (1 + MARGIN) * 40) - round(100 - MARGIN * 40),
+        round(50 + (1 + MARGIN) * 20) - round(50 - MARGIN * 20),
+    )
+    assert _inside((0, 0, 400, 300), 300, 400) == (0, 0, 400, 300)
+    assert _inside((390, 295, 40, 20), 300, 400)[2:] == (
+        400 - round(390 - MARGIN * 40),
+        300 - round(295 - MARGIN * 20),
+    )
+    assert _inside((500, 400, 10, 10), 300, 400)[2:] == (0, 0)
