@@ -357,6 +357,7 @@ class AllModels:
             Worlds(words, named, unnamed)
             for named in places(words.individuals)
             for unnamed in range(words.unnamed + 1)
+            if named or unnamed  # There is always some element.
         ]
         self._models: list[int] = []
 

@@ -41,6 +41,12 @@ OF_PROPERTIES: tuple[Any, ...] = (
     ax.TransitiveObjectProperty,
     ax.ReflexiveObjectProperty,
 )
+LARGER: tuple[Any, ...] = (
+    ax.FunctionalObjectProperty,
+    ax.InverseFunctionalObjectProperty,
+    ax.TransitiveObjectProperty,
+)
+"""Those that three elements refute."""
 
 
 class Draw:
@@ -117,6 +123,8 @@ class Draw:
 
     def _either(self, choice: int, least_or_most: object) -> ClassExpression:
         draw = self.random
+        if choice in (9, 10) and not self.words.individuals:
+            return draw.choice(self.words.classes)
         if choice == 9:
             return ex.ObjectHasValue(self.prop(), draw.choice(self.words.individuals))
         if choice == 10:
@@ -291,3 +299,66 @@ def test_what_holds_is_what_holds_in_all_models(seed: int, existing: bool) -> No
         compare(kb, models.of(kb.axioms()), words, not existing)
         gone = draw.random.choice([axiom for axiom in kb.axioms() if axiom not in declared])
         kb.change([draw.random.choice([draw.assertion, draw.schema_axiom])()], [gone])
+
+
+def goals(words: Vocabulary) -> list[Axiom]:
+    """Return axioms of all kinds that can be asked for, each refuted by two elements or none."""
+    a, b = words.classes[:2]
+    p = words.objects[0]
+    found: list[Axiom] = [record((a, b)) for record in (ax.EquivalentClasses, ax.DisjointClasses)]
+    found += [ax.DisjointUnion(a, (b, ex.ObjectSomeValuesFrom(p, a)))]
+    found += [ax.SubClassOf(*pair) for pair in product((a, b, THING, NOTHING), repeat=2)]
+    found.append(ax.SubClassOf(ex.ObjectSomeValuesFrom(p, a), ex.ObjectComplementOf(b)))
+    for prop in (p, ex.ObjectInverseOf(p)):
+        found += [record(prop) for record in OF_PROPERTIES if record not in LARGER]
+        found += [record(prop, b) for record in (ax.ObjectPropertyDomain, ax.ObjectPropertyRange)]
+    roles: tuple[ex.PropertyExpression, ...] = (p, ex.ObjectInverseOf(p))
+    for both in product(roles, words.objects):
+        found += [ax.EquivalentObjectProperties(both), ax.DisjointObjectProperties(both)]
+        kinds: tuple[Any, ...] = (ax.SubObjectPropertyOf, ax.InverseObjectProperties)
+        found += [record(*both) for record in kinds]
+    for one in words.individuals:
+        found.append(ax.ClassAssertion(ex.ObjectComplementOf(a), one))
+        found += [ax.NegativeObjectPropertyAssertion(p, one, each) for each in words.individuals]
+    return [*found, *questions(words)]
+
+
+def larger_goals(words: Vocabulary) -> list[Axiom]:
+    """Return axioms that it may take more elements, or other values, to refute."""
+    p, back = words.objects[0], ex.ObjectInverseOf(words.objects[0])
+    found: list[Axiom] = [record(prop) for record in LARGER for prop in (p, back)]
+    found += [ax.SubPropertyChainOf(chain, p) for chain in ((p, back), (p, p, p), (back, back))]
+    for data in words.datas:
+        found += [
+            ax.FunctionalDataProperty(data),
+            ax.DataPropertyDomain(data, words.classes[0]),
+            ax.DataPropertyRange(data, ex.DataOneOf((num(1),))),
+            ax.SubClassOf(words.classes[0], ex.DataSomeValuesFrom(data, TOP_LITERAL)),
+        ]
+        for one, number in product(words.individuals, words.numbers):
+            found.append(ax.NegativeDataPropertyAssertion(data, one, num(number)))
+    return found
+
+
+@pytest.mark.parametrize('seed', range(24))
+def test_an_axiom_of_any_kind_follows_as_it_does_in_all_models(seed: int) -> None:
+    words = (
+        Vocabulary((A, B), (P,), (), (i,), unnamed=2),
+        Vocabulary((A, B), (P,), (S,), (i,), unnamed=1),
+        Vocabulary((A, B), (P, Q), (), (), unnamed=2),
+    )[seed % 3]
+    draw = Draw(seed, words)
+    axioms: list[Axiom] = [ax.Declaration('individual', name) for name in words.individuals]
+    while len(axioms) < draw.random.choice([3, 4, 6, 8]):
+        axioms.append(draw.schema_axiom())
+    models = AllModels(words).of(axioms)
+    kb = KnowledgeBase('x:', axioms)
+    kb.reason()
+    exact = words.unnamed == 2
+    for goal in [*draw.random.sample(goals(words), 14), *larger_goals(words)]:
+        answer = kb.entails(goal)
+        if not isinstance(answer, Unknown):
+            holds = models.entail(goal)
+            assert answer <= holds, goal
+            if exact and goal not in larger_goals(words):
+                assert answer == holds, goal
