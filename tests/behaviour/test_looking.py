@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -12,7 +13,7 @@ import state_machines as fsm
 from state_machines import Interrupt
 from state_machines.exceptions import CallError, CallInterruptedError
 from surveillance_behaviour.machines import MACHINES
-from surveillance_behaviour.mission.looking import one_way
+from surveillance_behaviour.mission.looking import RoomLook, one_way
 from surveillance_behaviour.mission.mission_log import MissionRecord, read
 from surveillance_behaviour.ports import Check, Doubt, Point
 
@@ -516,3 +517,335 @@ def test_at_a_check_the_robot_stands_until_it_is_settled():
     run.until(200.0)
     first = next(n for n, (where, _) in enumerate(run.looking.sides) if where == 'C1')
     assert stood[first + 1] == pytest.approx(9.0, abs=0.51)
+
+
+class Stay:
+    """Looks at one room, and what happened in it by its seconds, in few words."""
+
+    def __init__(self, **setup: object) -> None:
+        self.run = Watched('surveillance', speed=float(str(setup.pop('speed', 1.0))))
+        self.world, self.looking = self.run.world, self.run.looking
+        self.lines: list[str] = []
+        for name, value in setup.items():
+            setattr(self.looking, name, value)
+        for name in ('face', 'drive', 'rest_arm'):
+            setattr(self.looking, name, self._noting(name, getattr(self.looking, name)))
+        self.run.mission.note = self._note  # type: ignore[method-assign]
+        self.look = RoomLook(self.run.mission)
+        self.put('C1')
+
+    def put(self, place: str) -> None:
+        """Put the robot into a room, at its own point."""
+        self.world.push(place)
+        self.run.mission.place = place
+
+    def _at(self) -> str:
+        return f'{self.world.clock.time - self.began:g}'
+
+    def _noting(self, name: str, call: Any) -> Any:
+        def noted(*words: Any) -> None:
+            what = {
+                'face': lambda: f'face {round(math.degrees(words[0])) % 360}',
+                'drive': lambda: f'drive to {words[0][0]:g}, {words[0][1]:g}',
+                'rest_arm': lambda: 'arm ahead',
+            }[name]()
+            self.lines.append(f'{self._at()} {what}')
+            call(*words)
+
+        return noted
+
+    def _note(self, name: str, **fields: Any) -> None:
+        more = {k: v for k, v in fields.items() if k not in ('place', 'seconds')}
+        if name != 'exploring' or more:
+            self.lines.append(f'{self._at()} {name} {more}'.replace("'", ''))
+
+    def explore(self, seconds: float, explored: float = 0.0) -> list[str]:
+        """Return what happened in a stay of so many seconds."""
+        self.began, self.lines = self.world.clock.time, []
+        self.world.said.clear()
+        self.run.mission.explored = explored
+        self.look.explore(seconds, Interrupt())
+        assert self.world.clock.time - self.began >= seconds - explored - 1e-9
+        assert self.run.mission.explored == math.inf
+        return self.lines + [f'said {each}' for each in self.world.said]
+
+
+TWO_POINTS = {'C1': [(12.0, 8.0, 0.0), (10.0, 11.0, 0.0)]}
+
+
+@pytest.mark.parametrize(
+    ('seconds', 'setup', 'expected'),
+    [
+        (
+            30.0,
+            {'arm': True},
+            [
+                '0 face 90',
+                '6.5 exploring {bearing: 90}',
+                '6.5 face 180',
+                '13 exploring {bearing: 180}',
+                '13 face 270',
+                '19.5 exploring {bearing: 270}',
+                '19.5 face 0',
+                '21.5 look {sides: [90, 180, 270], left_out: 0}',
+            ],
+        ),
+        (
+            30.0,
+            {},
+            [
+                '0 face 90',
+                '6.5 exploring {bearing: 90}',
+                '6.5 face 180',
+                '13 exploring {bearing: 180}',
+                '13 face 270',
+                '19.5 exploring {bearing: 270}',
+                '19.5 look {sides: [90, 180, 270], left_out: 0}',
+            ],
+        ),
+        (
+            30.0,
+            {'around': True, 'points': TWO_POINTS},
+            [
+                '4 drive to 12, 8',
+                '6 viewpoint {point: [12.0, 8.0]}',
+                '10 drive to 10, 11',
+                '13.6056 viewpoint {point: [10.0, 11.0]}',
+                '17.6056 look {sides: [], left_out: 0}',
+            ],
+        ),
+        (
+            20.0,
+            {'around': True, 'points': TWO_POINTS},
+            [
+                '4 drive to 12, 8',
+                '6 viewpoint {point: [12.0, 8.0]}',
+                '10 look {sides: [], left_out: 1}',
+            ],
+        ),
+        (
+            45.0,
+            {'arm': True, 'points': TWO_POINTS},
+            [
+                '0 face 90',
+                '6.5 exploring {bearing: 90}',
+                '6.5 face 180',
+                '13 exploring {bearing: 180}',
+                '13 face 270',
+                '19.5 exploring {bearing: 270}',
+                '19.5 face 0',
+                '21.5 drive to 12, 8',
+                '23.5 viewpoint {point: [12.0, 8.0]}',
+                '23.5 face 90',
+                '30 exploring {bearing: 90, point: [12.0, 8.0]}',
+                '30 face 0',
+                '32 drive to 10, 11',
+                '35.6056 viewpoint {point: [10.0, 11.0]}',
+                '35.6056 face 90',
+                '42.1056 exploring {bearing: 90, point: [10.0, 11.0]}',
+                '42.1056 face 0',
+                '44.1056 look {sides: [90, 180, 270, 90, 90], left_out: 0}',
+            ],
+        ),
+        (
+            25.0,
+            {'arm': True, 'points': TWO_POINTS},
+            [
+                '0 face 90',
+                '6.5 exploring {bearing: 90}',
+                '6.5 face 0',
+                '8.5 drive to 12, 8',
+                '10.5 viewpoint {point: [12.0, 8.0]}',
+                '10.5 face 90',
+                '17 exploring {bearing: 90, point: [12.0, 8.0]}',
+                '17 face 0',
+                '19 look {sides: [90, 90], left_out: 1}',
+            ],
+        ),
+        (
+            60.0,
+            {'points': TWO_POINTS},
+            [
+                '0 face 0',
+                '6.5 exploring {bearing: 0}',
+                '6.5 face 90',
+                '13 exploring {bearing: 90}',
+                '13 face 180',
+                '19.5 exploring {bearing: 180}',
+                '19.5 face 270',
+                '26 exploring {bearing: 270}',
+                '26 drive to 12, 8',
+                '28 viewpoint {point: [12.0, 8.0]}',
+                '28 face 0',
+                '34.5 exploring {bearing: 0, point: [12.0, 8.0]}',
+                '34.5 face 90',
+                '41 exploring {bearing: 90, point: [12.0, 8.0]}',
+                '41 face 180',
+                '47.5 exploring {bearing: 180, point: [12.0, 8.0]}',
+                '47.5 drive to 10, 11',
+                '51.1056 viewpoint {point: [10.0, 11.0]}',
+                '51.1056 face 270',
+                '57.6056 exploring {bearing: 270, point: [10.0, 11.0]}',
+                '57.6056 look {sides: [0, 90, 180, 270, 0, 90, 180, 270], left_out: 0}',
+            ],
+        ),
+        (
+            40.0,
+            {
+                'arm': True,
+                'asked': {
+                    'C1': [
+                        Check('m1', (20.0, 8.0, 0.0)),
+                        Check('m2', (10.0, 1.0, 0.0), (12.0, 8.0, 0.0)),
+                    ]
+                },
+            },
+            [
+                '0 face 0',
+                '7.5 exploring {check: m1}',
+                '7.5 face 0',
+                '9.5 drive to 12, 8',
+                '11.5 face 254',
+                '19 exploring {check: m2}',
+                '19 face 0',
+                '21 drive to 10, 8',
+                '23 face 90',
+                '29.5 exploring {bearing: 90}',
+                '29.5 face 180',
+                '36 exploring {bearing: 180}',
+                '36 face 0',
+                '38 look {sides: [90, 180], left_out: 0, checks: [m1, m2]}',
+            ],
+        ),
+        (
+            14.0,
+            {'arm': True, 'asked': {'C1': [Check('m1', (20.0, 8.0, 0.0))]}},
+            [
+                '0 face 0',
+                '7.5 exploring {check: m1}',
+                '7.5 face 0',
+                '9.5 look {sides: [], left_out: 0, checks: [m1]}',
+            ],
+        ),
+        (
+            30.0,
+            {'asked': {'C1': [Check('m1', (20.0, 8.0, 0.0))]}, 'blind': {0}},
+            [
+                '0 face 0',
+                '15.5 face 90',
+                '22 exploring {bearing: 90}',
+                '22 look {sides: [90], left_out: 0}',
+            ],
+        ),
+        (
+            20.0,
+            {
+                'waiting': [
+                    Doubt(3, 'C1', (12.0, 8.0, 0.0), (14.0, 8.0)),
+                    Doubt(4, 'C1'),
+                    Doubt(5, 'C1'),
+                ],
+                'arm': True,
+            },
+            [
+                '0 face 90',
+                '6.5 exploring {bearing: 90}',
+                '6.5 drive to 12, 8',
+                '8.5 face 0',
+                '10.5 arm ahead',
+                '10.5 verify {number: 3, found: is settled}',
+                '14.5 verify {number: 4, found: is still in doubt}',
+                '14.5 face 0',
+                '16.5 look {sides: [90], left_out: 0}',
+                '20.5 verify {number: 5, found: is still in doubt}',
+                'said looking again at event 3 in C1',
+                'said looked again: event 3 is settled',
+                'said looked again: event 4 is still in doubt',
+                'said looked again: event 5 is still in doubt',
+            ],
+        ),
+        (
+            16.0,
+            {'waiting': [Doubt(3, 'C1', (30.0, 8.0, 0.0))], 'around': True},
+            [
+                '4 look {sides: [], left_out: 0}',
+                '8 verify {number: 3, found: is still in doubt}',
+                'said looked again: event 3 is still in doubt',
+            ],
+        ),
+        (
+            30.0,
+            {'fails': True, 'points': TWO_POINTS},
+            [
+                '0 face 90',
+                '6.5 exploring {bearing: 90}',
+                '6.5 drive to 12, 8',
+                'said looking at C1: follow_path: the goal was aborted',
+            ],
+        ),
+        (
+            3.9,
+            {'around': True},
+            [
+                'said a stay of 3.9 s is too short to look at anything: '
+                'exploration_seconds of 4 or more would do'
+            ],
+        ),
+        (4.0, {'around': True}, ['4 look {sides: [], left_out: 0}']),
+        (
+            40.0,
+            {'arm': True, 'angle': 2.0, 'front': 1.0, 'points': TWO_POINTS},
+            [
+                '0 face 90',
+                '6.5 exploring {bearing: 90}',
+                '6.5 face 180',
+                '13 exploring {bearing: 180}',
+                '13 face 57',
+                '15 drive to 12, 8',
+                '17 viewpoint {point: [12.0, 8.0]}',
+                '17 face 90',
+                '23.5 exploring {bearing: 90, point: [12.0, 8.0]}',
+                '23.5 face 57',
+                '25.5 drive to 10, 11',
+                '29.1056 viewpoint {point: [10.0, 11.0]}',
+                '29.1056 face 90',
+                '35.6056 exploring {bearing: 90, point: [10.0, 11.0]}',
+                '35.6056 face 57',
+                '37.6056 look {sides: [90, 180, 90, 90], left_out: 0}',
+            ],
+        ),
+        (
+            33.0,
+            {'speed': 0.2, 'points': TWO_POINTS, 'around': True},
+            [
+                '4 drive to 12, 8',
+                '6 viewpoint {point: [12.0, 8.0]}',
+                '10 look {sides: [], left_out: 1}',
+            ],
+        ),
+    ],
+)
+def test_a_stay_goes_as_its_time_allows(
+    seconds: float, setup: dict[str, object], expected: list[str]
+) -> None:
+    assert Stay(**setup).explore(seconds) == expected
+
+
+def test_what_was_left_out_comes_first_and_what_was_looked_at_last() -> None:
+    stay = Stay(arm=True)
+    looks = [stay.explore(16.0)[-1] for _ in range(5)]
+    assert looks == [
+        '8.5 look {sides: [90], left_out: 0}',
+        '8.5 look {sides: [180], left_out: 0}',
+        '15 look {sides: [270, 0], left_out: 0}',
+        '15 look {sides: [90, 180], left_out: 0}',
+        '15 look {sides: [270, 0], left_out: 0}',
+    ]
+    # A stay that was cut off goes on with what is left of its time.
+    assert stay.explore(16.0, explored=7.0) == [
+        '0 face 90',
+        '6.5 exploring {bearing: 90}',
+        '6.5 face 0',
+        '8.5 look {sides: [90], left_out: 0}',
+    ]
+    assert stay.explore(16.0, explored=99.0) == []
