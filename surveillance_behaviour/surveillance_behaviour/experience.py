@@ -374,11 +374,11 @@ class Experience:
         if not all(math.isfinite(at) for at in visits.values()):
             raise ValueError('visits: expected finite times')
         left_out = leg_times.restore(kept['leg_times']) + draw.restore(kept['draw'])
-        charge.restore(kept.get('charge', {}))
-        sent_to_charge = str(kept['sent_to_charge'])
+        charge.restore(kept['charge'])
+        sent_to_charge, requested = str(kept['sent_to_charge']), str(kept['requested'])
         self.visits, self.leg_times = visits, leg_times
         self.draw, self.charge = draw, charge
-        self.sent_to_charge, self.requested = sent_to_charge, str(kept.get('requested', ''))
+        self.sent_to_charge, self.requested = sent_to_charge, requested
         if left_out:
             self.left_out = f'{left_out} learned values that no robot can have are left out'
 
@@ -412,7 +412,7 @@ class Experience:
         if passed is not None and self._passed is not None:
             jump = now - self.now - (passed - self._passed)
         latest = max((self.now, *self.visits.values()))
-        if is_other_simulation(latest, now):
+        if is_other_simulation(latest - SIMULTANEOUS, now):
             self.visits = on_present_clock(self.visits, latest, now)
         elif abs(jump) > SIMULTANEOUS:
             self.visits = {place: at + jump for place, at in self.visits.items()}

@@ -554,10 +554,10 @@ class Stay:
 
         return noted
 
-    def _note(self, name: str, **fields: Any) -> None:
+    def _note(self, event: str, **fields: object) -> None:
         more = {k: v for k, v in fields.items() if k not in ('place', 'seconds')}
-        if name != 'exploring' or more:
-            self.lines.append(f'{self._at()} {name} {more}'.replace("'", ''))
+        if event != 'exploring' or more:
+            self.lines.append(f'{self._at()} {event} {more}'.replace("'", ''))
 
     def explore(self, seconds: float, explored: float = 0.0) -> list[str]:
         """Return what happened in a stay of so many seconds."""
@@ -741,7 +741,7 @@ TWO_POINTS = {'C1': [(12.0, 8.0, 0.0), (10.0, 11.0, 0.0)]}
             20.0,
             {
                 'waiting': [
-                    Doubt(3, 'C1', (12.0, 8.0, 0.0), (14.0, 8.0)),
+                    Doubt(3, 'C1', (12.0, 8.0, 0.0), (14.0, 8.0, 0.0)),
                     Doubt(4, 'C1'),
                     Doubt(5, 'C1'),
                 ],

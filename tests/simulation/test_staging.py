@@ -588,6 +588,8 @@ def test_each_key_of_a_script_is_checked(tmp_path: Path, text: str, words: str) 
     assert read_script(tmp_path / 'stage.yaml') == [
         Happening('a', Times(5.0), ('lens clear',), 90.0, ('lens covered', 'door D open'))
     ]
+    (tmp_path / 'stage.yaml').write_text('stage: {a: {at: 5 s, do: [lens clear]}}')
+    assert read_script(tmp_path / 'stage.yaml') == [Happening('a', Times(5.0), ('lens clear',))]
 
 
 def test_a_script_is_tried_as_it_will_be_carried_out() -> None:
