@@ -14,7 +14,7 @@ from rclpy.callback_groups import ReentrantCallbackGroup
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, Header
 
-from marker_detection.fusion import FusedPositions
+from marker_detection.fusion import MOST_MARKERS, FusedPositions
 from state_machines.ros import GoalAbortedError, GoalRun, GoalServer, work_aside
 from surveillance_interfaces.action import ScanSurroundings
 from surveillance_interfaces.msg import MarkerDetectionArray
@@ -236,6 +236,11 @@ class ArmController(PatrolNode):
         standing = odom @ np.vstack([np.reshape(base, (3, 4)), [0.0, 0.0, 0.0, 1.0]])
         camera = standing @ ARM.camera_frame(posture)
         taken = fuse_views(self._fused, message, camera, doubt)
+        if self._fused.is_full:
+            self.get_logger().warn(
+                f'markers of {MOST_MARKERS} ids are kept: those of further ids are left out',
+                once=True,
+            )
         self._report_twins(frame)
         fused = [(each, self._fused.position_of(each)) for each in taken]
         seen = MarkerDetectionArray(header=Header(stamp=message.header.stamp, frame_id=frame))

@@ -11,6 +11,7 @@ from surveillance_controllers.geometry import composed, relative
 from surveillance_controllers.motion.path_following import DriveParameters, Velocity
 from surveillance_controllers.motion.sampled_planning import (
     SampledPlanner,
+    _standing,
     is_safe,
     price_of_effort,
     price_of_way,
@@ -207,3 +208,155 @@ def test_a_plan_is_forgotten() -> None:
     assert planner.step(way, NOTHING, [], Velocity(), PERIOD) == fresh.step(
         way, NOTHING, [], Velocity(), PERIOD
     )
+
+
+# --- the parts of a price, beside plain sums ---
+
+
+def planner() -> SampledPlanner:
+    return SampledPlanner(ROBOT)
+
+
+def test_known_manoeuvres_stand_back_off_and_swerve() -> None:
+    known = planner()._known_manoeuvres()
+    assert known.shape == (12, 20, 2)
+    assert (known[0] == 0.0).all()
+    for row, turn in zip(known[1:4], (0.0, 0.5, -0.5), strict=True):
+        assert row == pytest.approx(np.tile([-0.3, turn], (20, 1)))
+    swerves = [(speed, turn) for speed in (0.6, 0.3) for turn in (0.6, 1.0, -0.6, -1.0)]
+    for row, (speed, turn) in zip(known[4:], swerves, strict=True):
+        # A third to one side, a third back, and straight on.
+        sides = [turn] * 6 + [-turn] * 6 + [0.0] * 8
+        assert row == pytest.approx(np.column_stack([[speed] * 20, sides]))
+
+
+def test_a_plan_goes_on_with_time_and_is_forgotten_when_told() -> None:
+    local = planner()
+    ramp = np.column_stack([np.arange(20.0), 40.0 - np.arange(20.0)]).astype(np.float32)
+    local._plan[:] = ramp
+    local._shift(0.075)
+    assert local._plan[:, 0] == pytest.approx([*(np.arange(19) + 0.5), 19.0])
+    assert local._plan[:, 1] == pytest.approx([*(39.5 - np.arange(19)), 21.0])
+    local._shift(0.3)
+    assert local._plan[0].tolist() == pytest.approx([2.5, 37.5])
+    local.forget()
+    assert (local._plan == 0.0).all()
+
+
+@pytest.mark.parametrize(
+    ('degrees', 'speed', 'turn'),
+    [
+        (0, 0.6, 0.0),
+        (30, 0.6 * math.cos(math.pi / 6), math.pi / 4),
+        (120, 0.0, 1.5),
+        (-90, 0, -1.5),
+    ],
+)
+def test_back_to_the_path_it_steers_to_a_point_a_bit_ahead(
+    degrees: float, speed: float, turn: float
+) -> None:
+    angle = math.radians(degrees)
+    path = np.array(
+        [[way * math.cos(angle), way * math.sin(angle)] for way in (0.0, 0.3, 0.6, 1.2)]
+    )
+    path[-1] = (-1.2, 0.1)
+    assert planner()._pursuit(path) == pytest.approx([speed, turn], abs=1e-6)
+
+
+def test_sequences_keep_the_robot_s_limits_and_hold_what_is_known() -> None:
+    local, last = planner(), Velocity(0.2, -0.3)
+    path = np.stack([np.arange(0, 3, 0.1), np.zeros(30)], axis=1)
+    drawn = local._drawn(last, path)
+    assert drawn.shape == (300, 20, 2)
+    speed, turn = drawn[..., 0], drawn[..., 1]
+    assert speed.min() >= -0.3 - 1e-6
+    assert speed.max() <= 0.6 + 1e-6
+    assert np.abs(turn).max() <= 1.5 + 1e-6
+    before = np.broadcast_to(np.array([0.2, -0.3]), (300, 1, 2))
+    steps = np.abs(np.diff(drawn, axis=1, prepend=before))
+    assert steps[..., 0].max() <= 0.8 * 0.15 + 1e-6
+    assert steps[..., 1].max() <= 3.0 * 0.15 + 1e-6
+    # Standing still is among them, as fast as the robot can, and so is what leads along the path.
+    assert drawn[0, :3, 0] == pytest.approx([0.08, 0.0, 0.0], abs=1e-6)
+    assert drawn[150, -1] == pytest.approx([0.6, 0.0], abs=1e-6)
+    assert drawn[12, -1] == pytest.approx([0.0, 0.0], abs=1e-6), 'the last plan'
+    assert 0.1 < turn[13:150].std() < 0.9
+    assert speed[151:].mean() > speed[13:150].mean() + 0.1, 'half of them are about the path'
+
+
+def test_how_far_the_cells_around_are_from_what_stands() -> None:
+    stands = np.array([[1.0, 0.5], [-0.6, -1.1], [3.16, 0.0], [0.0, -9.0]])
+    away = planner()._away_from(stands)
+    assert away.shape == (128, 128)
+    met = [(math.floor((y + 3.2) / 0.05), math.floor((x + 3.2) / 0.05)) for x, y in stands[:2]]
+    for row, column in ((0, 0), (64, 64), (84, 74), (40, 60), (127, 3), met[0]):
+        nearest = 0.05 * min(math.hypot(row - r, column - c) for r, c in met)
+        assert away[row, column] == pytest.approx(nearest, rel=0.06)
+    assert planner()._away_from(NOTHING).min() > 3.2
+
+
+@pytest.mark.parametrize('corners', [(), (0.5, 0.2, -0.3, 0.2, -0.3, -0.2, 0.5, -0.2)])
+def test_coming_near_to_what_stands_costs_while_it_moves(corners: tuple[float, ...]) -> None:
+    robot = DriveParameters(radius=0.2, footprint=corners)
+    local = SampledPlanner(robot)
+    stands = np.array([[1.0, 0.3], [0.4, -0.8]])
+    away = local._away_from(stands)
+    draw = np.random.default_rng(3)
+    poses = draw.uniform(-1.0, 1.0, (6, 20, 3)).astype(np.float32)
+    controls = draw.uniform(-0.1, 0.1, (6, 20, 2)).astype(np.float32)
+    controls[:, ::3, 0] = 0.0
+    found = local._of_standing(poses, controls, away)
+    for sample in range(6):
+        price = 0.0
+        for moment in range(20):
+            x, y, yaw = (float(each) for each in poses[sample, moment])
+            points = [(x, y)]
+            if corners:
+                cos, sin = math.cos(yaw), math.sin(yaw)
+                points = [
+                    (x + cos * a - sin * b, y + sin * a + cos * b)
+                    for a, b in robot.body.outline(0.1).tolist()
+                ]
+            at = [away[int((b + 3.2) / 0.05), int((a + 3.2) / 0.05)] for a, b in points]
+            gap = float(min(at)) - (0.0 if corners else 0.2)
+            moves = abs(float(controls[sample, moment, 0])) > 0.02
+            price += 50.0 * (gap < robot.margin + 0.025 and moves)
+            price += 0.5 * math.exp(-max(gap, 0.0) / 0.1)
+        assert found[sample] == pytest.approx(price, rel=1e-3)
+    assert found.max() > 50.0
+
+
+@pytest.mark.parametrize('corners', [(), (0.5, 0.2, -0.3, 0.2, -0.3, -0.2, 0.5, -0.2)])
+def test_coming_near_to_who_moves_costs_the_more_the_sooner_and_faster(
+    corners: tuple[float, ...],
+) -> None:
+    robot = DriveParameters(radius=0.2, footprint=corners)
+    local = SampledPlanner(robot)
+    movers = [Mover(0.8, 0.2, -0.3, 0.1, 0.25), Mover(-0.5, 1.0, 0.0, -0.4, 0.2)]
+    draw = np.random.default_rng(4)
+    poses = draw.uniform(-1.0, 1.0, (5, 20, 3)).astype(np.float32)
+    controls = draw.uniform(-0.6, 0.6, (5, 20, 2)).astype(np.float32)
+    found = local._of_moving(poses, controls, movers)
+    for sample in range(5):
+        price = 0.0
+        for moment in range(20):
+            ahead = (moment + 1) * 0.15
+            x, y, yaw = (float(each) for each in poses[sample, moment])
+            moving = 0.5 + abs(float(controls[sample, moment, 0])) / robot.speed
+            sooner = 1.5 - moment / 19
+            for each in movers:
+                dx, dy = each.x + each.vx * ahead - x, each.y + each.vy * ahead - y
+                dx, dy, _ = relative((0.0, 0.0, yaw), (dx, dy, 0.0))
+                gap = float(robot.body.gap(dx, dy)) - each.radius
+                wanted = 0.15 + 0.08 * ahead
+                near = 20.0 * (gap < wanted) + 2.0 * math.exp(-max(gap - wanted, 0.0) / 0.25)
+                price += near * moving * sooner
+        assert found[sample] == pytest.approx(price, rel=1e-3)
+    assert (local._of_moving(poses, controls, []) == 0.0).all()
+
+
+def test_points_of_who_moves_do_not_stand() -> None:
+    seen = np.array([[1.0, 0.0], [1.39, 0.0], [1.41, 0.0], [3.0, 2.0]])
+    movers = [Mover(1.0, 0.0, 0.5, 0.0, 0.25), Mover(3.0, 2.1, 0.5, 0.0, 0.1)]
+    assert _standing(seen, movers).tolist() == [[1.41, 0.0]]
+    assert _standing(seen, []).tolist() == seen.tolist()

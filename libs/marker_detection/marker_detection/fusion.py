@@ -24,6 +24,9 @@ _MOVED_VIEWS = 5
 _TOGETHER, _MOST_PLACES = 3, 4
 _CARRIER_DEVIATION = 0.02
 
+MOST_MARKERS = 4096
+"""So many ids are kept: more than any usual dictionary has."""
+
 
 class FusedPosition(NamedTuple):
     """Where a marker is in the fixed frame.
@@ -144,9 +147,13 @@ class FusedPositions:
     row the marker is taken to have been moved, and its position begins anew. If it is seen at the
     former place again, or at both in the same images, there are two panels with one id: the
     position stays, and `two_places` tells both.
+
+    Attributes:
+        is_full: Whether `MOST_MARKERS` ids are known, and a view of a further one was left out.
     """
 
     def __init__(self) -> None:
+        self.is_full = False
         self._panels: dict[int, _Panels] = {}
         self._image = 0
 
@@ -176,12 +183,16 @@ class FusedPositions:
                 does not become less with their number. None: an arm on a base that stands.
 
         Returns:
-            Whether it counts: it is a finite view, not too ambiguous, of where the marker is.
+            Whether it counts: it is a finite view, not too ambiguous, of where the marker is, and
+            there was room for the id.
         """
         # the arm and its base are not exact either
         least = np.eye(3) * _CARRIER_DEVIATION**2
         shared = least if carrier is None else least + carrier
         if ambiguity > _MOST_AMBIGUOUS or not is_measured(position, covariance):
+            return False
+        if marker_id not in self._panels and len(self._panels) >= MOST_MARKERS:
+            self.is_full = True
             return False
         turn = camera[:3, :3]
         covariance = turn @ covariance @ turn.T + shared

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from marker_detection import FusedPositions
+from marker_detection import FusedPositions, fusion
 
 LONG_SIGHT = np.diag([1e-4, 1e-4, 0.09])
 
@@ -217,3 +217,17 @@ def test_without_images_nothing_is_seen_at_the_same_time() -> None:
         for place in (HERE, THERE):
             fused.add(7, np.eye(4), place, EXACT, 0.0)
     assert fused.twins == []
+
+
+def test_a_stream_of_ever_new_ids_is_bounded_and_that_is_told(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(fusion, 'MOST_MARKERS', 2)
+    fused = FusedPositions()
+    for number in (5, 6, 5):
+        assert fused.add(number, np.eye(4), HERE, EXACT, 0.0)
+    assert not fused.is_full
+    assert not fused.add(7, np.eye(4), HERE, EXACT, 0.0)
+    assert fused.is_full
+    assert fused.position_of(7) is None
+    assert fused.add(6, np.eye(4), HERE, EXACT, 0.0), 'those that are known go on'
