@@ -21,6 +21,7 @@ PAUSE = 0.0002
 _lock = threading.Lock()
 _inside = 0
 _was_on = False
+_settled = False
 _thread = threading.local()
 
 
@@ -64,7 +65,9 @@ def _switch(inside: bool) -> None:
 
 def settle(axioms: int) -> None:
     """Have the collector look no more at an ontology of so many axioms; call it `uncollected`."""
+    global _settled
     if axioms > LARGE:
+        _settled = True
         gc.freeze()
 
 
@@ -76,9 +79,13 @@ def release(parts: Iterable[None], others: bool) -> None:
         others: There are other large ontologies, which a collection would look through: what is
             left, a few objects that refer to each other in cycles, waits until they are dropped.
     """
+    global _settled
     for _ in parts:
         time.sleep(PAUSE)
-    if not others:
+    # Of small ones the collector finds what is left when it looks by itself, and what others keep
+    # out of its way stays there.
+    if _settled and not others:
+        _settled = False
         gc.unfreeze()
         gc.collect()
     with suppress(OSError, AttributeError):  # Not glibc: it decides itself.

@@ -92,3 +92,17 @@ def test_small_ontologies_stay_with_the_collector() -> None:
     before = gc.get_freeze_count()
     memory.settle(10)
     assert gc.get_freeze_count() == before
+
+
+def test_a_small_ontology_that_is_dropped_leaves_alone_what_others_keep_from_the_collector() -> (
+    None
+):
+    ring = Ring()
+    gone = weakref.ref(ring)
+    gc.freeze()
+    del ring
+    memory.settle(10)
+    memory.release([], others=False)
+    gc.collect()
+    assert gone() is not None
+    gc.unfreeze()
