@@ -22,9 +22,12 @@ def nearest(name: str, known: Iterable[str]) -> str:
 
     Returns:
         The nearest name, in quotes, where one is like it, whatever the case of its letters, begins
-        with it or has it as one of its words, and the only name; else the names, at most sixteen.
+        with it or has it as one of its words, and the only name; else the names, at most sixteen;
+        where there are none, that.
     """
     names = list(dict.fromkeys(known))
+    if not names:
+        return 'none, for there is none'
     if len(names) == 1 or (likest := like(name, names)):
         return f"'{names[0] if len(names) == 1 else likest}'"
     more = f' and {len(names) - _MOST} more' if len(names) > _MOST else ''

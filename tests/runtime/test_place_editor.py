@@ -15,6 +15,8 @@ from surveillance_runtime.place.plan_grid import draw
 from surveillance_runtime.place.writing import format_place
 from surveillance_runtime.place_editor import PlaceEditor
 
+from . import edited_places
+
 pytestmark = pytest.mark.unit
 SEVEN = Path(__file__).parents[2] / 'config' / 'seven_rooms.yaml'
 
@@ -185,3 +187,12 @@ def test_the_part_with_the_station_is_where_the_robot_charges(scanned: PlaceEdit
     assert scanned.now.plan.place.recharge_rooms == (other,)
     scanned.save()
     assert read_place_file(scanned.path).plan.stations[other].pose[:2] == (8.5, 12.0)
+
+
+def test_each_change_says_and_changes_what_it_did() -> None:
+    """What it should do is to be read in the record.
+
+    `python -m tests.runtime.edited_places` takes what each change does now.
+    """
+    before = edited_places.RECORD.read_text('utf-8').splitlines()
+    assert edited_places.recorded() == before

@@ -25,3 +25,8 @@ def test_the_likest_name_is_proposed_and_all_of_them_where_none_is_like(given, e
 
 def test_of_many_names_the_first_sixteen_are_listed() -> None:
     assert nearest('x', [f'name{i}' for i in range(18)]).endswith(', name15 and 2 more')
+
+
+def test_where_there_is_no_name_that_is_said() -> None:
+    assert nearest('x', []) == 'none, for there is none'
+    assert nearest('x', ['y']) == "'y'"
