@@ -41,11 +41,11 @@ from benchmarks.perception import (
 )
 from benchmarks.photographs import photographs_in
 from benchmarks.tables import table
-from marker_detection.candidates import EdgeFit
 from marker_detection.cell_differences import CellReadings
 from marker_detection.decoding import MarkerReader
 from marker_detection.detector import DetectorSettings, MarkerDetector
 from marker_detection.dictionaries import dictionary_named
+from marker_detection.edge_fit import EdgeFit, SharpEdges
 from marker_detection.other_families import OtherFamilies
 from marker_detection.preprocessing import PreparedImage, grey_of
 from marker_detection.template_fit import TemplateFit
@@ -108,7 +108,7 @@ STEPS: dict[str, tuple[DetectorSettings, Callable[[], AbstractContextManager[Any
     ),
     'corners in the whole image': (
         DetectorSettings(),
-        lambda: patch('marker_detection.detector._sharpened', lambda outline, *_: outline),
+        _left_out(SharpEdges, 'followed', lambda _self, _pyramid, quads: quads),
     ),
     'other dictionaries': (
         DetectorSettings(),

@@ -3,7 +3,7 @@
 A marker's black border is one dark blob on its white margin, so its outline is found by local
 thresholding and the convex hull of each dark blob is cut down to the smallest quadrilateral around
 it. Hulls survive what breaks polygon approximation on small and oblique markers: the corners are a
-few tenths of a pixel wrong, which `template_fit` repairs, but they are there. `EdgeFit` moves the
+few tenths of a pixel wrong, which `template_fit` repairs, but they are there. `edge_fit` moves the
 sides of those that are wrong by up to a cell.
 
 Of the hundreds of dark outlines in a textured image only a few pass `BorderCheck`, and every marker
@@ -25,7 +25,7 @@ from marker_detection.image_sampling import (
     Array,
     Grey,
     ImagePyramid,
-    homographies_of,
+    halved,
     levels_for,
 )
 
@@ -60,10 +60,6 @@ _CELL_PIXELS = 6.0
 _LEAST_CORRELATION = 0.68
 _LEAST_SIDE, _WORST_SIDE = 0.15, 0.5
 _LEAST_INNER_DEVIATION, _MOST_INNER_DEVIATION = 0.1, 2.0
-# of `EdgeFit`: places along a side, steps across it, and how far it looks, in cells
-_PLACES, _STEPS, _REACH = 10, 13, 1.2
-# cells from a side's line at which a place counts half, and the steepest slope of that line
-_STRAIGHTNESS, _STEEPEST = 0.15, 0.5
 
 
 class Mask(NamedTuple):
@@ -108,20 +104,19 @@ def dark_masks(
         the image's grey levels part best: a shadow's edge, which is dark beside the light, is
         still brighter than ink in the light. Then the masks with gaps closed.
     """
-    half = (max(1, image.shape[1] // 2), max(1, image.shape[0] // 2))
-    halved = _bytes(cv2.resize(image, half, interpolation=cv2.INTER_AREA))
-    white = float(np.percentile(halved[::4, ::4], 98.0))
+    half = halved(image)
+    white = float(np.percentile(half[::4, ::4], 98.0))
     yield Mask(_bytes(cv2.threshold(image, white / 4.0, 255, cv2.THRESH_BINARY_INV)[1]))
     full_size: list[Grey] = []
     for window in windows:
         wide = window >= _WIDE_WINDOW and window > min(windows)
         if wide:
-            yield Mask(_darker_than_around(halved, max(3, window // 4 * 2 + 1), contrast), 2)
+            yield Mask(_darker_than_around(half, max(3, window // 4 * 2 + 1), contrast), 2)
         else:
             full_size.append(_darker_than_around(image, window, contrast))
             yield Mask(full_size[-1])
-    split, _ = cv2.threshold(halved, 0, 255, cv2.THRESH_BINARY_INV + cv2.THRESH_OTSU)
-    yield Mask(_bytes(cv2.threshold(halved, split, 255, cv2.THRESH_BINARY_INV)[1]), 2)
+    split, _ = cv2.threshold(half, 0, 255, cv2.THRESH_BINARY_INV + cv2.THRESH_OTSU)
+    yield Mask(_bytes(cv2.threshold(half, split, 255, cv2.THRESH_BINARY_INV)[1]), 2)
     if touching:
         whole = _bytes(cv2.threshold(image, split, 255, cv2.THRESH_BINARY_INV)[1])
         for dark in (*full_size, whole):
@@ -385,75 +380,3 @@ def _border(along: npt.NDArray[np.float64], radius: float) -> Array:
     across = np.full_like(along, radius)
     sides = [(along, -across), (across, along), (along, across), (-across, along)]
     return np.concatenate([np.stack(side) for side in sides], axis=1)
-
-
-class EdgeFit:
-    """Moves the sides of quadrilaterals onto the outer edges of a border of `side` cells.
-
-    A hull is wrong by up to a cell where something dark touches the marker, or light ate a corner.
-    Across each side the steepest rise from dark to light is looked for at some places, and a line
-    laid through them; places far from the line count less (iteratively reweighted least squares).
-    """
-
-    def __init__(self, side: int) -> None:
-        self._side = side
-        self._along = np.linspace(-0.9, 0.9, _PLACES)
-        self._across = np.linspace(-_REACH, _REACH, _STEPS) * 2.0 / side
-        along, across = (
-            each.ravel() for each in np.meshgrid(self._along, self._across, indexing='ij')
-        )
-        out = 1.0 + across
-        sides = [(along, -out), (out, along), (along, out), (-out, along)]
-        points = np.concatenate([np.stack(side) for side in sides], axis=1)
-        self._grid = np.vstack([points, np.ones(points.shape[1])]).astype(np.float32)
-
-    def fitted(self, pyramid: ImagePyramid, quads: Quads) -> Quads:
-        """Return quads (m, 4, 2) with their sides on the edges nearest to them."""
-        homographies = homographies_of(quads)
-        levels = levels_for(homographies, self._side, _CELL_PIXELS)
-        values = pyramid.sample(homographies, self._grid, levels)
-        values = values.reshape(len(quads), 4, _PLACES, _STEPS)
-        # from dark to light on the way out: the code's own edges in the border's other direction
-        # do not attract it
-        rise = np.maximum(values[..., 2:] - values[..., :-2], 0.0)
-        steepest = rise.max(axis=3)
-        near = np.square(rise * (rise > 0.5 * steepest[..., None])) + 1e-9
-        # where each place's edge is, in marker units outwards
-        found = (near * self._across[1:-1]).sum(axis=3) / near.sum(axis=3)
-        weight = steepest / np.maximum(steepest.max(axis=2, keepdims=True), 1e-6) + 1e-3
-        spread = 2.0 / self._side * _STRAIGHTNESS
-        shift, slope = _line(self._along, found, weight)
-        for _ in range(2):
-            residual = found - shift[..., None] - slope[..., None] * self._along
-            shift, slope = _line(self._along, found, weight / (1.0 + np.square(residual / spread)))
-        return _corners_between(homographies, 1.0 + shift, np.clip(slope, -_STEEPEST, _STEEPEST))
-
-
-def _line(x: Array, y: Array, weight: Array) -> tuple[Array, Array]:
-    """Return a weighted straight line through y (..., n) over x (n,): value at 0, and slope."""
-    total = weight.sum(axis=-1)
-    middle = (weight * x).sum(axis=-1) / total
-    height = (weight * y).sum(axis=-1) / total
-    centred = x - middle[..., None]
-    variance = np.maximum((weight * centred * centred).sum(axis=-1), 1e-9)
-    slope = (weight * centred * (y - height[..., None])).sum(axis=-1) / variance
-    return height - slope * middle, slope
-
-
-def _corners_between(homographies: Array, out: Array, slope: Array) -> Quads:
-    """Corners (m, 4, 2) in pixels where sides meet, given as `out + slope * along` (m, 4)."""
-    top, right, bottom, left = range(4)
-    corners = np.empty((len(out), 4, 3))
-    for index, (level, upright) in enumerate(
-        [(top, left), (top, right), (bottom, right), (bottom, left)]
-    ):
-        # y = down (out + slope x), x = across (out + slope y)
-        down = -1.0 if level == top else 1.0
-        across = -1.0 if upright == left else 1.0
-        first, second = down * out[:, level], down * slope[:, level]
-        third, fourth = across * out[:, upright], across * slope[:, upright]
-        x = (third + fourth * first) / (1.0 - fourth * second)
-        corners[:, index] = np.stack([x, first + second * x, np.ones_like(x)], axis=1)
-    pixels = corners @ homographies.transpose(0, 2, 1)
-    depth = np.where(np.abs(pixels[..., 2:]) < 1e-6, 1e-6, pixels[..., 2:])
-    return np.asarray(pixels[..., :2] / depth)

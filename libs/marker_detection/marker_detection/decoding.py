@@ -94,9 +94,11 @@ class MarkerReader:
         """Homographies (m, 3, 3) moved to where what was read lies, unless that agrees less."""
         blur = np.full((len(homographies), 2), self._blur)
         moved = self.fit.refine(pyramid, homographies, cells.entries, blur, _ROUGH_ITERATIONS)
-        again = self.read_cells(pyramid, moved)
-        better = (again.entries == cells.entries) & (again.correlation >= cells.correlation)
-        return np.where(better[:, None, None], moved, homographies)
+        # of the whole patch: the cells' middles hardly change within half a cell
+        before, after = (
+            self.fit.agreement(pyramid, each, cells.entries, blur) for each in (homographies, moved)
+        )
+        return np.where((after >= before)[:, None, None], moved, homographies)
 
     def read(
         self, pyramid: ImagePyramid, homographies: Array, cells: CellReadings

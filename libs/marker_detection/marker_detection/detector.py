@@ -3,8 +3,8 @@
 The way from an image to markers, with the module of each step:
 
 1. `preprocessing` stretches a dark image and smooths a noisy one.
-2. `candidates` proposes quadrilaterals around dark blobs, keeps those with a white margin, a black
-   border and something inside, and moves their sides onto the border.
+2. `candidates` proposes quadrilaterals around dark blobs and keeps those with a white margin, a
+   black border and something inside; `edge_fit` moves their sides onto the border.
 3. `cell_differences` reads those whose cells are wide enough to show their code, under any light;
    what such a reading may be wrong is computed.
 4. `decoding` has `template_fit` compare what is left with every code of the dictionary through the
@@ -12,6 +12,8 @@ The way from an image to markers, with the module of each step:
 5. `MarkerDetector` accepts such a reading by its correlation and by its lead over the second best
    code: a lower lead is enough for an id on the known list than for any other.
 6. `other_families` takes away what is better explained as a marker of another dictionary.
+7. `edge_fit` follows the sides of large markers, which were read from halved images, into the image
+   itself, and tells how much of each outline lies on an edge.
 """
 
 from __future__ import annotations
@@ -26,7 +28,6 @@ import numpy.typing as npt
 
 from marker_detection.candidates import (
     BorderCheck,
-    EdgeFit,
     Quads,
     dark_masks,
     distinct,
@@ -35,9 +36,9 @@ from marker_detection.candidates import (
 from marker_detection.cell_differences import CellReadings
 from marker_detection.decoding import MarkerReader, Readings
 from marker_detection.dictionaries import MarkerCodes, dictionary_named
+from marker_detection.edge_fit import EdgeFit, SharpEdges
 from marker_detection.image_sampling import (
     Array,
-    Grey,
     ImagePyramid,
     corners_of,
     homographies_of,
@@ -49,8 +50,6 @@ from marker_detection.template_fit import Indices
 
 # pixels between the middles of outlines that are one: what the search's masks differ by
 _SAME_QUAD = 2.0
-# pixels a cell from which corners are found in the image itself: it was halved for the reading
-_LARGE_CELL = 8.0
 # candidates that are matched at once: bounds the memory
 _BATCH = 128
 # share of a marker's half diagonal within which another outline's middle is taken for its part
@@ -145,7 +144,8 @@ class Detection:
         marker_id: Its id.
         corners: (4, 2) pixels, clockwise from the marker's own top left corner.
         confidence: 0 to 1: its correlation, less the share by which the second best code does
-            nearly as well.
+            nearly as well, less the share of its outline that lies on no edge; what of that is not
+            in the image counts half.
         known: Whether its id is on the known list (always when there is no list).
     """
 
@@ -175,6 +175,7 @@ class MarkerDetector:
         self._reader = MarkerReader(codes, self.settings.blur)
         self._border = BorderCheck(self._reader.codes.side)
         self._edges = EdgeFit(self._reader.codes.side)
+        self._sharp = SharpEdges(self._reader.codes.side)
         self._others = OtherFamilies(self._reader.fit, self.settings.blur)
 
     def detect(
@@ -221,17 +222,17 @@ class MarkerDetector:
             return []
         homographies = homographies_of(quads)
         cells = self._reader.read_cells(pyramid, homographies)
-        found = self._shown_by_cells(pyramid, homographies, cells, prepared.grey)
+        found = self._shown_by_cells(pyramid, homographies, cells)
         unread = np.flatnonzero(~_covered(quads, found))
         for start in range(0, len(unread), _BATCH):
             part = unread[start : start + _BATCH]
             readings = self._reader.read(pyramid, homographies[part], cells.chosen(part))
             if readings is not None:
-                found += self._accepted(pyramid, readings, prepared.grey)
+                found += self._accepted(pyramid, readings)
         return _best(found)
 
     def _shown_by_cells(
-        self, pyramid: ImagePyramid, homographies: Array, cells: CellReadings, grey: Grey
+        self, pyramid: ImagePyramid, homographies: Array, cells: CellReadings
     ) -> list[Detection]:
         """Return the markers whose cells alone show their codes."""
         shown = cells.error < _LARGEST_ERROR
@@ -241,7 +242,7 @@ class MarkerDetector:
         cells = cells.chosen(shown)
         homographies = self._reader.aligned(pyramid, homographies[shown], cells)
         confidence = cells.correlation * (1.0 - 1.0 / cells.lead)
-        return self._detections(pyramid, homographies, cells.entries, confidence, grey)
+        return self._detections(pyramid, homographies, cells.entries, confidence)
 
     def _candidates(self, prepared: PreparedImage, pyramid: ImagePyramid) -> Quads:
         """Return quadrilaterals (m, 4, 2) that look like a marker's border, the likeliest first."""
@@ -268,7 +269,7 @@ class MarkerDetector:
         self.left_out = max(0, len(best) - settings.max_candidates)
         return np.asarray(quads[best[: settings.max_candidates]])
 
-    def _accepted(self, pyramid: ImagePyramid, readings: Readings, grey: Grey) -> list[Detection]:
+    def _accepted(self, pyramid: ImagePyramid, readings: Readings) -> list[Detection]:
         settings, codes = self.settings, self._reader.codes
         known = self._known(codes.ids[readings.entries])
         listed = known & (settings.known_ids is not None)
@@ -292,7 +293,6 @@ class MarkerDetector:
             readings.homographies[accepted],
             readings.entries[accepted],
             confidence[accepted],
-            grey,
         )
 
     def _known(self, ids: Indices) -> npt.NDArray[np.bool_]:
@@ -305,7 +305,6 @@ class MarkerDetector:
         homographies: Array,
         entries: Indices,
         confidence: Array,
-        grey: Grey,
     ) -> list[Detection]:
         """Return readings as detections, but for those that rather are other families' markers."""
         codes = self._reader.codes
@@ -315,15 +314,17 @@ class MarkerDetector:
             ours = np.ones(len(entries), bool)
             ours[doubtful[theirs]] = False
             homographies, entries, confidence = homographies[ours], entries[ours], confidence[ours]
+        if not len(entries):
+            return []
         ids = codes.ids[entries]
+        quads = self._sharp.followed(pyramid, corners_of(homographies))
+        confidence = confidence * self._sharp.explained(pyramid, quads)
         outlines = [
             np.roll(corners, -turn, axis=0)
-            for corners, turn in zip(
-                corners_of(homographies), codes.turns[entries].tolist(), strict=True
-            )
+            for corners, turn in zip(quads, codes.turns[entries].tolist(), strict=True)
         ]
         return [
-            Detection(marker_id, _sharpened(outline, grey, codes.side), sure, known)
+            Detection(marker_id, outline, sure, known)
             for marker_id, outline, sure, known in zip(
                 ids.tolist(), outlines, confidence.tolist(), self._known(ids).tolist(), strict=True
             )
@@ -358,23 +359,3 @@ def _covered(quads: Quads, found: Sequence[Detection]) -> npt.NDArray[np.bool_]:
     reach = np.linalg.norm(outlines - middles[:, None], axis=2).mean(axis=1)
     apart = np.linalg.norm(quads.mean(axis=1)[:, None] - middles[None], axis=2)
     return np.asarray((apart < _COVER * reach).any(axis=1))
-
-
-def _sharpened(outline: Array, grey: Grey, side: int) -> Array:
-    """Corners of a large marker, which was read from halved images, found in the whole one."""
-    cell = float(np.linalg.norm(np.roll(outline, -1, axis=0) - outline, axis=1).min()) / side
-    if cell < _LARGE_CELL:
-        return outline
-    reach = min(int(cell / 2.5), 8)
-    height, width = grey.shape
-    # OpenCV refuses all corners when one lies outside, and images smaller than its window
-    inside = ((outline >= 0) & (outline <= (width - 1, height - 1))).all(axis=1)
-    if not inside.any() or min(width, height) < 2 * reach + 5:
-        return outline
-    limits = (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_COUNT, 20, 0.01)
-    start = outline[inside].astype(np.float32).reshape(-1, 1, 2)
-    refined = cv2.cornerSubPix(grey, start.copy(), (reach, reach), (-1, -1), limits)
-    moved = np.linalg.norm(refined - start, axis=2)
-    sharp = outline.copy()
-    sharp[inside] = np.where(moved[:, :, None] < cell / 2.0, refined, start).reshape(-1, 2)
-    return sharp

@@ -17,6 +17,8 @@ Grey = npt.NDArray[np.uint8]
 _TO_UNIT_SQUARE = np.array([[0.5, 0.0, 0.5], [0.0, 0.5, 0.5], [0.0, 0.0, 1.0]])
 _CORNERS = np.array([[-1.0, -1.0, 1.0], [1.0, -1.0, 1.0], [1.0, 1.0, 1.0], [-1.0, 1.0, 1.0]])
 _LAST_LEVEL = 5
+# pixels of the read image that a sample lies at least from the middles of the outermost ones
+_INSIDE = 0.5
 
 
 class ImagePyramid:
@@ -53,16 +55,50 @@ class ImagePyramid:
             patches[chosen] = self._read(x[chosen], y[chosen], level)
         return patches
 
+    def shown(
+        self, homographies: Array, grid: Patches, levels: npt.NDArray[np.int64]
+    ) -> npt.NDArray[np.bool_]:
+        """Return which samples (m, n) are of the image itself, not of what goes on beyond its edge.
+
+        Those count that are interpolated between whole pixels of the halved image alone.
+
+        Args:
+            homographies: As in `sample`.
+            grid: As in `sample`.
+            levels: As in `sample`.
+        """
+        points = homographies @ grid
+        shown = points[:, 2] > 0.0
+        size = 2.0 ** levels[:, None]
+        height, width = self._levels[0].shape
+        for axis, length in enumerate((width, height)):
+            # in pixels of the image that is read
+            places = (points[:, axis] / points[:, 2] + 0.5) / size - 0.5
+            shown &= (places >= _INSIDE) & (places <= length // size - 1.0 - _INSIDE)
+        return np.asarray(shown)
+
     def _read(self, x: Patches, y: Patches, level: int) -> Patches:
         while len(self._levels) <= level:
-            last = self._levels[-1]
-            size = (max(1, last.shape[1] // 2), max(1, last.shape[0] // 2))
-            halved = cv2.resize(last, size, interpolation=cv2.INTER_AREA)
-            self._levels.append(np.asarray(halved, np.uint8))
+            self._levels.append(halved(self._levels[-1]))
         sampled = cv2.remap(
             self._levels[level], x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
         )
         return np.asarray(sampled, dtype=np.float32)
+
+
+def halved(image: Grey) -> Grey:
+    """Return an image of half the size, rounded up: each pixel is the mean of four.
+
+    Of an odd number of rows or columns the last one counts twice. Scaling by any other factor than
+    2 would move what is far from the upper left corner, by as many pixels as it was scaled often.
+    """
+    below, right = image.shape[0] % 2, image.shape[1] % 2
+    if below or right:
+        image = np.asarray(
+            cv2.copyMakeBorder(image, 0, below, 0, right, cv2.BORDER_REPLICATE), np.uint8
+        )
+    size = (image.shape[1] // 2, image.shape[0] // 2)
+    return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), np.uint8)
 
 
 def cell_widths(homographies: Array, cells: int) -> Array:

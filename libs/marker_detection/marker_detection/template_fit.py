@@ -179,16 +179,21 @@ class TemplateFit:
         blur: Array,
         iterations: int,
     ) -> Array:
-        """Homographies (m, 3, 3) aligned so that the codes lie on the image."""
+        """Homographies (m, 3, 3) aligned so that the codes lie on the image.
+
+        Samples beyond the image's edge do not count: what is repeated there is neither the margin
+        nor the border, and would draw the code towards it.
+        """
         levels = self.levels(homographies)
         footprint = self.footprint(homographies, levels, blur)
         # inverse compositional: the template is moved instead of the image, so that its slopes
         # and the Hessian are made once for all iterations
-        template = self._render(entries, footprint)
-        flat = template - template.mean(axis=1, keepdims=True)
-        energy = np.maximum(np.einsum('mn,mn->m', flat, flat), 1e-6)
+        flat = self._render(entries, footprint)
         steepest = self._steepest(entries, footprint)
+        flat -= flat.mean(axis=1, keepdims=True)
         steepest -= steepest.mean(axis=2, keepdims=True)
+        self._leave_out_what_is_beyond(pyramid, homographies, levels, flat, steepest)
+        energy = np.maximum(np.einsum('mn,mn->m', flat, flat), 1e-6)
         # brightness and contrast are no movement: what of a slope looks like them is taken away
         along = (steepest @ flat[:, :, None]) / energy[:, None, None]
         steepest -= along * flat[:, None]
@@ -212,6 +217,39 @@ class TemplateFit:
             if largest.max(initial=0.0) < _SETTLED:
                 break
         return result
+
+    def agreement(
+        self, pyramid: ImagePyramid, homographies: Array, entries: Indices, blur: Array
+    ) -> Patches:
+        """Correlations (m,) of codes (m,) with what of them is in the image."""
+        levels = self.levels(homographies)
+        drawn = self._render(entries, self.footprint(homographies, levels, blur))
+        drawn -= drawn.mean(axis=1, keepdims=True)
+        seen = self.sample(pyramid, homographies, levels)
+        seen -= seen.mean(axis=1, keepdims=True)
+        for values in (drawn, seen):
+            self._leave_out_what_is_beyond(pyramid, homographies, levels, values)
+        sizes = np.einsum('mn,mn->m', drawn, drawn) * np.einsum('mn,mn->m', seen, seen)
+        return np.asarray(np.einsum('mn,mn->m', drawn, seen) / np.sqrt(np.maximum(sizes, 1e-6)))
+
+    def _leave_out_what_is_beyond(
+        self, pyramid: ImagePyramid, homographies: Array, levels: Indices, *values: Patches
+    ) -> None:
+        """Set what belongs to samples (m, n) or (m, k, n) to 0 beyond the image's edge.
+
+        What is left of each has a mean of 0 again.
+        """
+        corners = self._grid[:, [0, self.count - 1, -self.count, -1]]
+        near = np.flatnonzero(~pyramid.shown(homographies, corners, levels).all(axis=1))
+        if not len(near):
+            return
+        shown = pyramid.shown(homographies[near], self._grid, levels[near]).astype(np.float32)
+        count = np.maximum(shown.sum(axis=1, keepdims=True), 1.0)
+        for each in values:
+            wide = (len(near), *[1] * (each.ndim - 2), -1)
+            part = shown.reshape(wide)
+            left = each[near] * part
+            each[near] = left - part * left.sum(axis=-1, keepdims=True) / count.reshape(wide)
 
     def _render(self, entries: Indices, footprint: Footprint) -> Patches:
         down, across = self._profile[footprint.down], self._profile[footprint.across]

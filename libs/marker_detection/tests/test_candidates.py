@@ -1,4 +1,4 @@
-"""Outlines of dark blobs, borders and their sides, beside plain loops and drawn shapes."""
+"""Outlines of dark blobs and borders, beside plain loops and drawn shapes."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ import pytest
 
 from marker_detection.candidates import (
     BorderCheck,
-    EdgeFit,
     Mask,
     dark_masks,
     distinct,
@@ -159,7 +158,7 @@ def test_of_quads_that_are_nearly_the_same_the_first_is_kept():
     assert distinct(quads[:1], 2.0).tolist() == [0]
 
 
-# Borders and their sides.
+# Borders.
 
 
 def marker(homography, white=200.0, black=40.0, side=7, entry=0, around=None):
@@ -218,18 +217,3 @@ def test_the_correlation_is_that_of_two_levels_with_noise_around_them():
     # contrast / sqrt(contrast^2 + 4 variance); halving the image once leaves a quarter of it,
     # interpolation about half
     assert found == pytest.approx(80.0 / np.sqrt(80.0**2 + 4.0 * 40.0**2 / 4.0 * 0.45), abs=0.06)
-
-
-@pytest.mark.parametrize('wrong', [-0.09, 0.0, 0.12])
-def test_sides_are_moved_onto_the_edges(wrong):
-    pyramid = ImagePyramid(marker(SEEN[0]))
-    truth = corners_of(SEEN)
-    start = truth + wrong * (truth - (100.0, 75.0))
-    start[:, 1] += (1.5, -2.0)
-    fitted = EdgeFit(7).fitted(pyramid, start)
-    assert np.abs(fitted - truth).max() < 0.8
-    again = EdgeFit(7).fitted(pyramid, fitted)
-    assert np.abs(again - truth).max() < 0.8
-    both = EdgeFit(7).fitted(pyramid, np.concatenate([start, truth]))
-    assert both[0] == pytest.approx(fitted[0])
-    assert np.abs(both[1] - truth).max() < 0.8

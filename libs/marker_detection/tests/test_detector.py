@@ -395,3 +395,65 @@ def test_white_margin_of_a_pixel_or_two_on_a_black_wall_is_enough(margin):
     generator = np.random.default_rng(1)
     image = image_of([panel], CAMERA, DICTIONARY, wall, Degradation(blur=0.5), generator)
     assert set(found(DETECTOR.detect(image))) == {14}
+
+
+# At the edge of the image.
+
+
+def at_the_rim(marker_id, side, gap, rim, shape, wall=220, frame=None):
+    """Return an image of a marker so many pixels before its edge, and the marker's corners."""
+    # the lower edge first, then turned
+    height, width = shape if rim in (0, 2) else shape[::-1]
+    image = np.full((height, width), wall, np.uint8)
+    top, left = height - gap - side, (width - side) // 3
+    cell = side // 7
+    image[max(0, top - cell) :, left - cell : left + side + cell] = 220
+    marker = DICTIONARY.generateImageMarker(marker_id, side)
+    image[top : top + side, left : left + side] = marker[: height - top]
+    if frame is not None:
+        image[-1:] = frame
+    image = cv2.GaussianBlur(image, (0, 0), 0.8)
+    corners = side * np.array([[0, 0], [1, 0], [1, 1], [0, 1]])
+    corners = np.add(corners, (left - 0.5, top - 0.5))
+    for _ in range(rim):
+        image = np.asarray(cv2.rotate(image, cv2.ROTATE_90_CLOCKWISE), np.uint8)
+        corners = np.stack([image.shape[1] - 1.0 - corners[:, 1], corners[:, 0]], axis=1)
+    return image, corners
+
+
+@pytest.mark.parametrize('rim', range(4))
+@pytest.mark.parametrize('shape', [(300, 400), (333, 417)])
+def test_corners_are_right_beside_the_edge_of_the_image(shape, rim):
+    for side in (35, 70, 126, 168, 210):
+        for gap in (1, 2, 3, 8):
+            image, truth = at_the_rim(14, side, gap, rim, shape)
+            (seen_at,) = DETECTOR.detect(image)
+            assert seen_at.marker_id == 14
+            error = np.linalg.norm(seen_at.corners - truth, axis=1).max()
+            assert error < 1.0, (side, gap)
+            assert seen_at.confidence > 0.8
+
+
+@pytest.mark.parametrize('wall', [60, 130])
+@pytest.mark.parametrize('frame', [None, 0, 255])
+def test_neither_wall_nor_frame_beside_the_edge_moves_a_corner(wall, frame):
+    for side, gap in ((63, 4), (105, 5), (168, 3), (210, 4)):
+        for rim, marker_id in enumerate((3, 22, 57, 91)):
+            image, truth = at_the_rim(marker_id, side, gap, rim, (333, 417), wall, frame)
+            (seen_at,) = DETECTOR.detect(image)
+            assert seen_at.marker_id == marker_id
+            error = np.linalg.norm(seen_at.corners - truth, axis=1).max()
+            assert error < 1.0, (side, gap, rim)
+
+
+@pytest.mark.parametrize('rim', range(4))
+def test_corners_beyond_the_edge_of_the_image_are_those_of_the_whole_marker(rim):
+    for side in (70, 126, 168):
+        whole = DETECTOR.detect(at_the_rim(14, side, 8, rim, (300, 400))[0])[0].confidence
+        for gap in (0, -1, -2):
+            image, truth = at_the_rim(14, side, gap, rim, (300, 400))
+            (seen_at,) = DETECTOR.detect(image)
+            error = np.linalg.norm(seen_at.corners - truth, axis=1).max()
+            assert error < 0.03 * side
+            # who has not seen a side is less sure
+            assert seen_at.confidence < whole - 0.08

@@ -10,6 +10,7 @@ from marker_detection.image_sampling import (
     ImagePyramid,
     cell_widths,
     corners_of,
+    halved,
     homographies_of,
     jacobians_of,
     levels_for,
@@ -91,3 +92,49 @@ def test_beyond_the_image_its_edge_goes_on():
     assert ImagePyramid(image).sample(far, middle, np.array([0])).tolist() == [[200.0]]
     # so small that it cannot be halved as often
     assert ImagePyramid(image[:1, :1]).sample(far, middle, np.array([3])).tolist() == [[7.0]]
+
+
+@pytest.mark.parametrize('shape', [(1, 1), (1, 4), (5, 8), (6, 7), (9, 11)])
+def test_a_pixel_of_a_halved_image_is_the_mean_of_four(shape):
+    image = GENERATOR.integers(0, 256, shape).astype(np.uint8)
+    rows, columns = (np.minimum(np.arange(n + n % 2), n - 1) for n in shape)
+    parts = image[rows][:, columns].astype(float)
+    parts = parts.reshape(len(rows) // 2, 2, len(columns) // 2, 2)
+    assert np.abs(halved(image) - parts.mean(axis=(1, 3))).max() <= 0.5
+
+
+@pytest.mark.parametrize('shape', [(300, 400), (301, 403), (333, 417), (255, 511)])
+@pytest.mark.parametrize('axis', [0, 1])
+def test_a_halved_image_shows_each_thing_where_it_is(shape, axis):
+    # grey levels that say which column or row they are of
+    ramp = np.arange(shape[1 - axis]) * 0.5
+    image = np.rint(np.broadcast_to(ramp if axis == 0 else ramp[:, None], shape)).astype(np.uint8)
+    pyramid = ImagePyramid(image)
+    places = np.array([[-1.0, 0.0, 1.0], [-1.0, 0.0, 1.0], [1.0] * 3], np.float32)
+    for level in range(6):
+        edge = 2.0 ** (level + 1)
+        low, high = np.full(2, edge), np.array([shape[1], shape[0]]) - edge
+        quad = np.array([low, (high[0], low[1]), high, (low[0], high[1])])
+        found = pyramid.sample(homographies_of(quad[None]), places, np.array([level]))[0]
+        expected = 0.5 * np.array([low[axis], (low[axis] + high[axis]) / 2.0, high[axis]])
+        assert found == pytest.approx(expected, abs=1.1)
+
+
+def test_samples_are_of_the_image_where_whole_pixels_of_it_lie_around_them():
+    pyramid = ImagePyramid(np.zeros((301, 403), np.uint8))
+    across = np.zeros((1, 3, 3))
+    across[:, 0, 0], across[:, 1, 1], across[:, 2, 2] = 1.0, 1.0, 1.0
+    for level in range(4):
+        size = 2**level
+        # middles of the first and the last whole pixel, and half a pixel further inside
+        for axis, length in ((0, 403), (1, 301)):
+            first, last = (size - 1) / 2 + size / 2, (length // size - 0.5) * size - 0.5 - size / 2
+            along = np.array([first - 0.1, first + 0.1, 150.0, last - 0.1, last + 0.1])
+            grid = np.full((3, 5), 150.0)
+            grid[2], grid[axis] = 1.0, along
+            shown = pyramid.shown(across, grid.astype(np.float32), np.array([level]))
+            assert shown.tolist() == [[False, True, True, True, False]]
+    # behind the camera
+    across[0, 2] = 0.0, 0.0, -1.0
+    behind = np.array([[-150.0], [-150.0], [1.0]], np.float32)
+    assert pyramid.shown(across, behind, np.array([0])).tolist() == [[False]]

@@ -1,0 +1,222 @@
+"""The sides of a marker's border, found in the image.
+
+Across each side the steepest rise from dark to light is looked for at some places, and a curve
+laid through them; places far from the curve count less (iteratively reweighted least squares).
+Where a side shows no such rise, as where the image ends at it, it stays where it was.
+
+`EdgeFit` moves the sides of outlines that are wrong by up to a cell. `SharpEdges` follows the sides
+of what was read from halved images into the image itself, from level to level, each time with half
+the reach: what lies beyond the margin, and the image's own edge, stay out of it.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from marker_detection.image_sampling import (
+    Array,
+    ImagePyramid,
+    Patches,
+    cell_widths,
+    homographies_of,
+    levels_for,
+)
+
+Quads = npt.NDArray[np.float64]
+Levels = npt.NDArray[np.int64]
+Reals = npt.NDArray[np.floating[Any]]
+
+# image pixels a cell has at most where outlines are moved, and how far that looks, in cells
+_CELL_PIXELS, _REACH = 6.0, 1.2
+# the same of the first level at which sharp edges are looked for, and pixels a cell has at least
+_FIRST_PIXELS, _FIRST_REACH, _LEAST_PIXELS = 8.0, 0.5, 5.0
+# cells from an outline within which its edge is looked for, to tell whether it lies right
+_NEAR = 0.25
+# what a part of an outline counts that is not in the image
+_UNSEEN = 0.5
+# steps across a side
+_STEPS = 13
+# share of a side's reach from its curve at which a place counts half
+_STRAIGHTNESS = 0.125
+# the steepest slope of a side, and its largest bow, in marker units
+_STEEPEST, _LARGEST_BOW = 0.5, 0.1
+# share of the marker's steepest rise below which a place shows no edge
+_LEAST_RISE = 0.12
+# what a place without an edge counts, as a share of one with the steepest
+_STAYS = 0.1
+# how often corners are moved along sides that are not straight: each time brings them nearer by the
+# product of two slopes
+_APPROACHES = 4
+_TOP, _RIGHT, _BOTTOM, _LEFT = range(4)
+
+
+class _Sides(NamedTuple):
+    """Where the sides of squares are: `1 + shift + slope t + bow t^2` outwards at t along them.
+
+    Attributes:
+        shift: (m, 4) top, right, bottom, left.
+        slope: (m, 4).
+        bow: (m, 4).
+    """
+
+    shift: Array
+    slope: Array
+    bow: Array
+
+    def out(self, side: int, along: Array) -> Array:
+        """Return how far out (m,) a side is at places (m,) along it."""
+        bend = self.slope[:, side] + self.bow[:, side] * along
+        return np.asarray(1.0 + self.shift[:, side] + bend * along)
+
+
+class _Scan:
+    """Looks across the sides of squares of `side` cells, so many cells to both directions."""
+
+    def __init__(self, side: int, reach: float, places: int, order: int) -> None:
+        self._side = side
+        self._along = np.linspace(-0.9, 0.9, places)
+        self._powers = np.stack([self._along**power for power in range(order + 1)], axis=1)
+        across = np.linspace(-reach, reach, _STEPS) * 2.0 / side
+        self._across = across[1:-1]
+        self._spread = 2.0 / side * reach * _STRAIGHTNESS
+        self._grid = self._places(1.0 + across)
+
+    def _places(self, out: Array) -> Patches:
+        """Return the places (3, 4 * places * n) so far out (n,) from each side."""
+        x, y = (each.ravel() for each in np.meshgrid(self._along, out, indexing='ij'))
+        sides = [(x, -y), (y, x), (x, y), (-y, x)]
+        points = np.concatenate([np.stack(each) for each in sides], axis=1)
+        return np.vstack([points, np.ones(points.shape[1])]).astype(np.float32)
+
+    def outline(self, cells: float) -> Patches:
+        """Return the places (3, 4 * places) so many cells outwards from the sides."""
+        return self._places(np.array([1.0 + 2.0 / self._side * cells]))
+
+    def edges(
+        self, pyramid: ImagePyramid, homographies: Array, levels: Levels
+    ) -> tuple[Patches, Patches]:
+        """Return how steep the edge is at each place of each side, and where: both (m, 4, places).
+
+        In grey levels over two steps, and in marker units outwards.
+        """
+        values = pyramid.sample(homographies, self._grid, levels)
+        values = values.reshape(len(values), 4, len(self._along), _STEPS)
+        # from dark to light on the way out: the code's own edges in the border's other direction
+        # do not attract it
+        rise = np.maximum(values[..., 2:] - values[..., :-2], 0.0)
+        steepest = rise.max(axis=3)
+        near = np.square(rise * (rise > 0.5 * steepest[..., None])) + 1e-9
+        return steepest, (near * self._across).sum(axis=3) / near.sum(axis=3)
+
+    def sides(self, pyramid: ImagePyramid, homographies: Array, levels: Levels) -> _Sides:
+        """Return the curves along the edges that are nearest to the squares' sides."""
+        steepest, found = self.edges(pyramid, homographies, levels)
+        most = np.maximum(steepest.max(axis=(1, 2), keepdims=True), 1e-6)
+        shown = steepest > _LEAST_RISE * most
+        # where no edge shows, the side rather is where it was
+        found = np.where(shown, found, 0.0)
+        weight = np.where(shown, steepest / most, _STAYS)
+        curve = self._curve(found, weight)
+        for _ in range(2):
+            residual = (found - curve @ self._powers.T) / self._spread
+            curve = self._curve(found, weight / (1.0 + np.square(residual)))
+        slope = np.clip(curve[..., 1], -_STEEPEST, _STEEPEST)
+        bow = np.zeros_like(slope)
+        if curve.shape[2] > 2:
+            bow = np.clip(curve[..., 2], -_LARGEST_BOW, _LARGEST_BOW)
+        return _Sides(curve[..., 0], slope, bow)
+
+    def _curve(self, height: Reals, weight: Reals) -> Array:
+        """Return the coefficients (m, 4, k) of weighted curves through places (m, 4, n)."""
+        weighed = weight[..., None] * self._powers
+        normal = np.swapaxes(weighed, 2, 3) @ self._powers
+        normal += 1e-9 * np.eye(normal.shape[-1])
+        moments = np.swapaxes(weighed, 2, 3) @ height[..., None]
+        return np.asarray(np.linalg.solve(normal, moments)[..., 0], float)
+
+
+class EdgeFit:
+    """Moves the sides of quadrilaterals onto the outer edges of a border of `side` cells.
+
+    A hull is wrong by up to a cell where something dark touches the marker, or light ate a corner.
+    """
+
+    def __init__(self, side: int) -> None:
+        self._side = side
+        self._scan = _Scan(side, _REACH, 10, 1)
+
+    def fitted(self, pyramid: ImagePyramid, quads: Quads) -> Quads:
+        """Return quads (m, 4, 2) with their sides on the edges nearest to them."""
+        homographies = homographies_of(quads)
+        levels = levels_for(homographies, self._side, _CELL_PIXELS)
+        return _corners_between(homographies, self._scan.sides(pyramid, homographies, levels))
+
+
+class SharpEdges:
+    """Follows the sides of a border of `side` cells from a halved image into the image itself."""
+
+    def __init__(self, side: int) -> None:
+        self._side = side
+        self._near = _Scan(side, _FIRST_REACH, 10, 1)
+        self._scans: list[_Scan] = []
+
+    def followed(self, pyramid: ImagePyramid, quads: Quads) -> Quads:
+        """Return quads (m, 4, 2) of large markers with their sides where the image has them.
+
+        Those whose cells are smaller than 5 pixels are returned as they are: the whole code says
+        more of them than a few pixels of its border.
+        """
+        quads = quads.copy()
+        homographies = homographies_of(quads)
+        levels = levels_for(homographies, self._side, _FIRST_PIXELS)
+        levels[cell_widths(homographies, self._side) < _LEAST_PIXELS] = -2
+        # once more in the image itself: what lay at the end of the reach was seen in part
+        for step in range(int(levels.max(initial=-2)) + 2):
+            if len(self._scans) <= step:
+                self._scans.append(_Scan(self._side, _FIRST_REACH / 2.0**step, 20, 2))
+            large = np.flatnonzero(levels >= step - 1)
+            homographies = homographies_of(quads[large])
+            sides = self._scans[step].sides(
+                pyramid, homographies, np.maximum(levels[large] - step, 0)
+            )
+            quads[large] = _corners_between(homographies, sides)
+        return quads
+
+    def explained(self, pyramid: ImagePyramid, quads: Quads) -> Array:
+        """Return which share (m,) of each outline lies on an edge from dark to light.
+
+        What is not in the image counts half.
+        """
+        homographies = homographies_of(quads)
+        levels = levels_for(homographies, self._side, _FIRST_PIXELS)
+        steepest, found = self._near.edges(pyramid, homographies, levels)
+        typical = np.median(steepest.reshape(len(quads), -1), axis=1)[:, None, None]
+        lies = (steepest > _LEAST_RISE * typical) & (np.abs(found) < _NEAR * 2.0 / self._side)
+        seen = [
+            pyramid.shown(homographies, each, level).reshape(lies.shape)
+            for each, level in (
+                (self._near.outline(0.0), 0 * levels),
+                (self._near.outline(_NEAR), levels),
+            )
+        ]
+        return np.asarray(np.where(seen[0], lies | ~seen[1], _UNSEEN).mean(axis=(1, 2)))
+
+
+def _corners_between(homographies: Array, sides: _Sides) -> Quads:
+    """Return the corners (m, 4, 2) in pixels where the sides of squares meet."""
+    corners = np.ones((len(homographies), 4, 3))
+    for index, (level, upright) in enumerate(
+        [(_TOP, _LEFT), (_TOP, _RIGHT), (_BOTTOM, _RIGHT), (_BOTTOM, _LEFT)]
+    ):
+        down = -1.0 if level == _TOP else 1.0
+        across = -1.0 if upright == _LEFT else 1.0
+        x, y = np.full(len(corners), across), np.full(len(corners), down)
+        for _ in range(_APPROACHES):
+            x, y = across * sides.out(upright, y), down * sides.out(level, x)
+        corners[:, index, 0], corners[:, index, 1] = x, y
+    pixels = corners @ homographies.transpose(0, 2, 1)
+    depth = np.where(np.abs(pixels[..., 2:]) < 1e-6, 1e-6, pixels[..., 2:])
+    return np.asarray(pixels[..., :2] / depth)
