@@ -90,3 +90,50 @@ def test_costs_that_changed_are_searched_once_it_is_told() -> None:
     around = search.way((100, 5), (100, 195))
     assert (straight[:, 0] == 100).all()
     assert price(cost, around) == pytest.approx(reference(cost, (100, 5), (100, 195)), rel=0.01)
+
+
+@pytest.mark.parametrize('shape', [(12, 9), (10, 10), (7, 4)])
+@pytest.mark.parametrize('size', [2, 3])
+def test_blocks_are_summed_also_where_the_last_ones_lack_cells(
+    shape: tuple[int, int], size: int
+) -> None:
+    field = np.random.default_rng(1).uniform(0, 9, shape).astype(np.float32)
+    found = grid_search._blocks(field, size)
+    rows, columns = (-(-side // size) for side in shape)
+    assert found.shape == (rows, columns)
+    for row, column in np.ndindex(rows, columns):
+        part = field[row * size : (row + 1) * size, column * size : (column + 1) * size]
+        assert found[row, column] == pytest.approx(part.sum(), rel=1e-5)
+
+
+def test_the_coarse_grid_is_the_mean_of_what_is_free_wherever_it_changed() -> None:
+    cost = cluttered(2)
+    search = GridSearch(cost)
+    size = search._block
+    assert size == 5  # 203 by 163 cells are as many as 182 by 182, and 40 blocks are wanted.
+    draw = np.random.default_rng(5)
+    for top, left in ((0, 0), (17, 33), (150, 101)):
+        cost[top : top + 23, left : left + 31] = draw.uniform(-2, 5, (23, 31)).astype(np.float32)
+        search.changed(top, top + 23, left, left + 31)
+        for row, column in np.ndindex(search._coarse.shape):
+            part = cost[row * size : (row + 1) * size, column * size : (column + 1) * size]
+            free = part[part > 0]
+            expected = free.mean() if len(free) else -1.0
+            assert search._coarse[row, column] == pytest.approx(expected, rel=1e-4)
+
+
+def test_steps_lead_to_the_eight_neighbours_and_not_over_the_edge_of_a_row() -> None:
+    columns, cost = 5, np.random.default_rng(3).uniform(1, 4, (6, 5))
+    cost[2, 1] = cost[4, 4] = -1
+    flat = np.flatnonzero(cost.ravel() > 0)
+    graph = grid_search._graph(flat, cost.ravel()[flat], columns).toarray()
+    graph = graph + graph.T
+    for i, first in enumerate(flat.tolist()):
+        for j, second in enumerate(flat.tolist()):
+            down = abs(first // columns - second // columns)
+            right = abs(first % columns - second % columns)
+            if max(down, right) == 1:
+                mean = (cost.ravel()[first] + cost.ravel()[second]) / 2
+                assert graph[i, j] == pytest.approx(np.hypot(down, right) * mean)
+            else:
+                assert graph[i, j] == 0.0
