@@ -21,8 +21,8 @@ from owl_reasoner.owl.axioms import Axiom
 from owl_reasoner.owl.expressions import ClassExpression
 from owl_reasoner.owl.vocabulary import NOTHING, SWRLB, THING, TOP_LITERAL, XSD
 
-from .all_models import COMPARISONS, AllModels, Vocabulary
-from .small_ontologies import A, B, C, P, Q, S, T, V, W, X, Y, Z, i, j, k, num
+from .all_models import COMPARISONS, AllModels, Vocabulary, terms_of
+from .small_ontologies import A, B, C, P, Q, S, T, V, W, X, Y, Z, i, j, k, m, num
 
 VOCABULARIES = (
     Vocabulary((A, B, C), (P, Q), (), (i, j)),
@@ -299,6 +299,105 @@ def test_what_holds_is_what_holds_in_all_models(seed: int, existing: bool) -> No
         compare(kb, models.of(kb.axioms()), words, not existing)
         gone = draw.random.choice([axiom for axiom in kb.axioms() if axiom not in declared])
         kb.change([draw.random.choice([draw.assertion, draw.schema_axiom])()], [gone])
+
+
+@pytest.mark.parametrize('existing', [False, True])
+@pytest.mark.parametrize('seed', range(12))
+def test_assertions_that_come_and_go_leave_what_holds_in_all_models(
+    seed: int, existing: bool
+) -> None:
+    """Where it takes cases, models stay between such changes."""
+    words = VOCABULARIES[seed % 4]
+    draw = Draw(100 + seed, words, existing)
+    parts = ex.ObjectUnionOf((draw.left(0), draw.right(1)))
+    axioms: list[Axiom] = [ax.Declaration('individual', name) for name in words.individuals]
+    axioms += [ax.SubClassOf(A, parts), *(draw.schema_axiom() for _ in range(2))]
+    kb = KnowledgeBase('x:', [*axioms, *(draw.assertion() for _ in range(4))])
+    models = AllModels(words)
+    moving: Axiom | None = None
+    for step in range(10):
+        kb.reason()
+        compare(kb, models.of(kb.axioms()), words, not existing)
+        # One fact moves, as a clock does; now and then another one comes or goes.
+        come: list[Axiom] = [draw.assertion()]
+        gone = [moving] if moving is not None else []
+        moving = come[0]
+        if step % 3 == 2:
+            others = [axiom for axiom in kb.axioms() if isinstance(axiom, ax.Assertion)]
+            gone += draw.random.sample(others, min(1, len(others)))
+        kb.change(come, [axiom for axiom in gone if axiom not in come])
+
+
+class Merging(Draw):
+    """Draws what makes individuals the same, keeps them apart, and links them."""
+
+    def schema_axiom(self) -> Axiom:
+        draw = self.random
+        pair, back = draw.sample([X, Y, Z, V], 2), ex.ObjectInverseOf(P)
+        links = ex.ObjectPropertyAtom(P, X, Y), ex.ObjectPropertyAtom(P, Z, V)
+        apart = ex.DifferentIndividualsAtom(X, Z)
+        record: Any = draw.choice([ex.SameIndividualAtom, ex.DifferentIndividualsAtom])
+        found: Axiom = draw.choice(
+            [
+                ax.FunctionalObjectProperty(P),
+                ax.InverseFunctionalObjectProperty(P),
+                ax.SubClassOf(THING, ex.ObjectMaxCardinality(draw.choice([1, 2]), back)),
+                ax.SubClassOf(ex.ObjectHasValue(P, i), ex.ObjectOneOf(self.some_individuals())),
+                ax.SubClassOf(ex.ObjectMinCardinality(2, P), ex.ObjectHasSelf(P)),
+                ax.HasKey(THING, (P,), ()),
+                ax.SymmetricObjectProperty(P),
+                ax.IrreflexiveObjectProperty(P),
+                ax.SubPropertyChainOf((P, back, P), P),
+                ax.Rule(links[: draw.choice([1, 2])], (record(*pair),)),
+                ax.Rule((*links, apart), (ex.ObjectPropertyAtom(P, X, V),)),
+            ]
+        )
+        if isinstance(found, ax.Rule):
+            known = {term for atom in found.body for term in terms_of(atom)}
+            return found if known >= set(pair) else self.schema_axiom()
+        return found
+
+    def assertion(self) -> Axiom:
+        draw, names = self.random, self.words.individuals
+        choice = draw.randrange(8)
+        if choice <= 3:
+            return ax.ObjectPropertyAssertion(P, draw.choice(names), draw.choice(names))
+        if choice == 4:
+            return ax.NegativeObjectPropertyAssertion(P, draw.choice(names), draw.choice(names))
+        record: Any = ax.SameIndividual if choice == 5 else ax.DifferentIndividuals
+        made: Axiom = record(frozenset(draw.sample(names, draw.choice([2, 2, 3]))))
+        return made
+
+
+@pytest.mark.parametrize('seed', range(16))
+def test_who_is_the_same_and_why_is_so_in_all_models(seed: int) -> None:
+    words = Vocabulary((), (P,), (), (i, j, k, m))
+    draw = Merging(seed, words)
+    declared: list[Axiom] = [ax.Declaration('individual', name) for name in words.individuals]
+    axioms = [*declared, *(draw.schema_axiom() for _ in range(draw.random.choice([1, 2, 3])))]
+    kb = KnowledgeBase('x:', [*axioms, *(draw.assertion() for _ in range(5))])
+    models, others = AllModels(words), AllModels(words)
+    for _ in range(7):
+        kb.reason()
+        compare(kb, models.of(kb.axioms()), words, exact=True)
+        asked: list[Axiom | None] = [None]
+        if kb.consistent:
+            known = [q for q in questions(words) if kb.holds(q) and q not in set(kb.axioms())]
+            asked = [*draw.random.sample(known, min(2, len(known)))]
+        for question in asked:
+            told = kb.explain(question) if question else kb.explain_inconsistency()
+            if told is not None:
+                others.of([*declared, *told.sources()])
+                assert others.entail(question) if question else not others.consistent
+            fewest = kb.justification(question)
+            assert bool(fewest) == bool(told) or kb.unsupported
+            for left_out in (None, *fewest):
+                others.of([*declared, *(axiom for axiom in fewest if axiom != left_out)])
+                follows = others.entail(question) if question else not others.consistent
+                assert follows == (left_out is None and bool(fewest)) or kb.unsupported
+        assertions = [axiom for axiom in kb.axioms() if isinstance(axiom, ax.Assertion)]
+        gone = draw.random.sample(assertions, min(draw.random.choice([0, 1, 2]), len(assertions)))
+        kb.change([draw.assertion() for _ in range(draw.random.choice([0, 1, 2]))], gone)
 
 
 def goals(words: Vocabulary) -> list[Axiom]:
