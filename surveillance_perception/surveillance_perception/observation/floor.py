@@ -152,10 +152,16 @@ class FloorVisit:
         of_things = self._cells(hits[~self.of_wall(hits, lengths[ended])])
         # Every half cell along each beam, up to a cell and a half before its end.
         side = self._grid.resolution
-        steps = np.arange(side / 2, self._farthest, side / 2)
         until = np.minimum(lengths, self._farthest) - np.where(ended, 1.5 * side, 0.0)
-        beams, places = np.nonzero(steps[None, :] < until[:, None])
-        passed = self._cells(origin + rays[beams] * steps[places, None])
+        counts = np.maximum(np.ceil(until / (side / 2)).astype(np.intp) - 1, 0)
+        firsts = np.cumsum(counts) - counts
+        steps = np.arange(1, counts.sum() + 1) - np.repeat(firsts, counts)
+        # In cells, and coordinate by coordinate: a sweep has some ten thousand of these points.
+        begin = (origin - self._grid.origin) / side
+        columns, rows = (
+            begin[axis] + np.repeat(rays[:, axis] / 2, counts) * steps for axis in (0, 1)
+        )
+        passed = self._marked(rows, columns)
         passed[hit] = False
         self._passes += passed
         self._ends += of_things
@@ -220,12 +226,15 @@ class FloorVisit:
 
     def _cells(self, points: Points) -> Mask:
         """Return which cells hold points."""
-        inside = np.zeros(self._grid.cells.shape, np.bool_)
-        found = self._grid.cells_of(points)
-        rows, columns = found[:, 0], found[:, 1]
+        columns_rows = (points - np.asarray(self._grid.origin)) / self._grid.resolution
+        return self._marked(columns_rows[:, 1], columns_rows[:, 0])
+
+    def _marked(self, rows: NDArray[np.float64], columns: NDArray[np.float64]) -> Mask:
+        """Return which cells hold points, whose coordinates are in cells."""
         height, width = self._grid.cells.shape
         good = (rows >= 0) & (columns >= 0) & (rows < height) & (columns < width)
-        inside[rows[good], columns[good]] = True
+        inside = np.zeros((height, width), np.bool_)
+        inside[rows[good].astype(np.intp), columns[good].astype(np.intp)] = True
         return inside
 
 
