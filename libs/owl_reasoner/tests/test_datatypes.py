@@ -265,7 +265,13 @@ def test_a_duration_is_of_the_types_that_it_suits() -> None:
     [
         ('P1M', 'P30D', None),
         ('P1M', 'P27D', 1),
+        ('P1M', 'P28D', None),
+        ('P1M', 'P31D', None),
         ('P1M', 'P32D', -1),
+        ('P2M', 'P59D', None),
+        ('P2M', 'P58D', 1),
+        ('P2M', 'P62D', None),
+        ('P2M', 'P63D', -1),
         ('P1Y', 'P364D', 1),
         ('P1Y', 'P365D', None),
         ('P100Y', 'P36525D', None),

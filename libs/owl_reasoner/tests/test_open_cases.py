@@ -209,3 +209,18 @@ def test_a_key_with_a_value_that_must_exist(
     assert kb.reason()
     assert kb.holds(same(i, j)) is are_same
     assert kb.unsupported == ()
+
+
+def test_of_one_too_many_the_only_pair_that_may_be_the_same_is() -> None:
+    apart = [differ(j, k), differ(k, m)]
+    for rules in ([], [ANY_RULE]):
+        kb = KnowledgeBase('x:', [FEW, *THREE, *apart, is_a(B, j), *rules])
+        assert kb.reason()
+        assert kb.unsupported == ()
+        assert kb.holds(same(j, m))
+        assert kb.holds(is_a(B, m))
+        kb.remove(apart[0])
+        kb.reason()
+        assert not kb.holds(same(j, m))
+        kb.change([apart[0], differ(j, m)])
+        assert not kb.reason()

@@ -19,7 +19,13 @@ from owl_reasoner.owl.axioms import Axiom, DataPropertyAssertion, Declaration
 from owl_reasoner.owl.expressions import Literal
 from owl_reasoner.owl.vocabulary import OWL, RDF, XSD
 from owl_reasoner.owlready import reasoning
-from owl_reasoner.owlready.quads import OntologyWriter, contexts_of, quads_of, read_axioms
+from owl_reasoner.owlready.quads import (
+    OntologyWriter,
+    contexts_of,
+    lexical_form,
+    quads_of,
+    read_axioms,
+)
 from owl_reasoner.reasoner.budget import ReasoningBudgetError
 
 from .random_ontologies import RandomOntology
@@ -285,6 +291,62 @@ def test_a_value_is_stored_as_owlready2_does_and_fits_into_its_column(
     assert (value, type(value)) == (stored, type(stored))
     (found,) = (a for a in read_axioms(world, contexts_of(world)).axioms if type(a) is type(axiom))
     assert found == axiom or (lexical, found.literal.lexical) == ('2.50', '2.5')
+
+
+@pytest.mark.parametrize(
+    ('value', 'datatype', 'text'),
+    [
+        (1.2e-07, 'decimal', '0.00000012'),
+        (-1.2e22, 'decimal', '-12000000000000000000000'),
+        (1.2e-07, 'double', '1.2e-07'),
+        (1e22, 'float', '1e+22'),
+        (5, 'decimal', '5'),
+        (True, 'boolean', 'true'),
+        (False, 'boolean', 'false'),
+        ('a', 'string', 'a'),
+    ],
+)
+def test_a_stored_value_is_written_as_its_datatype_has_it(
+    value: object, datatype: str, text: str
+) -> None:
+    assert lexical_form(value, XSD + datatype) == text
+
+
+def test_ontologies_that_were_not_chosen_say_nothing() -> None:
+    world: Any = owlready2.World()
+    first, second = (world.get_ontology(f'http://example.org/{name}#') for name in 'ab')
+    with first:
+
+        class Drug(Thing):
+            pass
+
+        class Cheap(Drug):
+            pass
+
+        aspirin: Any = Cheap('aspirin')
+        box: Any = Thing('box', namespace=first)
+
+    sync_reasoner_native([first])
+    assert box not in Drug.instances()
+    with second:
+        box.is_a.append(Cheap)
+    sync_reasoner_native([first])
+    target = world.get_ontology(reasoning.INFERRED)
+    asked = 'SELECT s, o FROM objs WHERE c=?'
+    told = world.graph.execute(asked, (target.graph.c,)).fetchall()
+    assert all(subject != box.storid for subject, _ in told)
+    sync_reasoner_native([first, second])
+    assert aspirin in Drug.instances()
+    assert box in Drug.instances()
+
+
+def test_what_follows_goes_where_the_innermost_with_says(shop: Shop) -> None:
+    outer, inner = (shop.world.get_ontology(f'http://example.org/{name}#') for name in 'ab')
+    with outer, inner:
+        sync_reasoner_native(shop.world, infer_data_property_values=True)
+    header, *others = quads_of(shop.world, [outer.graph.c])
+    assert (header[0], others) == (outer.storid, [])
+    assert len(list(quads_of(shop.world, [inner.graph.c]))) > 2
 
 
 def differences(world: Any) -> dict[str, set[Any]]:
