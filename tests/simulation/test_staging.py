@@ -374,6 +374,8 @@ def test_what_is_staged_has_the_size_and_the_place_that_the_line_says() -> None:
         'box high 2 0.5 0.4 1.1',
         'chair d 5 1.5 90',
         'person p 5 0.5 -90',
+        'person q 5 0.5',
+        'chair e 4 1.5',
         'lamp A 0.25',
         'lamp B off',
     ).world
