@@ -102,7 +102,7 @@ def test_the_way_that_is_left_is_the_shortest_one_that_keeps_off_the_walls() -> 
     for goal in ('A', 'B'):
         x, y = ways.point(goal)
         cell = int(number[int(y / 0.1 + 1e-9), int(x / 0.1 + 1e-9)])
-        expected = dijkstra(graph, directed=False, indices=cell).reshape(free.shape)
+        expected = dijkstra(graph, directed=False, indices=np.array([cell]))[0].reshape(free.shape)
         for row, column in np.argwhere(np.isfinite(expected))[::7]:
             at = (column + 0.5) * 0.1, (row + 0.5) * 0.1
             assert ways.is_free(at)
