@@ -43,6 +43,8 @@ def test_jacobians_are_the_slopes_at_the_middle():
         assert jacobian == pytest.approx(np.column_stack([across, down]), rel=1e-4)
         narrow = min(np.linalg.norm(across), np.linalg.norm(down)) * 2.0 / 7
         assert cell_widths(homography[None], 7) == pytest.approx(narrow, rel=1e-4)
+    # a homography is the same times any number
+    assert jacobians_of(3.0 * found) == pytest.approx(jacobians_of(found))
 
 
 @pytest.mark.parametrize(

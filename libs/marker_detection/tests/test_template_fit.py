@@ -178,3 +178,25 @@ def test_codes_are_aligned_with_the_image_whatever_their_contrast():
     # each is aligned by itself
     alone = fit.refine(pyramid, start[1:2], entries[1:2], blur[1:2], 12)
     assert corners_of(alone) == pytest.approx(corners_of(result[1:2]), abs=0.02)
+
+
+def test_what_lies_beyond_the_image_neither_counts_nor_moves_a_code():
+    codes = codes_of(5)
+    fit = TemplateFit(codes)
+    quad = 24.0 * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]) + (59.5, 59.5)
+    columns = np.clip((np.arange(120) - 36 + 8) // 8, 0, 7)
+    entries, blur = np.array([6]), np.full((1, 2), 0.8)
+    whole = (40.0 + 160.0 * (codes.cells[6][columns][:, columns] > 0)).astype(np.uint8)
+    for cut in (120, 84, 80):
+        image = whole[:, :cut].copy()
+        # what is repeated beyond the edge is not what is there
+        image[:, -1] = np.where(np.arange(120) % 8 < 4, 255, 0)
+        pyramid, truth = ImagePyramid(image), homographies_of(quad[None])
+        start = homographies_of(quad[None] + (1.5, -1.0))
+        agreed = fit.agreement(
+            pyramid, np.concatenate([truth, start]), entries[[0, 0]], blur[[0, 0]]
+        )
+        assert agreed[0] > 0.97
+        assert agreed[1] < agreed[0] - 0.02
+        found = fit.refine(pyramid, start, entries, blur, 8)
+        assert np.abs(corners_of(found)[0] - quad).max() < 0.5
