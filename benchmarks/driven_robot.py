@@ -80,9 +80,9 @@ class DrivenRobot:
                 robot.lidar.range_max,
                 times=times if told.age else None,
             )
-            begun = time.process_time()
+            begun = time.thread_time()
             velocity = navigator.see(scan, stamp) or velocity
-            self.steps_ms.append((time.process_time() - begun) * 1e3)
+            self.steps_ms.append((time.thread_time() - begun) * 1e3)
             self._seen(scan, stamp)
         robot.base.command(velocity.speed, velocity.turn)
         self._stepped()
