@@ -59,10 +59,10 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     """Mark each test by what it needs: nothing (unit), ROS nodes (nodes), a whole mission.
 
     Several processes begin with the files that take longest, those that start processes or whole
-    missions or say so (`early`), and end at about the same time.
+    missions, then those that say so (`early`), and end at about the same time.
     """
     kinds = ('mission', 'nodes', 'unit')
-    dearest: dict[Path, int] = {}
+    dearest: dict[Path, float] = {}
     for item in items:
         folder = item.path.relative_to(item.config.rootpath).parts[1]
         fixtures = set(getattr(item, 'fixturenames', ()))
@@ -73,7 +73,8 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         else:
             kind = 2
         item.add_marker(kinds[kind])
-        dear = 0 if fixtures & PROCESS_FIXTURES or item.get_closest_marker('early') else kind
+        early = 0.5 if item.get_closest_marker('early') else 2.0
+        dear = 0.0 if fixtures & PROCESS_FIXTURES else min(early, kind)
         dearest[item.path] = min(dear, dearest.get(item.path, dear))
     if hasattr(config, 'workerinput'):
         items.sort(key=lambda item: (dearest[item.path], item.path))

@@ -12,6 +12,8 @@ from typing import Any
 CHROMIUM = shutil.which('chromium') or shutil.which('chromium-browser')
 DRIVER = shutil.which('chromedriver')
 MISSING = 'no Chromium: apt-get install chromium chromium-driver'
+PATIENCE = 240.0
+"""Seconds for which a page is waited for: Chromium lets all else on a busy machine go first."""
 PHONE, DESK = (390, 844), (1400, 1000)
 
 
@@ -28,6 +30,7 @@ class Viewer:
             options.add_argument(f'--{argument}')
         options.set_capability('goog:loggingPrefs', {'browser': 'ALL'})
         self.driver: Any = webdriver.Chrome(options=options, service=Service(DRIVER))
+        self.driver.set_script_timeout(PATIENCE)
         self.size(*DESK)
         self.address = address
         self.driver.get(address)
@@ -53,7 +56,7 @@ class Viewer:
         query = 'return document.querySelector(arguments[0])?.getAttribute(arguments[1])'
         return str(self.js(query, selector, name) or '')
 
-    def until(self, what: Callable[[], Any], seconds: float = 120.0) -> Any:
+    def until(self, what: Callable[[], Any], seconds: float = PATIENCE) -> Any:
         from selenium.webdriver.support.wait import WebDriverWait
 
         return WebDriverWait(self.driver, seconds, 0.1).until(lambda _: what())
@@ -61,7 +64,7 @@ class Viewer:
     def click(self, selector: str) -> None:
         self.js('document.querySelector(arguments[0]).click()', selector)
 
-    def changes(self, look: Callable[[], Any], seconds: float = 120.0) -> None:
+    def changes(self, look: Callable[[], Any], seconds: float = PATIENCE) -> None:
         before = look()
         self.until(lambda: look() != before, seconds)
 
