@@ -436,9 +436,9 @@ def collected(root: Path, mutants: Sequence[Mutant]) -> tuple[Reach, dict[Mutant
 def test_files(root: Path, mutants: Sequence[Mutant]) -> list[str]:
     """Return the test files to collect: of the robot's those that name a mutant's module.
 
-    What a file takes from the helpers beside it counts as its own. A module that none names is
-    tried by the files that name its folder, or else its package. Tests in processes of their own
-    meet no fault.
+    What a file takes from the helpers beside it counts as its own, and `test_<module>.py` names its
+    module. A module that none names is tried by the files that name one that imports it, or else
+    its folder, or its package. Tests in processes of their own meet no fault.
     """
     if root != CHECKOUT:
         return []
@@ -451,14 +451,24 @@ def test_files(root: Path, mutants: Sequence[Mutant]) -> list[str]:
             if re.search(rf'\b{helper.stem} import\b', text):
                 text += helper.read_text(encoding='utf-8')
         texts[str(path.relative_to(root))] = text
+
+    def naming(name: Sequence[str]) -> set[str]:
+        near = re.compile(rf'\b{".".join(name[:-1])}(?:\.| import (?:.*, )?){name[-1]}\b')
+        own = f'test_{name[-1]}'
+        return {f for f, text in texts.items() if near.search(text) or Path(f).stem == own}
+
     chosen: set[str] = set()
     for module in {each.module for each in mutants}:
-        name = list(Path(module).with_suffix('').parts[1:])
-        found: set[str] = set()
-        while name and not found:
-            near = re.compile(rf'\b{".".join(name[:-1])}(?:\.| import (?:.*, )?){name[-1]}\b')
-            found = {file for file, text in texts.items() if near.search(text)}
-            name.pop()
+        name = Path(module).with_suffix('').parts[1:]
+        found = naming(name)
+        if not found:
+            imports = re.compile(rf'\b{".".join(name)} import\b')
+            for path in (root / Path(module).parts[0]).rglob('*.py'):
+                if imports.search(path.read_text(encoding='utf-8')):
+                    found |= naming(path.relative_to(root).with_suffix('').parts[1:])
+        while len(name) > 1 and not found:
+            name = name[:-1]
+            found = naming(name)
         chosen |= found
     return sorted(chosen)
 

@@ -57,3 +57,27 @@ def test_a_large_map_is_taken_coarsely() -> None:
 def test_a_map_of_one_long_row_of_cells_has_its_region() -> None:
     strip = Grid(np.zeros((1, 900_000), np.int8), 0.05)
     assert room_outlines(strip, {'A': (5.0, 0.02)}, {})['A'].boxes == ((0.0, 0.0, 45_000.0, 0.05),)
+
+
+@pytest.mark.parametrize('size', [40, 41])
+def test_places_that_share_a_floor_have_the_cells_that_are_nearer_to_them(size: int) -> None:
+    """Beside the distance of each cell's middle, in a room that begins nowhere near the corner."""
+    grid = two_rooms(size=size)
+    wall = -1.0 + size // 2 * 0.5
+    points = {'B': (wall + 5.25, 8.25), 'F': (wall + 3.25, 1.25), 'G': (wall + 7.25, 2.25)}
+    found = room_outlines(grid, points, {'D': (wall + 0.25, 7.0, wall + 0.25, 9.0)})
+    assert found.keys() == points.keys()
+    for row in range(3, size - 2, 2):
+        for column in range(size // 2 + 3, size - 2, 2):
+            x, y = -1.0 + (column + 0.5) * 0.5, -2.0 + (row + 0.5) * 0.5
+            away = {name: np.hypot(x - at[0], y - at[1]) for name, at in points.items()}
+            first, second = sorted(away.values())[:2]
+            within = [
+                name
+                for name, region in found.items()
+                for left, bottom, right, top in region.boxes
+                if left < x < right and bottom < y < top
+            ]
+            assert len(within) == 1, 'each cell once'
+            if second - first > 0.01:
+                assert within == [min(away, key=lambda name: away[name])]
