@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import cv2
 import numpy as np
 import pytest
 
@@ -74,3 +75,26 @@ def test_large_images_have_thick_lines():
 
     assert thickness(400) <= 4
     assert thickness(2400) >= thickness(400) + 2
+
+
+@pytest.mark.parametrize(
+    ('shape', 'thickness'),
+    [((300, 400), 1), ((900, 640), 1), ((1200, 900), 1), ((1200, 1100), 2), ((2000, 3000), 3)],
+)
+def test_what_is_drawn_grows_with_the_shorter_side_of_the_image(shape, thickness):
+    side = 20 * thickness
+    found = Detection(3, side * np.array([[2.0, 2], [3, 2], [3, 3], [2, 3]]), 0.5, True)
+    drawn = annotated(np.zeros(shape, np.uint8), [found])
+    expected = np.zeros((*shape, 3), np.uint8)
+    scale = max(0.45, min(shape) / 1100.0)
+    outline = np.rint(found.corners * 16).astype(np.int32)
+    cv2.polylines(expected, [outline], True, GREEN, thickness, cv2.LINE_AA, shift=4)
+    at = 2 * side
+    cv2.circle(expected, (16 * at, 16 * at), 32 * thickness, CORNER, -1, cv2.LINE_AA, shift=4)
+    (width, height), _ = cv2.getTextSize('3 0.50', 0, scale, thickness)
+    left, low = at, at - 5
+    cv2.rectangle(
+        expected, (left - 2, low - height - 2), (left + width + 2, low + 3), (20,) * 3, -1
+    )
+    cv2.putText(expected, '3 0.50', (left, low), 0, scale, GREEN, thickness, cv2.LINE_AA)
+    assert (drawn == expected).all()
