@@ -231,3 +231,25 @@ def test_a_place_that_is_taken_while_somebody_looks_falsifies_no_leg() -> None:
     assert told.look(2.0, NOBODY).graph.leg_seconds == whole
     world.faults = lambda call: None
     assert told.look(3.0, NOBODY).graph.own_exploration == {'R1': 60.0}
+
+
+def test_who_is_sent_home_goes_to_the_station_that_is_next_from_where_the_robot_is_now() -> None:
+    world = World()
+    settings = DecisionSettings(recharge_rooms=('E', 'R4'))
+    told = WorldModel(settings, world, world, world.battery)
+    with pytest.raises(ValueError, match='the map is not known yet'):
+        told.request('')
+    told.begin(1.0, NOBODY)
+    # Since that look it has come elsewhere.
+    told.saw('C2', 2.0)
+    assert told.request('') == 'the robot goes to R4 when it has ended what it is at'
+    assert told.experience.requested == 'R4'
+    told.saw('C1', 3.0)
+    assert told.request('') == 'the robot goes to E when it has ended what it is at'
+    told.saw('E', 4.0)
+    assert told.request('') == 'the robot is in E already'
+    assert told.experience.requested == ''
+    told.place = ''
+    assert told.request('') == 'the robot goes to E when it has ended what it is at'
+    with pytest.raises(ValueError, match='R9'):
+        told.request('R9')

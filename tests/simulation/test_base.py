@@ -157,3 +157,20 @@ def test_no_commands_ever_drive_it_into_something(
             base.command(speed, turn_speed)
             base.step(DT)
             assert seven_rooms.clearance(*base.pose[:2]) >= base.model.radius
+
+
+def test_a_base_begins_at_rest_with_nothing_behind_it_and_counts_its_way() -> None:
+    base = Base(two_rooms(), (1.0, 1.0, 0.0))
+    assert (base.travelled, base.collisions, base.speed, base.turn_speed) == (0.0, 0, 0.0, 0.0)
+    assert base.odometry == base.pose == (1.0, 1.0, 0.0)
+    drive(base, 0.4, 0.0, 2.0)
+    assert base.travelled == pytest.approx(base.pose[0] - 1.0)
+    before = base.travelled
+    drive(base, -0.4, 0.0, 3.0)
+    assert base.travelled > before + 0.5, 'backwards is a way, too'
+    driven = base.travelled
+    base.push(0.3, 0.0, 0.0)
+    assert base.travelled == driven, 'who is pushed does not drive'
+    turned = Base(two_rooms(), (1.0, 1.0, 0.0))
+    drive(turned, 0.0, 1.0, 1.0)
+    assert turned.travelled == 0.0
