@@ -9,6 +9,7 @@ import pytest
 from armor_service.client import ArmorClient, InProcessTransport
 from armor_service.directives import TABLE
 from armor_service.service import ArmorService
+from owl_reasoner.knowledge_base import KnowledgeBase
 
 from .seven_rooms import IRI, Ask, asker, build_seven_rooms, names
 
@@ -70,6 +71,26 @@ def test_a_frame_declares_what_is_new_and_nothing_else(rooms: Ask) -> None:
     assert rooms('QUERY AXIOMS', 'Cellar').queried_objects
     assert rooms('REMOVE AXIOM', 'Class: Cellar').success
     assert rooms('QUERY AXIOMS', 'Cellar').queried_objects == []
+
+
+@pytest.mark.parametrize('is_large', [False, True])
+def test_what_names_stand_for_is_known_of_a_large_ontology_too(
+    rooms: Ask, monkeypatch: pytest.MonkeyPatch, is_large: bool
+) -> None:
+    """What no axiom but a declaration names, and of a large one the declarations alone."""
+    for frame in ('DataProperty: width', 'ObjectProperty: sees', 'Datatype: Size'):
+        assert rooms('ADD AXIOM', frame).error_description == ''
+    if is_large:
+        monkeypatch.setattr(KnowledgeBase, 'schema_names', lambda *_: [])
+    for axiom, shown in (
+        ('Class: Wide SubClassOf: width min 1', 'width min 1 rdfs:Literal'),
+        ('Class: Open SubClassOf: sees min 1', 'sees min 1 owl:Thing'),
+        ('Class: Sized SubClassOf: width some Size', 'width some Size'),
+    ):
+        assert rooms('ADD AXIOM', axiom).error_description == ''
+        name = axiom.split()[1]
+        (found,) = (a for a in rooms('QUERY AXIOMS', name).queried_objects if 'SubClassOf' in a)
+        assert shown in found
 
 
 def test_what_is_said_of_a_class_is_shown_of_a_class(rooms: Ask) -> None:

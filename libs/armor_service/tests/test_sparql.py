@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import random
 import signal
 import socket
@@ -60,6 +61,17 @@ def test_rows_as_one_text_and_as_pairs(service: ArmorService, built: ArmorClient
     for args in (parts, (*parts, '5000'), (''.join(parts), '5000')):
         assert ask('QUERY SPARQL', *args).queried_objects == [f'{{x={IRI}#E}}']
     assert ask('QUERY SPARQL', PREFIX + 'SELECT ?x { :R9 :isIn ?x }').queried_objects == ['']
+
+
+def test_rows_as_json_hold_texts_as_they_are(service: ArmorService, built: ArmorClient) -> None:
+    ask = asker(service)
+    ask('ADD DATAPROP IND', 'called', 'R1', 'STRING', 'Küche "1"')
+    query = PREFIX + 'SELECT ?x ?v { :R1 :isIn ?x } '
+    optional = PREFIX + 'SELECT ?x ?v { :R1 :called ?x OPTIONAL { :R1 :isIn ?v } }'
+    assert ask('QUERY SPARQL ROWS', query).queried_objects == []
+    (row,) = ask('QUERY SPARQL ROWS', optional).queried_objects
+    assert json.loads(row).keys() == {'x'}
+    assert 'Küche \\"1\\"' in row
 
 
 def test_it_follows_the_ontology(built: ArmorClient) -> None:
