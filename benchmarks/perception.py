@@ -552,6 +552,46 @@ def print_corners(folder: Path | None) -> None:
     )
 
 
+GAPS = (-2.0, 0.0, 1.0, 3.0, 8.0)
+
+
+def beside_the_edge(gap: float, index: int) -> tuple[ImageArray, Panel]:
+    """Return a marker at 0.4 to 2 m, up to 45 degrees, so many pixels before the image's edge."""
+    generator = np.random.default_rng([15, index])
+    shown = panel(generator.uniform(0.4, 2.0), generator.uniform(0, 45), generator)
+    shown = replace(shown, offset=(0.0, 0.0), margin=float(generator.uniform(0.5, 1.5)))
+    axis, last = index % 2, (CAMERA.width, CAMERA.height)[index % 2] - 0.5
+    for _ in range(6):
+        corners = corners_in_image(shown, CAMERA)[:, axis]
+        # towards the last column or row, or towards the first one
+        miss = last - gap - corners.max() if index % 4 < 2 else gap - 0.5 - corners.min()
+        offset = list(shown.offset)
+        offset[axis] += float(miss)
+        shown = replace(shown, offset=(offset[0], offset[1]))
+    return scene([shown], indoors(generator), SHARP, generator), shown
+
+
+def print_edge(count: int) -> None:
+    """Markers beside the edge of the image, and cut by it: found, and how far a corner is off."""
+    detectors = {'OpenCV': opencv_defaults(), 'ladder': opencv_ladder(), 'here': this_project()}
+    rows = []
+    for gap in GAPS:
+        row = [f'{gap:g} pixels']
+        views = [beside_the_edge(gap, index) for index in range(count)]
+        for detect in detectors.values():
+            errors = [
+                float(np.linalg.norm(corners - corners_in_image(shown, CAMERA), axis=1).max())
+                for image, shown in views
+                for marker_id, corners in detect(image)
+                if marker_id == shown.marker_id
+            ]
+            worst = f'{np.median(errors):.2f}, {max(errors):.1f}' if errors else '-'
+            row.append(f'{len(errors)}; {worst}')
+        rows.append(row)
+    head = [f'of {count}: found; worst corner, median and most', *detectors]
+    print_table(head, rows)
+
+
 def natural_images(count: int) -> Iterator[ImageArray]:
     """Photographs of scikit-image and, where it is installed, scikit-learn: parts, rescaled."""
     import skimage.data
@@ -827,6 +867,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     print_foreign(40 if options.quick else 1)
     print_kalibr(1 if options.quick else 5)
     print_corners(None if options.photos is None else Path(options.photos))
+    print_edge(4 if options.quick else 60)
     print_natural(40 if options.quick else 1500)
     cells = grid(detectors, samples)
     for name in detectors:
