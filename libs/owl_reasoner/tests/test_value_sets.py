@@ -177,6 +177,20 @@ def test_a_bound_of_another_type_of_numbers_is_compared_by_value(
     assert values['minInclusive'].within(values['minExclusive']) != is_exact
 
 
+@pytest.mark.parametrize(('space', 'step'), [('float', 2.0**-23), ('double', 2.0**-52)])
+@pytest.mark.parametrize('sign', [1, -1])
+def test_floats_of_either_sign_are_counted_and_listed(space: str, step: float, sign: int) -> None:
+    near = [sign * (1 + count * step) for count in range(4)]
+    low, high = sorted((near[0], near[-1]))
+    facets = tuple(
+        (XSD + facet, Literal(repr(bound), XSD + space))
+        for facet, bound in (('minInclusive', low), ('maxExclusive', high))
+    )
+    found = values_of(DatatypeRestriction(XSD + space, facets))
+    assert found.size == 3
+    assert [value[1] for value in found.members()] == sorted(near)[:3]  # type: ignore[index]
+
+
 def test_facets_that_are_not_supported_are_named() -> None:
     facet = (RDF + 'langRange', Literal('en'))
     assert value_set(DatatypeRestriction(RDF + 'PlainLiteral', (facet,))) is None
