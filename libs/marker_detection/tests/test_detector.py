@@ -457,3 +457,12 @@ def test_corners_beyond_the_edge_of_the_image_are_those_of_the_whole_marker(rim)
             assert error < 0.03 * side
             # who has not seen a side is less sure
             assert seen_at.confidence < whole - 0.08
+
+
+@pytest.mark.parametrize('seed', range(3))
+def test_marker_whose_blurred_cells_show_nothing_is_matched_as_a_whole(seed):
+    image = seen([Panel(14, 6.0, 0.3, roll=0.1)], Degradation(blur=2.0), 'plain', seed)
+    (detection,) = DETECTOR.detect(image)
+    assert detection.marker_id == 14
+    truth = corners_in_image(Panel(14, 6.0, 0.3, roll=0.1), CAMERA)
+    assert np.linalg.norm(detection.corners - truth, axis=1).max() < 1.5
