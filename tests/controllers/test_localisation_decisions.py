@@ -294,7 +294,7 @@ def test_the_rival_that_leads_most_wins_and_the_present_pose_becomes_a_rival() -
     localiser.see(SCAN, 0.0)
     assert (localiser.pose, localiser.jumps) == (second, 1)
     assert [each.pose for each in localiser._rivals] == [FAR, (18.0, 2.0, 0.0), HERE]
-    assert [each.lead for each in localiser._rivals] == pytest.approx([-0.04, -0.55, -0.35])
+    assert [each.lead for each in localiser._rivals] == pytest.approx([-0.04, -0.2, 0.0])
     assert all(each.is_equal for each in localiser._rivals)
 
 
