@@ -126,7 +126,6 @@ class Tracker:
         dt, self._now = now - self._now, now
         if dt > self._parameters.keep:
             self._bodies.clear()
-            dt = 0.0
         for body in self._bodies:
             body.at = body.at + body.velocity * dt
         seen = self._grouped(np.array(pose[:2]), points)

@@ -145,8 +145,7 @@ def robots_in_a_row(plan: FloorPlan, count: int, radius: float) -> tuple[FleetMe
 def _clearance(plan: FloorPlan) -> tuple[Grid, NDArray[np.float32]]:
     """Return the place as a grid, and the distance of each cell to the next wall, metres."""
     grid = draw(plan)
-    solid = ~grid.free if plan.map is not None else grid.occupied
-    return grid, distance_to(solid, grid.resolution)
+    return grid, distance_to(~grid.free, grid.resolution)
 
 
 def _room_to_pass(radius: float) -> float:
