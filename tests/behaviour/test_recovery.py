@@ -9,6 +9,7 @@ import pytest
 
 import state_machines as fsm
 from state_machines.exceptions import CallError, UnavailableError
+from surveillance_behaviour.mission.recovery import Failure, Recovery, RecoveryLimits
 from surveillance_behaviour.ports import Point
 
 from .machine_runs import CALLS, Run, visited
@@ -44,6 +45,16 @@ def test_a_peer_that_stays_away_is_cried_about_and_waited_for(name: str, call: s
         return
     assert any('scripted fault' in cry for cry in world.cries)
     assert world.cries.count('') >= 3, 'it goes on trying'
+
+
+def test_a_place_that_is_given_up_again_is_left_alone_for_twice_as_long() -> None:
+    recovery = Recovery(RecoveryLimits(path_tries=1, avoid_seconds=60.0, longest_avoid=300.0))
+    now = 0.0
+    for seconds in (60.0, 120.0, 240.0, 300.0, 300.0):
+        recovery.next_step(Failure('move', 'no way', 'R1'), now)
+        assert recovery.avoided(now + seconds - 0.5) == {'R1'}
+        now += seconds
+        assert recovery.avoided(now) == set()
 
 
 def test_a_peer_that_is_away_is_waited_for_at_once(machine: str) -> None:

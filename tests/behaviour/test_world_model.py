@@ -142,6 +142,25 @@ def test_an_alert_is_urgent_at_once_though_its_place_has_a_longer_threshold(
     assert list(decision.scores) == ['R1']
 
 
+@pytest.mark.parametrize(('seconds', 'is_urgent'), [(40.0, False), (50.0, False), (50.5, True)])
+def test_a_place_is_urgent_beyond_its_own_threshold_and_not_at_it(
+    monkeypatch: pytest.MonkeyPatch, seconds: float, is_urgent: bool
+) -> None:
+    world, right = World(), World.snapshot
+    rules = PatrolRules(thresholds={'R2': 50.0})
+    told = WorldModel(DecisionSettings(), world, world, world.battery, rules=rules)
+
+    def snapshot(*args: Any) -> Snapshot:
+        found = right(*args)
+        rooms = {name: kinds - {'URGENT'} for name, kinds in found.classes.items()}
+        rooms['R2'] = frozenset({'ROOM', 'URGENT'})
+        return replace(found, classes=rooms, visited_at={**found.visited_at, 'R2': 100.0})
+
+    monkeypatch.setattr(World, 'snapshot', snapshot)
+    world.is_in = 'C1'
+    assert (told.decide(100.0 + seconds, NOBODY).rule == 'URGENT') is is_urgent
+
+
 def test_a_request_is_taken_while_somebody_looks(tmp_path: Path) -> None:
     world = World()
     told = world_model(world, tmp_path / 'mission.jsonl')

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from surveillance_controllers.motion.place_locator import PlaceLocator, PlaceRegions
+from surveillance_controllers.motion.place_locator import PlaceLocator, PlaceRegions, _stretched
 from surveillance_runtime.place.occupancy_grid import Grid
 
 SIDE = 0.05
@@ -64,6 +64,12 @@ def test_the_cells_of_a_place_are_those_nearest_to_its_point(grid: Grid) -> None
     assert np.array_equal(c & away, free & (x > 2.0) & (to_c <= to_b) & away)
     assert regions.cells_of('Z') is None
     assert PlaceRegions(grid, [], {'A': (90.0, 1.0)}).cells_of('A') is None
+
+
+def test_a_door_in_a_slanted_wall_is_closed_beyond_both_its_ends() -> None:
+    assert _stretched((1.0, 2.0, 4.0, 6.0), 0.5) == pytest.approx((0.7, 1.6, 4.3, 6.4))
+    assert _stretched((4.0, 6.0, 1.0, 2.0), 0.5) == pytest.approx((4.3, 6.4, 0.7, 1.6))
+    assert _stretched((1.0, 2.0, 1.0, 2.0), 0.5) == (1.0, 2.0, 1.0, 2.0)
 
 
 def test_the_places_are_known_once_there_are_a_map_and_points(grid: Grid) -> None:

@@ -280,6 +280,8 @@ def spots(ways: list[float], period: float = 0.3, aside: float = 0.0) -> list:
         (spots([0.0, 0.15, 0.3, 0.45, 0.75]), 2.0, True),
         (spots([0.0, 0.05, 0.1, 0.15, 0.75]), 2.0, False),
         (spots([0.0, 0.0, 0.8, 0.8, 0.8]), 2.0, False),
+        (spots([0.0, 0.15, 0.3, 0.69, 0.8]), 2.0, True),
+        (spots([0.0, 0.1, 0.2, 0.7, 0.8]), 2.0, False),
     ],
 )
 def test_what_walks_goes_far_enough_straight_and_steadily(

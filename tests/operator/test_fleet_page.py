@@ -196,6 +196,37 @@ def test_a_viewer_gets_all_of_one_robot_and_a_glance_of_the_others() -> None:
     assert (later['p'], later['r']) == ({}, {'anna': {'battery': {'level': 79.0, 'low': False}}})
 
 
+def test_a_viewer_of_a_robot_that_is_shown_no_longer_sees_another_one_whole() -> None:
+    hub = Hub()
+    for name, snapshot in FLEET.items():
+        hub.show(snapshot, name)
+
+    async def look() -> list[Any]:
+        stream = hub.stream('bert')
+        await anext(stream)
+        read = []
+        for leaves in ('nobody', 'bert', 'carl'):
+            read.append(json.loads((await anext(stream)).removeprefix('data: ')))
+            hub.forget(leaves)
+            if leaves == 'nobody':
+                hub.show(replace(FLEET['anna'], battery=70.0), 'anna')
+        return [*read, json.loads((await anext(stream)).removeprefix('data: '))]
+
+    whole, same, other, last = asyncio.run(look())
+    assert [(each['robot'], each['whole']) for each in (whole, same, other, last)] == [
+        ('bert', 1),
+        ('bert', 0),
+        ('anna', 1),
+        ('anna', 1),
+    ], 'what is not told again is not known'
+    assert 'grid' not in same['p']
+    assert 'grid' in other['p']
+    assert other['r'].keys() == {'', 'carl'}
+    assert last['r'].keys() == {''}
+    began = [each[1] for each in last['p']['events'] if each[2].endswith('begins')]
+    assert began == ['anna'], 'nobody else is in the time line of all'
+
+
 # --- among nodes ---
 
 
@@ -466,6 +497,13 @@ def test_rviz_shows_each_robot_in_a_group_of_its_own() -> None:
     }
     assert planned['anna']['Topic']['Value'] == '/house/anna/plan'
     assert planned['anna']['Color'] != planned['bert']['Color']
+    hidden = [
+        [each.get('Namespaces') for each in group['Displays'] if each['Class'].endswith('Array')]
+        for group in displays[1:]
+    ]
+    off = {'places': False, 'names': False, 'doors': False}
+    assert off not in hidden[0], 'the first one shows the place, once'
+    assert hidden[1] == [off] * len(hidden[0]) != []
     (name,) = [each for each in markers_of(FLEET['anna'], Time()).markers if each.ns == 'robots']
     assert name.text == 'anna'
 

@@ -323,6 +323,7 @@ def test_a_replay_goes_on_with_time_until_it_is_paused_or_over(
     assert 2 <= len(lidar.asked) <= 4, 'a look each 0.2 s'
     assert player.jpeg('') == b'picture of 1199'
     assert player.jpeg('nobody') is None
+    assert [do['play'](), do['pause']()] == ['playing', 'paused']
     assert [do['seek'](-5), json.loads(hub._of_all['replay'][1])['at']] == ['moved', 0.0]
 
 

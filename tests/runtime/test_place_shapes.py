@@ -32,8 +32,10 @@ from surveillance_runtime.place_editor.shapes import (
     free_point,
     sides_of,
 )
+from surveillance_runtime.team import members
 
-PLAN = read_place_file(Path(__file__).parents[2] / 'config' / 'seven_rooms.yaml').plan
+SEVEN_ROOMS = Path(__file__).parents[2] / 'config' / 'seven_rooms.yaml'
+PLAN = read_place_file(SEVEN_ROOMS).plan
 BENT = ((0.0, 0.0), (4.0, 0.0), (4.0, 3.0), (3.0, 3.0), (3.0, 1.0), (0.0, 1.0))
 
 
@@ -314,6 +316,21 @@ def test_robots_in_a_row_stand_apart_from_each_other_and_from_walls_and_doors() 
         PlaceError, match=r'E has room for \d+ robots beside one another, not for 99'
     ):
         robots_in_a_row(PLAN, 99, 0.22)
+
+
+def test_a_run_has_the_robots_of_its_place_or_so_many_in_a_row(tmp_path: Path) -> None:
+    assert members(SEVEN_ROOMS, None, 0.22) == ()
+    assert members(SEVEN_ROOMS, 2, 0.22) == robots_in_a_row(PLAN, 2, 0.22)
+    path = tmp_path / 'two.yaml'
+    robots = (
+        '    robots:\n      anna: {start: [10.0, 8.0, 0.0]}\n      bert: {start: [4.0, 9.0, 0.0]}\n'
+    )
+    path.write_text(SEVEN_ROOMS.read_text() + robots)
+    for asked in (None, 2):
+        assert [each.name for each in members(path, asked, 0.22)] == ['anna', 'bert']
+    for asked in (1, 3):
+        with pytest.raises(ValueError, match=f'--robots {asked}: two.yaml has 2: anna, bert'):
+            members(path, asked, 0.22)
 
 
 def test_where_robots_can_pass_each_other_is_measured() -> None:

@@ -56,6 +56,7 @@ def test_a_zone_of_any_shape_knows_what_lies_in_it() -> None:
     inside = zone.contains([(0.5, 2.5), (3.5, 0.5), (2.0, 2.0), (-0.1, 1.0)])
     assert inside.tolist() == [True, True, False, False]
     assert zone.distance((2.0, 2.0)) == pytest.approx(1.0)
+    assert zone.distance((7.0, -4.0, 1.5)) == pytest.approx(5.0), 'of a pose, without its yaw'
     assert zone.area == pytest.approx(6.0)
 
 

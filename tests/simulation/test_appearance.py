@@ -205,6 +205,8 @@ def test_a_person_has_the_outline_of_one_in_mid_step() -> None:
             max(e.y + e.width / 2 for e in there),
         ):
             assert reach == pytest.approx(side, abs=4e-3), height
+    face = [(e.y, e.width, e.bottom) for e in parts if e.shape == Shape.BOX and e.bottom > 1.5]
+    assert sorted(face) == sorted((-y, *rest) for y, *rest in face), 'two like halves'
     # The left foot is ahead, and the right hand.
     left_shoe = next(each for each in parts if each.colour == SHOE and each.y > 0)
     assert (left_shoe.x, left_shoe.y) == (0.25, 0.11)

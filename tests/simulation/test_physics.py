@@ -99,6 +99,12 @@ def test_each_ray_of_a_turn_is_measured_at_its_own_moment() -> None:
     assert off(joined(swept, readings, robot.time - told.age)) < 0.5 * off(swept)
 
 
+def test_a_mount_is_off_along_each_axis() -> None:
+    assert physics_base.moved_by((0.1, 0.2, 0.3), (0.01, 0.04, 0.5)) == pytest.approx(
+        (0.11, 0.24, 0.8)
+    )
+
+
 def test_its_lidar_sits_where_it_is_said_not_to() -> None:
     there = robot_in(sweep=0.0).measure()
     off = robot_in(sweep=0.0, lidar_offset=(0.1, 0.0, 0.0)).measure()
