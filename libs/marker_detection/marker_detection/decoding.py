@@ -12,6 +12,7 @@ from marker_detection.image_sampling import (
     Array,
     ImagePyramid,
     Patches,
+    cell_widths,
 )
 from marker_detection.template_fit import (
     Footprint,
@@ -33,6 +34,9 @@ _LEAST_ROUGH_CORRELATION = 0.76
 # makes much of the whole marker's correlation
 _LEAST_INNER, _LEAST_ROUGH_INNER = 0.6, 0.68
 _GOOD_CORRELATION = 0.98
+# pixels a cell below which its middle tells, too, whether an alignment is better: the lens spreads
+# what lies beyond the margin over all of that, which draws the outline outwards
+_SMALL_CELL = 2.0
 _STRONGER_BLURS = np.array([[1.6, 1.6], [2.4, 2.4], [0.8, 2.4], [2.4, 0.8]])
 
 
@@ -98,7 +102,13 @@ class MarkerReader:
         before, after = (
             self.fit.agreement(pyramid, each, cells.entries, blur) for each in (homographies, moved)
         )
-        return np.where((after >= before)[:, None, None], moved, homographies)
+        better = after >= before
+        small = cell_widths(homographies, self.codes.side) < _SMALL_CELL
+        if small.any():
+            again = self.read_cells(pyramid, moved)
+            same = again.entries == cells.entries
+            better &= ~small | (same & (again.correlation >= cells.correlation))
+        return np.where(better[:, None, None], moved, homographies)
 
     def read(
         self, pyramid: ImagePyramid, homographies: Array, cells: CellReadings

@@ -47,6 +47,8 @@ _STEEPEST, _LARGEST_BOW = 0.5, 0.1
 _LEAST_RISE = 0.12
 # what a place without an edge counts, as a share of one with the steepest
 _STAYS = 0.1
+# share of a side that is in the image, below which it stays where it was
+_LEAST_SEEN = 0.6
 # how often corners are moved along sides that are not straight: each time brings them nearer by the
 # product of two slopes
 _APPROACHES = 4
@@ -83,6 +85,8 @@ class _Scan:
         self._across = across[1:-1]
         self._spread = 2.0 / side * reach * _STRAIGHTNESS
         self._grid = self._places(1.0 + across)
+        # the side itself is within reach of these, also where it is a few pixels wrong
+        self._within = self.outline(-reach / 4.0)
 
     def _places(self, out: Array) -> Patches:
         """Return the places (3, 4 * places * n) so far out (n,) from each side."""
@@ -114,6 +118,10 @@ class _Scan:
     def sides(self, pyramid: ImagePyramid, homographies: Array, levels: Levels) -> _Sides:
         """Return the curves along the edges that are nearest to the squares' sides."""
         steepest, found = self.edges(pyramid, homographies, levels)
+        # what is repeated beyond the image's edge rises, too, where that is crossed aslant
+        inside = pyramid.shown(homographies, self._within, np.zeros_like(levels))
+        inside = inside.reshape(steepest.shape)
+        steepest = np.where(inside, steepest, 0.0)
         most = np.maximum(steepest.max(axis=(1, 2), keepdims=True), 1e-6)
         shown = steepest > _LEAST_RISE * most
         # where no edge shows, the side rather is where it was
@@ -123,6 +131,8 @@ class _Scan:
         for _ in range(2):
             residual = (found - curve @ self._powers.T) / self._spread
             curve = self._curve(found, weight / (1.0 + np.square(residual)))
+        # of a side of which little is seen, the rest of the marker says more
+        curve = np.where(inside.mean(axis=2)[..., None] < _LEAST_SEEN, 0.0, curve)
         slope = np.clip(curve[..., 1], -_STEEPEST, _STEEPEST)
         bow = np.zeros_like(slope)
         if curve.shape[2] > 2:

@@ -466,3 +466,20 @@ def test_marker_whose_blurred_cells_show_nothing_is_matched_as_a_whole(seed):
     assert detection.marker_id == 14
     truth = corners_in_image(Panel(14, 6.0, 0.3, roll=0.1), CAMERA)
     assert np.linalg.norm(detection.corners - truth, axis=1).max() < 1.5
+
+
+def test_corners_of_a_marker_of_ten_pixels_are_not_drawn_outwards():
+    errors = []
+    for marker_id in range(20):
+        # sixteen times as large, between pixels, with a margin of a cell
+        side, left, top = 154, 320 + 13 * marker_id, 300 + 7 * marker_id
+        sheet = np.full((800, 960), 90, np.uint8)
+        sheet[top - 22 : top + side + 22, left - 22 : left + side + 22] = 220
+        marker = DICTIONARY.generateImageMarker(marker_id, side)
+        sheet[top : top + side, left : left + side] = np.where(marker > 0, 220, 20)
+        image = cv2.resize(sheet, (60, 50), interpolation=cv2.INTER_AREA)
+        (seen_at,) = DETECTOR.detect(np.asarray(cv2.GaussianBlur(image, (0, 0), 0.6), np.uint8))
+        assert seen_at.marker_id == marker_id
+        truth = np.add(side * np.array([[0, 0], [1, 0], [1, 1], [0, 1]]), (left, top)) / 16 - 0.5
+        errors.append(np.linalg.norm(seen_at.corners - truth, axis=1).max())
+    assert max(errors) < 0.45

@@ -144,3 +144,15 @@ def test_a_side_in_a_deep_shadow_is_an_edge_as_well():
     (found,) = SharpEdges(7).followed(pyramid, moved(SEEN, 1, 0.3)[None])
     assert np.abs(found - SEEN).max() < 0.5
     assert SharpEdges(7).explained(pyramid, found[None])[0] > 0.9
+
+
+@pytest.mark.parametrize(('size', 'most'), [(250.0, 3.0), (275.0, 5.2), (350.0, 5.2)])
+def test_what_is_repeated_beyond_the_image_is_no_side(size, most):
+    # turned by an eighth: all corners are beyond the image, and a third of each side or most of it
+    turned = SQUARE @ np.array([[0.72, 0.69], [-0.69, 0.72]])
+    turned += [(0.02, 0.0), (-0.01, 0.0), (0.0, -0.01), (0.0, 0.02)]
+    truth = size * turned + (299.0, 266.0)
+    pyramid = ImagePyramid(drawn(truth, shape=(534, 600)))
+    start = truth + np.array([(3.0, -2.0), (-4.0, 2.0), (3.0, 3.0), (-2.0, -3.0)])
+    (followed,) = SharpEdges(7).followed(pyramid, start[None])
+    assert np.linalg.norm(followed - truth, axis=1).max() < most
