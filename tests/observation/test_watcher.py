@@ -954,6 +954,7 @@ def test_evidence_keeps_the_most_severe_and_newest_within_its_bound(tmp_path: Pa
     [
         ('look', None, 'int'),
         ('normal', {'shape': [2, 2], 'occupied': 'eA==', 'free': 'eA=='}, 'a layer of the map'),
+        ('normal', {'shape': [0, 0], 'occupied': 'eJwDAAAAAAE=', 'free': 'eJwDAAAAAAE='}, 'resol'),
         ('doubts', {'x': 1.0}, 'x'),
         ('hung', {'14': {}}, 'accepted'),
         ('views', {'next': 1}, 'views'),

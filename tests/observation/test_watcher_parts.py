@@ -122,6 +122,9 @@ def test_a_damaged_layer_is_refused_in_one_line() -> None:
             ValueError, match=rf'^a layer of the map of {length} bytes, not 40 by 60$'
         ):
             _masks({**packed, 'occupied': short})
+    for shape in ([10**9, 10**6], [-40, -60]):
+        with pytest.raises(ValueError, match=r'^a layer of the map of 300 bytes, not '):
+            _masks({**packed, 'shape': shape})
     whole = base64.b64encode(zlib.compress(bytes(300))).decode()
     assert not _masks({**packed, 'free': whole})[1].any()
 

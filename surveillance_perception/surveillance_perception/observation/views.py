@@ -415,8 +415,10 @@ def _common(
     starts = np.cumsum(sizes) - sizes
     lower, upper = starts + (sizes - 1) // 2, starts + sizes // 2
     medians = np.zeros((1024, 2), np.float32)
+    # in double precision: single has steps of 0.008 at the last classes
+    apart = 64.0 * names.astype(float)
     for axis in (0, 1):
         # All classes at once: logarithms of ratios of bytes lie far less than 32 from 0.
-        ordered = np.sort(64.0 * names + values[:, axis])
+        ordered = np.sort(apart + values[:, axis])
         medians[present, axis] = (ordered[lower] + ordered[upper]) / 2 - 64.0 * present
     return np.take(medians, classes, axis=0)

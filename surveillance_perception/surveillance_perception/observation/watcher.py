@@ -992,6 +992,7 @@ class Watcher:
         doubts = {int(each): float(until) for each, until in dict(kept['doubts']).items()}
         if normal:
             _masks(normal)
+            _where(normal)
         with contextlib.ExitStack() as undo:
             # A part that does not fit gives back what the parts before it had.
             for part, name in (
@@ -1039,14 +1040,19 @@ def _packed(view: FloorView) -> dict[str, Any]:
 
 def _unpacked(values: Mapping[str, Any], grid: Grid) -> FloorView | None:
     """Return what is normal on a map; None where it was on another one."""
-    if (list(values['shape']), values['resolution'], list(values['origin'])) != (
-        list(grid.cells.shape),
-        grid.resolution,
-        list(grid.origin),
-    ):
+    if _where(values) != (list(grid.cells.shape), grid.resolution, list(grid.origin)):
         return None
     occupied, free = _masks(values)
     return FloorView(grid, occupied, free, np.zeros_like(free))
+
+
+def _where(values: Mapping[str, Any]) -> tuple[list[int], float, list[float]]:
+    """Return the shape, resolution and origin of the map that a packed layer is of.
+
+    Raises:
+        ValueError, KeyError, TypeError: It is something else.
+    """
+    return list(values['shape']), values['resolution'], list(values['origin'])
 
 
 def _masks(values: Mapping[str, Any]) -> tuple[Mask, Mask]:
@@ -1062,9 +1068,10 @@ def _masks(values: Mapping[str, Any]) -> tuple[Mask, Mask]:
             data = zlib.decompress(base64.b64decode(text))
         except zlib.error as error:
             raise ValueError(f'a layer of the map: {error}') from None
-        cells = np.unpackbits(np.frombuffer(data, np.uint8), count=rows * columns)
-        if len(data) != -(-rows * columns // 8):
+        # before room is made for the cells
+        if min(rows, columns) < 0 or len(data) != -(-rows * columns // 8):
             raise ValueError(f'a layer of the map of {len(data)} bytes, not {rows} by {columns}')
+        cells = np.unpackbits(np.frombuffer(data, np.uint8), count=rows * columns)
         return np.asarray(cells.reshape(rows, columns), np.bool_)
 
     return mask(values['occupied']), mask(values['free'])
