@@ -54,6 +54,12 @@ def test_floor_is_shown_within_the_field_of_view_and_so_far_as_persons_are_found
     assert 0.9 * math.pi * 36.0 / 6.0 < area < math.pi * 36.0 / 6.0
 
 
+def test_a_camera_that_looks_down_a_little_shows_what_is_nearer():
+    nearest = {pitch: shown(camera(2.0, 5.0, 0.0, pitch=pitch)) for pitch in (0.0, 0.3, 0.5)}
+    assert [at(floor, 3.1, 5.0) for floor in nearest.values()] == [False, True, False]
+    assert [at(floor, 2.8, 5.0) for floor in nearest.values()] == [False, False, True]
+
+
 def test_of_one_who_stands_too_near_only_a_part_is_in_the_picture():
     floor = shown(camera(2.0, 5.0, 0.0))
     assert not at(floor, 2.6, 5.0)

@@ -83,6 +83,7 @@ def test_a_building_becomes_a_place(
     assert regions.room_at(-1.0, 1.0) is None or plan.map is not None
     assert plan.map is not None
     grid = plan.map.grid
+    assert grid.bounds == pytest.approx((-0.5, -4.5, 10.5, 0.5)), 'half a metre around'
     assert [grid.at(grid.cells, *at) for at in ((1, -1), (5, -1), (5, -2), (0, -2), (-0.3, 0))] == [
         *(0, 100, 0, 100, -1)
     ]

@@ -152,4 +152,5 @@ def test_through_an_open_door_light_comes_as_far_as_a_metre() -> None:
     assert 0.22 < seen_light(open_door, *beside)[1, 1] < 0.6
     assert 0.6 < seen_light(open_door, *bright)[1, 1] < 0.95
     assert seen_light(open_door, *away)[1, 1] == pytest.approx(0.2, abs=0.01)
+    assert seen_light(open_door, 2.4, 1.0)[1, 1] == pytest.approx(0.2, abs=1e-4)
     assert seen_light(open_door, 2.8, 0.2)[1, 1] < 0.3, 'beside the door the wall keeps it out'

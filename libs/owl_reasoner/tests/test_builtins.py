@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import product
 
 import pytest
@@ -99,6 +100,28 @@ def test_what_a_built_in_makes(
     name: str, arguments: tuple[Literal, ...], expected: list[str]
 ) -> None:
     assert solved(name, *arguments) == expected
+
+
+@pytest.mark.parametrize(
+    ('name', 'counts'),
+    [
+        ('add', range(3, 9)),
+        ('subtract', [3]),
+        ('unaryMinus', [2]),
+        ('stringLength', [2]),
+        ('translate', [4]),
+        ('substringBefore', [3]),
+        ('replace', [4]),
+        ('tokenize', [3]),
+        ('resolveURI', [3]),
+        ('lessThan', [2]),
+    ],
+)
+def test_a_built_in_has_as_many_arguments_as_the_submission_says(
+    name: str, counts: Sequence[int]
+) -> None:
+    taken = [count for count in range(9) if swrl_builtins.builtin(name, count) is not None]
+    assert taken == list(counts)
 
 
 def test_a_quotient_that_no_decimal_is_equal_to_is_rounded_to_one() -> None:

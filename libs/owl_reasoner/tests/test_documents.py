@@ -409,6 +409,20 @@ def test_imports_are_found_in_a_catalog_and_in_packages(tmp_path: Path) -> None:
     assert len(read_ontology(folder / 'map.ofn', 'urn:map').unsupported) == 3
 
 
+@pytest.mark.parametrize(('depth', 'is_found'), [(0, True), (6, True), (7, False)])
+def test_a_package_is_looked_for_so_many_folders_above(
+    tmp_path: Path, depth: int, is_found: bool
+) -> None:
+    folder = tmp_path.joinpath(*'abcdefg'[:depth])
+    folder.mkdir(parents=True, exist_ok=True)
+    (tmp_path / 'maps').mkdir()
+    (tmp_path / 'maps' / 'upper.ofn').write_text('Ontology(Declaration(Class(<urn:c>)))')
+    (folder / 'map.ofn').write_text('Ontology(<urn:map> Import(<package://maps/upper.ofn>))')
+    document = read_ontology(folder / 'map.ofn', 'urn:map')
+    assert any(isinstance(axiom, ax.Declaration) for axiom in document.axioms) is is_found
+    assert bool(document.unsupported) is not is_found
+
+
 def test_a_catalog_leads_to_files_by_its_uri_entries_alone(tmp_path: Path) -> None:
     catalog = tmp_path / 'catalog-v001.xml'
     catalog.write_text(

@@ -97,6 +97,7 @@ def test_the_time_at_a_dock_for_each_second_away_counts_the_way_to_it() -> None:
     assert energy.charge_ratio(40.0) == pytest.approx((20.0 + 5.0 + 12.0) / 40.0)
     # No more than the charge between full and least: 70 % in 140 s.
     assert energy.charge_ratio(500.0) == pytest.approx((20.0 + 30.0 + 12.0) / 140.0)
+    assert energy.charge_ratio(0.5) == pytest.approx((0.5 + 12.0) / 0.5)
     assert energy.charge_ratio(0.0) == 0.0
     unknown = Energy(graph, [Station('E', station.curve, math.inf)], Draw(0.5), 0.0, limits)
     assert unknown.charge_ratio(20.0) == 0.0

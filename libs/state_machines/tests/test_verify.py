@@ -243,6 +243,14 @@ def test_interrupts_are_entered_from_anywhere():
     assert 'unreachable' not in {check for _, check, _ in found(machine)}
 
 
+def test_what_an_interrupt_of_a_container_writes_may_be_there_after_it():
+    inner = machine_of({'A': (Answer('done'),)}, output_keys=['x', 'y'])
+    inner.add_interrupt('STOP', keyed((), ['x']))
+    machine = machine_of({'INNER': (inner, {'done': 'B'}), 'B': (keyed(['x', 'y']),)})
+    unset = {f.message.split("'")[1]: f.severity for f in verify(machine) if f.path == 'ROOT/B'}
+    assert unset == {'x': 'warning', 'y': 'error'}
+
+
 class Sleeps(fsm.State):
     def __init__(self):
         super().__init__(['done'])
