@@ -486,6 +486,10 @@ def read_functional(*lines: str) -> OntologyDocument:
             ax.SubPropertyChainOf(('x:p', ex.ObjectInverseOf('x:q')), 'x:r'),
         ),
         (
+            'SubObjectPropertyOf(ObjectInverseOf(:p) :q)',
+            ax.SubObjectPropertyOf(ex.ObjectInverseOf('x:p'), 'x:q'),
+        ),
+        (
             'ObjectPropertyAssertion(ObjectInverseOf(ObjectInverseOf(:p)) :i :j)',
             ax.ObjectPropertyAssertion('x:p', 'x:i', 'x:j'),
         ),

@@ -588,6 +588,15 @@ def test_a_wrong_frame_names_what_was_expected(frame: str, expected: str) -> Non
     assert error.value.line == 2
 
 
+def test_only_what_needs_brackets_is_written_in_brackets() -> None:
+    writer = ManchesterWriter({'': N})
+    ones = ex.ObjectOneOf((f'{N}i', f'{N}j'))
+    assert writer.expression(ones) == '{:i, :j}'
+    some = ex.ObjectSomeValuesFrom(f'{N}p', ones)
+    assert writer.expression(some) == '(:p some {:i, :j})'
+    assert writer.expression(some, inner=False) == ':p some {:i, :j}'
+
+
 def test_names_are_written_with_the_longest_prefix_or_in_full() -> None:
     prefixes = {'': N, 'n': f'{N}deep/', 'e': ''}
     writer, bare = ManchesterWriter(prefixes), ManchesterWriter(prefixes, bare=True)
