@@ -12,7 +12,7 @@ from std_msgs.msg import String
 from state_machines.ros import GoalCaller, ServiceCaller
 from surveillance_controllers.motion_controller_node import MotionController
 from surveillance_controllers.planner_controller_node import PlannerController
-from surveillance_interfaces.action import Control, Plan
+from surveillance_interfaces.action import Control, FollowPath, Plan
 from surveillance_interfaces.msg import RobotPlace
 from surveillance_interfaces.srv import ConsoleCommand, ReferenceName
 from surveillance_ontology.armor_client import ArmorClient
@@ -113,3 +113,25 @@ def test_a_move_that_ends_in_no_place_is_aborted_and_not_noted(
     assert (end.result.reached_point.x, end.result.reached_point.y) == (50, 50)
     assert 'expected a place within 2 m, R4 is 49.50 m away' in capfd.readouterr().err
     assert armor.query.objectprop_b2_ind('isIn', 'Robot1') == ['E']
+
+
+def test_an_ontology_that_comes_back_empty_has_the_robot_where_it_was_last_known_to_be(
+    graph: Any, armor: ArmorClient, in_background: Any
+) -> None:
+    places = graph.listen(RobotPlace, 'robot_place', STATE_QOS)
+    told = graph.listen(String, 'motion_controller/announcement', STATE_QOS)
+    graph.add(MotionController, {'execution_mode': 'MANUAL', 'console': False})
+    graph.until(lambda: places and places[-1].place == 'E')
+    caller = GoalCaller(graph.node, FollowPath, 'follow_path')
+    goal = FollowPath.Goal(path=[Point(x=5.0, y=10.0), Point(x=50.0, y=50.0)])
+    end = in_background(lambda: caller.run(goal, accept_timeout=60.0))
+    graph.until(lambda: told)
+    console = ServiceCaller(graph.node, ConsoleCommand, 'motion_controller/command')
+    assert console.call(ConsoleCommand.Request(line='move 0.05 0'), 60.0).accepted
+    assert end().status == 'succeeded'
+    graph.until(lambda: places[-1].place == '')
+    assert armor.query.objectprop_b2_ind('isIn', 'Robot1') == ['E']
+    armor.utils.drop_ref()
+    graph.until(lambda: armor.utils.get_all_refs())
+    graph.until(lambda: armor.query.objectprop_b2_ind('isIn', 'Robot1') == ['E'])
+    assert places[-1].place == ''

@@ -31,7 +31,7 @@ class PlaceRecorder:
 
     `tell` waits for nobody. A worker writes; what cannot be written yet is tried again, and an
     ontology that has another place (it came back, was built anew, or somebody else wrote) is told
-    again.
+    again. While the place is not known, the ontology keeps the last one that was.
 
     Args:
         node: The motion controller's node.
@@ -116,8 +116,14 @@ class PlaceRecorder:
         if self._told is None and self._start is not None:
             self._begin()
         told, written = self._told, self._written
-        if told is None or not told.place:
+        if told is None:
             return None
+        if not told.place:
+            # Not known at present, as between two places: `isIn` stays what it was, also in an
+            # ontology that has come back empty.
+            if written is None or self._facts.facts:
+                return None
+            told = written
         told_stamp = told.header.stamp
         place, stamp = str(told.place), nanoseconds_of(told_stamp)
         if written is told:
