@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import itertools
 import json
 import math
 import os
@@ -192,9 +193,10 @@ def keep_aside(path: Path) -> None:
     Raises:
         OSError: It cannot be renamed.
     """
-    file = path.resolve()
+    file = Path(os.path.realpath(path))
     if file.is_file():
-        names = (file.with_name(f'{file.name}.unread{each}') for each in ('', *range(2, 1000)))
+        endings = itertools.chain([''], itertools.count(2))
+        names = (file.with_name(f'{file.name}.unread{each}') for each in endings)
         file.rename(next(name for name in names if not os.path.lexists(name)))
 
 

@@ -227,6 +227,18 @@ def test_a_kept_file_that_cannot_be_read_is_kept_aside_at_a_write(
     assert len(list(tmp_path.iterdir())) == 5, 'one that was read is replaced'
 
 
+def test_a_kept_file_is_written_however_many_were_kept_aside(tmp_path: Path) -> None:
+    path = tmp_path / 'kept.json'
+    path.write_text('damaged')
+    for ending in ('', *range(2, 1001)):
+        (tmp_path / f'kept.json.unread{ending}').touch()
+    kept = KeptFile(str(path))
+    assert kept.read(lambda found: None)
+    assert kept.write({'level': 7}) == ''
+    assert path.read_text() == '{"level": 7}\n'
+    assert (tmp_path / 'kept.json.unread1001').read_text() == 'damaged'
+
+
 def test_what_is_kept_is_found_and_a_file_that_cannot_be_written_is_told(tmp_path: Path) -> None:
     taken: list[int] = []
     assert KeptFile.of_record(str(tmp_path / 'new' / 'm.jsonl'), '.level').write({'level': 7}) == ''
