@@ -79,7 +79,7 @@ from surveillance_perception.observation.watch_rules import (
     Level,
     read_watch_file,
 )
-from surveillance_perception.observation.watcher import Look, Watcher, same_map
+from surveillance_perception.observation.watcher import MOST_CELLS, Look, Watcher, same_map
 from surveillance_perception.observation.ways import Ways
 from surveillance_perception.stream.image_subscription import ImageSubscription
 from surveillance_runtime.conversions import (
@@ -114,7 +114,6 @@ MOST_WAITING = {'sweeps': 10, 'pictures': 4, 'passing': 4}
 """So many wait for the worker; beyond that the oldest of the least worth is left out, and told."""
 MOST_HEARD = 20
 """Depth of the queue of what the fleet tells."""
-MOST_CELLS = 25_000_000
 MOST_PIXELS = 20_000_000
 SECTORS = 36
 """Of the horizon: lidars see all around when each sector has a beam."""

@@ -16,6 +16,7 @@ from surveillance_perception.observation.events import EventBook
 from surveillance_perception.observation.floor import FloorView
 from surveillance_perception.observation.observations import Kind, Observation
 from surveillance_perception.observation.watcher import (
+    MOST_CELLS,
     Look,
     Watcher,
     _Agreement,
@@ -125,6 +126,10 @@ def test_a_damaged_layer_is_refused_in_one_line() -> None:
     for shape in ([10**9, 10**6], [-40, -60]):
         with pytest.raises(ValueError, match=r'^a layer of the map of 300 bytes, not '):
             _masks({**packed, 'shape': shape})
+    huge = zlib.compress(bytes(MOST_CELLS // 4))
+    for wrong in (packed['occupied'][:40], base64.b64encode(huge).decode()):
+        with pytest.raises(ValueError, match=r'^a layer of the map: cut off, or of more than 25'):
+            _masks({**packed, 'occupied': wrong})
     whole = base64.b64encode(zlib.compress(bytes(300))).decode()
     assert not _masks({**packed, 'free': whole})[1].any()
 

@@ -70,6 +70,8 @@ AGREEING = 4
 FEWEST_SWEEPS = 5
 SAME_THING = 0.4
 """Two assessments mean one thing up to here, metres."""
+MOST_CELLS = 25_000_000
+"""Of the largest map on which a robot watches."""
 SPOT, SPOT_FREE = 0.15, 0.8
 """A thing is gone when so many cells are free so far around where it stood, metres."""
 OTHER_SIDES = 0.6
@@ -1064,10 +1066,14 @@ def _masks(values: Mapping[str, Any]) -> tuple[Mask, Mask]:
     rows, columns = map(int, values['shape'])
 
     def mask(text: str) -> Mask:
+        unpacking = zlib.decompressobj()
         try:
-            data = zlib.decompress(base64.b64decode(text))
+            # Not more than a map can hold: a file may be packed a thousand times smaller.
+            data = unpacking.decompress(base64.b64decode(text), MOST_CELLS // 8 + 1)
         except zlib.error as error:
             raise ValueError(f'a layer of the map: {error}') from None
+        if not unpacking.eof:
+            raise ValueError(f'a layer of the map: cut off, or of more than {MOST_CELLS} cells')
         # before room is made for the cells
         if min(rows, columns) < 0 or len(data) != -(-rows * columns // 8):
             raise ValueError(f'a layer of the map of {len(data)} bytes, not {rows} by {columns}')
