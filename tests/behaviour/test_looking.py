@@ -793,6 +793,17 @@ TWO_POINTS = {'C1': [(12.0, 8.0, 0.0), (10.0, 11.0, 0.0)]}
         ),
         (4.0, {'around': True}, ['4 look {sides: [], left_out: 0}']),
         (
+            8.5,
+            {},
+            [
+                '0 face 90',
+                '6.5 exploring {bearing: 90}',
+                '6.5 look {sides: [90], left_out: 0}',
+                'said a stay of 8.5 s may be too short to turn the camera to a side: '
+                'exploration_seconds of 12 or more would do',
+            ],
+        ),
+        (
             40.0,
             {'arm': True, 'angle': 2.0, 'front': 1.0, 'points': TWO_POINTS},
             [

@@ -39,7 +39,7 @@ settled, and there is time, seconds."""
 MOST_INSISTED = 3
 """A check that is not settled comes before the others so many times in a row."""
 LEAST_STAY = 12.0
-"""A shorter stay has no time for a side, seconds."""
+"""A shorter stay may have no time for a side, seconds: that takes as long as the camera turns."""
 VIEW = math.pi / 2
 """A picture is taken to show so much of the horizon where nobody says how much, rad."""
 OVERLAP = 0.07
@@ -121,8 +121,11 @@ class RoomLook:
             least = SETTLE if looking.sees_around() else LEAST_STAY
             if seconds < least and not self._said_short:
                 self._said_short = True
+                short = 'is too short to look at anything'
+                if seconds >= SETTLE:
+                    short = 'may be too short to turn the camera to a side'
                 mission.say(
-                    f'a stay of {seconds:g} s is too short to look at anything: '
+                    f'a stay of {seconds:g} s {short}: '
                     f'exploration_seconds of {least:g} or more would do',
                     warning=True,
                 )
