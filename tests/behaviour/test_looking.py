@@ -467,25 +467,6 @@ def test_where_there_is_time_for_one_thing_it_is_a_check_in_every_other_stay():
     assert {'marker 21', 'marker 22', '90', '180'} <= set(looked)
 
 
-@pytest.mark.parametrize(('period', 'stands'), [(1.8, 5.5), (3.0, 9.0), (100.0, 13.5)])
-def test_at_a_check_the_robot_stands_until_enough_pictures_were_looked_at(period, stands):
-    run = Watched('surveillance', exploration_seconds=60.0)
-    run.looking.arm, run.looking.picture_period = True, period
-    run.looking.asked = {'C1': [Check('marker 21', (20.0, 8.0, 0.0))]}
-    faced: list[float] = []
-    turned = run.looking.face
-
-    def face(bearing: float, interrupt: Interrupt) -> None:
-        turned(bearing, interrupt)
-        if run.world.place == 'C1':
-            faced.append(run.world.clock.time)
-
-    run.looking.face = face  # type: ignore[method-assign]
-    run.until(200.0)
-    first, following = faced[0], faced[1]
-    assert following - 2.0 - first == pytest.approx(stands, abs=0.51)
-
-
 def test_a_check_that_is_not_settled_comes_first_three_times_and_then_takes_its_turn():
     run = Watched('surveillance', exploration_seconds=12.0)
     run.looking.arm = True
@@ -494,29 +475,6 @@ def test_a_check_that_is_not_settled_comes_first_three_times_and_then_takes_its_
     run.until(900.0)
     order = [side for where, side in run.looking.sides if where == 'C1' and side in (45, 225)]
     assert order[:7] == [45, 45, 45, 225, 45, 225, 45]
-
-
-def test_at_a_check_the_robot_stands_until_it_is_settled():
-    run = Watched('surveillance', exploration_seconds=60.0)
-    run.looking.arm = True
-    here = (20.0, 8.0, 0.0)
-
-    def checks(place: str) -> Sequence[Check]:
-        is_open = 0.0 < run.world.clock.time - run.looking.faced_at < 9.0
-        return [Check('marker 21', here, is_open=is_open)] if place == 'C1' else []
-
-    run.looking.checks = checks  # type: ignore[method-assign]
-    stood: list[float] = []
-    turned = run.looking.face
-
-    def face(bearing: float, interrupt: Interrupt) -> None:
-        stood.append(run.world.clock.time - run.looking.faced_at)
-        turned(bearing, interrupt)
-
-    run.looking.face = face  # type: ignore[method-assign]
-    run.until(200.0)
-    first = next(n for n, (where, _) in enumerate(run.looking.sides) if where == 'C1')
-    assert stood[first + 1] == pytest.approx(9.0, abs=0.51)
 
 
 class Stay:
@@ -568,6 +526,27 @@ class Stay:
         assert self.world.clock.time - self.began >= seconds - explored - 1e-9
         assert self.run.mission.explored == math.inf
         return self.lines + [f'said {each}' for each in self.world.said]
+
+
+@pytest.mark.parametrize(('period', 'stands'), [(1.8, 5.5), (3.0, 9.0), (100.0, 13.5)])
+def test_at_a_check_the_robot_stands_until_enough_pictures_were_looked_at(period, stands):
+    asked = {'C1': [Check('marker 21', (20.0, 8.0, 0.0))]}
+    first, following = Stay(arm=True, picture_period=period, asked=asked).explore(60.0)[:2]
+    assert first == '0 face 0'
+    assert float(following.split()[0]) - 2.0 == pytest.approx(stands, abs=0.51)
+
+
+def test_at_a_check_the_robot_stands_until_it_is_settled():
+    stay = Stay(arm=True)
+
+    def checks(place: str) -> Sequence[Check]:
+        is_open = 0.0 < stay.world.clock.time - stay.looking.faced_at < 9.0
+        return [Check('marker 21', (20.0, 8.0, 0.0), is_open=is_open)]
+
+    stay.looking.checks = checks  # type: ignore[method-assign]
+    first, following = stay.explore(60.0)[:2]
+    assert first == '0 face 0'
+    assert float(following.split()[0]) - 2.0 == pytest.approx(9.0, abs=0.51)
 
 
 TWO_POINTS = {'C1': [(12.0, 8.0, 0.0), (10.0, 11.0, 0.0)]}
