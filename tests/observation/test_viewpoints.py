@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -109,6 +110,9 @@ def test_a_marker_is_looked_at_from_the_same_point_while_it_can_be_read_from_the
     assert first.look_from is not None
     (again,) = checks.of([HungSpot(21, (6.05, 0.28, 1.0), math.pi / 2 + 0.2, 0.2)])
     assert again == first, 'how it looks from there is known'
+    spot = HungSpot(21, (6.05, 0.28, 1.0), math.pi / 2 + 0.2, 0.2)
+    assert checks.of([replace(spot, is_open=True)]) == [replace(first, is_open=True)]
+    assert checks.of([spot]) == [first], 'it was read'
     (other,) = checks.of([HungSpot(21, at, math.pi / 2 - 1.0, 0.2)])
     assert other.look_from != first.look_from, 'it cannot be read from there'
     assert checks.of([]) == []

@@ -76,8 +76,8 @@ class MarkerChecks:
 
     def of(self, spots: Sequence[HungSpot]) -> list[MarkerCheck]:
         """Return how some markers are to be looked at, those that a rule asks for."""
-        found, is_open = {}, {each.number: each.is_open for each in spots}
-        for spot in (replace(each, is_open=False) for each in spots):
+        found = {}
+        for spot in spots:
             known = self._checks.get(spot.number)
             if known is not None and known[0] == spot:
                 found[spot.number] = known
@@ -86,9 +86,9 @@ class MarkerChecks:
             if known is not None and check is not None and self._is_good(known[1], check, spot):
                 check = known[1]
             if check is not None:
-                found[spot.number] = spot, check
+                found[spot.number] = spot, replace(check, is_open=spot.is_open)
         self._checks = found
-        return [replace(found[n][1], is_open=is_open[n]) for n in found]
+        return [check for _, check in found.values()]
 
     def _is_good(self, known: MarkerCheck, now: MarkerCheck, spot: HungSpot) -> bool:
         """Tell whether a check that was told before serves for a spot as it is known now."""
