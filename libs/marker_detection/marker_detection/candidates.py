@@ -25,13 +25,15 @@ from marker_detection.image_sampling import (
     Array,
     Grey,
     ImagePyramid,
+    Indices,
+    Quads,
+    beside_sides,
     halved,
+    homogeneous,
     levels_for,
 )
 
-Quads = npt.NDArray[np.float64]
 Outline = npt.NDArray[np.int32]
-Indices = npt.NDArray[np.int64]
 
 # pixels across the narrowest blob
 _LEAST_WIDTH = 2.0
@@ -272,7 +274,7 @@ def _scatter(x: Indices, y: Indices, counts: Indices) -> Array:
     return np.asarray(144.0 * (spread_x * spread_y - spread_xy**2) / area**2)
 
 
-def distinct(quads: Quads, distance: float) -> npt.NDArray[np.int64]:
+def distinct(quads: Quads, distance: float) -> Indices:
     """Return the indices of the quads whose middle and size are not those of an earlier one.
 
     Args:
@@ -329,11 +331,9 @@ class BorderCheck:
         along = np.linspace(-0.85, 0.85, _PER_SIDE)
         inner = np.linspace(-1.0, 1.0, _INNER) * (1.0 - 3.0 / side)
         cell = 2.0 / side
-        points = [_border(along, 1.0 + cell * part) for part in _MARGINS]
-        points.append(_border(along, 1.0 - cell * 0.5))
+        points = [beside_sides(along, np.array([1.0 + cell * part])) for part in (*_MARGINS, -0.5)]
         points.append(np.stack([each.ravel() for each in np.meshgrid(inner, inner)]))
-        flat = np.concatenate(points, axis=1)
-        self._grid = np.vstack([flat, np.ones(flat.shape[1])]).astype(np.float32)
+        self._grid = homogeneous(np.concatenate(points, axis=1))
 
     def correlation(
         self, pyramid: ImagePyramid, homographies: Array, least_contrast: float
@@ -374,9 +374,3 @@ class BorderCheck:
             & (deviation < _MOST_INNER_DEVIATION * contrast)
         )
         return np.where(passed, correlation, -1.0)
-
-
-def _border(along: npt.NDArray[np.float64], radius: float) -> Array:
-    across = np.full_like(along, radius)
-    sides = [(along, -across), (across, along), (along, across), (-across, along)]
-    return np.concatenate([np.stack(side) for side in sides], axis=1)

@@ -21,18 +21,14 @@ differs from a code in three cells at most, in DICT_5X5_100 one of 3,200 in one.
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 from scipy.special import bdtr, betainc
 
 from marker_detection.dictionaries import MarkerCodes
-from marker_detection.image_sampling import Array, Patches
-
-Indices = npt.NDArray[np.int64]
-Reals = npt.NDArray[np.floating[Any]]
-"""Of single precision; numpy's own types say so for some operations only."""
+from marker_detection.image_sampling import Array, Indices, Patches, Reals
 
 _SATURATED = 252.0
 _LEAST_STEP = 20.0

@@ -11,14 +11,11 @@ from marker_detection.dictionaries import MarkerCodes
 from marker_detection.image_sampling import (
     Array,
     ImagePyramid,
+    Indices,
     Patches,
     cell_widths,
 )
-from marker_detection.template_fit import (
-    Footprint,
-    Indices,
-    TemplateFit,
-)
+from marker_detection.template_fit import Footprint, TemplateFit
 
 # along a side of a cell, until the likeliest codes are aligned
 _ROUGH_SAMPLES = 2

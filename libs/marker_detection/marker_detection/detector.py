@@ -28,7 +28,6 @@ import numpy.typing as npt
 
 from marker_detection.candidates import (
     BorderCheck,
-    Quads,
     dark_masks,
     distinct,
     quads_around,
@@ -40,13 +39,14 @@ from marker_detection.edge_fit import EdgeFit, SharpEdges
 from marker_detection.image_sampling import (
     Array,
     ImagePyramid,
+    Indices,
+    Quads,
     corners_of,
     homographies_of,
 )
 from marker_detection.other_families import OtherFamilies
 from marker_detection.preprocessing import PreparedImage, prepare
 from marker_detection.settings import converted, odd_numbers, parameter
-from marker_detection.template_fit import Indices
 
 # pixels between the middles of outlines that are one: what the search's masks differ by
 _SAME_QUAD = 2.0

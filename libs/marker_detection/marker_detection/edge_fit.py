@@ -11,23 +11,23 @@ the reach: what lies beyond the margin, and the image's own edge, stay out of it
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from marker_detection.image_sampling import (
     Array,
     ImagePyramid,
+    Indices,
     Patches,
+    Quads,
+    Reals,
+    beside_sides,
     cell_widths,
+    homogeneous,
     homographies_of,
     levels_for,
 )
-
-Quads = npt.NDArray[np.float64]
-Levels = npt.NDArray[np.int64]
-Reals = npt.NDArray[np.floating[Any]]
 
 # image pixels a cell has at most where outlines are moved, and how far that looks, in cells
 _CELL_PIXELS, _REACH = 6.0, 1.2
@@ -84,23 +84,17 @@ class _Scan:
         across = np.linspace(-reach, reach, _STEPS) * 2.0 / side
         self._across = across[1:-1]
         self._spread = 2.0 / side * reach * _STRAIGHTNESS
-        self._grid = self._places(1.0 + across)
+        self._grid = homogeneous(beside_sides(self._along, 1.0 + across))
         # the side itself is within reach of these, also where it is a few pixels wrong
         self._within = self.outline(-reach / 4.0)
 
-    def _places(self, out: Array) -> Patches:
-        """Return the places (3, 4 * places * n) so far out (n,) from each side."""
-        x, y = (each.ravel() for each in np.meshgrid(self._along, out, indexing='ij'))
-        sides = [(x, -y), (y, x), (x, y), (-y, x)]
-        points = np.concatenate([np.stack(each) for each in sides], axis=1)
-        return np.vstack([points, np.ones(points.shape[1])]).astype(np.float32)
-
     def outline(self, cells: float) -> Patches:
         """Return the places (3, 4 * places) so many cells outwards from the sides."""
-        return self._places(np.array([1.0 + 2.0 / self._side * cells]))
+        out = np.array([1.0 + 2.0 / self._side * cells])
+        return homogeneous(beside_sides(self._along, out))
 
     def edges(
-        self, pyramid: ImagePyramid, homographies: Array, levels: Levels
+        self, pyramid: ImagePyramid, homographies: Array, levels: Indices
     ) -> tuple[Patches, Patches]:
         """Return how steep the edge is at each place of each side, and where: both (m, 4, places).
 
@@ -115,7 +109,7 @@ class _Scan:
         near = np.square(rise * (rise > 0.5 * steepest[..., None])) + 1e-9
         return steepest, (near * self._across).sum(axis=3) / near.sum(axis=3)
 
-    def sides(self, pyramid: ImagePyramid, homographies: Array, levels: Levels) -> _Sides:
+    def sides(self, pyramid: ImagePyramid, homographies: Array, levels: Indices) -> _Sides:
         """Return the curves along the edges that are nearest to the squares' sides."""
         steepest, found = self.edges(pyramid, homographies, levels)
         # what is repeated beyond the image's edge rises, too, where that is crossed aslant

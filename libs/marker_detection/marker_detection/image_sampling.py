@@ -6,12 +6,19 @@ takes them to pixels, pixel centres having integer coordinates.
 
 from __future__ import annotations
 
+from typing import Any
+
 import cv2
 import numpy as np
 import numpy.typing as npt
 
 Array = npt.NDArray[np.float64]
+Quads = npt.NDArray[np.float64]
+"""(m, 4, 2) corners in pixels, clockwise."""
+Indices = npt.NDArray[np.int64]
 Patches = npt.NDArray[np.float32]
+Reals = npt.NDArray[np.floating[Any]]
+"""Of single or double precision; numpy's own types do not say which for some operations."""
 Grey = npt.NDArray[np.uint8]
 
 _TO_UNIT_SQUARE = np.array([[0.5, 0.0, 0.5], [0.0, 0.5, 0.5], [0.0, 0.0, 1.0]])
@@ -27,7 +34,7 @@ class ImagePyramid:
     def __init__(self, image: Grey) -> None:
         self._levels = [image]
 
-    def sample(self, homographies: Array, grid: Patches, levels: npt.NDArray[np.int64]) -> Patches:
+    def sample(self, homographies: Array, grid: Patches, levels: Indices) -> Patches:
         """Return grey levels under homographies, linearly interpolated.
 
         Args:
@@ -55,9 +62,7 @@ class ImagePyramid:
             patches[chosen] = self._read(x[chosen], y[chosen], level)
         return patches
 
-    def shown(
-        self, homographies: Array, grid: Patches, levels: npt.NDArray[np.int64]
-    ) -> npt.NDArray[np.bool_]:
+    def shown(self, homographies: Array, grid: Patches, levels: Indices) -> npt.NDArray[np.bool_]:
         """Return which samples (m, n) are of the image itself, not of what goes on beyond its edge.
 
         Those count that are interpolated between whole pixels of the halved image alone.
@@ -101,19 +106,40 @@ def halved(image: Grey) -> Grey:
     return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), np.uint8)
 
 
+def beside_sides(along: Array, out: Array) -> Array:
+    """Return places (2, 4 * k * n) along the sides of squares around the marker.
+
+    Args:
+        along: (k,) where along each side, from -1 to 1.
+        out: (n,) half the width of each square: 1 is the black square.
+
+    Returns:
+        The upper side's, then those of the right, lower and left one; of each the places `along`,
+        and at each of them `out`.
+    """
+    x, y = (each.ravel() for each in np.meshgrid(along, out, indexing='ij'))
+    sides = ((x, -y), (y, x), (x, y), (-y, x))
+    return np.concatenate([np.stack(side) for side in sides], axis=1)
+
+
+def homogeneous(points: Array) -> Patches:
+    """Return marker coordinates (2, n) as a grid (3, n) to sample at."""
+    return np.vstack([points, np.ones(points.shape[1])]).astype(np.float32)
+
+
 def cell_widths(homographies: Array, cells: int) -> Array:
     """Width in pixels (m,) of a marker's cell across its narrower direction."""
     return np.asarray(np.linalg.norm(jacobians_of(homographies), axis=1).min(axis=1) * 2.0 / cells)
 
 
-def levels_for(homographies: Array, cells: int, cell_pixels: float) -> npt.NDArray[np.int64]:
+def levels_for(homographies: Array, cells: int, cell_pixels: float) -> Indices:
     """Return how often to halve the image so that a cell is at most `cell_pixels` wide."""
     width = cell_widths(homographies, cells)
     level = np.floor(np.log2(np.maximum(width / cell_pixels, 1e-3))) + 1
     return np.asarray(np.clip(level, 0, _LAST_LEVEL), dtype=np.int64)
 
 
-def homographies_of(quads: Array) -> Array:
+def homographies_of(quads: Quads) -> Array:
     """Homographies (m, 3, 3) from marker coordinates to quads (m, 4, 2), clockwise.
 
     Closed form of a square's projection (Heckbert, "Fundamentals of texture mapping and image
@@ -134,7 +160,7 @@ def homographies_of(quads: Array) -> Array:
     return np.asarray(result / result[:, 2:, 2:])
 
 
-def corners_of(homographies: Array) -> Array:
+def corners_of(homographies: Array) -> Quads:
     """Corners (m, 4, 2) of the black square in pixels, clockwise from marker (-1, -1)."""
     points = homographies @ _CORNERS.T
     return np.asarray((points[:, :2] / points[:, 2:]).transpose(0, 2, 1))

@@ -19,8 +19,8 @@ import numpy.typing as npt
 
 from marker_detection.cell_differences import CellDifferences
 from marker_detection.dictionaries import DICTIONARY_NAMES, MarkerCodes, dictionary_named
-from marker_detection.image_sampling import Array, ImagePyramid, Patches, corners_of
-from marker_detection.template_fit import Indices, TemplateFit
+from marker_detection.image_sampling import Array, ImagePyramid, Indices, Patches, corners_of
+from marker_detection.template_fit import TemplateFit
 
 # pixels of blur under which a reading and its rivals are compared
 _BLURS = (0.8, 1.6, 2.4)

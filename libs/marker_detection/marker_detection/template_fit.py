@@ -16,19 +16,18 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 from scipy.special import ndtr
 
 from marker_detection.dictionaries import MarkerCodes
 from marker_detection.image_sampling import (
     Array,
     ImagePyramid,
+    Indices,
     Patches,
+    homogeneous,
     jacobians_of,
     levels_for,
 )
-
-Indices = npt.NDArray[np.int64]
 
 _MARGIN_SAMPLES = 1
 _LEVEL_CELL_PIXELS = 4.0
@@ -74,7 +73,7 @@ class TemplateFit:
         self.count = codes.side * samples + 2 * _MARGIN_SAMPLES
         positions: Array = (np.arange(self.count, dtype=float) - (self.count - 1) / 2.0) * step
         x, y = (each.ravel() for each in np.meshgrid(positions, positions))
-        self._grid = np.stack([x, y, np.ones_like(x)]).astype(np.float32)
+        self._grid = homogeneous(np.stack([x, y]))
         within = np.abs(positions) < 1.0 - 2.0 * codes.border / codes.side
         self._inside = np.outer(within, within).ravel()
         zero, one = np.zeros_like(x), np.ones_like(x)
