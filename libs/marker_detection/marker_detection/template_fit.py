@@ -226,8 +226,7 @@ class TemplateFit:
         drawn -= drawn.mean(axis=1, keepdims=True)
         seen = self.sample(pyramid, homographies, levels)
         seen -= seen.mean(axis=1, keepdims=True)
-        for values in (drawn, seen):
-            self._leave_out_what_is_beyond(pyramid, homographies, levels, values)
+        self._leave_out_what_is_beyond(pyramid, homographies, levels, drawn, seen)
         sizes = np.einsum('mn,mn->m', drawn, drawn) * np.einsum('mn,mn->m', seen, seen)
         return np.asarray(np.einsum('mn,mn->m', drawn, seen) / np.sqrt(np.maximum(sizes, 1e-6)))
 
