@@ -24,10 +24,13 @@ OWL_XML = (
 )
 
 
-def failure(text: str) -> tuple[str, int | None, int | None]:
+def refuse(text: str, message: str, line: int, column: int | None) -> None:
+    """Check that a document is refused with what its message starts with, and where."""
     with pytest.raises(OntologyFileError) as error:
         read_ontology(text.encode(), 'urn:base')
-    return error.value.message, error.value.line, error.value.column
+    assert error.value.message.startswith(message)
+    assert error.value.line == line
+    assert column is None or error.value.column == column
 
 
 def literals(axioms: list[Axiom]) -> list[Literal]:
@@ -67,10 +70,7 @@ def literals(axioms: list[Axiom]) -> list[Literal]:
 def test_each_error_of_functional_syntax(
     text: str, message: str, line: int, column: int | None
 ) -> None:
-    said, *place = failure(text)
-    assert said.startswith(message)
-    assert place[0] == line
-    assert column is None or place[1] == column
+    refuse(text, message, line, column)
 
 
 def test_each_form_of_a_value_in_functional_syntax() -> None:
@@ -133,10 +133,7 @@ def test_each_form_of_a_value_in_functional_syntax() -> None:
     ],
 )
 def test_each_error_of_owl_xml(inside: str, message: str, line: int, column: int | None) -> None:
-    said, *place = failure(OWL_XML.format('', inside))
-    assert said.startswith(message)
-    assert place[0] == line
-    assert column is None or place[1] == column
+    refuse(OWL_XML.format('', inside), message, line, column)
 
 
 def test_each_form_of_a_name_and_a_value_in_owl_xml() -> None:

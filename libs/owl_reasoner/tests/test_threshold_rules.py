@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 import operator
 import random
 from collections.abc import Callable
 from itertools import product
+from typing import NamedTuple
 
 import pytest
 
@@ -46,36 +48,37 @@ TEXTS = [
     *(('decimal', text) for text in ('0.5', '1.5', '2.0')),
     *(('double', text) for text in ('1.5', '2', 'NaN', 'INF')),
 ]
-SHAPES: dict[str, tuple[tuple[Atom, ...], Callable[[float, float, float], float]]] = {
-    'subtract': ((computed('subtract', D, T, V),), lambda t, h, v: t - v - h),
-    'add': (
-        (computed('add', D, V, H, 1), computed('unaryMinus', U, D)),
-        lambda t, h, v: t - v - h - 1,
-    ),
-    'minus': (
-        (computed('unaryMinus', U, V), computed('unaryPlus', D, U)),
-        lambda t, h, v: -v - h,
+
+
+class Shape(NamedTuple):
+    """A rule that compares two values, and what these are of a time, a limit and what was seen."""
+
+    body: tuple[Atom, ...]
+    compared: tuple[Variable, Variable]
+    sides: Callable[[float, float, float], tuple[float, float]]
+
+    def rule(self, comparison: str) -> Rule:
+        return Rule((*self.body, computed(comparison, *self.compared)), (LATE,))
+
+
+SHAPES = {
+    'subtract': Shape((*FACTS, computed('subtract', D, T, V)), (D, H), lambda t, h, v: (t - v, h)),
+    'add': Shape((*FACTS, computed('add', D, V, H, 1)), (T, D), lambda t, h, v: (t, v + h + 1)),
+    'minus': Shape(
+        (*FACTS[1:], computed('unaryMinus', U, V), computed('unaryPlus', D, U)),
+        (D, H),
+        lambda t, h, v: (-v, h),
     ),
 }
-
-
-def rule_of(shape: str, name: str) -> Rule:
-    steps, _ = SHAPES[shape]
-    compared = {
-        'subtract': computed(name, D, H),
-        'add': computed(name, T, D),
-        'minus': computed(name, D, H),
-    }[shape]
-    facts = FACTS if shape != 'minus' else FACTS[1:]
-    return Rule((*facts, *steps[: 1 if shape == 'add' else None], compared), (LATE,))
 
 
 @pytest.mark.parametrize('name', COMPARE)
 @pytest.mark.parametrize('shape', SHAPES)
 def test_who_is_late_is_found_as_by_looking_at_each_pair(shape: str, name: str) -> None:
     rng = random.Random(f'{shape} {name}')
-    difference = SHAPES[shape][1]
-    kb = KnowledgeBase('x:', [rule_of(shape, name)])
+    body, _, sides = SHAPES[shape]
+    has_time = FACTS[0] in body
+    kb = KnowledgeBase('x:', [SHAPES[shape].rule(name)])
     kb.reason()
     said: list[Axiom] = []
     for _ in range(15):
@@ -97,35 +100,17 @@ def test_who_is_late_is_found_as_by_looking_at_each_pair(shape: str, name: str) 
         late = {
             who
             for robot, who in product((i, j), (f'x:l{n}' for n in range(6)))
-            for t in values.get((NOW, robot), [0.0] if shape == 'minus' else [])
+            for t in (values.get((NOW, robot), []) if has_time else [math.nan])
             for h in values.get((LIMIT, robot), [])
             for v in values.get((SEEN, who), [])
-            if holds(name, t, h, v, difference)
+            if COMPARE[name](*sides(t, h, v))
         }
         assert kb.instances(A) == late
         for who in sorted(late)[:1]:
             explanation = kb.explain(is_a(A, who))
             assert explanation is not None
             assert set(explanation.sources()[1:]) <= set(said)
-            assert len(explanation.premises) == (2 if shape == 'minus' else 3)
-
-
-def holds(
-    name: str, t: float, h: float, v: float, difference: Callable[[float, float, float], float]
-) -> bool:
-    """Tell whether a comparison holds; two infinite sides are compared as they are."""
-    left, right = sides(t, h, v, difference)
-    return COMPARE[name](left, right)
-
-
-def sides(
-    t: float, h: float, v: float, difference: Callable[[float, float, float], float]
-) -> tuple[float, float]:
-    if difference is SHAPES['subtract'][1]:
-        return t - v, h
-    if difference is SHAPES['add'][1]:
-        return t, v + h + 1
-    return -v, h
+            assert len(explanation.premises) == (3 if has_time else 2)
 
 
 def split(*body: Atom, head: Atom = LATE) -> bool:
