@@ -22,11 +22,9 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
-sys.path.insert(0, str(Path(__file__).resolve().parent))
 
-from patrol_facts import IRI, Patrol, schema
-from tables import table
-
+from benchmarks.patrol_facts import IRI, Patrol, schema
+from benchmarks.tables import table
 from libs.owl_reasoner.tests.java_reasoner import JavaReasoner, JavaReasonerError, absent
 from owl_reasoner import KnowledgeBase, ReasoningBudgetError, read_ontology, write_ontology
 from owl_reasoner.owl import axioms as ax

@@ -553,6 +553,7 @@ def print_corners(folder: Path | None) -> None:
 
 
 GAPS = (-2.0, 0.0, 1.0, 3.0, 8.0)
+"""Pixels between a marker and the edge of the image; less than 0: the edge cuts it."""
 
 
 def beside_the_edge(gap: float, index: int) -> tuple[ImageArray, Panel]:
@@ -560,7 +561,9 @@ def beside_the_edge(gap: float, index: int) -> tuple[ImageArray, Panel]:
     generator = np.random.default_rng([15, index])
     shown = panel(generator.uniform(0.4, 2.0), generator.uniform(0, 45), generator)
     shown = replace(shown, offset=(0.0, 0.0), margin=float(generator.uniform(0.5, 1.5)))
-    axis, last = index % 2, (CAMERA.width, CAMERA.height)[index % 2] - 0.5
+    axis = index % 2
+    last = (CAMERA.width, CAMERA.height)[axis] - 0.5
+    # its outline changes as it is moved (perspective), so it is moved again by what is left
     for _ in range(6):
         corners = corners_in_image(shown, CAMERA)[:, axis]
         # towards the last column or row, or towards the first one
