@@ -548,17 +548,13 @@ def test_where_the_map_is_unknown_is_said() -> None:
     assert str(caught.value) == 'the goal (1.00, 3.00) lies where the map is unknown'
 
 
-@pytest.mark.parametrize(
-    ('start', 'leaves'), [((0.2, 1.0), True), ((1.0, 0.1), True), ((0.07, 0.07), True)]
-)
-def test_who_stands_too_near_to_a_wall_leaves_it_straight(
-    start: tuple[float, float], leaves: bool
-) -> None:
+@pytest.mark.parametrize('start', [(0.2, 1.0), (1.0, 0.1), (0.07, 0.07)])
+def test_who_stands_too_near_to_a_wall_leaves_it_straight(start: tuple[float, float]) -> None:
     planner = GridPlanner(two_rooms(), ROBOT)
     path = planner.plan(start, (3, 2))
     assert path[0] == pytest.approx(start)
     gaps = [float(planner.clearance(point)[0]) for point in geometry.equally_spaced(path[:2], 0.02)]
-    assert all(later > gap - 0.013 for gap, later in pairwise(gaps)) is leaves
+    assert all(later > gap - 0.013 for gap, later in pairwise(gaps))
     assert gaps[-1] >= ROBOT.radius + ROBOT.margin - 0.03
 
 

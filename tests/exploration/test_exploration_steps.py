@@ -138,7 +138,8 @@ def test_a_map_that_is_whole_brings_it_home_and_a_stop_ends_it() -> None:
     assert sees(exploration, 0.1) == Velocity()
     exploration.think()
     assert (exploration.phase, exploration.reason) == (Phase.DONE, '')
-    assert not exploration.think() or exploration.phase is Phase.DONE
+    exploration.think()
+    assert exploration.phase is Phase.DONE, 'it stays so'
     stopped, _ = begun(hall(80))
     stopped.stop()
     assert stopped.phase is Phase.DONE
