@@ -24,6 +24,7 @@ from sensor_msgs.msg import BatteryState, LaserScan
 from surveillance_controllers.battery import Battery
 from surveillance_controllers.geometry import Mount, Points, Scan
 from surveillance_runtime.conversions import map_from, point_message
+from surveillance_runtime.place.occupancy_map import MOST_CELLS
 
 if TYPE_CHECKING:
     from surveillance_controllers.motion.path_following import Velocity
@@ -96,8 +97,6 @@ def battery_state(battery: Battery, *, charging: bool) -> BatteryState:
     return message
 
 
-MOST_CELLS = 100_000_000
-"""Cells of the largest map that is taken."""
 MOST_RAYS = 100_000
 """Rays of the largest scan that is taken."""
 LONGEST_RANGE = 1000.0
