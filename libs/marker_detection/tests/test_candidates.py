@@ -13,10 +13,9 @@ from marker_detection.candidates import (
     distinct,
     quads_around,
 )
-from marker_detection.dictionaries import MarkerCodes, dictionary_named
-from marker_detection.image_sampling import ImagePyramid, corners_of, homographies_of
+from marker_detection.image_sampling import ImagePyramid, homographies_of
 
-SQUARE = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
+from .drawn_codes import SEEN, SQUARE, drawn
 
 
 def blank(*boxes, size=(120, 160)):
@@ -161,59 +160,41 @@ def test_of_quads_that_are_nearly_the_same_the_first_is_kept():
 # Borders.
 
 
-def marker(homography, white=200.0, black=40.0, side=7, entry=0, around=None):
-    """Return an image of a code, with a margin of a cell and a half on a wall."""
-    cells = MarkerCodes.of(dictionary_named('DICT_5X5_100'), [11]).cells[entry]
-    y, x = np.mgrid[:600, :800] / 4.0 - 0.375
-    back = np.linalg.inv(homography)
-    u, v, w = (back[n, 0] * x + back[n, 1] * y + back[n, 2] for n in range(3))
-    u, v = u / w, v / w
-    places = [
-        np.clip(np.floor((each + 1.0) * side / 2.0).astype(int) + 1, 0, side + 1) for each in (u, v)
-    ]
-    image = black + (white - black) * (cells[places[1], places[0]] > 0)
-    if around is not None:
-        image[np.maximum(np.abs(u), np.abs(v)) > 1.0 + around[0]] = around[1]
-    return np.rint(image.reshape(150, 4, 200, 4).mean(axis=(1, 3))).astype(np.uint8)
-
-
-SEEN = homographies_of(
-    (35.0 * SQUARE + (100.0, 75.0) + [(3.0, 2.0), (-4.0, 0.0), (0.0, -3.0), (2.0, 1.0)])[None]
-)
+PLACED = homographies_of(SEEN[None])
 
 
 def test_a_border_with_its_margin_correlates_and_other_places_do_not():
     check = BorderCheck(7)
-    pyramid = ImagePyramid(marker(SEEN[0]))
+    pyramid = ImagePyramid(drawn(SEEN))
     ((found,), (beside,), (inside,)) = (
         check.correlation(pyramid, homographies, 7.0)
         for homographies in (
-            SEEN,
-            homographies_of(corners_of(SEEN) + np.array([12.0, 0.0])),
-            homographies_of(0.6 * (corners_of(SEEN) - (100.0, 75.0)) + (100.0, 75.0)),
+            PLACED,
+            homographies_of(SEEN[None] + (12.0, 0.0)),
+            homographies_of(0.6 * (SEEN[None] - (100.0, 75.0)) + (100.0, 75.0)),
         )
     )
     assert found > 0.95
     assert beside == inside == -1.0
-    assert check.correlation(pyramid, SEEN, 155.0)[0] > 0.9
-    assert check.correlation(pyramid, SEEN, 165.0)[0] == -1.0
-    thin = ImagePyramid(marker(SEEN[0], around=(0.5 / 3.5, 20.0)))
-    assert check.correlation(thin, SEEN, 7.0)[0] > 0.9
-    white_on_black = ImagePyramid(255 - marker(SEEN[0]))
-    assert check.correlation(white_on_black, SEEN, 7.0)[0] == -1.0
-    empty = marker(SEEN[0])
-    cv2.fillConvexPoly(empty, np.rint(corners_of(SEEN)[0]).astype(np.int32), 40)
-    assert check.correlation(ImagePyramid(empty), SEEN, 7.0)[0] == -1.0
-    one_side, two_sides = marker(SEEN[0]), marker(SEEN[0])
+    assert check.correlation(pyramid, PLACED, 155.0)[0] > 0.9
+    assert check.correlation(pyramid, PLACED, 165.0)[0] == -1.0
+    thin = ImagePyramid(drawn(SEEN, 0.5, 20.0))
+    assert check.correlation(thin, PLACED, 7.0)[0] > 0.9
+    white_on_black = ImagePyramid(255 - drawn(SEEN))
+    assert check.correlation(white_on_black, PLACED, 7.0)[0] == -1.0
+    empty = drawn(SEEN)
+    cv2.fillConvexPoly(empty, np.rint(SEEN).astype(np.int32), 40)
+    assert check.correlation(ImagePyramid(empty), PLACED, 7.0)[0] == -1.0
+    one_side, two_sides = drawn(SEEN), drawn(SEEN)
     one_side[:, 132:] = two_sides[:, 132:] = two_sides[:, :69] = 40
-    assert check.correlation(ImagePyramid(one_side), SEEN, 7.0)[0] > 0.0
-    assert check.correlation(ImagePyramid(two_sides), SEEN, 7.0)[0] == -1.0
+    assert check.correlation(ImagePyramid(one_side), PLACED, 7.0)[0] > 0.0
+    assert check.correlation(ImagePyramid(two_sides), PLACED, 7.0)[0] == -1.0
 
 
 def test_the_correlation_is_that_of_two_levels_with_noise_around_them():
     noise = np.random.default_rng(6).normal(0.0, 40.0, (150, 200))
-    noisy = np.clip(marker(SEEN[0], 170.0, 90.0) + noise, 0, 255).astype(np.uint8)
-    (found,) = BorderCheck(7).correlation(ImagePyramid(noisy), SEEN, 7.0)
+    noisy = np.clip(drawn(SEEN, white=170.0, black=90.0) + noise, 0, 255).astype(np.uint8)
+    (found,) = BorderCheck(7).correlation(ImagePyramid(noisy), PLACED, 7.0)
     # contrast / sqrt(contrast^2 + 4 variance); halving the image once leaves a quarter of it,
     # interpolation about half
     assert found == pytest.approx(80.0 / np.sqrt(80.0**2 + 4.0 * 40.0**2 / 4.0 * 0.45), abs=0.06)

@@ -24,6 +24,7 @@ from marker_detection.testing.marker_scene import (
 )
 
 from .backdrops import BACKDROPS, backdrop_of
+from .drawn_codes import SQUARE
 
 CAMERA = CameraModel.from_field_of_view(640, 480, math.radians(60))
 DICTIONARY = dictionary_named('DICT_5X5_100')
@@ -375,10 +376,9 @@ def test_square_with_two_covered_corners_is_an_outline_in_crowds_too():
 def test_outlines_of_one_marker_are_one_in_crowds_too():
     generator = np.random.default_rng(3)
     middles = np.stack(np.meshgrid(np.arange(60.0), np.arange(50.0)), axis=-1).reshape(-1, 1, 2)
-    square = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
-    quads = 12.0 * middles + 4.0 * square
+    quads = 12.0 * middles + 4.0 * SQUARE
     near = quads + generator.uniform(-0.5, 0.5, (len(quads), 1, 2))
-    inside = 12.0 * middles + 1.5 * square
+    inside = 12.0 * middles + 1.5 * SQUARE
     tracemalloc.start()
     kept = distinct(np.concatenate([quads, near, inside]), 2.0)
     peak = tracemalloc.get_traced_memory()[1]
@@ -400,10 +400,10 @@ def test_white_margin_of_a_pixel_or_two_on_a_black_wall_is_enough(margin):
 # At the edge of the image.
 
 
-def at_the_rim(marker_id, side, gap, rim, shape, wall=220, frame=None):
+def beside_the_edge(marker_id, side, gap, turns, shape, wall=220, frame=None):
     """Return an image of a marker so many pixels before its edge, and the marker's corners."""
-    # the lower edge first, then turned
-    height, width = shape if rim in (0, 2) else shape[::-1]
+    # beside the lower edge, then turned by quarters
+    height, width = shape if turns in (0, 2) else shape[::-1]
     image = np.full((height, width), wall, np.uint8)
     top, left = height - gap - side, (width - side) // 3
     cell = side // 7
@@ -415,18 +415,18 @@ def at_the_rim(marker_id, side, gap, rim, shape, wall=220, frame=None):
     image = cv2.GaussianBlur(image, (0, 0), 0.8)
     corners = side * np.array([[0, 0], [1, 0], [1, 1], [0, 1]])
     corners = np.add(corners, (left - 0.5, top - 0.5))
-    for _ in range(rim):
+    for _ in range(turns):
         image = np.asarray(cv2.rotate(image, cv2.ROTATE_90_CLOCKWISE), np.uint8)
         corners = np.stack([image.shape[1] - 1.0 - corners[:, 1], corners[:, 0]], axis=1)
     return image, corners
 
 
-@pytest.mark.parametrize('rim', range(4))
+@pytest.mark.parametrize('turns', range(4))
 @pytest.mark.parametrize('shape', [(300, 400), (333, 417)])
-def test_corners_are_right_beside_the_edge_of_the_image(shape, rim):
+def test_corners_are_right_beside_the_edge_of_the_image(shape, turns):
     for side in (35, 70, 126, 168, 210):
         for gap in (1, 2, 3, 8):
-            image, truth = at_the_rim(14, side, gap, rim, shape)
+            image, truth = beside_the_edge(14, side, gap, turns, shape)
             (seen_at,) = DETECTOR.detect(image)
             assert seen_at.marker_id == 14
             error = np.linalg.norm(seen_at.corners - truth, axis=1).max()
@@ -438,20 +438,20 @@ def test_corners_are_right_beside_the_edge_of_the_image(shape, rim):
 @pytest.mark.parametrize('frame', [None, 0, 255])
 def test_neither_wall_nor_frame_beside_the_edge_moves_a_corner(wall, frame):
     for side, gap in ((63, 4), (105, 5), (168, 3), (210, 4)):
-        for rim, marker_id in enumerate((3, 22, 57, 91)):
-            image, truth = at_the_rim(marker_id, side, gap, rim, (333, 417), wall, frame)
+        for turns, marker_id in enumerate((3, 22, 57, 91)):
+            image, truth = beside_the_edge(marker_id, side, gap, turns, (333, 417), wall, frame)
             (seen_at,) = DETECTOR.detect(image)
             assert seen_at.marker_id == marker_id
             error = np.linalg.norm(seen_at.corners - truth, axis=1).max()
-            assert error < 1.0, (side, gap, rim)
+            assert error < 1.0, (side, gap, turns)
 
 
-@pytest.mark.parametrize('rim', range(4))
-def test_corners_beyond_the_edge_of_the_image_are_those_of_the_whole_marker(rim):
+@pytest.mark.parametrize('turns', range(4))
+def test_corners_beyond_the_edge_of_the_image_are_those_of_the_whole_marker(turns):
     for side in (70, 126, 168):
-        whole = DETECTOR.detect(at_the_rim(14, side, 8, rim, (300, 400))[0])[0].confidence
+        whole = DETECTOR.detect(beside_the_edge(14, side, 8, turns, (300, 400))[0])[0].confidence
         for gap in (0, -1, -2):
-            image, truth = at_the_rim(14, side, gap, rim, (300, 400))
+            image, truth = beside_the_edge(14, side, gap, turns, (300, 400))
             (seen_at,) = DETECTOR.detect(image)
             error = np.linalg.norm(seen_at.corners - truth, axis=1).max()
             assert error < 0.03 * side

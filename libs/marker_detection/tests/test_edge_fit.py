@@ -6,33 +6,10 @@ import cv2
 import numpy as np
 import pytest
 
-from marker_detection.dictionaries import MarkerCodes, dictionary_named
 from marker_detection.edge_fit import EdgeFit, SharpEdges
-from marker_detection.image_sampling import ImagePyramid, homographies_of
+from marker_detection.image_sampling import ImagePyramid
 
-SQUARE = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
-SEEN = 35.0 * SQUARE + (100.0, 75.0) + [(3.0, 2.0), (-4.0, 0.0), (0.0, -3.0), (2.0, 1.0)]
-CELLS = MarkerCodes.of(dictionary_named('DICT_5X5_100'), [11]).cells[0] > 0
-
-
-def drawn(quad, margin=1.0, wall=200.0, shape=(150, 200)):
-    """Return an image of a code under a homography: white 200, black 40, blurred a little."""
-    # four samples to a pixel, thirty to a cell; white goes on to the end of the margin
-    cells = np.pad(CELLS[1:-1, 1:-1], 2, constant_values=True).repeat(30, 0).repeat(30, 1)
-    sheet = (40.0 + 160.0 * cells).astype(np.float32)
-    matrix = homographies_of(quad[None])[0]
-    to_pixel = np.array([[4.0, 0.0, 1.5], [0.0, 4.0, 1.5], [0.0, 0.0, 1.0]])
-    to_marker = np.array([[1 / 105, 0.0, -164.5 / 105], [0.0, 1 / 105, -164.5 / 105], [0, 0, 1]])
-    size = (4 * shape[1], 4 * shape[0])
-    image = np.full(size[::-1], wall, np.float32)
-    border = round((2.0 - margin) * 30.0)
-    sheet = sheet[border : len(sheet) - border, border : len(sheet) - border]
-    to_marker = to_marker @ np.array([[1, 0, border], [0, 1, border], [0, 0, 1.0]])
-    cv2.warpPerspective(
-        sheet, to_pixel @ matrix @ to_marker, size, image, borderMode=cv2.BORDER_TRANSPARENT
-    )
-    image = image.reshape(shape[0], 4, shape[1], 4).mean(axis=(1, 3))
-    return np.rint(cv2.GaussianBlur(image, (0, 0), 0.7)).astype(np.uint8)
+from .drawn_codes import SEEN, SQUARE, drawn
 
 
 def moved(quad, side, cells):

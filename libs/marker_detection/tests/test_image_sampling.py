@@ -16,7 +16,8 @@ from marker_detection.image_sampling import (
     levels_for,
 )
 
-SQUARE = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
+from .drawn_codes import SQUARE
+
 GENERATOR = np.random.default_rng(3)
 QUADS = 40.0 * SQUARE + (200.0, 150.0) + GENERATOR.uniform(-25.0, 25.0, (20, 4, 2))
 

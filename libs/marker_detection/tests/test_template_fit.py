@@ -11,6 +11,8 @@ from marker_detection.dictionaries import MarkerCodes, dictionary_named
 from marker_detection.image_sampling import ImagePyramid, corners_of, homographies_of
 from marker_detection.template_fit import Footprint, TemplateFit
 
+from .drawn_codes import SQUARE
+
 BLURS = np.geomspace(0.02, 2.0, 96)
 """The deviations that footprints name, in marker units."""
 
@@ -152,12 +154,11 @@ def scene(fit, quads, entries, contrasts):
 
 def test_codes_are_aligned_with_the_image_whatever_their_contrast():
     fit = TemplateFit(codes_of(8))
-    square = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
     quads = np.stack(
         [
-            square * 14.0 + (40.0, 50.0) + [(0.0, 0.3), (-2.0, 1.0), (0.5, -1.0), (2.0, 0.0)],
-            square * 11.0 + (110.3, 60.2),
-            square @ [[12.0, 5.0], [-5.0, 12.0]] + (190.0, 55.0),
+            SQUARE * 14.0 + (40.0, 50.0) + [(0.0, 0.3), (-2.0, 1.0), (0.5, -1.0), (2.0, 0.0)],
+            SQUARE * 11.0 + (110.3, 60.2),
+            SQUARE @ [[12.0, 5.0], [-5.0, 12.0]] + (190.0, 55.0),
         ]
     )
     entries = np.array([0, 13, 30])
@@ -183,7 +184,7 @@ def test_codes_are_aligned_with_the_image_whatever_their_contrast():
 def test_what_lies_beyond_the_image_neither_counts_nor_moves_a_code():
     codes = codes_of(5)
     fit = TemplateFit(codes)
-    quad = 24.0 * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]) + (59.5, 59.5)
+    quad = 24.0 * SQUARE + (59.5, 59.5)
     columns = np.clip((np.arange(120) - 36 + 8) // 8, 0, 7)
     entries, blur = np.array([6]), np.full((1, 2), 0.8)
     whole = (40.0 + 160.0 * (codes.cells[6][columns][:, columns] > 0)).astype(np.uint8)
