@@ -589,8 +589,9 @@ class _Command:
         self._wheels = environment.wheels
         if self._wheels is not None:  # the builds, which pip isolates, hear it in this way alone
             environ |= {'PIP_NO_INDEX': '1', 'PIP_FIND_LINKS': str(self._wheels)}
-        # pip builds in temporary folders, whose compiled modules would stay in the folder of those
-        # that are kept. Its own lie beside it, where Python does not look while that folder is set.
+        # pip builds in temporary folders: what Python compiles of these would stay for good where
+        # this variable has it kept. And pip's own compiled modules lie beside pip, where Python
+        # does not look while the variable is set.
         if environ.pop(_KEPT_IN, None):
             environ['PYTHONDONTWRITEBYTECODE'] = '1'
         self._process = subprocess.Popen(
