@@ -8,7 +8,8 @@ reasoner is used.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+import operator
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import reduce
 from itertools import combinations, product
@@ -22,19 +23,20 @@ from owl_reasoner.owl.expressions import Literal
 from owl_reasoner.owl.vocabulary import NOTHING, OWL, SWRLB, THING, TOP_LITERAL, XSD
 
 Terms = Mapping[ex.Variable, Any]
-FACETS = {
-    'minInclusive': lambda value, bound: value >= bound,
-    'maxInclusive': lambda value, bound: value <= bound,
-    'minExclusive': lambda value, bound: value > bound,
-    'maxExclusive': lambda value, bound: value < bound,
+Comparison = Callable[[Any, Any], bool]
+FACETS: dict[str, Comparison] = {
+    'minInclusive': operator.ge,
+    'maxInclusive': operator.le,
+    'minExclusive': operator.gt,
+    'maxExclusive': operator.lt,
 }
-COMPARISONS = {
-    'equal': lambda one, other: one == other,
-    'notEqual': lambda one, other: one != other,
-    'lessThan': lambda one, other: one < other,
-    'lessThanOrEqual': lambda one, other: one <= other,
-    'greaterThan': lambda one, other: one > other,
-    'greaterThanOrEqual': lambda one, other: one >= other,
+COMPARISONS: dict[str, Comparison] = {
+    'equal': operator.eq,
+    'notEqual': operator.ne,
+    'lessThan': operator.lt,
+    'lessThanOrEqual': operator.le,
+    'greaterThan': operator.gt,
+    'greaterThanOrEqual': operator.ge,
 }
 
 

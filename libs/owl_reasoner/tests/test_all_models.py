@@ -21,7 +21,7 @@ from owl_reasoner.owl.axioms import Axiom
 from owl_reasoner.owl.expressions import ClassExpression
 from owl_reasoner.owl.vocabulary import NOTHING, SWRLB, THING, TOP_LITERAL, XSD
 
-from .all_models import COMPARISONS, AllModels, Vocabulary, terms_of
+from .all_models import COMPARISONS, FACETS, AllModels, Vocabulary, terms_of
 from .small_ontologies import A, B, C, P, Q, S, T, V, W, X, Y, Z, i, j, k, m, num
 
 VOCABULARIES = (
@@ -31,7 +31,6 @@ VOCABULARIES = (
     Vocabulary((A,), (P,), (S,), (i, j, k)),
     Vocabulary((A, B, C), (P, Q), (), (i,), unnamed=1),
 )
-FACETS = ('minInclusive', 'maxInclusive', 'minExclusive', 'maxExclusive')
 OF_PROPERTIES: tuple[Any, ...] = (
     ax.FunctionalObjectProperty,
     ax.InverseFunctionalObjectProperty,
@@ -66,7 +65,7 @@ class Draw:
         if choice <= 1:
             return draw.choice([XSD + 'integer', XSD + 'decimal', TOP_LITERAL, XSD + 'string'])
         if choice <= 3:
-            facet = (XSD + draw.choice(FACETS), num(draw.randrange(4)))
+            facet = (XSD + draw.choice([*FACETS]), num(draw.randrange(4)))
             return ex.DatatypeRestriction(XSD + 'integer', (facet,))
         if choice <= 5:
             numbers = draw.sample(self.words.numbers, draw.choice([1, 1, 2]))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import operator
 import random
 from collections.abc import Callable
 from itertools import product
@@ -27,6 +26,7 @@ from owl_reasoner.reasoner.clauses import Clause
 from owl_reasoner.reasoner.threshold_rules import split_rule
 from owl_reasoner.reasoner.translation import Translation
 
+from .all_models import COMPARISONS
 from .small_ontologies import A, B, P, U, V, X, Y, base, computed, has, i, is_a, j, k, num, rel
 
 NOW, LIMIT, SEEN = 'x:now', 'x:limit', 'x:seen'
@@ -37,12 +37,7 @@ FACTS: tuple[Atom, ...] = (
     DataPropertyAtom(SEEN, L, V),
 )
 LATE = ClassAtom(A, L)
-COMPARE: dict[str, Callable[[float, float], bool]] = {
-    'greaterThan': operator.gt,
-    'greaterThanOrEqual': operator.ge,
-    'lessThan': operator.lt,
-    'lessThanOrEqual': operator.le,
-}
+ORDERS = ('greaterThan', 'greaterThanOrEqual', 'lessThan', 'lessThanOrEqual')
 TEXTS = [
     *(('integer', str(number)) for number in range(-1, 5)),
     *(('decimal', text) for text in ('0.5', '1.5', '2.0')),
@@ -72,7 +67,7 @@ SHAPES = {
 }
 
 
-@pytest.mark.parametrize('name', COMPARE)
+@pytest.mark.parametrize('name', ORDERS)
 @pytest.mark.parametrize('shape', SHAPES)
 def test_who_is_late_is_found_as_by_looking_at_each_pair(shape: str, name: str) -> None:
     rng = random.Random(f'{shape} {name}')
@@ -103,7 +98,7 @@ def test_who_is_late_is_found_as_by_looking_at_each_pair(shape: str, name: str) 
             for t in (values.get((NOW, robot), []) if has_time else [math.nan])
             for h in values.get((LIMIT, robot), [])
             for v in values.get((SEEN, who), [])
-            if COMPARE[name](*sides(t, h, v))
+            if COMPARISONS[name](*sides(t, h, v))
         }
         assert kb.instances(A) == late
         for who in sorted(late)[:1]:
