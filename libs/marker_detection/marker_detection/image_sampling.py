@@ -74,11 +74,12 @@ class ImagePyramid:
         """
         points = homographies @ grid
         shown = points[:, 2] > 0.0
+        depth = np.where(shown, points[:, 2], 1.0)
         size = 2.0 ** levels[:, None]
         height, width = self._levels[0].shape
         for axis, length in enumerate((width, height)):
             # in pixels of the image that is read
-            places = (points[:, axis] / points[:, 2] + 0.5) / size - 0.5
+            places = (points[:, axis] / depth + 0.5) / size - 0.5
             shown &= (places >= _INSIDE) & (places <= length // size - 1.0 - _INSIDE)
         return np.asarray(shown)
 

@@ -137,7 +137,12 @@ def test_samples_are_of_the_image_where_whole_pixels_of_it_lie_around_them():
             grid[2], grid[axis] = 1.0, along
             shown = pyramid.shown(across, grid.astype(np.float32), np.array([level]))
             assert shown.tolist() == [[False, True, True, True, False]]
-    # behind the camera
-    across[0, 2] = 0.0, 0.0, -1.0
-    behind = np.array([[-150.0], [-150.0], [1.0]], np.float32)
-    assert pyramid.shown(across, behind, np.array([0])).tolist() == [[False]]
+
+
+@pytest.mark.filterwarnings('error')
+@pytest.mark.parametrize('depth', [-1.0, 0.0])
+def test_samples_behind_the_camera_or_infinitely_far_are_not_of_the_image(depth):
+    pyramid = ImagePyramid(np.zeros((301, 403), np.uint8))
+    homography = np.array([[[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, depth]]])
+    place = np.array([[-150.0], [-150.0], [1.0]], np.float32)
+    assert pyramid.shown(homography, place, np.array([0])).tolist() == [[False]]
