@@ -11,7 +11,7 @@ from owl_reasoner.documents.writing import ontology_bytes
 from owl_reasoner.owl import axioms as ax
 from owl_reasoner.owl import expressions as ex
 from owl_reasoner.owl.expressions import Literal
-from owl_reasoner.owl.vocabulary import RDF, RDFS, XSD
+from owl_reasoner.owl.vocabulary import RDF, RDFS, SWRLB, XSD
 
 from .random_ontologies import RandomOntology
 
@@ -382,7 +382,6 @@ def atoms(text: str) -> tuple[tuple[ex.Atom, ...], tuple[ex.Atom, ...]]:
 
 
 x, y = (ex.Variable(f'urn:swrl:var#{name}') for name in 'xy')
-SWRLB_ = 'http://www.w3.org/2003/11/swrlb#'
 
 
 @pytest.mark.parametrize(
@@ -408,11 +407,11 @@ SWRLB_ = 'http://www.w3.org/2003/11/swrlb#'
         ),
         (
             'swrlb:add(?x, 1, ?y) ->',
-            [ex.BuiltinAtom(SWRLB_ + 'add', (x, Literal('1', INT), y))],
+            [ex.BuiltinAtom(SWRLB + 'add', (x, Literal('1', INT), y))],
             [],
         ),
-        ('lessThan(?x, ?y) ->', [ex.BuiltinAtom(SWRLB_ + 'lessThan', (x, y))], []),
-        (f'<{SWRLB_}add>(?x, ?y, ?y) ->', [ex.BuiltinAtom(SWRLB_ + 'add', (x, y, y))], []),
+        ('lessThan(?x, ?y) ->', [ex.BuiltinAtom(SWRLB + 'lessThan', (x, y))], []),
+        (f'<{SWRLB}add>(?x, ?y, ?y) ->', [ex.BuiltinAtom(SWRLB + 'add', (x, y, y))], []),
     ],
 )
 def test_a_rule_is_read(text: str, body: list[ex.Atom], head: list[ex.Atom]) -> None:
