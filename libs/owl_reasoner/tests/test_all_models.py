@@ -211,17 +211,8 @@ class Draw:
             other: ex.DataArgument = W if draw.random() < 0.5 else number
             body = [*values, ex.BuiltinAtom(compare, (V, other)), *body[:1]]
             heads.append(ex.DataPropertyAtom(draw.choice(self.words.datas), Y, V))
-        known = {
-            term
-            for atom in body
-            for term in (getattr(atom, name, None) for name in ('first', 'second', 'argument'))
-        }
-        fit = [
-            head
-            for head in heads
-            if known
-            >= {getattr(head, n) for n in head.__slots__ if n in ('first', 'second', 'argument')}
-        ]
+        known = {term for atom in body for term in terms_of(atom)}
+        fit = [head for head in heads if known >= {*terms_of(head)}]
         return ax.Rule(tuple(body), tuple(draw.sample(fit, 1)) if fit else ())
 
     def assertion(self) -> Axiom:
