@@ -68,6 +68,8 @@ _TOP, _RIGHT, _BOTTOM, _LEFT = range(4)
 class _Sides(NamedTuple):
     """Where the sides of squares are: `1 + shift + slope t + bow t^2` outwards at t along them.
 
+    All in marker units.
+
     Attributes:
         shift: (m, 4) top, right, bottom, left.
         slope: (m, 4).
@@ -157,7 +159,7 @@ class _Scan:
         """Return the coefficients (m, 4, k) of weighted curves through places (m, 4, n)."""
         weighed = weight[..., None] * self._powers
         normal = np.swapaxes(weighed, 2, 3) @ self._powers
-        # can be solved whatever the places count
+        # not singular, whatever the places count
         normal += 1e-9 * np.eye(normal.shape[-1])
         moments = np.swapaxes(weighed, 2, 3) @ height[..., None]
         return np.asarray(np.linalg.solve(normal, moments)[..., 0], float)
@@ -222,14 +224,12 @@ class SharpEdges:
         steepest, found = self._near.edges(pyramid, homographies, levels)
         typical = np.median(steepest.reshape(len(quads), -1), axis=1)[:, None, None]
         lies = (steepest > _LEAST_RISE * typical) & (np.abs(found) < _NEAR * 2.0 / self._side)
-        seen = [
-            pyramid.shown(homographies, each, level).reshape(lies.shape)
-            for each, level in (
-                (self._near.outline(0.0), 0 * levels),
-                (self._near.outline(_NEAR), levels),
-            )
-        ]
-        return np.asarray(np.where(seen[0], lies | ~seen[1], _UNSEEN).mean(axis=(1, 2)))
+        in_image = pyramid.shown(homographies, self._near.outline(0.0), np.zeros_like(levels))
+        # where the margin is not in the image that is read, no edge can be seen: that is no doubt
+        margin = pyramid.shown(homographies, self._near.outline(_NEAR), levels)
+        lies |= ~margin.reshape(lies.shape)
+        counts = np.where(in_image.reshape(lies.shape), lies, _UNSEEN)
+        return np.asarray(counts.mean(axis=(1, 2)))
 
 
 def _corners_between(homographies: Array, sides: _Sides) -> Quads:
