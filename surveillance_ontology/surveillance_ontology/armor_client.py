@@ -231,6 +231,8 @@ class FactSubscription:
         return self._set.facts
 
     def _on_matched(self, _status: Any) -> None:
+        # Another server may count on from any number, by chance from the next one.
+        self._set.forget_sequence()
         if self._on_reload is not None:
             self._on_reload()
         self._resynchronise()
@@ -240,10 +242,12 @@ class FactSubscription:
             return
         if msg.sequence == 0 and self._on_reload is not None:
             self._on_reload()
-        told = self._set.follow(msg.sequence, changes_from_ros(msg))
-        if told is None or (told and self._asking):
+        changes = changes_from_ros(msg)
+        told = self._set.follow(msg.sequence, changes)
+        # An answer that is awaited may be from before these changes.
+        if told is None or (self._asking and self._set.concerns(changes)):
             self._resynchronise()
-        # The answer that is awaited is told by its difference to what is known by then.
+        # That answer is told by its difference to what is known by then.
         self._tell(told or [])
 
     def _on_retry(self) -> None:
@@ -264,21 +268,25 @@ class FactSubscription:
         try:
             while True:
                 self._ask_again = False
-                pattern = str(self._set.pattern)
-                facts = await self._armor.query.facts_by_origin.call_async(pattern)
+                facts = await self._answer()
                 if not self._ask_again:
                     break
             self._tell(self._set.replace(*facts))
         except ArmorServiceCallError as error:
             self._node.get_logger().debug(f'facts {self._set.pattern}: {error}')
-            if self._subscription.get_publisher_count() > 0:
+            if self._ask_again or self._subscription.get_publisher_count() > 0:
                 # Its topic is discovered, its service not yet. Without it, its return is told.
                 self._retry.reset()
-        except ArmorServiceInternalError:
-            # There is no such reference: no facts either. Its loading is announced.
-            self._tell(self._set.replace([], []))
         finally:
             self._asking = False
+
+    async def _answer(self) -> tuple[list[ShortFact], list[ShortFact]]:
+        """Return the facts that match, and those of them that are asserted."""
+        try:
+            return await self._armor.query.facts_by_origin.call_async(str(self._set.pattern))
+        except ArmorServiceInternalError:
+            # There is no such reference: no facts either. Its loading is announced.
+            return [], []
 
     def _tell(self, changes: list[tuple[ShortFact, bool]]) -> None:
         for fact, came in changes:

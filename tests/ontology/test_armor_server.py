@@ -14,6 +14,7 @@ from libs.armor_service.tests.seven_rooms import IRI, ONTOLOGY, build_seven_room
 from surveillance_interfaces.srv import (
     ArmorDirective,
 )
+from surveillance_ontology import armor_client
 from surveillance_ontology.armor_client import (
     ArmorClient,
     ArmorServiceCallError,
@@ -21,6 +22,7 @@ from surveillance_ontology.armor_client import (
     FactSubscription,
 )
 from surveillance_ontology.armor_server_node import ArmorServer
+from surveillance_ontology.conversions import changes_from_ros
 from surveillance_runtime.launch_protocol import NotNowError
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.parameters import ParameterError
@@ -289,19 +291,31 @@ def test_facts_come_and_go_at_a_subscriber(graph: Any) -> None:
 
 
 class HeldClient:
-    """A client whose questions wait until they are let go."""
+    """A client whose answers wait until they are let go.
+
+    Attributes:
+        answered: How many answers the server has given so far.
+    """
 
     def __init__(self, graph: Any, armor: ArmorClient) -> None:
         self.reference_name = armor.reference_name
         self.query = self.facts_by_origin = self
         self._armor = armor
-        self.go = Future(executor=graph.node.executor)
-        self.asked = 0
+        self._executor = graph.node.executor
+        self._held: list[Future] = []
+        self.answered = 0
+
+    def let_go(self) -> None:
+        self._executor.create_task(self._held.pop().set_result, None)
 
     async def call_async(self, pattern: str) -> Any:
-        self.asked += 1
-        await self.go
-        return await self._armor.query.facts_by_origin.call_async(pattern)
+        held = Future(executor=self._executor)
+        try:
+            return await self._armor.query.facts_by_origin.call_async(pattern)
+        finally:
+            self._held.append(held)
+            self.answered += 1
+            await held
 
 
 def test_what_changes_while_the_server_is_asked_is_told_too(graph: Any) -> None:
@@ -316,11 +330,72 @@ def test_what_changes_while_the_server_is_asked_is_told_too(graph: Any) -> None:
         'visitedAt(R3, ?)',
         lambda fact, came: (told.add if came else told.discard)(str(fact)),
     )
-    graph.until(lambda: held.asked)
+    graph.until(lambda: held.answered)
     for before, after in (('1665579740', '5'), ('5', '6'), ('6', '7')):
         armor.manipulation.replace_dataprop_b2_ind('visitedAt', 'R3', 'LONG', after, before)
     last = 'visitedAt(R3, "7"^^xsd:long)'
     graph.until(lambda: last in map(str, visits.facts))
-    graph.node.executor.create_task(held.go.set_result, None)
-    graph.until(lambda: set(map(str, visits.facts)) == {last} and held.asked > 1)
+    held.let_go()
+    graph.until(lambda: held.answered > 1)
+    held.let_go()
+    graph.until(lambda: told)
+    assert set(map(str, visits.facts)) == {last}
     assert told == {last}
+
+
+def test_what_is_loaded_while_the_server_says_that_there_is_no_such_reference_is_told(
+    graph: Any,
+) -> None:
+    graph.add(ArmorServer)
+    armor = ArmorClient(graph.node, 'test', 'map', timeout=60.0)
+    held = HeldClient(graph, armor)
+    rooms = FactSubscription(
+        graph.node,
+        held,  # type: ignore[arg-type]
+        'ROOM(?)',
+        lambda _fact, _came: None,
+    )
+    graph.until(lambda: held.answered)
+    build_seven_rooms(armor, False, True)
+    armor.manipulation.add_ind_to_class('X', 'ROOM')
+    graph.until(lambda: 'ROOM(X)' in map(str, rooms.facts))
+    held.let_go()
+    graph.until(lambda: held.answered > 1)
+    held.let_go()
+    graph.until(lambda: {'ROOM(X)', 'ROOM(R1)'} <= set(map(str, rooms.facts)))
+
+
+def test_what_goes_before_it_was_ever_known_is_not_kept(
+    graph: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    graph.add(ArmorServer)
+    armor = ArmorClient(graph.node, 'test', 'map', timeout=60.0)
+    build_seven_rooms(armor, False, True)
+    held = HeldClient(graph, armor)
+    taken: list[tuple[str, bool]] = []
+    told: list[tuple[str, bool]] = []
+
+    def noted(message: Any) -> Any:
+        changes = changes_from_ros(message)
+        taken.extend((str(fact), came) for fact, came, _ in changes)
+        return changes
+
+    monkeypatch.setattr(armor_client, 'changes_from_ros', noted)
+    visits = FactSubscription(
+        graph.node,
+        held,  # type: ignore[arg-type]
+        'visitedAt(?, ?)',
+        lambda fact, came: told.append((fact.arguments[0], came)),
+    )
+    armor.manipulation.add_ind_to_class('X', 'ROOM')  # the first message tells where the count is
+    graph.until(lambda: ('ROOM(X)', True) in taken and held.answered)
+    held.let_go()
+    graph.until(lambda: held.answered > 1)
+    armor.manipulation.remove_dataprop_from_ind('visitedAt', 'R3', 'LONG', '1665579740')
+    graph.until(lambda: ('visitedAt(R3, "1665579740"^^xsd:long)', False) in taken)
+    held.let_go()
+    graph.until(lambda: held.answered > 2)
+    held.let_go()
+    graph.until(lambda: told)
+    assert 'R3' not in dict(told)
+    assert not any(fact.arguments[0] == 'R3' for fact in visits.facts)

@@ -115,6 +115,14 @@ class FactSet:
         """The facts that match, as far as is known."""
         return frozenset(fact for fact, _ in self._held)
 
+    def concerns(self, changes: Iterable[FactChange]) -> bool:
+        """Tell whether any of the changes is one of the pattern's facts."""
+        return any(self.pattern.matches(fact) for fact, _, _ in changes)
+
+    def forget_sequence(self) -> None:
+        """Have the next message count as one before which others were missed."""
+        self._sequence = None
+
     def follow(
         self, sequence: int, changes: Sequence[FactChange]
     ) -> list[tuple[ShortFact, bool]] | None:

@@ -87,6 +87,8 @@ def test_a_fact_holds_until_it_is_neither_asserted_nor_derived(
 def test_a_message_that_was_missed_is_noticed_and_made_up_for() -> None:
     followed = FactSet('URGENT(?)')
     assert followed.facts == frozenset()
+    assert followed.concerns([(parse_fact('ROOM(R1)'), True, True), (R1, False, True)])
+    assert not followed.concerns([(parse_fact('ROOM(R1)'), True, True)])
     # The first one tells where the count is.
     assert followed.follow(3, [(R1, True, True)]) is None
     assert followed.replace([], []) == []
@@ -98,3 +100,12 @@ def test_a_message_that_was_missed_is_noticed_and_made_up_for() -> None:
     assert followed.follow(7, [(R2, False, False)]) == [(R2, False)]
     assert followed.replace([R2, R1], []) == [(R1, True), (R2, True)]
     assert followed.replace([], []) == [(R1, False), (R2, False)]
+
+
+def test_another_server_may_count_on_by_chance() -> None:
+    followed = FactSet('URGENT(?)')
+    assert followed.follow(3, []) is None
+    assert followed.replace([R1], [R1]) == [(R1, True)]
+    followed.forget_sequence()
+    assert followed.follow(4, []) is None
+    assert followed.follow(5, [(R1, False, False)]) == [(R1, False)]
