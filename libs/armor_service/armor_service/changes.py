@@ -120,7 +120,7 @@ class NumberedChange(NamedTuple):
 
     Attributes:
         reference_name: Where.
-        sequence: Counts from 1 for each reference; 0 says that it was loaded or dropped.
+        sequence: Counts up for each reference; 0 says that it was loaded or dropped.
         added: Axioms that came, each with whether it is derived.
         removed: Axioms that went, likewise.
         is_consistent: As of the last reasoning.
@@ -170,12 +170,14 @@ class ChangeFeed:
         """Take in a change of a reference; None: it was loaded or dropped."""
         with self._lock:
             first = not self._waiting
+            number = self._sequences.get(name, 0) + 1
             if changes is None:
-                self._sequences[name] = 0
+                # It counts on: who misses this message sees a gap before the next one.
+                self._sequences[name] = number
                 self._waiting.append(NumberedChange(name, 0, (), (), False))
             else:
                 large = len(changes.added) + len(changes.removed) > LARGE
-                number = self._sequences.get(name, 0) + (2 if large else 1)
+                number += large
                 self._sequences[name] = number
                 added = () if large else changes.added
                 removed = () if large else changes.removed

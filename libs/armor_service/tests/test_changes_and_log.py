@@ -60,17 +60,21 @@ def test_changes_are_numbered_for_each_reference_until_they_are_taken() -> None:
     assert told == [0], 'announced once while something waits'
     assert feed.take() == [
         NumberedChange('map', 0, (), (), False),
-        NumberedChange('map', 1, ((ROOM, False),), (), True),
+        NumberedChange('map', 2, ((ROOM, False),), (), True),
         NumberedChange('other', 1, ((DOOR, False),), ((ROOM, True),), False),
-        NumberedChange('map', 2, ((BELOW, False),), (), True),
+        NumberedChange('map', 3, ((BELOW, False),), (), True),
     ]
     assert feed.take() == []
     feed.note('map', changed(ROOM))
     assert told == [0, 1]
-    assert [each.sequence for each in feed.take()] == [3]
+    assert [each.sequence for each in feed.take()] == [4]
+    for load in (None, None):
+        feed.note('map', load)
+    feed.note('map', changed(BELOW))
+    assert [each.sequence for each in feed.take()] == [0, 0, 7], 'who missed a load sees a gap'
     feed.note('map', None)
     feed.note('map', changed(ROOM))
-    assert [each.sequence for each in feed.take()] == [0, 1]
+    assert [each.sequence for each in feed.take()] == [0, 9]
 
 
 def test_a_change_that_is_too_large_leaves_a_gap(monkeypatch: pytest.MonkeyPatch) -> None:
