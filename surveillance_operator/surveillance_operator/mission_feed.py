@@ -407,10 +407,13 @@ class _Facts:
         try:
             for question in (*self._questions, self._ask_positions):
                 if question in self._unanswered or question == self._ask_positions:
+                    # Not after it: what is to be asked anew meanwhile stays so.
+                    self._unanswered.discard(question)
                     try:
                         await question()
-                        self._unanswered.discard(question)
                     except CallError as error:
+                        if question in self._questions:
+                            self._unanswered.add(question)
                         self._node.get_logger().debug(str(error))
         finally:
             self._asking = False
@@ -432,9 +435,13 @@ class _Facts:
     async def _ask_positions(self) -> None:
         for place in sorted(self._without_position):
             request = RoomPosition.Request(room_name=place)
-            answer = await self._position.call_async(request, TIMEOUT)
             self._without_position.discard(place)
-            if answer.valid:
+            try:
+                answer = await self._position.call_async(request, TIMEOUT)
+            except CallError:
+                self._without_position.add(place)
+                raise
+            if answer.valid and place in self._places:
                 self._update(_with_position(place, point_from(answer.position)))
 
     async def _ask_doors(self) -> None:

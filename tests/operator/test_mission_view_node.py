@@ -13,10 +13,12 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import PoseWithCovarianceStamped
 from nav_msgs.msg import OccupancyGrid
 from rclpy.qos import QoSProfile
+from rclpy.task import Future
 from rich.console import Console
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Bool, UInt8
 
+from state_machines.ros import ServiceCaller
 from surveillance_interfaces.action import FollowPath
 from surveillance_interfaces.msg import Decision, DoorStates, MissionStatus
 from surveillance_interfaces.srv import ConsoleCommand
@@ -96,6 +98,40 @@ def test_zones_and_stations_follow_a_changed_place(graph: Any) -> None:
     assert asked.result().accepted, asked.result().answer
     graph.until(lambda: view.snapshot.stations == {'B': (5.0, 2.0, 0.0)})
     assert {name: zone.speed for name, zone in view.snapshot.zones.items()} == {'S': 0.2}
+
+
+def test_a_point_that_is_moved_while_it_is_asked_for_is_asked_for_again(
+    graph: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    held: list[Future] = []
+    ask = ServiceCaller.call_async
+
+    async def hold_first(self: ServiceCaller, request: Any, timeout: float) -> Any:
+        answer = await ask(self, request, timeout)
+        if not held and getattr(request, 'room_name', '') == 'B':
+            held.append(Future(executor=graph.node.executor))
+            await held[0]
+        return answer
+
+    monkeypatch.setattr(ServiceCaller, 'call_async', hold_first)
+    graph.add(ArmorServer)
+    graph.add(OntologyMapBuilder, parameters={**PLACE, 'station': [1.0, 2.0, 0.5]})
+    graph.add(Planner)
+    view = graph.add(MissionViewNode)
+    graph.until(lambda: held and view.snapshot.stations)
+    described = {
+        'map': {'A': ['D'], 'B': ['D']},
+        'room_positions': {'A': [1.0, 1.0], 'B': [6.0, 1.0]},
+        'robot_room': 'A',
+        'recharge_rooms': ['B'],
+        'station': [5.0, 2.0, 0.0],
+    }
+    command = graph.node.create_client(ConsoleCommand, 'ontology_map/set_place')
+    graph.until(command.service_is_ready)
+    command.call_async(ConsoleCommand.Request(line=json.dumps(described)))
+    graph.until(lambda: view.snapshot.stations == {'B': (5.0, 2.0, 0.0)})
+    graph.node.executor.create_task(held[0].set_result, None)
+    graph.until(lambda: view.snapshot.positions == {'A': (1.0, 1.0), 'B': (6.0, 1.0)})
 
 
 def test_it_gathers_what_topics_ontology_and_parameters_tell(graph: Any) -> None:
