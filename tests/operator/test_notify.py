@@ -162,6 +162,7 @@ def test_an_email_has_text_picture_and_an_identity(
     assert 'sweep-door-D1-ajar.jpg' in text
 
 
+@pytest.mark.filterwarnings('ignore:Requiring AUTH')  # the server's own advice
 def test_an_email_that_the_server_refuses_says_why_without_the_password(
     tmp_path: Path,
 ) -> None:

@@ -194,5 +194,5 @@ class CameraModel:
             # a denominator that changes its sign is no lens beyond
             below = 1.0 + numbers[5:8] @ powers
             seen = np.where(np.minimum.accumulate(below) > 0.0, radius * above / below, -np.inf)
-        falls = np.flatnonzero(~(np.diff(seen) > 0.0))
+        falls = np.flatnonzero(~(seen[1:] > seen[:-1]))
         return float(_ANGLES[falls[0] if len(falls) else -1])
