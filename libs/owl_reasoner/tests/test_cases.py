@@ -816,3 +816,38 @@ def test_a_value_that_classes_forbid_leaves_the_other() -> None:
     assert not kb.holds(ax.DataPropertyAssertion(T, i, whole(1)))
     kb.add(ClassAssertion(C, i))
     assert not kb.reason()
+
+
+def test_a_rule_by_an_unknown_value_says_something_of_somebody_else() -> None:
+    x, y, v = map(ex.Variable, 'xyv')
+    large = (ex.DataPropertyAtom(S, x, v), ex.BuiltinAtom(SWRLB + 'greaterThan', (v, whole(3))))
+    kb = reasoned(
+        ax.Rule((*large, ex.ObjectPropertyAtom(P, x, y)), (ex.ClassAtom(B, y),)),
+        SubClassOf(A, ex.DataSomeValuesFrom(S, ex.DataOneOf((whole(4), whole(5))))),
+        *(ClassAssertion(cls, i) for cls in (A, B)),
+        ax.ObjectPropertyAssertion(P, i, j),
+    )
+    assert kb.types(j) == {B}
+
+
+def test_what_cases_said_of_classes_goes_when_there_is_too_much_for_cases(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    outside = ClassAssertion(D, k)
+    range_of_p = (ax.ObjectPropertyRange(P, C), ax.DisjointClasses((C, D)))
+    kb = reasoned(SubClassOf(A, ex.ObjectHasValue(P, k)), *range_of_p, outside)
+    assert kb.holds(SubClassOf(A, NOTHING))
+    monkeypatch.setattr('owl_reasoner.reasoner.horn_completeness._MOST_ASSERTIONS', 3)
+    kb.change([ClassAssertion(B, one) for one in (i, j, k, m)], [outside])
+    assert kb.reason()
+    assert not kb.holds(SubClassOf(A, NOTHING))
+    assert kb.unsupported == ('the assertions: too many for reasoning by cases',)
+
+
+def test_each_part_of_a_union_is_below_the_whole_where_it_is_a_case() -> None:
+    kb = reasoned(
+        SubClassOf(A, ex.ObjectSomeValuesFrom(P, B_OR_C)),
+        ax.DisjointUnion(D, (B, C)),
+        SubClassOf(ex.ObjectSomeValuesFrom(P, D), 'x:E'),
+    )
+    assert kb.superclasses(A) == {'x:E'}

@@ -8,6 +8,7 @@ from owl_reasoner.owl.axioms import (
     AsymmetricObjectProperty,
     Axiom,
     DisjointClasses,
+    DisjointDataProperties,
     DisjointObjectProperties,
     FunctionalDataProperty,
     IrreflexiveObjectProperty,
@@ -18,7 +19,11 @@ from owl_reasoner.owl.axioms import (
     SubObjectPropertyOf,
 )
 from owl_reasoner.owl.expressions import (
+    ClassExpression,
+    DataHasValue,
     DataMaxCardinality,
+    DataMinCardinality,
+    DataOneOf,
     DataSomeValuesFrom,
     DatatypeRestriction,
     ObjectAllValuesFrom,
@@ -28,7 +33,7 @@ from owl_reasoner.owl.expressions import (
     ObjectOneOf,
     ObjectSomeValuesFrom,
 )
-from owl_reasoner.owl.vocabulary import NOTHING, OWL, THING, XSD
+from owl_reasoner.owl.vocabulary import NOTHING, OWL, THING, TOP_LITERAL, XSD
 from owl_reasoner.reasoner.clauses import PredicateAtom
 from owl_reasoner.reasoner.consequence_based.classification import Classification
 
@@ -214,3 +219,38 @@ def test_the_only_value_that_counts_is_the_one_that_must_exist(
     kb = base(most, SubDataPropertyOf(S, T), some, *facts, consistent=consistent)
     if consistent:
         assert kb.holds(has(S, i, value)) is follows
+
+
+def one_of(*numbers: int) -> DataOneOf:
+    return DataOneOf(tuple(map(num, numbers)))
+
+
+@pytest.mark.parametrize(
+    'said',
+    [
+        [DataSomeValuesFrom(S, one_of(*some)) for some in ((1,), (2,), (1, 2, 3))],
+        [DataMinCardinality(2, S, one_of(1, 2, 3))],
+        [DataMinCardinality(2, S, one_of(1, 2)), DataSomeValuesFrom(S, one_of(2, 3))],
+    ],
+)
+def test_values_that_differ_are_counted(said: list[ClassExpression]) -> None:
+    two = SubClassOf(DataMinCardinality(2, S, TOP_LITERAL), B)
+    found = Classification([two, *(SubClassOf(A, one) for one in said)])
+    assert found.superclasses(A) == {B}
+    assert found.program.unsupported == []
+    if len(said) > 1:
+        single = Classification([two, SubClassOf(A, said[-1])])
+        assert single.superclasses(A) == set()
+
+
+def test_a_value_that_a_disjoint_property_has_is_not_the_one() -> None:
+    axioms = [
+        DisjointDataProperties((S, T)),
+        SubClassOf(A, DataHasValue(T, num(1))),
+        SubClassOf(A, DataSomeValuesFrom(S, one_of(1, 2))),
+        SubClassOf(C, DataSomeValuesFrom(S, one_of(1, 2))),
+        SubClassOf(DataHasValue(S, num(2)), B),
+    ]
+    found = Classification(axioms)
+    assert found.superclasses(A) == {B}
+    assert found.superclasses(C) == set()

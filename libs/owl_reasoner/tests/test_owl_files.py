@@ -13,6 +13,7 @@ import pytest
 
 from owl_reasoner.documents.reading import read_ontology
 from owl_reasoner.documents.writing import (
+    FORMATS,
     ontology_bytes,
     write_ontology,
 )
@@ -45,6 +46,7 @@ from .patrol_map import (
     value,
 )
 from .random_ontologies import RandomOntology
+from .wide_ontologies import WideOntology
 
 DATA = Path(__file__).parent / 'data'
 HEAD = (
@@ -312,6 +314,15 @@ def test_round_trip_of_random_ontologies(seed: int) -> None:
         read = read_ontology(ontology_bytes(axioms, 'http://example.org/random', form), 'x:')
         assert read.unsupported == []
         assert set(read.axioms) == set(axioms)
+
+
+@pytest.mark.parametrize('form', FORMATS)
+@pytest.mark.parametrize('seed', range(6))
+def test_any_construct_comes_back_from_any_format(form: str, seed: int) -> None:
+    axioms = WideOntology(seed).ontology(14, 8)
+    read = read_ontology(ontology_bytes(axioms, 'http://example.org/wide', form), 'x:')
+    assert read.unsupported == []
+    assert set(read.axioms) == set(axioms)
 
 
 @pytest.mark.parametrize('text', ['a<b & "c"', ' two\nlines\r\n\ttab ', 'ünïcode \U0001f916', ''])
