@@ -125,8 +125,8 @@ class Source:
     )
     state_file: str = parameter(
         '',
-        'File that keeps the rooms added and removed over a restart of the process; empty: '
-        'nothing is kept.',
+        'File that keeps the rooms added, removed and told by messages over a restart of the '
+        'process; empty: nothing is kept.',
     )
 
 
@@ -304,6 +304,9 @@ class MapKeeper:
             self._reports.refused(f'the map that was sent is not used: {error}')
             return
         before, self.place = self.place, place
+        if place != before:
+            # Whoever described them may be gone when another process comes after this one.
+            self._keep(place, self._by_hand)
         if before is not None and self.is_built:
             try:
                 self._ontology.change(before, place, self._first_visit())

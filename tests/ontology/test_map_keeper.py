@@ -332,6 +332,17 @@ def test_rooms_that_another_place_had_leave_an_ontology_that_was_kept(tmp_path: 
     service.close()
 
 
+def test_a_map_that_was_sent_is_known_to_the_next_process(tmp_path: Path) -> None:
+    service = ArmorService(warn=lambda _: None)
+    path = str(tmp_path / 'state.json')
+    keeper, _ = kept(service, path, None)
+    keeper.extend([RoomNote('A', (1, 0, 0), (('B', 'D'),))], 'A')
+    keeper.extend([RoomNote('B', (2, 0, 0), (('A', 'D'),))], '')
+    again, said = kept(service, path, None)
+    assert (again.place, again.is_built, said) == (keeper.place, True, [])
+    service.close()
+
+
 def test_a_map_that_is_sent_again_changes_nothing_that_was_edited(tmp_path: Path) -> None:
     service = ArmorService(warn=lambda _: None)
     path = str(tmp_path / 'state.json')
