@@ -114,7 +114,9 @@ class Workspace:
         """Make a reference known under its name, and its changes to the watchers."""
 
         def on_changes(changes: Changes) -> None:
-            self.tell(ref.name, changes)
+            # Whoever still works on one that was dropped changes no other of that name.
+            if not ref.dropped:
+                self.tell(ref.name, changes)
 
         taken_back = ref.on_taken_back
 

@@ -181,6 +181,19 @@ def test_an_ontology_that_was_dropped_meanwhile_is_asked_no_more(
     )
 
 
+def test_who_still_works_on_what_was_dropped_tells_nothing_of_the_next_of_its_name(
+    service: ArmorService, ask: Ask
+) -> None:
+    told: list[tuple[str, bool]] = []
+    service.watch(lambda name, changes: told.append((name, changes is None)))
+    ref = service.workspace.references.find('map')
+    with ref.lock:
+        ask('DROP')
+        ask('LOAD FILE', ONTOLOGY, IRI, 'false', 'PELLET', 'false')
+        ref.kb.change([], list(ref.kb.axioms()))
+    assert told == [('map', True), ('map', True)]
+
+
 def test_the_memory_of_a_large_ontology_is_given_back(
     service: ArmorService, tmp_path: Path
 ) -> None:
