@@ -230,6 +230,10 @@ class FactSubscription:
         """The facts that match now, as far as is known."""
         return self._set.facts
 
+    def ask_anew(self) -> None:
+        """Ask for all facts again, as where the client's reference is another one."""
+        self._resynchronise()
+
     def _on_matched(self, _status: Any) -> None:
         # Another server may count on from any number, by chance from the next one.
         self._set.forget_sequence()
@@ -238,11 +242,11 @@ class FactSubscription:
         self._resynchronise()
 
     def _on_changes(self, msg: FactChanges) -> None:
-        if msg.reference_name != self._armor.reference_name:
-            return
-        if msg.sequence == 0 and self._on_reload is not None:
+        is_own = msg.reference_name == self._armor.reference_name
+        if is_own and msg.sequence == 0 and self._on_reload is not None:
             self._on_reload()
-        changes = changes_from_ros(msg)
+        # One of another reference tells by its number whether any was missed.
+        changes = changes_from_ros(msg) if is_own else []
         told = self._set.follow(msg.sequence, changes)
         # An answer that is awaited may be from before these changes.
         if told is None or (self._asking and self._set.concerns(changes)):

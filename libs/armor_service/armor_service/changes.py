@@ -120,7 +120,7 @@ class NumberedChange(NamedTuple):
 
     Attributes:
         reference_name: Where.
-        sequence: Counts up for each reference; 0 says that it was loaded or dropped.
+        sequence: Counts up over all references; 0 says that this one was loaded or dropped.
         added: Axioms that came, each with whether it is derived.
         removed: Axioms that went, likewise.
         is_consistent: As of the last reasoning.
@@ -143,9 +143,10 @@ class NumberedChange(NamedTuple):
 
 
 class ChangeFeed:
-    """Changes of facts on their way to subscribers: numbered for each reference, kept until taken.
+    """Changes of facts on their way to subscribers: numbered, kept until taken.
 
-    A subscriber that sees a gap in the numbers asks the server anew. So a change that is too large
+    A subscriber that sees a gap in the numbers asks the server anew. They are those of all
+    references: what is missed of one is noticed with the next of any. So a change that is too large
     for a message (a whole ontology that was loaded) is only counted, and only the last changes are
     kept while nobody listens.
 
@@ -157,7 +158,7 @@ class ChangeFeed:
         self._announce = announce
         self._lock = threading.Lock()
         self._waiting: deque[NumberedChange] = deque(maxlen=KEPT)
-        self._sequences: dict[str, int] = {}
+        self._sequence = 0
 
     def take(self) -> list[NumberedChange]:
         """Take what waits, oldest first."""
@@ -170,19 +171,17 @@ class ChangeFeed:
         """Take in a change of a reference; None: it was loaded or dropped."""
         with self._lock:
             first = not self._waiting
-            number = self._sequences.get(name, 0) + 1
+            self._sequence += 1
             if changes is None:
                 # It counts on: who misses this message sees a gap before the next one.
-                self._sequences[name] = number
                 self._waiting.append(NumberedChange(name, 0, (), (), False))
             else:
                 large = len(changes.added) + len(changes.removed) > LARGE
-                number += large
-                self._sequences[name] = number
+                self._sequence += large
                 added = () if large else changes.added
                 removed = () if large else changes.removed
                 self._waiting.append(
-                    NumberedChange(name, number, added, removed, changes.consistent)
+                    NumberedChange(name, self._sequence, added, removed, changes.consistent)
                 )
         if first:
             self._announce()
