@@ -362,6 +362,7 @@ class _Facts:
         self._get_behaviour = ServiceCaller(node, GetParameters, f'{behaviour}/get_parameters')
         follow_place(node, self._take_place)
         self._armor: ArmorClient | None = None
+        self._followed: list[FactSubscription] = []
         self._places: set[str] = set()
         self._without_position: set[str] = set()
         of_robot = (self._ask_doors, self._ask_behaviour)
@@ -421,7 +422,10 @@ class _Facts:
     async def _ask_reference(self) -> None:
         name = (await self._reference.call_async(ReferenceName.Request(), TIMEOUT)).name
         if self._armor is not None:
-            self._armor.reference_name = name
+            if name != self._armor.reference_name:
+                self._armor.reference_name = name
+                for followed in self._followed:
+                    followed.ask_anew()
             return
         self._armor = ArmorClient(self._node, self._node.get_name(), name, timeout=TIMEOUT)
         for pattern, callback in (
@@ -430,7 +434,7 @@ class _Facts:
             (VISITS, self._on_fact),
             (CONNECTIONS, self._on_fact),
         ):
-            FactSubscription(self._node, self._armor, pattern, callback)
+            self._followed.append(FactSubscription(self._node, self._armor, pattern, callback))
 
     async def _ask_positions(self) -> None:
         for place in sorted(self._without_position):

@@ -134,6 +134,22 @@ def test_a_point_that_is_moved_while_it_is_asked_for_is_asked_for_again(
     graph.until(lambda: view.snapshot.positions == {'A': (1.0, 1.0), 'B': (6.0, 1.0)})
 
 
+def test_another_mission_may_have_another_ontology(
+    graph: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(mission_feed, 'WHOLE_LOOK_PERIOD', 0.05)
+    graph.add(ArmorServer)
+    view = graph.add(MissionViewNode)
+    for reference, room in (('first', 'B'), ('second', 'C')):
+        place = {key.replace('B', room): value for key, value in PLACE.items()}
+        parameters = {**place, 'ontology_reference': reference}
+        nodes = graph.add(OntologyMapBuilder, parameters=parameters), graph.add(Planner)
+        graph.until(lambda room=room: set(view.snapshot.positions) == {'A', room})
+        for node in nodes:
+            graph.remove(node)
+        graph.until(lambda: not view.snapshot.nodes)
+
+
 def test_it_gathers_what_topics_ontology_and_parameters_tell(graph: Any) -> None:
     graph.add(ArmorServer)
     graph.add(OntologyMapBuilder, parameters=PLACE)
