@@ -395,10 +395,11 @@ class Experience:
             }
         )
 
-    def saw(self, place: str, now: float) -> None:
-        """Note that the robot was in ``place``."""
+    def saw(self, place: str, now: float, *, until: float | None = None) -> None:
+        """Note that the robot was in ``place``, now or until a moment before, seconds."""
         self.tell_time(now)
-        self.visits[place] = now
+        at = now if until is None else min(until, now)
+        self.visits[place] = max(at, min(now, self.visits.get(place, at)))
 
     def tell_time(self, now: float) -> float:
         """Take the visits with a clock that was set, forget those of another simulation.

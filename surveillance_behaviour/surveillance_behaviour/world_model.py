@@ -519,7 +519,8 @@ class WorldModel:
         if here := self._ontology.await_place(self.place, 0.0, interrupt):
             self.saw(here, now)
         world = self.look(now, interrupt, avoided)
-        self.saw(world.place, now)
+        # Else it is in no place, as where a drive ended early: the ontology has the last one.
+        self.saw(world.place, now, until=None if here else self._seen_at)
         if to_charge and not self.experience.sent_to_charge:
             why = why_charge(world, self.battery(), self.settings)
             self.send_to_charge(why or 'charging was begun')
@@ -728,10 +729,22 @@ class WorldModel:
             world = replace(world, place=place, reachable=tuple(world.graph.leg_seconds[place]))
         return why_charge(world, self.battery(), self.settings)
 
-    def saw(self, place: str, now: float) -> None:
-        """Note that the robot is in ``place``; finer than the ontology's whole seconds."""
+    @property
+    def _seen_at(self) -> float | None:
+        """When the robot was seen in the place that the ontology has; None where nobody told."""
+        stamp = 0 if self._last is None else self._last.seen_at
+        return stamp / 1e9 if stamp else None
+
+    def saw(self, place: str, now: float, *, until: float | None = None) -> None:
+        """Note that the robot is in ``place``; finer than the ontology's whole seconds.
+
+        Args:
+            place: The place.
+            now: Seconds on the mission's clock.
+            until: When it was seen there last; None: it is there now.
+        """
         self.place = place
-        self.experience.saw(place, now)
+        self.experience.saw(place, now, until=until)
         if place == self._target:
             self._target = None
         if place == self.experience.requested:

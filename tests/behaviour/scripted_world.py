@@ -81,6 +81,8 @@ class World:
         is_silent: Whether an ontology that did not answer still does not.
         faults: Called with the name of each port method before it works; may raise, or change the
             world.
+        seen_at: When the robot left the place that the ontology has, nanoseconds: it is in none
+            now; 0: it is there.
         station_points: Where the stations are that are not at the points of their rooms.
         speed: Metres per second.
         draw: Percent per second away from the station; there it charges with ``charge``.
@@ -97,6 +99,7 @@ class World:
     low_below: float = 20.0
     faults: Callable[[str], None] = lambda call: None
     is_silent: bool = False
+    seen_at: int = 0
 
     def __post_init__(self) -> None:
         self.clock = ScriptedClock()
@@ -194,7 +197,7 @@ class World:
         }
         return Snapshot(
             place=self.is_in,
-            seen_at=0,
+            seen_at=self.seen_at,
             reachable=self.neighbours(self.is_in),
             classes=members,
             visited_at={place: float(int(self.visited_at[place])) for place in self.rooms},
@@ -205,7 +208,7 @@ class World:
         return frozenset(self.neighbours(self.is_in))
 
     def await_place(self, place: str, seconds: float, interrupt: Interrupt) -> str:
-        return self.is_in
+        return '' if self.seen_at else self.is_in
 
     def position(self, place: str, interrupt: Interrupt) -> Point:
         self._call('position', interrupt)

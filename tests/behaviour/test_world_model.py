@@ -32,6 +32,20 @@ def world_model(world: World, record: Path) -> WorldModel:
     return WorldModel(DecisionSettings(), world, world, world.battery, experience)
 
 
+def test_a_robot_between_two_places_visits_none(tmp_path: Path) -> None:
+    world = World()
+    model = world_model(world, tmp_path / 'mission.jsonl')
+    model.begin(1.0, NOBODY)
+    world.seen_at = 2_500_000_000
+    model.decide(4.0, NOBODY)
+    assert model.experience.visits == {'E': 2.5}
+    world.seen_at = 0
+    model.decide(5.0, NOBODY)
+    world.seen_at = 2_500_000_000
+    model.decide(6.0, NOBODY)
+    assert model.experience.visits == {'E': 5.0}, 'it was there until then'
+
+
 def test_a_request_outlives_the_node_that_took_it(tmp_path: Path) -> None:
     world, record = World(), tmp_path / 'mission.jsonl'
     first = world_model(world, record)
