@@ -31,6 +31,14 @@ def test_a_mission_that_stands_still_says_which_step_it_waits_for() -> None:
     assert told[1].over
 
 
+def test_what_stops_the_mission_is_told_though_no_step_failed() -> None:
+    watchdog, told = watch()
+    watchdog.look(replace(MOVING, waiting='the machine broke: a mistake'))
+    assert told[0].text == 'the robot waits for help in C1: the machine broke: a mistake'
+    watchdog.look(replace(MOVING, now=1.0))
+    assert told[1].over
+
+
 def test_a_robot_that_creeps_moves() -> None:
     watchdog, told = watch()
     for second in range(100):

@@ -193,7 +193,8 @@ def test_a_machine_that_breaks_is_started_again_and_does_not_cry_on(
     assert cries.count(True) < len(cries) / 2
     assert not cries[-1]
     assert [each for each in errors if 'a mistake' in each]
-    assert health.findings() == []
+    # Whoever looks once a second of real time may have seen it wait.
+    graph.until(lambda: not health.findings())
     assert len(robot.visited(since=30.0)) > 2
 
 

@@ -186,7 +186,7 @@ def text_of(seen: Seen) -> str:
     if seen.closed and seen.failure is not None and seen.failure.is_over is None:
         names = ', '.join(seen.closed)
         doors = f' ({names} {"is" if len(seen.closed) == 1 else "are"} closed)'
-    what = 'nothing works'
+    what = seen.waiting  # as where the machine broke, which is no failure of a step
     if seen.failure is not None:
         what = f'{seen.failure.what} failed: {seen.failure.reason}'
     return f'the robot waits for help in {seen.place or "an unknown place"}: {what}{doors}'
