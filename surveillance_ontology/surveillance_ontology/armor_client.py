@@ -230,16 +230,12 @@ class FactSubscription:
         """The facts that match now, as far as is known."""
         return self._set.facts
 
-    def ask_anew(self) -> None:
-        """Ask for all facts again, as where the client's reference is another one."""
-        self._resynchronise()
-
     def _on_matched(self, _status: Any) -> None:
         # Another server may count on from any number, by chance from the next one.
         self._set.forget_sequence()
         if self._on_reload is not None:
             self._on_reload()
-        self._resynchronise()
+        self.ask_anew()
 
     def _on_changes(self, msg: FactChanges) -> None:
         is_own = msg.reference_name == self._armor.reference_name
@@ -250,15 +246,16 @@ class FactSubscription:
         told = self._set.follow(msg.sequence, changes)
         # An answer that is awaited may be from before these changes.
         if told is None or (self._asking and self._set.concerns(changes)):
-            self._resynchronise()
+            self.ask_anew()
         # That answer is told by its difference to what is known by then.
         self._tell(told or [])
 
     def _on_retry(self) -> None:
         self._retry.cancel()
-        self._resynchronise()
+        self.ask_anew()
 
-    def _resynchronise(self) -> None:
+    def ask_anew(self) -> None:
+        """Ask for all facts again, as where the client's reference is another one."""
         stopping = getattr(self._node, 'stopping', None)
         if stopping is not None and stopping.is_set():
             return  # The server's leaving is news, too, and nobody would await the answer.

@@ -74,6 +74,23 @@ def test_what_a_peer_says_commands_no_terminal(graph: Any, monkeypatch: pytest.M
     assert publisher is not None
 
 
+def change_place(graph: Any, **changes: Any) -> None:
+    """Have the map builder go on with another place, whose station is in B."""
+    described = {
+        'map': {'A': ['D'], 'B': ['D']},
+        'room_positions': {'A': [1.0, 1.0], 'B': [5.0, 1.0]},
+        'robot_room': 'A',
+        'recharge_rooms': ['B'],
+        'station': [5.0, 2.0, 0.0],
+        **changes,
+    }
+    command = graph.node.create_client(ConsoleCommand, 'ontology_map/set_place')
+    graph.until(command.service_is_ready)
+    asked = command.call_async(ConsoleCommand.Request(line=json.dumps(described)))
+    graph.until(asked.done)
+    assert asked.result().accepted, asked.result().answer
+
+
 def test_zones_and_stations_follow_a_changed_place(graph: Any) -> None:
     graph.add(ArmorServer)
     graph.add(OntologyMapBuilder, parameters={**PLACE, 'station': [1.0, 2.0, 0.5]})
@@ -83,19 +100,7 @@ def test_zones_and_stations_follow_a_changed_place(graph: Any) -> None:
     graph.until(lambda: view.snapshot.stations == {'A': (1.0, 2.0, 0.5)})
     graph.until(lambda: {'K', 'S'} == set(view.snapshot.zones))
     assert view.snapshot.zones['S'].speed == 0.3
-    described = {
-        'map': {'A': ['D'], 'B': ['D']},
-        'room_positions': {'A': [1.0, 1.0], 'B': [5.0, 1.0]},
-        'robot_room': 'A',
-        'recharge_rooms': ['B'],
-        'station': [5.0, 2.0, 0.0],
-        'slow_zones': {'S': [0.2, *zone]},
-    }
-    command = graph.node.create_client(ConsoleCommand, 'ontology_map/set_place')
-    graph.until(command.service_is_ready)
-    asked = command.call_async(ConsoleCommand.Request(line=json.dumps(described)))
-    graph.until(asked.done)
-    assert asked.result().accepted, asked.result().answer
+    change_place(graph, slow_zones={'S': [0.2, *zone]})
     graph.until(lambda: view.snapshot.stations == {'B': (5.0, 2.0, 0.0)})
     assert {name: zone.speed for name, zone in view.snapshot.zones.items()} == {'S': 0.2}
 
@@ -119,16 +124,7 @@ def test_a_point_that_is_moved_while_it_is_asked_for_is_asked_for_again(
     graph.add(Planner)
     view = graph.add(MissionViewNode)
     graph.until(lambda: held and view.snapshot.stations)
-    described = {
-        'map': {'A': ['D'], 'B': ['D']},
-        'room_positions': {'A': [1.0, 1.0], 'B': [6.0, 1.0]},
-        'robot_room': 'A',
-        'recharge_rooms': ['B'],
-        'station': [5.0, 2.0, 0.0],
-    }
-    command = graph.node.create_client(ConsoleCommand, 'ontology_map/set_place')
-    graph.until(command.service_is_ready)
-    command.call_async(ConsoleCommand.Request(line=json.dumps(described)))
+    change_place(graph, room_positions={'A': [1.0, 1.0], 'B': [6.0, 1.0]})
     graph.until(lambda: view.snapshot.stations == {'B': (5.0, 2.0, 0.0)})
     graph.node.executor.create_task(held[0].set_result, None)
     graph.until(lambda: view.snapshot.positions == {'A': (1.0, 1.0), 'B': (6.0, 1.0)})
