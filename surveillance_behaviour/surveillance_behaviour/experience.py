@@ -395,10 +395,11 @@ class Experience:
             }
         )
 
-    def saw(self, place: str, now: float, *, until: float | None = None) -> None:
-        """Note that the robot was in ``place``, now or until a moment before, seconds."""
+    def saw(self, place: str, now: float, *, came: float | None = None) -> None:
+        """Note that the robot is in ``place``, or came there before and has left; seconds."""
         self.tell_time(now)
-        at = now if until is None else min(until, now)
+        at = now if came is None else min(came, now)
+        # What was seen of it since it came there stays, unless that lies ahead of the clock.
         self.visits[place] = max(at, min(now, self.visits.get(place, at)))
 
     def tell_time(self, now: float) -> float:

@@ -90,8 +90,10 @@ class Reasoner(PatrolNode):
         if status.waiting_for_help or 'Recover' in status.state:
             self._world_model.disturbed()
         if status.place and status.place != self._place:
-            self._place = status.place
-            self._world_model.arrived(status.place, seconds_of(status.stamp))
+            before, self._place = self._place, status.place
+            # Where the robot was last when this node began, it may have left.
+            if before:
+                self._world_model.arrived(status.place, seconds_of(status.stamp))
 
     def _on_parameters(self, event: ParameterEvent) -> None:
         """Take over what is set in the node that owns the settings of decisions."""

@@ -162,6 +162,8 @@ class RobotBehavior(PatrolNode):
                 try:
                     self.machine.execute()
                 except fsm.SmachError as error:
+                    # A step that failed before is not why the robot waits.
+                    self.mission.failure = None
                     self._announcer.waiting_for_help(f'the machine broke: {error}')
                     self._mission_clock.sleep(self.mission.recovery.pause(), self.stopping)
                     self._announcer.waiting_for_help('')

@@ -520,7 +520,7 @@ class WorldModel:
             self.saw(here, now)
         world = self.look(now, interrupt, avoided)
         # Else it is in no place, as where a drive ended early: the ontology has the last one.
-        self.saw(world.place, now, until=None if here else self._seen_at)
+        self.saw(world.place, now, came=None if here else self._came)
         if to_charge and not self.experience.sent_to_charge:
             why = why_charge(world, self.battery(), self.settings)
             self.send_to_charge(why or 'charging was begun')
@@ -730,24 +730,24 @@ class WorldModel:
         return why_charge(world, self.battery(), self.settings)
 
     @property
-    def _seen_at(self) -> float | None:
-        """When the robot was seen in the place that the ontology has; None where nobody told."""
+    def _came(self) -> float | None:
+        """When the robot came to the place that the ontology has; None where nobody told."""
         stamp = 0 if self._last is None else self._last.seen_at
         return stamp / 1e9 if stamp else None
 
-    def saw(self, place: str, now: float, *, until: float | None = None) -> None:
+    def saw(self, place: str, now: float, *, came: float | None = None) -> None:
         """Note that the robot is in ``place``; finer than the ontology's whole seconds.
 
         Args:
             place: The place.
             now: Seconds on the mission's clock.
-            until: When it was seen there last; None: it is there now.
+            came: When it came there, where it has left since; None: it is there now.
         """
         self.place = place
-        self.experience.saw(place, now, until=until)
-        if place == self._target:
+        self.experience.saw(place, now, came=came)
+        if came is None and place == self._target:
             self._target = None
-        if place == self.experience.requested:
+        if came is None and place == self.experience.requested:
             self.experience.requested = ''
         if self.fleet is not None:
             self.fleet.tell(place=place, now=now, visits=self.experience.visits.copy())

@@ -81,8 +81,8 @@ class World:
         is_silent: Whether an ontology that did not answer still does not.
         faults: Called with the name of each port method before it works; may raise, or change the
             world.
-        seen_at: When the robot left the place that the ontology has, nanoseconds: it is in none
-            now; 0: it is there.
+        seen_at: When the robot came to the place that the ontology has, nanoseconds: it has left
+            it since, and is in none; 0: it is there.
         station_points: Where the stations are that are not at the points of their rooms.
         speed: Metres per second.
         draw: Percent per second away from the station; there it charges with ``charge``.

@@ -43,7 +43,10 @@ def test_a_robot_between_two_places_visits_none(tmp_path: Path) -> None:
     model.decide(5.0, NOBODY)
     world.seen_at = 2_500_000_000
     model.decide(6.0, NOBODY)
-    assert model.experience.visits == {'E': 5.0}, 'it was there until then'
+    assert model.experience.visits == {'E': 5.0}, 'it was there then'
+    model.request('E')
+    model.decide(7.0, NOBODY)
+    assert model.experience.requested == 'E', 'it is not there'
 
 
 def test_a_request_outlives_the_node_that_took_it(tmp_path: Path) -> None:

@@ -12,6 +12,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.task import Future
 from std_srvs.srv import Empty
 
+from surveillance_behaviour.mission.recovery import Failure
 from surveillance_interfaces.msg import Decision, FsmTransition, MissionStatus
 from surveillance_interfaces.srv import GoTo, WhyNot
 from surveillance_runtime.node import PatrolNode
@@ -171,12 +172,21 @@ def test_a_machine_that_breaks_is_started_again_and_does_not_cry_on(
     robot.configure('battery_controller', random_battery_time=[5000.0, 6000.0])
     robot.begin()
     robot.until(20.0)
-    places = robot.nodes['robot_behavior'].mission.ports.places
+    mission = robot.nodes['robot_behavior'].mission
+    places, announcer = mission.ports.places, mission.ports.announcer
     right, broken = places.position, threading.Event()
+    say_wait, failures = announcer.waiting_for_help, []
+
+    def waiting_for_help(reason: str) -> None:
+        failures.append(mission.failure)
+        say_wait(reason)
+
+    monkeypatch.setattr(announcer, 'waiting_for_help', waiting_for_help)
 
     def position(*arguments: Any) -> Any:
         if not broken.is_set():
             broken.set()
+            mission.failure = Failure('moving', 'no path', 'R2')  # as of a step before
             raise RuntimeError('a mistake')
         return right(*arguments)
 
@@ -188,6 +198,7 @@ def test_a_machine_that_breaks_is_started_again_and_does_not_cry_on(
     )
     robot.until(90.0)
     assert broken.is_set()
+    assert failures[0] is None, 'no other cause'
     cries = [message.waiting_for_help for message in status]
     assert any('a mistake' in message.text for message in status)
     assert cries.count(True) < len(cries) / 2

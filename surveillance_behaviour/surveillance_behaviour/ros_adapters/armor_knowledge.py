@@ -58,7 +58,7 @@ class Whereabouts:
             interrupt: Ends the wait early.
 
         Returns:
-            Where it is then; empty when nobody said so far.
+            Where it is then; empty when it is in none, or nobody said so far.
         """
         deadline = time.monotonic() + seconds
 
