@@ -239,11 +239,11 @@ class FactSubscription:
 
     def _on_changes(self, msg: FactChanges) -> None:
         is_own = msg.reference_name == self._armor.reference_name
-        if is_own and msg.sequence == 0 and self._on_reload is not None:
-            self._on_reload()
         # One of another reference tells by its number whether any was missed.
         changes = changes_from_ros(msg) if is_own else []
         told = self._set.follow(msg.sequence, changes)
+        if told is None and self._on_reload is not None:
+            self._on_reload()  # That it was loaded or dropped may be what was missed.
         # An answer that is awaited may be from before these changes.
         if told is None or (self._asking and self._set.concerns(changes)):
             self.ask_anew()

@@ -167,7 +167,7 @@ class MapKeeper:
         self._gave_up_mending = False
         self._described = None if place is None else description_of(place)
         self._kept = KeptFile(
-            source.state_file, 'rooms that were added or removed are as described'
+            source.state_file, 'rooms that were added, removed or told by messages are not known'
         )
         self._by_hand: frozenset[str] = frozenset()
         self._entered: set[str] = set()
@@ -202,7 +202,7 @@ class MapKeeper:
         )
         if problem:
             self._reports.warn(
-                f'parameter state_file: {problem}; edited rooms are lost at a restart'
+                f'parameter state_file: {problem}; these rooms are lost at a restart'
             )
 
     def ensure_built(self) -> None:

@@ -18,7 +18,6 @@ from typing import Any
 
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.clock import Clock, ClockType
-from rclpy.event_handler import SubscriptionEventCallbacks
 from std_msgs.msg import String
 
 from surveillance_interfaces.msg import FactChanges, OntologyMap
@@ -125,13 +124,13 @@ class OntologyMapBuilder(PatrolNode):
             CHANGES_TOPIC,
             self._on_changes,
             CHANGES_QOS,
-            event_callbacks=SubscriptionEventCallbacks(matched=lambda _status: self._look()),
         )
         self._placed = FactSubscription(
             self,
             armor,
             PatrolOntology(armor, robot, fleet).robot_place_facts,
             lambda _fact, _came: self._built.happen(),
+            self._look,
         )
         self._built_at: float | None = None
         self._late = self.create_timer(PLACE_SECONDS, self._on_late, clock=steady)
@@ -321,11 +320,8 @@ class OntologyMapBuilder(PatrolNode):
         self._work.put(lambda: self._keeper.extend(notes, msg.robot_room))
 
     def _on_changes(self, msg: FactChanges) -> None:
-        if msg.reference_name != self._reference:
-            return
-        if msg.sequence == 0:
-            self._look()
-        elif not msg.is_consistent and self._doubt.is_canceled():
+        is_own = msg.reference_name == self._reference and msg.sequence
+        if is_own and not msg.is_consistent and self._doubt.is_canceled():
             self._doubt.reset()
 
     def _on_doubt(self) -> None:

@@ -11,11 +11,12 @@ from rclpy.task import Future
 
 from armor_service.protocol import DirectiveRequest
 from libs.armor_service.tests.seven_rooms import IRI, ONTOLOGY, build_seven_rooms, reach
-from surveillance_interfaces.srv import (
-    ArmorDirective,
-)
+from surveillance_interfaces.msg import FactChanges
+from surveillance_interfaces.srv import ArmorDirective
 from surveillance_ontology import armor_client
 from surveillance_ontology.armor_client import (
+    CHANGES_QOS,
+    CHANGES_TOPIC,
     ArmorClient,
     ArmorServiceCallError,
     ArmorServiceInternalError,
@@ -399,3 +400,17 @@ def test_what_goes_before_it_was_ever_known_is_not_kept(
     graph.until(lambda: told)
     assert 'R3' not in dict(told)
     assert not any(fact.arguments[0] == 'R3' for fact in visits.facts)
+
+
+def test_a_load_that_was_missed_is_told_as_one_that_was_heard(graph: Any) -> None:
+    armor = ArmorClient(graph.node, 'test', 'map', timeout=60.0)
+    reloads: list[int] = []
+    rooms = FactSubscription(
+        graph.node, armor, 'ROOM(?)', lambda _fact, _came: None, lambda: reloads.append(1)
+    )
+    publisher = graph.node.create_publisher(FactChanges, CHANGES_TOPIC, CHANGES_QOS)
+    graph.until(lambda: reloads)
+    for heard, (number, name) in enumerate([(3, 'map'), (6, 'other'), (0, 'map')], 2):
+        publisher.publish(FactChanges(sequence=number, reference_name=name))
+        graph.until(lambda heard=heard: len(reloads) == heard)
+    assert not rooms.facts

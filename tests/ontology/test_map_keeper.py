@@ -381,5 +381,5 @@ def test_a_state_file_that_no_file_can_be_is_told(path: str) -> None:
     assert keeper.place == seven()
     assert all(line.startswith('parameter state_file: ') for line in said)
     assert keeper.edit(lambda place: place.with_room('R5', (1, 2, 0), ['D8'])) == ''
-    assert said[-1].endswith('edited rooms are lost at a restart')
+    assert said[-1].endswith('these rooms are lost at a restart')
     service.close()
