@@ -19,7 +19,7 @@ import pytest
 from armor_service import changes
 from armor_service.client import ArmorServiceCallError, ArmorServiceInternalError
 from armor_service.facts import ShortFact, parse_fact
-from owl_reasoner.feed import Changes
+from owl_reasoner.notifier import Changes
 from owl_reasoner.owl.axioms import ClassAssertion
 from surveillance_interfaces.msg import FactChanges
 from surveillance_ontology import armor_client

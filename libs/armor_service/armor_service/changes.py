@@ -15,8 +15,8 @@ from typing import NamedTuple
 
 from armor_service.facts import FactChange
 from armor_service.rendering import render_entity, short_facts
-from owl_reasoner.feed import Changes
 from owl_reasoner.knowledge_base import KnowledgeBase
+from owl_reasoner.notifier import Changes
 from owl_reasoner.owl.axiom_text import axiom_text
 from owl_reasoner.owl.axioms import (
     Axiom,

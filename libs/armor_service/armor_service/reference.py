@@ -22,8 +22,8 @@ from armor_service.changes import (
 )
 from armor_service.protocol import DirectiveError
 from armor_service.rendering import render_entity, shown
-from owl_reasoner.feed import Changes
 from owl_reasoner.knowledge_base import KnowledgeBase
+from owl_reasoner.notifier import Changes
 from owl_reasoner.owl.axiom_text import axiom_text
 from owl_reasoner.owl.axioms import Axiom
 from owl_reasoner.reasoner.budget import ReasoningBudgetError

@@ -24,9 +24,9 @@ from typing import Any
 from armor_service.access import Settings
 from armor_service.protocol import DirectiveError, QueryItem
 from armor_service.reference import Reference
-from owl_reasoner.feed import Changes
+from owl_reasoner.gc_control import uncollected
 from owl_reasoner.knowledge_base import KnowledgeBase
-from owl_reasoner.memory import uncollected
+from owl_reasoner.notifier import Changes
 from owl_reasoner.owl.axioms import (
     Axiom,
     AxiomAnnotation,

@@ -21,8 +21,8 @@ from armor_service.rendering import one_line
 from armor_service.sparql import SparqlEngine
 from armor_service.store import Store
 from armor_service.worlds import Worlds
-from owl_reasoner import memory
-from owl_reasoner.feed import Changes
+from owl_reasoner import gc_control
+from owl_reasoner.notifier import Changes
 
 Watcher: TypeAlias = Callable[[str, Changes | None], None]
 """Told of a reference's name and what changed in it; None: it was loaded or dropped."""
@@ -81,11 +81,11 @@ class Workspace:
             store.warn = self.warn
             if self.settings.worlds:
                 self.worlds = Worlds(store.directory / 'worlds', self.warn)
-            with memory.uncollected():
+            with gc_control.uncollected():
                 recovered = store.recover()
                 for ref in recovered:
                     self.register(ref)
-                    memory.settle(len(ref.kb))
+                    gc_control.settle(len(ref.kb))
             if self.worlds:
                 self.worlds.keep_only(self.references.names())
             for note in store.notes:
@@ -138,7 +138,7 @@ class Workspace:
         Whoever asks for one does not wait for the others.
         """
         for ref in references:
-            with ref.lock, memory.uncollected(), contextlib.suppress(StoreError):
+            with ref.lock, gc_control.uncollected(), contextlib.suppress(StoreError):
                 if not ref.dropped:
                     ref.open()
 

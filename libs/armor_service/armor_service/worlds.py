@@ -30,7 +30,7 @@ from typing import Any
 from urllib.parse import quote
 
 from armor_service.reference import Reference
-from owl_reasoner.feed import Changes
+from owl_reasoner.notifier import Changes
 from owl_reasoner.owl.axioms import Axiom
 from owl_reasoner.owl.entities import entities_of
 

@@ -27,8 +27,8 @@ from armor_service.changes import (
 from armor_service.directive_log import DirectiveLog
 from armor_service.facts import ShortFact
 from armor_service.protocol import DirectiveError, DirectiveRequest, DirectiveResponse
-from owl_reasoner.feed import Changes
 from owl_reasoner.knowledge_base import KnowledgeBase
+from owl_reasoner.notifier import Changes
 from owl_reasoner.owl.axioms import (
     Axiom,
     ClassAssertion,

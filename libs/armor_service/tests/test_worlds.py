@@ -18,8 +18,8 @@ from armor_service.reference import Origin, Reference
 from armor_service.service import ArmorService
 from armor_service.store import Store
 from armor_service.worlds import Worlds, file_stem
-from owl_reasoner.feed import Changes
 from owl_reasoner.knowledge_base import KnowledgeBase
+from owl_reasoner.notifier import Changes
 from owl_reasoner.owl.axioms import ClassAssertion, SubClassOf
 from owl_reasoner.owl.expressions import ObjectSomeValuesFrom
 

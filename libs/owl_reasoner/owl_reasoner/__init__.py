@@ -22,8 +22,8 @@ if TYPE_CHECKING:
     from owl_reasoner.documents.writing import ontology_bytes as ontology_bytes
     from owl_reasoner.documents.writing import write_ontology as write_ontology
     from owl_reasoner.documents.xml_reading import OntologyFileError as OntologyFileError
-    from owl_reasoner.feed import Changes as Changes
     from owl_reasoner.knowledge_base import KnowledgeBase as KnowledgeBase
+    from owl_reasoner.notifier import Changes as Changes
     from owl_reasoner.owlready.reasoning import sync_reasoner_native as sync_reasoner_native
     from owl_reasoner.reasoner.answers import Unknown as Unknown
     from owl_reasoner.reasoner.budget import Progress as Progress

@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import partial
 
-from owl_reasoner.feed import Feed
-from owl_reasoner.memory import uncollected
+from owl_reasoner.gc_control import uncollected
+from owl_reasoner.notifier import Notifier
 from owl_reasoner.owl.assertions import Assertions, Unsettled, is_assertion
 from owl_reasoner.owl.axioms import (
     Axiom,
@@ -24,10 +24,10 @@ from owl_reasoner.owl.expressions import ClassExpression
 from owl_reasoner.owl.vocabulary import NOTHING, THING
 from owl_reasoner.reasoner.assertion_reader import needs_of
 from owl_reasoner.reasoner.budget import Budget, ReasoningBudgetError
+from owl_reasoner.reasoner.case_completion import CaseCompletion
 from owl_reasoner.reasoner.clauses import Predicate
 from owl_reasoner.reasoner.consequence_based.classification import Classification
 from owl_reasoner.reasoner.engine import Engine
-from owl_reasoner.reasoner.horn_completeness import Completion
 from owl_reasoner.reasoner.program_change import ProgramChange, program_change
 
 
@@ -45,7 +45,7 @@ class Derivation:
 
     Attributes:
         budget: What reasoning may use.
-        feed: Who is told of changes.
+        notifier: Who is told of changes.
         consistent: Whether no contradiction was found.
         engine, completion, classification: The layers; None: nothing was reasoned yet.
         interrupted: The last reasoning did not come to its end.
@@ -56,10 +56,10 @@ class Derivation:
 
     def __init__(self, told: Assertions, budget: Budget) -> None:
         self._told, self.budget = told, budget
-        self.feed = Feed()
+        self.notifier = Notifier()
         self.consistent = True
         self.engine: Engine | None = None
-        self.completion: Completion | None = None
+        self.completion: CaseCompletion | None = None
         self.classification: Classification | None = None
         self.interrupted = False
         self.costly: Axiom | None = None
@@ -253,15 +253,15 @@ class Derivation:
             update()
             completion.run(self._told.axioms)
 
-        if self.feed:
-            self.feed.updating(engine, complete)
+        if self.notifier:
+            self.notifier.updating(engine, complete)
         else:
             complete()
         self.consistent = engine.consistent
 
-    def _completion_of(self, engine: Engine) -> Completion:
+    def _completion_of(self, engine: Engine) -> CaseCompletion:
         assert self.classification is not None
-        return Completion(self.classification, engine, tuple(self._told.schema))
+        return CaseCompletion(self.classification, engine, tuple(self._told.schema))
 
     def _adopt(self, engine: Engine, change: ProgramChange) -> None:
         added, removed = self._told.settle()
@@ -271,7 +271,7 @@ class Derivation:
         self.snapshots.clear()
 
     def _rebuild(self, old: Engine | None) -> None:
-        before = self.feed.shown_by(old) if self.feed else set()
+        before = self.notifier.shown_by(old) if self.notifier else set()
         assert self.classification is not None
         engine = self.engine = Engine(self.classification.program, self._told, self.budget)
         if old is not None:
@@ -288,13 +288,13 @@ class Derivation:
         self.consistent = engine.consistent
         self.snapshots.clear()
         self._watched.clear()
-        if self.feed:
-            self.feed.replaced(before, engine)
+        if self.notifier:
+            self.notifier.replaced(before, engine)
 
     def _give_up(self, before: Engine | None, changes: Unsettled) -> None:
         """Forget an engine that an error left in the middle of its work."""
-        if self.feed:
-            self.feed.given_up(before)
+        if self.notifier:
+            self.notifier.given_up(before)
         self.engine = self.completion = self.classification = None
         self.interrupted = True
         self.snapshots.clear()

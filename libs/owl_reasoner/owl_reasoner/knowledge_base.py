@@ -20,8 +20,8 @@ from dataclasses import replace
 from typing import Any, TypeAlias
 
 from owl_reasoner.derivation import Derivation
-from owl_reasoner.feed import Changes, visible
 from owl_reasoner.justification import Justifications
+from owl_reasoner.notifier import Changes, visible
 from owl_reasoner.owl.assertions import Assertions
 from owl_reasoner.owl.axiom_text import axiom_text
 from owl_reasoner.owl.axioms import (
@@ -36,12 +36,12 @@ from owl_reasoner.owl.axioms import (
 from owl_reasoner.owl.entities import entities_of, renamed
 from owl_reasoner.owl.expressions import ClassExpression, Literal
 from owl_reasoner.owl.vocabulary import THING
-from owl_reasoner.reasoner.absence import Absence, Absences
 from owl_reasoner.reasoner.answers import Unknown
 from owl_reasoner.reasoner.budget import Budget, Cancel, Progress
 from owl_reasoner.reasoner.engine import FactView
 from owl_reasoner.reasoner.explanation import Explanation
 from owl_reasoner.reasoner.hypertableau.entailment import entails
+from owl_reasoner.reasoner.non_entailment import Absence, Absences
 
 MOST_SEARCHED = 500
 """Axioms about classes and properties among which a name like a mistyped one is looked for."""
@@ -51,6 +51,8 @@ Fact: TypeAlias = ClassAssertion | ObjectPropertyAssertion | DataPropertyAsserti
 
 class KnowledgeBase:
     """The assertions of one ontology and the facts derived from them.
+
+    Large because it is the public face: a method a question, each short.
 
     Queries answer from what is asserted now together with what was derived by the last `reason`; a
     value whose assertion was retracted is never returned. When the last `reason` found a
@@ -488,8 +490,8 @@ class KnowledgeBase:
         """
         gone = [axiom for axiom in removed if self._told.discard(axiom)]
         come = [axiom for axiom in added if self._told.insert(axiom)]
-        if self._derived.feed and (gone or come):
-            self._derived.feed.asserted(come, gone)
+        if self._derived.notifier and (gone or come):
+            self._derived.notifier.asserted(come, gone)
         return len(gone) + len(come)
 
     def rename(self, kind: str, old: str, new: str) -> int:
@@ -605,7 +607,7 @@ class KnowledgeBase:
         Returns:
             A function that ends the subscription.
         """
-        return self._derived.feed.subscribe(callback, self._derived.engine)
+        return self._derived.notifier.subscribe(callback, self._derived.engine)
 
     def copy(self) -> KnowledgeBase:
         """Another knowledge base with the same assertions, nothing derived and no subscribers."""

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from owl_reasoner import KnowledgeBase, ReasoningBudgetError
-from owl_reasoner.feed import Changes
+from owl_reasoner.notifier import Changes
 from owl_reasoner.owl import axioms as ax
 from owl_reasoner.owl import expressions as ex
 from owl_reasoner.owl.axioms import Axiom, ClassAssertion, SubClassOf

@@ -339,7 +339,7 @@ def test_a_value_that_nobody_asks_for_needs_no_cases(monkeypatch: pytest.MonkeyP
             asked.append(axioms)
             super().__init__(axioms, budget=budget)
 
-    monkeypatch.setattr('owl_reasoner.reasoner.horn_completeness.CaseReasoner', Counted)
+    monkeypatch.setattr('owl_reasoner.reasoner.case_completion.CaseReasoner', Counted)
     value = [SubClassOf(A, ex.ObjectHasValue(P, k)), ax.SubObjectPropertyOf(P, Q)]
     facts = [SubClassOf(B, A), ClassAssertion(B, i), ClassAssertion(C, k)]
     kb = reasoned(*value, *facts)
@@ -357,7 +357,7 @@ def test_a_value_that_nobody_asks_for_needs_no_cases(monkeypatch: pytest.MonkeyP
 def test_a_rule_that_computes_with_known_values_needs_no_cases(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr('owl_reasoner.reasoner.horn_completeness.CaseReasoner', None)
+    monkeypatch.setattr('owl_reasoner.reasoner.case_completion.CaseReasoner', None)
     x, v, w = map(ex.Variable, 'xvw')
     following = (ex.DataPropertyAtom(S, x, v), ex.BuiltinAtom(SWRLB + 'add', (w, v, whole(1))))
     adult = ex.DatatypeRestriction(XSD + 'integer', ((XSD + 'minInclusive', whole(18)),))
@@ -375,7 +375,7 @@ def test_a_rule_that_computes_with_known_values_needs_no_cases(
 
 def test_a_join_that_takes_too_long_is_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
     few_steps = partial(CaseReasoner, most_steps=200)
-    monkeypatch.setattr('owl_reasoner.reasoner.horn_completeness.CaseReasoner', few_steps)
+    monkeypatch.setattr('owl_reasoner.reasoner.case_completion.CaseReasoner', few_steps)
     x, y = ex.Variable('x'), ex.Variable('y')
     body = (ex.ClassAtom(A, x), ex.ClassAtom(B, y))
     members = [ClassAssertion(cls, f'x:n{n}') for n in range(20) for cls in (A, B)]
@@ -389,7 +389,7 @@ def test_a_join_that_takes_too_long_is_given_up(monkeypatch: pytest.MonkeyPatch)
 
 def test_classes_are_compared_once_individuals_leave_steps(monkeypatch: pytest.MonkeyPatch) -> None:
     few_steps = partial(CaseReasoner, most_steps=200)
-    monkeypatch.setattr('owl_reasoner.reasoner.horn_completeness.CaseReasoner', few_steps)
+    monkeypatch.setattr('owl_reasoner.reasoner.case_completion.CaseReasoner', few_steps)
     many = ClassAssertion(ex.ObjectMinCardinality(30, P, ex.ObjectUnionOf((A, B))), i)
     kb = reasoned(SubClassOf(A, B_OR_C), SubClassOf(B, D), SubClassOf(C, D), many)
     assert kb.unsupported[-1] == 'the ontology: reasoning by cases took too many steps'
@@ -837,7 +837,7 @@ def test_what_cases_said_of_classes_goes_when_there_is_too_much_for_cases(
     range_of_p = (ax.ObjectPropertyRange(P, C), ax.DisjointClasses((C, D)))
     kb = reasoned(SubClassOf(A, ex.ObjectHasValue(P, k)), *range_of_p, outside)
     assert kb.holds(SubClassOf(A, NOTHING))
-    monkeypatch.setattr('owl_reasoner.reasoner.horn_completeness._MOST_ASSERTIONS', 3)
+    monkeypatch.setattr('owl_reasoner.reasoner.case_completion._MOST_ASSERTIONS', 3)
     kb.change([ClassAssertion(B, one) for one in (i, j, k, m)], [outside])
     assert kb.reason()
     assert not kb.holds(SubClassOf(A, NOTHING))

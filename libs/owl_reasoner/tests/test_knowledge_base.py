@@ -8,8 +8,8 @@ import dataclasses
 
 import pytest
 
-from owl_reasoner.feed import Changes
 from owl_reasoner.knowledge_base import KnowledgeBase
+from owl_reasoner.notifier import Changes
 from owl_reasoner.owl import axioms as ax
 from owl_reasoner.owl.axioms import (
     AnnotationAssertion,

@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from owl_reasoner.feed import Changes
 from owl_reasoner.knowledge_base import KnowledgeBase
+from owl_reasoner.notifier import Changes
 from owl_reasoner.owl.assertions import is_assertion
 from owl_reasoner.owl.axioms import (
     Axiom,

@@ -65,7 +65,7 @@ from owl_reasoner.owl.expressions import (
     PropertyExpression,
 )
 from owl_reasoner.owl.vocabulary import NOTHING, OWL, THING, local_name
-from owl_reasoner.reasoner.absence import Absence
+from owl_reasoner.reasoner.non_entailment import Absence
 
 
 def _entities(iris: Iterable[str]) -> list[str]:

@@ -24,7 +24,7 @@ from armor_service.reference import (
 )
 from armor_service.rendering import parse_entity, shown
 from armor_service.workspace import Workspace
-from owl_reasoner import memory
+from owl_reasoner import gc_control
 from owl_reasoner.documents.reading import read_ontology
 from owl_reasoner.documents.xml_reading import OntologyFileError
 from owl_reasoner.knowledge_base import KnowledgeBase
@@ -102,9 +102,9 @@ def _load(
     name = request.reference_name
     notes = [f'{name} is loaded already']
     if not _rebuffer(workspace, request, buffered):
-        with memory.uncollected():
+        with gc_control.uncollected():
             ref, found = _read_document(workspace, request, source, iri, reasoner)
-            memory.settle(len(ref.kb))
+            gc_control.settle(len(ref.kb))
         ref.buffered_manipulation, ref.buffered_reasoner = buffered, lazy
         with workspace.entering:
             entered = name not in workspace.references
@@ -169,12 +169,12 @@ def _drop(workspace: Workspace, request: DirectiveRequest) -> DirectiveResponse:
 
 def _release(workspace: Workspace, ref: Reference) -> None:
     """Give back an ontology's memory; of a large one also that of those who know its graph."""
-    if len(ref.kb) > memory.LARGE:
+    if len(ref.kb) > gc_control.LARGE:
         workspace.sparql.forget()
     with ref.lock:  # The last of those who found it before it was dropped.
         parts = ref.kb.give_up()
         ref.kb = KnowledgeBase(ref.kb.iri)
-    memory.release(parts, workspace.references.hold_more_than(memory.LARGE))
+    gc_control.release(parts, workspace.references.hold_more_than(gc_control.LARGE))
 
 
 @utility(
@@ -207,7 +207,7 @@ def _save(workspace: Workspace, request: DirectiveRequest, path: str) -> Directi
         chosen = path or _loaded_file(workspace, first)
     # While nobody waits for the reference: the disk may not answer.
     target = workspace.paths.to_write(chosen, ONTOLOGY_ENDINGS)
-    with workspace.references.locked(request.reference_name) as ref, memory.uncollected():
+    with workspace.references.locked(request.reference_name) as ref, gc_control.uncollected():
         workspace.check_free(ref, request.client_name)
         if ref is not first and not path:
             # Its own file is another one.
@@ -222,7 +222,7 @@ def _save(workspace: Workspace, request: DirectiveRequest, path: str) -> Directi
         if taken < workspace.saved.get(target, 0):
             return DirectiveResponse()  # A newer state is there already.
         try:
-            with memory.uncollected():
+            with gc_control.uncollected():
                 write_ontology(axioms, iri, target, form, origin.prefixes)
         except OntologyFileError as error:
             raise DirectiveError(f'SAVE: {error}') from None
@@ -403,7 +403,7 @@ def _read_document(
         if request.primary.upper() == 'WEB':
             path, found = source, _fetch(source, workspace.settings)
         else:
-            with memory.collected():
+            with gc_control.collected():
                 found = workspace.paths.to_read(source)
             path = str(found)
         limit = workspace.settings.max_file_bytes
@@ -449,7 +449,7 @@ def _fetch(url: str, settings: Settings) -> bytes:
     if not url.lower().startswith(('http://', 'https://')):
         raise DirectiveError(f'LOAD WEB: {shown(url)} is not an http address')
     try:
-        with memory.collected(), urllib.request.urlopen(url, timeout=WEB_TIMEOUT) as answer:
+        with gc_control.collected(), urllib.request.urlopen(url, timeout=WEB_TIMEOUT) as answer:
             data: bytes = answer.read(settings.max_file_bytes + 1)
     except (OSError, ValueError) as error:
         reason = error.reason if isinstance(error, urllib.error.URLError) else error

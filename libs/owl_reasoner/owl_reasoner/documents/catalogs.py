@@ -17,7 +17,7 @@ _BASE = XML + 'base'
 _MOST = 1 << 20
 
 
-class _Reader(XmlReader):
+class _CatalogReader(XmlReader):
     def __init__(self, data: bytes, folder: Path) -> None:
         super().__init__(data)
         self.found: dict[str, Path] = {}
@@ -65,6 +65,6 @@ def catalog_entries(catalog: Path) -> dict[str, Path]:
         data = file.read(_MOST + 1)
     if len(data) > _MOST:
         raise OntologyFileError(f'larger than {_MOST} bytes', path=str(catalog))
-    reader = _Reader(data, catalog.parent)
+    reader = _CatalogReader(data, catalog.parent)
     reader.read()
     return reader.found

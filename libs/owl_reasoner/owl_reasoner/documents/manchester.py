@@ -220,6 +220,8 @@ class _Tokens:
 class ManchesterParser:
     """Reads class expressions, frames and rules.
 
+    Large because it has one method for each production of the grammar.
+
     Args:
         text: The text.
         named: Gives the IRI of a name, prefixed or not; raises ValueError.

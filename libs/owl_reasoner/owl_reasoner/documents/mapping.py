@@ -34,7 +34,7 @@ from owl_reasoner.owl.vocabulary import (
 
 _TYPE = RDF + 'type'
 T = TypeVar('T')
-_ReadNode: TypeAlias = 'Callable[[Mapping, str, dict[str, list[Node]]], None]'
+_ReadNode: TypeAlias = 'Callable[[RdfMapper, str, dict[str, list[Node]]], None]'
 DECLARATIONS = {
     OWL + 'Class': 'class',
     RDFS + 'Class': 'class',
@@ -436,8 +436,10 @@ class _Terms:
         )
 
 
-class Mapping:
+class RdfMapper:
     """Turns one graph into axioms.
+
+    Large because it has one method for each row of the mapping's tables.
 
     Args:
         graph: The graph.
@@ -865,39 +867,39 @@ _BETWEEN: dict[str, tuple[Callable[..., Axiom], Callable[..., Axiom]]] = {
 """The relations of two properties: as axioms of object properties, and of data properties."""
 _OF_PROPERTIES = {*_BETWEEN, RDFS + 'domain', RDFS + 'range'}
 """What is a mere annotation where it is said of an annotation property."""
-_PREDICATES: dict[str, Callable[[Mapping, str, str], Axiom | None]] = {
+_PREDICATES: dict[str, Callable[[RdfMapper, str, str], Axiom | None]] = {
     OWL + 'imports': lambda m, s, v: ax.Import(v),
     RDFS + 'subClassOf': lambda m, s, v: ax.SubClassOf(
         m._terms.expression(s), m._terms.expression(v)
     ),
-    OWL + 'equivalentClass': Mapping._equivalent_class,
+    OWL + 'equivalentClass': RdfMapper._equivalent_class,
     OWL + 'disjointWith': lambda m, s, v: ax.DisjointClasses(
         (m._terms.expression(s), m._terms.expression(v))
     ),
-    OWL + 'disjointUnionOf': Mapping._disjoint_union,
-    OWL + 'propertyChainAxiom': Mapping._chain,
-    OWL + 'inverseOf': Mapping._inverse,
-    RDFS + 'domain': Mapping._domain,
-    RDFS + 'range': Mapping._range,
-    OWL + 'sameAs': Mapping._same,
+    OWL + 'disjointUnionOf': RdfMapper._disjoint_union,
+    OWL + 'propertyChainAxiom': RdfMapper._chain,
+    OWL + 'inverseOf': RdfMapper._inverse,
+    RDFS + 'domain': RdfMapper._domain,
+    RDFS + 'range': RdfMapper._range,
+    OWL + 'sameAs': RdfMapper._same,
     OWL + 'differentFrom': lambda m, s, v: ax.DifferentIndividuals(frozenset((s, v))),
-    OWL + 'hasKey': Mapping._key,
+    OWL + 'hasKey': RdfMapper._key,
     OWL + 'datatypeComplementOf': lambda *_: None,
     _CHAIN: lambda *_: None,
-    **{name: partial(Mapping._between, predicate=name) for name in _BETWEEN},
-    **{name: partial(Mapping._defined, predicate=name) for name in _CONSTRUCTED},
+    **{name: partial(RdfMapper._between, predicate=name) for name in _BETWEEN},
+    **{name: partial(RdfMapper._defined, predicate=name) for name in _CONSTRUCTED},
 }
 
 _SPECIAL: dict[str, _ReadNode] = {
-    OWL + name: partial(Mapping._group, read=read)
+    OWL + name: partial(RdfMapper._group, read=read)
     for name, read in (
-        ('AllDifferent', Mapping._all_different),
-        ('AllDisjointClasses', Mapping._all_disjoint_classes),
-        ('AllDisjointProperties', Mapping._all_disjoint_properties),
-        ('NegativePropertyAssertion', Mapping._negative),
+        ('AllDifferent', RdfMapper._all_different),
+        ('AllDisjointClasses', RdfMapper._all_disjoint_classes),
+        ('AllDisjointProperties', RdfMapper._all_disjoint_properties),
+        ('NegativePropertyAssertion', RdfMapper._negative),
     )
 } | {
-    OWL + 'Axiom': Mapping._annotated,
-    OWL + 'Annotation': Mapping._annotated_annotation,
-    SWRL + 'Imp': Mapping._rule,
+    OWL + 'Axiom': RdfMapper._annotated,
+    OWL + 'Annotation': RdfMapper._annotated_annotation,
+    SWRL + 'Imp': RdfMapper._rule,
 }

@@ -51,7 +51,7 @@ class _Element:
     text: list[str] = field(default_factory=list)
 
 
-class _Reader(XmlReader):
+class _OwlXmlReader(XmlReader):
     def __init__(self, data: bytes, base: str) -> None:
         super().__init__(data)
         self.stated = Axioms(lambda line: line, base)
@@ -193,6 +193,6 @@ def parse_owl_xml(data: bytes, base: str) -> Axioms:
     Raises:
         OntologyFileError: With line and column.
     """
-    reader = _Reader(data, base)
+    reader = _OwlXmlReader(data, base)
     reader.read()
     return reader.stated

@@ -62,7 +62,7 @@ _NAME = re.compile(r'[^\W\d][\w.\-]*')
 _TAG = re.compile(rb'<(?:[^"\'>]++|"[^"]*"|\'[^\']*\')*+>')
 
 
-class _Reader(XmlReader):
+class _RdfXmlReader(XmlReader):
     def __init__(self, base: str, data: bytes) -> None:
         super().__init__(data)
         self.graph = Graph(unsupported=self.unsupported)
@@ -282,7 +282,7 @@ def parse_rdf_xml(data: bytes, base: str) -> Graph:
         OntologyFileError: With line and column, for anything that is not RDF/XML or would expand
             entities.
     """
-    reader = _Reader(base, data)
+    reader = _RdfXmlReader(base, data)
     reader.read()
     if not reader.seen_root:
         raise OntologyFileError('the document holds no element', 1, 1)

@@ -17,12 +17,12 @@ from urllib.parse import unquote, urlsplit
 from owl_reasoner.documents.catalogs import CATALOG, catalog_entries
 from owl_reasoner.documents.functional_syntax import is_functional, parse_functional
 from owl_reasoner.documents.manchester import ManchesterDocument
-from owl_reasoner.documents.mapping import Mapping
+from owl_reasoner.documents.mapping import RdfMapper
 from owl_reasoner.documents.owl_xml import is_owl_xml, parse_owl_xml
 from owl_reasoner.documents.rdf_xml import Graph, Node, parse_rdf_xml
 from owl_reasoner.documents.structural import Axioms
 from owl_reasoner.documents.xml_reading import OntologyFileError, is_absolute, legal
-from owl_reasoner.memory import collected, uncollected
+from owl_reasoner.gc_control import collected, uncollected
 from owl_reasoner.owl.axioms import Axiom, Import
 from owl_reasoner.owl.entities import entities_of, renamed
 from owl_reasoner.owl.expressions import Literal, language_tag
@@ -104,7 +104,7 @@ def read_ontology(
     with collected():
         seen = set() if isinstance(source, bytes) else {Path(source).resolve()}
     form, main = _read(source, iri, size_limit)
-    documents: list[tuple[str, Mapping | Axioms, Path | None]] = [('', main, folder)]
+    documents: list[tuple[str, RdfMapper | Axioms, Path | None]] = [('', main, folder)]
     missing: dict[str, str] = {}
     for _, document, place in documents:
         for name in document.imports:
@@ -186,7 +186,7 @@ def _in_package(iri: str, folder: Path) -> Path | None:
     return None
 
 
-def _read(source: str | Path | bytes, iri: str, size_limit: int) -> tuple[str, Mapping | Axioms]:
+def _read(source: str | Path | bytes, iri: str, size_limit: int) -> tuple[str, RdfMapper | Axioms]:
     """Parse one document; return its format and what it states."""
     if isinstance(source, bytes):
         name, data = '<document>', source
@@ -222,7 +222,7 @@ def _utf8(data: bytes) -> bytes:
         raise OntologyFileError(f'its encoding cannot be read: {error}', 1, 1) from None
 
 
-def _parsed(data: bytes, iri: str) -> tuple[str, Mapping | Axioms]:
+def _parsed(data: bytes, iri: str) -> tuple[str, RdfMapper | Axioms]:
     """Parse a document in UTF-8 by the format that it begins with."""
     begin = _COMMENTS.match(data)
     place = begin.end() if begin else 0
@@ -232,21 +232,21 @@ def _parsed(data: bytes, iri: str) -> tuple[str, Mapping | Axioms]:
         return 'functional', parse_functional(_text(data), iri)
     if _TRIPLE.match(data, place):
         try:
-            return 'ntriples', Mapping(_rdf_text(data, iri, 'ntriples'), iri)
+            return 'ntriples', RdfMapper(_rdf_text(data, iri, 'ntriples'), iri)
         except OntologyFileError as error:
             # Turtle can begin so as well.
             try:
-                return 'turtle', Mapping(_rdf_text(data, iri, 'turtle'), iri)
+                return 'turtle', RdfMapper(_rdf_text(data, iri, 'turtle'), iri)
             except OntologyFileError as other:
                 raise max(error, other, key=lambda e: e.line) from None
     if _XML.match(data, place):
         if is_owl_xml(data):
             return 'owlxml', parse_owl_xml(data, iri)
-        return 'rdfxml', Mapping(parse_rdf_xml(data, iri), iri)
+        return 'rdfxml', RdfMapper(parse_rdf_xml(data, iri), iri)
     if _JSON.match(data, place):
-        return 'jsonld', Mapping(_rdf_text(data, iri, 'jsonld'), iri)
+        return 'jsonld', RdfMapper(_rdf_text(data, iri, 'jsonld'), iri)
     if _TURTLE.match(data, place):
-        return 'turtle', Mapping(_rdf_text(data, iri, 'turtle'), iri)
+        return 'turtle', RdfMapper(_rdf_text(data, iri, 'turtle'), iri)
     if _MANCHESTER.match(data, place):
         return 'manchester', ManchesterDocument(_text(data), iri)
     shown = data[place : place + 40].decode('latin-1')
@@ -265,7 +265,7 @@ def _text(data: bytes) -> str:
         raise OntologyFileError(f'not UTF-8: {error.reason}', line, 1) from None
 
 
-class _Names(dict[str, str]):
+class _NodeNames(dict[str, str]):
     """The names of nodes, by the nodes as N-Triples has them.
 
     Args:
@@ -304,7 +304,7 @@ def _rdf_text(data: bytes, iri: str, form: str) -> Graph:
         'jsonld': pyoxigraph.RdfFormat.JSON_LD,
     }[form]
     graph = Graph()
-    names = _Names(graph.unsupported)
+    names = _NodeNames(graph.unsupported)
     properties: set[str] = set()
     default = pyoxigraph.DefaultGraph()
     literal, triple = pyoxigraph.Literal, pyoxigraph.Triple

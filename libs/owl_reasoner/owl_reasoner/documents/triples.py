@@ -91,7 +91,7 @@ _GROUPS = {_NEGATIVE[0], *(group for _, _, group in _APART.values())}
 _COUNTED = {record: row[:2] for row in CARDINALITIES for record in row[2:]}
 
 
-class _Mapping:
+class _TripleWriter:
     def __init__(self, iri: str, prefix: str = '_:w') -> None:
         self.iri = iri
         self.triples: list[Triple] = []
@@ -297,12 +297,12 @@ def axiom_triples(axiom: Axiom, iri: str) -> list[Triple]:
         axiom: Of any kind; the annotation of an axiom comes with the axiom that it annotates.
         iri: The ontology's IRI, the subject of imports.
     """
-    mapping = _Mapping(iri, NODE)
+    writer = _TripleWriter(iri, NODE)
     if isinstance(axiom, ax.AxiomAnnotation):
-        mapping.annotated(axiom.axiom, [axiom])
+        writer.annotated(axiom.axiom, [axiom])
     else:
-        mapping.axiom(axiom)
-    return mapping.triples
+        writer.axiom(axiom)
+    return writer.triples
 
 
 _VALUED = ('object_property', 'data_property')
@@ -315,8 +315,8 @@ def triples_of(axioms: Iterable[Axiom], iri: str) -> Iterator[Triple]:
     could not tell an object property from a data property. One that the header is annotated with
     is not declared for that where it has values, too: they would be read as annotations.
     """
-    mapping = _Mapping(iri)
-    mapping.add(iri, _TYPE, OWL + 'Ontology')
+    writer = _TripleWriter(iri)
+    writer.add(iri, _TYPE, OWL + 'Ontology')
     axioms = tuple(dict.fromkeys(axioms))
     declared = {(axiom.kind, axiom.iri) for axiom in axioms if isinstance(axiom, ax.Declaration)}
     used, labels = _mentioned(axioms)
@@ -327,13 +327,13 @@ def triples_of(axioms: Iterable[Axiom], iri: str) -> Iterator[Triple]:
             notes.setdefault(axiom.axiom, []).append(axiom)
     for axiom in axioms:
         if axiom in notes:
-            mapping.annotated(axiom, notes[axiom])
+            writer.annotated(axiom, notes[axiom])
         elif not isinstance(axiom, ax.AxiomAnnotation):
-            mapping.axiom(axiom)
+            writer.axiom(axiom)
     valued = {name for kind, name in used | dict.fromkeys(declared) if kind in _VALUED}
     for kind, name in used:
         if kind == 'annotation_property' and name in valued:
             continue
         if (kind, name) not in declared and not name.startswith((OWL, RDF, RDFS, XSD)):
-            mapping.add(name, _TYPE, KIND_TYPES[kind])
-    return iter(mapping.triples)
+            writer.add(name, _TYPE, KIND_TYPES[kind])
+    return iter(writer.triples)

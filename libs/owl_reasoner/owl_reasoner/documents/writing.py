@@ -13,7 +13,7 @@ from owl_reasoner.documents.rdf_xml import Node, Triple
 from owl_reasoner.documents.replacing import replace_file
 from owl_reasoner.documents.triples import triples_of
 from owl_reasoner.documents.xml_reading import FORBIDDEN, OntologyFileError
-from owl_reasoner.memory import collected
+from owl_reasoner.gc_control import collected
 from owl_reasoner.owl.axioms import (
     Axiom,
     ClassAssertion,

@@ -41,7 +41,7 @@ def locality_module(axioms: Iterable[Axiom], goals: Iterable[Axiom]) -> list[Axi
     matter always.
     """
     axioms = [a for a in axioms if not isinstance(a, ax.Declaration | ax.Annotation | ax.Import)]
-    names = _Names(name for goal in goals for name in _mentioned(goal))
+    names = _Signature(name for goal in goals for name in _mentioned(goal))
     about: dict[str, list[int]] = {}
     for number, axiom in enumerate(axioms):
         for name in _mentioned(axiom):
@@ -62,7 +62,7 @@ def _mentioned(axiom: Axiom) -> set[str]:
     return {iri for kind, iri in entities_of(axiom) if kind in _KINDS}
 
 
-class _Names:
+class _Signature:
     """The classes and properties that may have members; all others are taken to have none."""
 
     def __init__(self, names: Iterable[str]) -> None:

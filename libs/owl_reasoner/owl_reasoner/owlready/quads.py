@@ -14,7 +14,7 @@ from collections.abc import Container, Iterable, Iterator
 from decimal import Decimal
 from typing import Any, TypeAlias
 
-from owl_reasoner.documents.mapping import Mapping
+from owl_reasoner.documents.mapping import RdfMapper
 from owl_reasoner.documents.rdf_xml import Graph, Node, Triple
 from owl_reasoner.documents.triples import KIND_TYPES, NODE, axiom_triples
 from owl_reasoner.owl import axioms as ax
@@ -189,7 +189,7 @@ class OntologyWriter:
             self._ontology._del_data_triple_raw_spod(*quad)
 
 
-class Names:
+class StoredNames:
     """What the numbers of a World stand for; asked of it once for each.
 
     Args:
@@ -209,7 +209,7 @@ class Names:
             name = self._known[number] = self._world._unabbreviate(number)
         return name
 
-    def all(self) -> Names:
+    def all(self) -> StoredNames:
         """Ask for all names at once."""
         self._known.update(self._world.graph.execute('SELECT storid, iri FROM resources'))
         return self
@@ -247,7 +247,7 @@ def read_axioms(
     contexts: Iterable[int],
     without: Container[Quad] = (),
     known: dict[int, str] | None = None,
-) -> Mapping:
+) -> RdfMapper:
     """Read the axioms of ontologies.
 
     Args:
@@ -260,8 +260,8 @@ def read_axioms(
         What was read: its ``axioms``, what it ``declared``, and in ``unsupported`` one sentence for
         each statement that was not understood.
     """
-    names = Names(world, known).all()
+    names = StoredNames(world, known).all()
     triples = [names.triple(quad) for quad in quads_of(world, contexts) if quad not in without]
-    mapping = Mapping(Graph(triples))
+    mapping = RdfMapper(Graph(triples))
     mapping.read()
     return mapping

@@ -24,12 +24,12 @@ from owlready2 import reasoning as owlready2_reasoning
 from owlready2.base import LOADING
 from owlready2.namespace import CURRENT_NAMESPACES
 
-from owl_reasoner.feed import Changes
 from owl_reasoner.knowledge_base import KnowledgeBase
+from owl_reasoner.notifier import Changes
 from owl_reasoner.owl import axioms as ax
 from owl_reasoner.owl.axioms import Axiom
 from owl_reasoner.owl.vocabulary import NOTHING, OWL, RDF, RDFS, THING
-from owl_reasoner.owlready.quads import Names, Quad, contexts_of, read_axioms, stored_value
+from owl_reasoner.owlready.quads import Quad, StoredNames, contexts_of, read_axioms, stored_value
 
 INFERRED = 'http://inferrences/'
 """The ontology for what follows where none is named; owlready2 spells it so."""
@@ -214,7 +214,7 @@ class _Session:
         """Return what came and what went, where all of it is of individuals; else None."""
         come: list[Axiom] = []
         gone: list[Axiom] = []
-        names, contexts = Names(self.world, self._names), set(self._contexts())
+        names, contexts = StoredNames(self.world, self._names), set(self._contexts())
         own = self.target.graph.c
         for c, *quad in rows:
             if c is None:
@@ -229,7 +229,7 @@ class _Session:
                 (come if self._is_there(found, contexts) else gone).append(axiom)
         return come, gone
 
-    def _fact(self, names: Names, quad: Quad) -> Axiom | None:
+    def _fact(self, names: StoredNames, quad: Quad) -> Axiom | None:
         """Return the fact that a quad states; None where it takes part in another axiom."""
         subject, predicate, value = names.triple(quad)
         kinds = self._kinds.single

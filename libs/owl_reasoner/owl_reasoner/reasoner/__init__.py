@@ -2,9 +2,9 @@
 
 What it derives is sound. Axioms become Horn clauses (`translation`, `clauses`, `simplify`); what
 classes alone imply is completed (`consequence_based`); the clauses run as compiled joins (`joins`,
-`network`) in an incremental engine (`engine`, `cardinality`, `equality`, `difference`,
+`join_network`) in an incremental engine (`engine`, `cardinality`, `equality`, `inequality`,
 `threshold_rules`) that explains what it holds (`proofs`, `explanation`). Values are compared by
 `datatypes` and `swrl_builtins`. What takes reasoning by cases is found by `hypertableau`
-and added by `horn_completeness`; what is left out is reported by
+and added by `case_completion`; what is left out is reported by
 `KnowledgeBase.unsupported`.
 """

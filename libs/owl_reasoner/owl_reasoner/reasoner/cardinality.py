@@ -1,4 +1,4 @@
-"""Cardinalities: counting what is known, with difference decided by `Difference`.
+"""Cardinalities: counting what is known, with inequality decided by `Inequality`.
 
 `AtLeastCounter` derives membership in `min n`; `AtMostCounter` finds contradictions with `max n`
 and functional properties, and the individuals that must be the same because only one is allowed.
@@ -20,7 +20,7 @@ from owl_reasoner.reasoner.clauses import (
     Predicate,
     Premises,
 )
-from owl_reasoner.reasoner.difference import Difference, clique, cliques
+from owl_reasoner.reasoner.inequality import Inequality, clique, cliques
 from owl_reasoner.reasoner.value_sets import ValueSet
 
 Emit = Callable[[Fact], None]
@@ -30,13 +30,13 @@ MergeRequest = Callable[[str, str, Axiom | None, Premises], None]
 class _Counter:
     """What the two have in common: who is related to whom, and who is in the filler."""
 
-    def __init__(self, condition: AtLeast | AtMost, difference: Difference) -> None:
+    def __init__(self, condition: AtLeast | AtMost, inequality: Inequality) -> None:
         self.prop = condition.prop
         self.inverse = condition.inverse
         self.n = condition.n
         self.origin = condition.origin
         self.is_data = condition.prop.kind == 'data'
-        self.difference = difference
+        self.inequality = inequality
         self.succ: dict[Any, dict[Any, None]] = self.prop.pred if self.inverse else self.prop.succ
         self.pred: dict[Any, dict[Any, None]] = self.prop.succ if self.inverse else self.prop.pred
         filler = condition.filler
@@ -82,13 +82,13 @@ class _Counter:
             return iter(())
         if self.is_data:
             return map(list, combinations(sorted(values, key=repr), size))
-        return cliques(sorted(values), size, self.difference.different)
+        return cliques(sorted(values), size, self.inequality.different)
 
     def differences(self, values: list[str]) -> Premises:
         """Return the facts by which the values are pairwise different; values of data just are."""
         if self.is_data:
             return ()
-        predicate = self.difference.predicate
+        predicate = self.inequality.predicate
         return tuple((predicate, *pair) for pair in combinations(values, 2))
 
     def _subjects(self, act: Callable[[str], None]) -> Callable[..., None]:
@@ -108,9 +108,9 @@ class AtLeastCounter(_Counter):
     """Keeps the members of one `min n` expression."""
 
     def __init__(
-        self, condition: AtLeast, difference: Difference, enqueue: Emit, overdelete: Emit
+        self, condition: AtLeast, inequality: Inequality, enqueue: Emit, overdelete: Emit
     ) -> None:
-        super().__init__(condition, difference)
+        super().__init__(condition, inequality)
         self.head = condition.head
         self._enqueue, self._overdelete = enqueue, overdelete
         self.prop.on_insert.append(self._subjects(self.gain))
@@ -132,7 +132,7 @@ class AtLeastCounter(_Counter):
         if len(values) >= self.n and (
             # Individuals may be the same unless known to be different (no unique name assumption):
             # so many pairwise different ones are a clique in the graph of known differences.
-            self.is_data or clique(values, self.n, self.difference.different) is not None
+            self.is_data or clique(values, self.n, self.inequality.different) is not None
         ):
             self._enqueue((self.head, z))
 
@@ -153,13 +153,13 @@ class AtMostCounter(_Counter):
     def __init__(
         self,
         condition: AtMost,
-        difference: Difference,
+        inequality: Inequality,
         nothing: Predicate,
         enqueue: Emit,
         overdelete: Emit,
         merge: MergeRequest,
     ) -> None:
-        super().__init__(condition, difference)
+        super().__init__(condition, inequality)
         self.condition = condition
         self.label = condition.label
         self._nothing = nothing
@@ -196,7 +196,7 @@ class AtMostCounter(_Counter):
             for other in related[1:]:
                 self._only_one(z, related[0], other)
             return
-        different = self.difference.different
+        different = self.inequality.different
         if self.is_data or clique(related, self.n + 1, different) is not None:
             if z not in self._nothing.members:
                 self._enqueue((self._nothing, z))
@@ -223,7 +223,7 @@ class AtMostCounter(_Counter):
                 self._only_one(z, first, y)
 
     def _only_one(self, z: str, first: Any, other: Any) -> None:
-        if self.is_data or self.difference.different(first, other):
+        if self.is_data or self.inequality.different(first, other):
             if z not in self._nothing.members:
                 self._enqueue((self._nothing, z))
             return
@@ -238,7 +238,7 @@ class AtMostCounter(_Counter):
 
     def _forced(self, related: list[str]) -> Iterator[tuple[str, str]]:
         """Pairs that must be the same for the rest to fit."""
-        different = self.difference.different
+        different = self.inequality.different
         related = sorted(related)
         if len(related) == self.n + 1:
             pairs = [pair for pair in combinations(related, 2) if not different(*pair)]
@@ -288,12 +288,12 @@ class AtMostCounter(_Counter):
                 for mark in marks:
                     yield mark + facts
             return
-        different = self.difference.different
+        different = self.inequality.different
         for one, other in self.pairs(x, y):
             if different(one, other):
                 facts = self.facts(x, [one]) + self.facts(y, [other])
                 for mark in marks:
-                    yield mark + facts + ((self.difference.predicate, one, other),)
+                    yield mark + facts + ((self.inequality.predicate, one, other),)
 
     def pairs(self, x: str, y: str) -> Iterator[tuple[str, str]]:
         """Yield where one is allowed: pairs of values that must be the same if `x` and `y` are."""

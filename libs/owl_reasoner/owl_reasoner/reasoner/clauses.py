@@ -271,6 +271,8 @@ class Partial:
 class Program:
     """Everything the engine runs.
 
+    Many attributes because it is a record: one table for each kind of clause.
+
     Attributes:
         classes, objects, datas: Predicates by IRI.
         labels: Predicates of complex class expressions.

@@ -20,8 +20,8 @@ from xml.etree import ElementTree
 
 from owl_reasoner.owl.expressions import Literal
 from owl_reasoner.owl.vocabulary import OWL, RDF, XSD
-from owl_reasoner.reasoner import moments
-from owl_reasoner.reasoner.moments import moment_of, text_of
+from owl_reasoner.reasoner import datetimes
+from owl_reasoner.reasoner.datetimes import moment_of, text_of
 
 Value: TypeAlias = 'int | Fraction | str | tuple[Any, ...]'
 
@@ -172,10 +172,10 @@ def parse_value(literal: Literal) -> Value:
             return ('boolean', text.strip(_SPACES) in ('true', '1'))
         if name in ('float', 'double'):
             return _floating(name, text.strip(_SPACES))
-        if name in moments.CALENDAR:
-            return moments.calendar_value(name, text.strip(_SPACES))
-        if name in moments.DURATIONS:
-            return moments.duration_of(name, text.strip(_SPACES))
+        if name in datetimes.CALENDAR:
+            return datetimes.calendar_value(name, text.strip(_SPACES))
+        if name in datetimes.DURATIONS:
+            return datetimes.duration_of(name, text.strip(_SPACES))
         if name in ('dateTime', 'dateTimeStamp'):
             value = moment_of(text.strip(_SPACES))
             if name == 'dateTimeStamp' and value[1] != 'utc':
@@ -241,10 +241,10 @@ def literal_of(value: Value) -> Literal:
         return Literal(text, XSD + space)
     if space == 'dateTime':
         return Literal(text_of(value), XSD + space)
-    if space in moments.CALENDAR:
-        return Literal(moments.calendar_text(value), XSD + space)
+    if space in datetimes.CALENDAR:
+        return Literal(datetimes.calendar_text(value), XSD + space)
     if space == 'duration':
-        return Literal(moments.duration_text(value), XSD + space)
+        return Literal(datetimes.duration_text(value), XSD + space)
     if space == 'anyURI':
         return Literal(value[1], XSD + space)
     if space == 'hexBinary':
@@ -297,10 +297,10 @@ def order(first: Value, second: Value) -> int | None:
     Equal by order may be different values: 0.0 and -0.0, or one instant in two zones.
     """
     if isinstance(first, tuple) and isinstance(second, tuple) and first[0] == second[0]:
-        if first[0] == 'dateTime' or first[0] in moments.CALENDAR:
-            return moments.order(first, second)
+        if first[0] == 'dateTime' or first[0] in datetimes.CALENDAR:
+            return datetimes.order(first, second)
         if first[0] == 'duration':
-            return moments.duration_order(first, second)
+            return datetimes.duration_order(first, second)
         if first[0] in ('ill-formed', 'other'):
             return None
         if first[0] == 'langString' and first[2] != second[2]:

@@ -32,9 +32,9 @@ from owl_reasoner.reasoner.assertion_reader import AssertionReader
 from owl_reasoner.reasoner.budget import Budget
 from owl_reasoner.reasoner.clauses import AtMost, Fact, Predicate, Premises, Program
 from owl_reasoner.reasoner.datatypes import Value, literal_of
-from owl_reasoner.reasoner.difference import Difference
 from owl_reasoner.reasoner.equality import Conflicts, Equality, Merge, individuals_in
-from owl_reasoner.reasoner.network import Network
+from owl_reasoner.reasoner.inequality import Inequality
+from owl_reasoner.reasoner.join_network import JoinNetwork
 from owl_reasoner.reasoner.program_change import ProgramChange
 from owl_reasoner.reasoner.proofs import ProofSearch
 
@@ -93,6 +93,8 @@ class _CaseFacts:
 class Engine:
     """Keeps the consequences of a program and a changing set of assertions.
 
+    Large because insertion, deletion and merging of individuals share one queue and its order.
+
     Facts are stored under the name of the individual that represents all individuals known to be
     the same. A class of equal individuals is split as soon as anything that could have justified
     it goes; its members' assertions are then stated again under their own names, and what still
@@ -106,7 +108,7 @@ class Engine:
 
     Attributes:
         equality: Who stands for whom.
-        difference: Who is known to be different.
+        inequality: Who is known to be different.
         reader: Reads assertions as facts.
         asserted: How many assertions state each fact.
         conflicts: Merges of individuals that are different.
@@ -124,7 +126,7 @@ class Engine:
         self.told = told
         self.equality = Equality()
         self.reader = AssertionReader(program, self.equality)
-        self.difference = Difference(program)
+        self.inequality = Inequality(program)
         self.asserted: dict[Fact, int] = {}
         # What is still to be added, and candidates for removal. The hooks of predicates append to
         # both.
@@ -146,10 +148,10 @@ class Engine:
         self.cases = _CaseFacts()
         self.changed: dict[Fact, bool] | None = None
         self.renamed = False
-        self._network = Network(
+        self._network = JoinNetwork(
             program,
             self.equality.representative,
-            self.difference,
+            self.inequality,
             self._queue.append,
             self._overdeleted.append,
             self._insert_now,
@@ -179,12 +181,12 @@ class Engine:
             return len({self.equality.find(name) for name in axiom.individuals}) == 1
         if isinstance(axiom, DifferentIndividuals):
             names = sorted(self.equality.find(name) for name in axiom.individuals)
-            return all(self.difference.different(*pair) for pair in combinations(names, 2))
+            return all(self.inequality.different(*pair) for pair in combinations(names, 2))
         fact = self.reader.fact_of(axiom)
         return fact is not None and bool(fact[0].holds(fact))
 
     @property
-    def network(self) -> Network:
+    def network(self) -> JoinNetwork:
         """What runs the program."""
         return self._network
 
@@ -285,7 +287,7 @@ class Engine:
 
     def _holds(self, fact: Fact) -> bool:
         if fact[0] is self.program.different:
-            return self.difference.different(fact[1], fact[2])
+            return self.inequality.different(fact[1], fact[2])
         if fact[0] is self.program.same:
             return bool(self.conflicts.between(fact[1], fact[2]))
         holds: bool = fact[0].holds(fact)
@@ -344,7 +346,7 @@ class Engine:
                 for ask in self._network.merging:  # By other premises they may still be.
                     ask(x, y)
                 continue
-            if self.difference.different(x, y):
+            if self.inequality.different(x, y):
                 self.conflicts.add(merge)
                 self._queue.append((self._nothing, x))
                 continue
@@ -356,7 +358,7 @@ class Engine:
     def _merge(self, merge: Merge, filled: list[Predicate]) -> None:
         self.renamed = True
         kept, gone = self.equality.join(merge)
-        self.difference.merge(kept, self.equality.members[kept])
+        self.inequality.merge(kept, self.equality.members[kept])
         moved = list(_facts_about(gone, filled))
         for fact in moved:
             for fire in fact[0].on_delete:
@@ -404,7 +406,7 @@ class Engine:
             others.update(dict.fromkeys(self.equality.dependents(fact)))
             self._take(fact)
         members = self.equality.split(representative)
-        self.difference.split(representative)
+        self.inequality.split(representative)
         for merge in self.conflicts.mentioning(members):
             self._overdeleted.append((self._nothing, representative))
             self._withdraw_conflict(merge)
@@ -576,11 +578,11 @@ class Engine:
         come = [axiom for axiom in added if isinstance(axiom, DifferentIndividuals)]
         if not gone and not come:
             return
-        difference, equality = self.difference, self.equality
+        inequality, equality = self.inequality, self.equality
         if not gone and self._is_blank():
             # The facts come after: who is different is known when they do.
             for axiom in come:
-                difference.state(axiom)
+                inequality.state(axiom)
             return
         touched: dict[str, None] = {}
         for axiom in gone:
@@ -592,11 +594,11 @@ class Engine:
                 touched[equality.find(individual)] = None
         self._touch_before_removal(*touched)
         for axiom in gone:
-            difference.withdraw(axiom)
+            inequality.withdraw(axiom)
         for axiom in come:
             heirs = [other.individuals for other in gone]
             known = max(heirs, key=lambda heir: len(heir & axiom.individuals), default=frozenset())
-            difference.state(axiom)
+            inequality.state(axiom)
             for individual in axiom.individuals - known:
                 self._touched[equality.find(individual)] = None
         if equality.members:

@@ -128,7 +128,7 @@ class Reasons:
         if isinstance(axiom, ax.DifferentIndividuals):
             names = sorted(engine.equality.find(name) for name in axiom.individuals)
             pairs = list(combinations(names, 2))
-            if not all(engine.difference.different(*pair) for pair in pairs):
+            if not all(engine.inequality.different(*pair) for pair in pairs):
                 return None
             proofs = [engine.proofs.find((engine.program.different, *pair)) for pair in pairs]
             parts = [self._explained(proof) for proof in proofs if proof is not None]
@@ -265,7 +265,7 @@ class Reasons:
     def _stated_difference(self, fact: Fact, text: str) -> Explanation:
         engine = self._engine
         _, x, y = fact
-        axiom = engine.difference.stating(engine.equality.same(x), engine.equality.same(y))
+        axiom = engine.inequality.stating(engine.equality.same(x), engine.equality.same(y))
         if axiom is None:
             return Explanation(text, 'asserted')
         return Explanation(text, 'axiom', axiom_text(axiom), axioms=(axiom,))

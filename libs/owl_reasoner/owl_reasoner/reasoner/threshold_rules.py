@@ -175,7 +175,10 @@ _HIGHEST = _Highest()
 
 
 class ThresholdIndex:
-    """Runs one clause that `split_rule` took apart."""
+    """Runs one clause that `split_rule` took apart.
+
+    Many attributes because it keeps one rule compiled: its terms, its sorted lists and its hooks.
+    """
 
     def __init__(
         self,

@@ -182,6 +182,8 @@ def computed_atom(atom: ex.BuiltinAtom, terms: RuleTerms) -> ComputedAtom:
 class Translation:
     """Builds a `Program` from axioms that are not assertions.
 
+    Large because it has one short method for each kind of axiom and expression.
+
     Args:
         axioms: The ontology's axioms; assertions and annotations among them are passed over.
         asserted: Complex class expressions that individuals are asserted to belong to.

@@ -33,7 +33,7 @@ from owl_reasoner.reasoner.datatypes import (
     schema_pattern,
     value_of,
 )
-from owl_reasoner.reasoner.moments import CALENDAR, DURATIONS, LARGEST_OFFSET, is_duration
+from owl_reasoner.reasoner.datetimes import CALENDAR, DURATIONS, LARGEST_OFFSET, is_duration
 
 _NUMBERS = ('whole', 'decimal', 'rational', 'real')
 _MOMENTS = ('utc', 'local')

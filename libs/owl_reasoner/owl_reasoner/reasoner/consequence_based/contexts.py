@@ -115,6 +115,8 @@ class Context:
 class Contexts:
     """Completes contexts of one program; rules of SWRL take no part.
 
+    Large because the rules of the calculus work on one set of contexts, in turn.
+
     Attributes:
         rules: What follows from what.
     """

@@ -11,7 +11,7 @@ from owl_reasoner.owl.axiom_text import expression_text
 from owl_reasoner.owl.axioms import Axiom
 from owl_reasoner.reasoner.clauses import UnsupportedError
 from owl_reasoner.reasoner.datatypes import value_of
-from owl_reasoner.reasoner.hypertableau.clauses import ANYBODY, CaseRules
+from owl_reasoner.reasoner.hypertableau.dl_clauses import ANYBODY, DLClauses
 from owl_reasoner.reasoner.hypertableau.model import CaseModel
 from owl_reasoner.reasoner.value_sets import point
 
@@ -29,7 +29,7 @@ class AssertionWriter:
         gaps: Gets one sentence for each class that is not covered.
     """
 
-    def __init__(self, rules: CaseRules, gaps: dict[str, None]) -> None:
+    def __init__(self, rules: DLClauses, gaps: dict[str, None]) -> None:
         self._rules, self._gaps = rules, gaps
         self._names: tuple[str, ...] = ()
 

@@ -14,7 +14,7 @@ from functools import partial
 from owl_reasoner.owl import expressions as ex
 from owl_reasoner.owl.vocabulary import NOTHING, THING, local_name
 from owl_reasoner.reasoner.clauses import StoppedError
-from owl_reasoner.reasoner.hypertableau.clauses import CaseRules
+from owl_reasoner.reasoner.hypertableau.dl_clauses import DLClauses
 from owl_reasoner.reasoner.hypertableau.search import CaseSearch
 
 _MOST_KEPT = 200
@@ -36,7 +36,7 @@ class ClassComparison:
     """
 
     def __init__(
-        self, rules: CaseRules, search: CaseSearch, restart: Callable[[], object], keeps: bool
+        self, rules: DLClauses, search: CaseSearch, restart: Callable[[], object], keeps: bool
     ) -> None:
         self._search, self._restart, self._keeps = search, restart, keeps
         self._budget = rules.budget
@@ -157,7 +157,7 @@ class ClassComparison:
 class _ClassModels:
     """What models of classes, one after the other, say of which class may be below which."""
 
-    def __init__(self, rules: CaseRules, search: CaseSearch) -> None:
+    def __init__(self, rules: DLClauses, search: CaseSearch) -> None:
         self._rules, self._search, self._somebody = rules, search, 0
         self.certain: list[tuple[str, str]] = []
         # Sets of named classes as bits: thousands of sets of hundreds of classes are intersected.

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from itertools import combinations
 
-from owl_reasoner.reasoner.hypertableau.clauses import Count
+from owl_reasoner.reasoner.hypertableau.dl_clauses import Count
 from owl_reasoner.reasoner.hypertableau.model import (
     Alternative,
     CaseModel,

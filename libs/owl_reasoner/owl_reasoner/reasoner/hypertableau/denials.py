@@ -12,7 +12,7 @@ from owl_reasoner.owl.axioms import Axiom
 from owl_reasoner.owl.expressions import ClassExpression
 from owl_reasoner.owl.vocabulary import THING, TOP_LITERAL
 from owl_reasoner.reasoner.clauses import UnsupportedError, turned
-from owl_reasoner.reasoner.hypertableau.clauses import FRESH
+from owl_reasoner.reasoner.hypertableau.dl_clauses import FRESH
 from owl_reasoner.reasoner.property_chains import AnyRole
 from owl_reasoner.reasoner.translation import directed, inclusions
 

@@ -17,8 +17,8 @@ from owl_reasoner.reasoner.budget import Budget
 from owl_reasoner.reasoner.clauses import StoppedError, UnsupportedError
 from owl_reasoner.reasoner.hypertableau.assertions import AssertionWriter
 from owl_reasoner.reasoner.hypertableau.class_comparison import ClassComparison
-from owl_reasoner.reasoner.hypertableau.clauses import CaseRules
 from owl_reasoner.reasoner.hypertableau.denials import Denial, denials
+from owl_reasoner.reasoner.hypertableau.dl_clauses import DLClauses
 from owl_reasoner.reasoner.hypertableau.fact_questions import FactQuestions
 from owl_reasoner.reasoner.hypertableau.model_facts import ModelFacts
 from owl_reasoner.reasoner.hypertableau.search import CaseSearch
@@ -55,7 +55,7 @@ class CaseReasoner:
         axioms = list(axioms)
         self._budget = budget or Budget()
         self._budget.stage = 'reasoning by cases'
-        self._rules = CaseRules(axioms, self._budget)
+        self._rules = DLClauses(axioms, self._budget)
         self.gaps = dict(self._rules.gaps)
         self.class_gaps: dict[str, None] = {}
         self.stopped = False

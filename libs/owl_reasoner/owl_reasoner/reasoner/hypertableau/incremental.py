@@ -24,7 +24,7 @@ from owl_reasoner.reasoner.budget import Budget
 from owl_reasoner.reasoner.clauses import StoppedError
 from owl_reasoner.reasoner.hypertableau.assertions import AssertionWriter
 from owl_reasoner.reasoner.hypertableau.class_comparison import ClassComparison
-from owl_reasoner.reasoner.hypertableau.clauses import CaseRules, OfChain
+from owl_reasoner.reasoner.hypertableau.dl_clauses import DLClauses, OfChain
 from owl_reasoner.reasoner.hypertableau.fact_questions import FactQuestions
 from owl_reasoner.reasoner.hypertableau.kept_model import KeptModel
 
@@ -110,7 +110,7 @@ class IncrementalCases:
         assertions = list(assertions)
         budget.stage = 'reasoning by cases'
         self._budget, self._history, self._most_steps = budget, history, most_steps
-        self._rules = CaseRules([*schema, *assertions], budget)
+        self._rules = DLClauses([*schema, *assertions], budget)
         self.gaps = dict(self._rules.gaps)
         self.class_gaps: dict[str, None] = {}
         self.stopped = False

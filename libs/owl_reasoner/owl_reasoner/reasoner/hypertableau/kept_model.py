@@ -16,7 +16,7 @@ from typing import Any
 from owl_reasoner.owl import axioms as ax
 from owl_reasoner.owl.axioms import Axiom
 from owl_reasoner.reasoner.hypertableau.assertions import AssertionWriter, Prepared
-from owl_reasoner.reasoner.hypertableau.clauses import CaseRules
+from owl_reasoner.reasoner.hypertableau.dl_clauses import DLClauses
 from owl_reasoner.reasoner.hypertableau.model import Choices
 from owl_reasoner.reasoner.hypertableau.model_facts import ModelFacts
 from owl_reasoner.reasoner.hypertableau.search import CaseSearch
@@ -39,7 +39,7 @@ class KeptModel:
         is_flat: Whether no choices are kept below the changing assertions.
     """
 
-    def __init__(self, rules: CaseRules, writer: AssertionWriter, most_steps: int) -> None:
+    def __init__(self, rules: DLClauses, writer: AssertionWriter, most_steps: int) -> None:
         self._rules, self._writer = rules, writer
         self.search = CaseSearch(rules, most_steps)
         self.reader = ModelFacts(rules, self.search)

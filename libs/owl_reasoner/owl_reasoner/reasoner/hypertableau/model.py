@@ -15,7 +15,7 @@ from typing import Any, NamedTuple, TypeAlias
 
 from owl_reasoner.reasoner.clauses import StoppedError
 from owl_reasoner.reasoner.datatypes import Value
-from owl_reasoner.reasoner.hypertableau.clauses import ANYBODY, FRESH, Asked, CaseRules
+from owl_reasoner.reasoner.hypertableau.dl_clauses import ANYBODY, FRESH, Asked, DLClauses
 from owl_reasoner.reasoner.value_sets import ValueSet
 
 Choices: TypeAlias = int
@@ -32,6 +32,8 @@ class ClashError(Exception):
 
 class CaseModel:
     """Individuals and values with their facts.
+
+    Many attributes because each is one index of the same graph, and backtracking undoes them all.
 
     Args:
         rules: Give the roles above a role, and the concept of each named individual.
@@ -51,7 +53,7 @@ class CaseModel:
             that rules about named individuals ask for; some are gone, or have it no more.
     """
 
-    def __init__(self, rules: CaseRules, most_steps: int) -> None:
+    def __init__(self, rules: DLClauses, most_steps: int) -> None:
         self.rules, self._most_steps, self.steps = rules, most_steps, 0
         self.budget, self._roles = rules.budget, rules.roles
         self.labels: dict[int, dict[int, Choices]] = {}

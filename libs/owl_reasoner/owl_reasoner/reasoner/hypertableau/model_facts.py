@@ -10,7 +10,7 @@ from owl_reasoner.owl.axioms import Axiom
 from owl_reasoner.owl.expressions import Literal
 from owl_reasoner.owl.vocabulary import THING, TOP
 from owl_reasoner.reasoner.datatypes import literal_of
-from owl_reasoner.reasoner.hypertableau.clauses import CaseRules
+from owl_reasoner.reasoner.hypertableau.dl_clauses import DLClauses
 from owl_reasoner.reasoner.hypertableau.model import Choices
 from owl_reasoner.reasoner.hypertableau.search import CaseSearch
 
@@ -28,7 +28,7 @@ class ModelFacts:
         search: Has it.
     """
 
-    def __init__(self, rules: CaseRules, search: CaseSearch) -> None:
+    def __init__(self, rules: DLClauses, search: CaseSearch) -> None:
         self._rules, self._search = rules, search
         # The steps from each state of what accepts a property's chains.
         self._automata: dict[str, dict[int, list[tuple[int | None, int]]]] = {}

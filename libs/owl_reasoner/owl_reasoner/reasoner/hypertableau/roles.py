@@ -2,7 +2,7 @@
 
 An object property has a number and its inverse the negative of it, so that a step from x to y and
 the same step from y to x need one entry. Everything is a role or a data property here; complex
-classes know them through `clauses.CaseRules`.
+classes know them through `dl_clauses.DLClauses`.
 """
 
 from __future__ import annotations

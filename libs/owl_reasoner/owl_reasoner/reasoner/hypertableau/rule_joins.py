@@ -24,7 +24,7 @@ from owl_reasoner.reasoner.clauses import (
     Term,
 )
 from owl_reasoner.reasoner.datatypes import Value, literal_of
-from owl_reasoner.reasoner.hypertableau.clauses import (
+from owl_reasoner.reasoner.hypertableau.dl_clauses import (
     ANYBODY,
     Asked,
     FactAtom,

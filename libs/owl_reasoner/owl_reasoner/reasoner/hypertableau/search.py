@@ -17,14 +17,14 @@ from collections.abc import Callable, Iterable
 from typing import NamedTuple
 
 from owl_reasoner.reasoner.hypertableau.blocking import Blocking
-from owl_reasoner.reasoner.hypertableau.clauses import (
+from owl_reasoner.reasoner.hypertableau.counting import Counting
+from owl_reasoner.reasoner.hypertableau.dl_clauses import (
     ANYBODY,
-    CaseRules,
     Count,
-    EdgeRule,
+    DLClauses,
+    EdgeClause,
     Heads,
 )
-from owl_reasoner.reasoner.hypertableau.counting import Counting
 from owl_reasoner.reasoner.hypertableau.model import (
     Alternative,
     CaseModel,
@@ -67,6 +67,8 @@ class _Always(NamedTuple):
 class CaseSearch:
     """Completes a model.
 
+    Large because the rules of the calculus share one agenda and one trail of choices.
+
     Args:
         rules: What must hold.
         most_steps: After so many added facts the search ends.
@@ -76,7 +78,7 @@ class CaseSearch:
         depends: Whether the last contradiction rests on choices that are held.
     """
 
-    def __init__(self, rules: CaseRules, most_steps: int) -> None:
+    def __init__(self, rules: DLClauses, most_steps: int) -> None:
         self.rules = rules
         self.model = CaseModel(rules, most_steps)
         self._values = CaseValues(self.model, self._either)
@@ -428,7 +430,7 @@ class CaseSearch:
                 model.recount[one] = None
         self._named.on_relation(x, role, y)
 
-    def _fire(self, rule: EdgeRule, x: int, y: int) -> None:
+    def _fire(self, rule: EdgeClause, x: int, y: int) -> None:
         model = self.model
         if model.is_gone(x) or model.is_gone(y):
             return

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from itertools import combinations
 
 from owl_reasoner.reasoner.datatypes import Value
-from owl_reasoner.reasoner.hypertableau.clauses import ValueCount
+from owl_reasoner.reasoner.hypertableau.dl_clauses import ValueCount
 from owl_reasoner.reasoner.hypertableau.model import (
     CaseModel,
     Choices,

@@ -67,7 +67,7 @@ class Absence:
 
 
 @dataclass(frozen=True)
-class _Gap:
+class _Shortfall:
     """A match of one clause: what is missing, and which facts were matched."""
 
     origin: Axiom | None
@@ -97,7 +97,7 @@ class Absences:
             because = axiom_text(gap.origin) if gap.origin else 'the axioms about its classes'
         return Absence(text, because, gap.missing, gap.facts)
 
-    def _nearest(self, fact: Fact, asked: tuple[Fact, ...]) -> _Gap | None:
+    def _nearest(self, fact: Fact, asked: tuple[Fact, ...]) -> _Shortfall | None:
         """Return the smallest gap of all clauses and bounds that could derive a fact.
 
         Args:
@@ -117,7 +117,7 @@ class Absences:
         ]
         return min(gaps, key=lambda gap: len(gap.missing), default=None)
 
-    def _of_bound(self, least: AtLeast, x: str) -> _Gap:
+    def _of_bound(self, least: AtLeast, x: str) -> _Shortfall:
         """Return what a lower bound lacks."""
         related = (least.prop.pred if least.inverse else least.prop.succ).get(x, ())
         name = local_name(least.prop.name)
@@ -126,13 +126,13 @@ class Absences:
         if isinstance(least.filler, Predicate):
             what = f' in {local_name(least.filler.name)}'
         text = f'{local_name(x)} {name} at least {least.n} different ones{what} ({found})'
-        return _Gap(least.origin, (text,))
+        return _Shortfall(least.origin, (text,))
 
     # --- clauses ---
 
     def _of_clause(
         self, clause: Clause, head: PredicateAtom, asked: tuple[Fact, ...]
-    ) -> Iterator[_Gap]:
+    ) -> Iterator[_Shortfall]:
         """Yield the cheapest match of a clause's body, where its head can be the last fact."""
         fact = asked[-1]
         bound: dict[Term, Any] = {}
@@ -188,7 +188,7 @@ class Absences:
         elif _UNKNOWN in values:
             yield bound, True, None  # It is about somebody who is missing already.
         elif isinstance(atom, DifferentAtom):
-            yield bound, self._engine.difference.different(*values), None
+            yield bound, self._engine.inequality.different(*values), None
         elif isinstance(atom, SameAtom):
             yield bound, values[0] == values[1], None
         else:
@@ -228,7 +228,7 @@ class Absences:
         missing: tuple[BodyAtom, ...],
         match: Proof,
         asked: tuple[Fact, ...],
-    ) -> _Gap | None:
+    ) -> _Shortfall | None:
         """Return the gap of a match; None where a fact is missing that was asked for."""
         texts: list[str] = []
         facts: list[Axiom] = []
@@ -250,7 +250,7 @@ class Absences:
             texts.append(self._text(atom.predicate, values))
             stated = None if _UNKNOWN in values else self._reasons.stated(fact)
             facts += [] if stated is None else [stated]
-        return _Gap(clause.origin, tuple(dict.fromkeys(texts)), tuple(facts))
+        return _Shortfall(clause.origin, tuple(dict.fromkeys(texts)), tuple(facts))
 
     def _text(self, predicate: Predicate, values: list[Any]) -> str:
         if _UNKNOWN not in values:

@@ -62,7 +62,7 @@ _ALL = frozenset((ANYBODY,))
 
 
 @dataclass(frozen=True, slots=True)
-class NodeRule:
+class NodeClause:
     """Whoever has the concepts has one of the heads."""
 
     body: frozenset[int]
@@ -70,7 +70,7 @@ class NodeRule:
 
 
 @dataclass(frozen=True, slots=True)
-class EdgeRule:
+class EdgeClause:
     """For x related to y by the role, with concepts of both: one of the heads."""
 
     xs: frozenset[int]
@@ -80,7 +80,7 @@ class EdgeRule:
 
 
 @dataclass(frozen=True, slots=True)
-class ValueRule:
+class ValueClause:
     """For x with a value in `values`: one of the heads; `rest` is what is not in `values`."""
 
     xs: frozenset[int]
@@ -162,8 +162,11 @@ class NamedRule:
     """Whether anonymous individuals take no part (OWL 2 Structural Specification, 9.5)."""
 
 
-class CaseRules:
+class DLClauses:
     """The rules of an ontology's axioms; assertions are passed over.
+
+    Many attributes because each is one index of the same clauses, which the search reads in its
+    innermost loop; a record between them would cost it a look-up each.
 
     Attributes:
         names: The classes and individuals of concepts: IRI by number, '' for the others.
@@ -196,12 +199,12 @@ class CaseRules:
         self._numbers: dict[str, int] = {}
         self.roles = Roles()
         self.always: list[Heads] = []
-        self.of_node: dict[int, list[NodeRule]] = {}
+        self.of_node: dict[int, list[NodeClause]] = {}
         self.excluded: dict[int, list[frozenset[int]]] = {}
-        self.by_role: dict[int, list[EdgeRule]] = {}
-        self.by_source: dict[int, list[EdgeRule]] = {}
-        self.by_target: dict[int, list[EdgeRule]] = {}
-        self.by_prop: dict[str, list[ValueRule]] = {}
+        self.by_role: dict[int, list[EdgeClause]] = {}
+        self.by_source: dict[int, list[EdgeClause]] = {}
+        self.by_target: dict[int, list[EdgeClause]] = {}
+        self.by_prop: dict[str, list[ValueClause]] = {}
         self._ranges: dict[str, ValueSet] = {}
         self.of_values: set[int] = set()
         self.at_least: dict[int, Count] = {}
@@ -403,7 +406,7 @@ class CaseRules:
 
     def include(self, sub: ClassExpression, sup: ClassExpression) -> None:
         """Add the rules by which members of one class are members of another."""
-        _Clause(self).add(normal_form(ex.ObjectUnionOf((ex.ObjectComplementOf(sub), sup))))
+        _Clausifier(self).add(normal_form(ex.ObjectUnionOf((ex.ObjectComplementOf(sub), sup))))
 
     def node_rule(self, body: frozenset[int], heads: Heads) -> None:
         """Add a rule about one individual."""
@@ -412,17 +415,17 @@ class CaseRules:
         if any(concept == ANYBODY or concept in body for _, concept in heads):
             return
         # It is a choice for every individual. What absorption (Horrocks and Tobies, KR 2000) can
-        # turn into a rule with a body has one by now (`_Clause`).
+        # turn into a rule with a body has one by now (`_Clausifier`).
         if body == _ALL and len(heads) > 1:
             self.always.append(heads)
             return
-        rule = NodeRule(body, heads)
+        rule = NodeClause(body, heads)
         for concept in body:
             self.of_node.setdefault(concept, []).append(rule)
             if not heads:
                 self.excluded.setdefault(concept, []).append(body - {concept})
 
-    def edge_rule(self, rule: EdgeRule) -> None:
+    def edge_rule(self, rule: EdgeClause) -> None:
         """Add a rule about related individuals."""
         if any(concept == ANYBODY for _, concept in rule.heads):
             return
@@ -437,7 +440,7 @@ class CaseRules:
         if prop == TOP_DATA:
             self.node_rule(xs, heads if self._size(values) else ((_X, ANYBODY),))
         elif not values.is_empty:
-            self.by_prop.setdefault(prop, []).append(ValueRule(xs, values, ~values, heads))
+            self.by_prop.setdefault(prop, []).append(ValueClause(xs, values, ~values, heads))
             self.of_values |= xs - _ALL
 
     def value_count(self, table: dict[int, ValueCount], count: ValueCount) -> int:
@@ -458,7 +461,7 @@ class CaseRules:
         """Add the rules by which whoever a member is related to has another concept."""
         body = frozenset((concept,))
         if not self.roles.is_complex(prop):
-            self.edge_rule(EdgeRule(body, self.roles.number(prop), _ALL, ((_Y, target),)))
+            self.edge_rule(EdgeClause(body, self.roles.number(prop), _ALL, ((_Y, target),)))
             return
         # A box over a complex role walks the automaton of its chains (Horrocks and Sattler,
         # "Decidability of SHIQ with complex role inclusion axioms", 2004): a concept for each
@@ -482,7 +485,7 @@ class CaseRules:
             if step is None:
                 self.node_rule(here, ((_X, there),))
             else:
-                self.edge_rule(EdgeRule(here, step, _ALL, ((_Y, there),)))
+                self.edge_rule(EdgeClause(here, step, _ALL, ((_Y, there),)))
 
     def mark(self, prop: PropertyExpression) -> int:
         """Return a concept of whoever is related to itself by the role."""
@@ -519,7 +522,7 @@ class CaseRules:
             somebody = Count(1, self.roles.number(TOP), self.nominal(self.fresh()))
             self.node_rule(_ALL, ((_X, self.counted(self.at_least, somebody)),))
         if BOTTOM in used:
-            self.edge_rule(EdgeRule(_ALL, self.roles.number(BOTTOM), _ALL, ()))
+            self.edge_rule(EdgeClause(_ALL, self.roles.number(BOTTOM), _ALL, ()))
         if BOTTOM_DATA in used:
             self.value_rule(BOTTOM_DATA, _ALL, EVERY, ())
 
@@ -602,7 +605,7 @@ class _NamedRules:
     end.
     """
 
-    def __init__(self, rules: CaseRules, individuals: Iterable[str]) -> None:
+    def __init__(self, rules: DLClauses, individuals: Iterable[str]) -> None:
         self._rules = rules
         self._individuals = tuple(dict.fromkeys(individuals))
 
@@ -700,10 +703,10 @@ class _NamedRules:
         return SameAtom(pair) if isinstance(atom, ex.SameIndividualAtom) else DifferentAtom(pair)
 
 
-class _Clause:
+class _Clausifier:
     """A disjunction of class expressions, which everybody is in, on its way to becoming rules."""
 
-    def __init__(self, rules: CaseRules) -> None:
+    def __init__(self, rules: DLClauses) -> None:
         self._rules = rules
         self._body: set[int] = set()
         self._heads: list[int] = []
@@ -734,7 +737,7 @@ class _Clause:
 
     def _apart(self, operand: ClassExpression) -> None:
         """Add the disjunction with one operand instead of an intersection."""
-        other = _Clause(self._rules)
+        other = _Clausifier(self._rules)
         other._body |= self._body
         other._heads += self._heads
         other._never += self._never
@@ -835,7 +838,7 @@ class _Clause:
         source, target = rules.recognised(filler), rules.concept(name)
         if not rules.roles.is_complex(prop):
             ys = frozenset((source,))
-            rules.edge_rule(EdgeRule(_ALL, rules.roles.number(prop), ys, ((_X, target),)))
+            rules.edge_rule(EdgeClause(_ALL, rules.roles.number(prop), ys, ((_X, target),)))
             return
         iri, inverted = directed(prop)
         rules.roles.has_inverse = True
@@ -855,7 +858,7 @@ class _Clause:
                     ys.add(rules.recognised(ex.ObjectComplementOf(one)))
                 else:
                     ends.append((_Y, rules.positive(one)))
-            rules.edge_rule(EdgeRule(body, role, frozenset(ys) or _ALL, (*heads, *ends)))
+            rules.edge_rule(EdgeClause(body, role, frozenset(ys) or _ALL, (*heads, *ends)))
 
 
 def _disjuncts(one: ClassExpression) -> tuple[ClassExpression, ...]:

@@ -30,7 +30,7 @@ class Changes:
     consistent: bool
 
 
-class Feed:
+class Notifier:
     """The subscribers, and what they were told last."""
 
     def __init__(self) -> None:

@@ -24,11 +24,11 @@ from owl_reasoner.reasoner.clauses import (
     SameAtom,
     Term,
 )
-from owl_reasoner.reasoner.difference import (
+from owl_reasoner.reasoner.inequality import (
     AsymmetricEvidence,
-    Difference,
     DisjointClassEvidence,
     DisjointPropertyEvidence,
+    Inequality,
     IrreflexiveEvidence,
 )
 from owl_reasoner.reasoner.joins import (
@@ -43,7 +43,7 @@ Emit = Callable[[Fact], None]
 MergeRequest = Callable[[str, str, Axiom | None, Premises], None]
 
 
-class Network:
+class JoinNetwork:
     """Attaches everything a program needs to its predicates.
 
     Attributes:
@@ -63,7 +63,7 @@ class Network:
         self,
         program: Program,
         representative: dict[str, str],
-        difference: Difference,
+        inequality: Inequality,
         enqueue: Emit,
         overdelete: Emit,
         insert: Emit,
@@ -72,10 +72,10 @@ class Network:
         looker: Callable[[Axiom | None], Callable[[], None]],
     ) -> None:
         self._program = program
-        self._difference = difference
+        self._inequality = inequality
         self._enqueue, self._overdelete, self._merge = enqueue, overdelete, merge
         self.context = JoinContext(
-            representative, difference.different, program.different, due, looker
+            representative, inequality.different, program.different, due, looker
         )
         self.initial: list[Callable[[], None]] = []
         self.naming: list[Callable[[], None]] = []
@@ -86,10 +86,10 @@ class Network:
         self.thresholds: list[ThresholdIndex] = []
         self._insert, self._closing = insert, set[Predicate]()
         self._hooks: dict[Clause, list[tuple[list[Any], Any]]] = {}
-        program.different.supports.append((difference.premises, None))
+        program.different.supports.append((inequality.premises, None))
         self.lower: list[AtLeastCounter] = []
         for at_least in program.at_least:
-            counter = AtLeastCounter(at_least, difference, enqueue, overdelete)
+            counter = AtLeastCounter(at_least, inequality, enqueue, overdelete)
             self.lower.append(counter)
             if not counter.is_data:
                 self.touch_insert.append(counter.touch_insert)
@@ -235,19 +235,19 @@ class Network:
 
     def limit(self, condition: AtMost) -> AtMostCounter:
         """Watch an upper bound, which may also tell individuals apart, from now on."""
-        difference, nothing = self._difference, self._program.nothing
+        inequality, nothing = self._inequality, self._program.nothing
         counter = AtMostCounter(
-            condition, difference, nothing, self._enqueue, self._overdelete, self._merge
+            condition, inequality, nothing, self._enqueue, self._overdelete, self._merge
         )
         self.counters.append(counter)
         if not counter.is_data:
             counter.hook(self.touch_insert, counter.touch_insert)
             counter.hook(self.touch_delete, counter.touch_delete)
         if counter.is_data:
-            counter.hook(difference.evidence, counter)
+            counter.hook(inequality.evidence, counter)
             counter.prop.touching = (1,)
         elif counter.n == 1:
-            counter.hook(difference.through, counter)
+            counter.hook(inequality.through, counter)
             _also_touches(counter.prop, 2 if counter.inverse else 1)
             if counter.filler is not None:
                 counter.filler.touching = (1,)
@@ -265,7 +265,7 @@ class Network:
         nothing, enqueue, overdelete = self._program.nothing, self._enqueue, self._overdelete
         if not self._disjoint:
             nothing.supports.append((self._in_disjoint, 'these classes are disjoint'))
-            self._difference.evidence.append(DisjointClassEvidence(self._disjoint))
+            self._inequality.evidence.append(DisjointClassEvidence(self._disjoint))
         self._disjoint[predicate] = None
         predicate.touching = (1,)
 
@@ -289,10 +289,10 @@ class Network:
                     if x in other.members:
                         yield ((predicate, x), (other, x))
 
-    # --- difference ---
+    # --- inequality ---
 
     def _attach_evidence(self) -> None:
-        program, evidence = self._program, self._difference.evidence
+        program, evidence = self._program, self._inequality.evidence
         for predicate in program.irreflexive:
             evidence.append(IrreflexiveEvidence(predicate))
             predicate.touching = (1, 2)

@@ -8,7 +8,7 @@ import weakref
 
 import pytest
 
-from owl_reasoner import memory
+from owl_reasoner import gc_control
 
 
 @pytest.fixture(autouse=True)
@@ -29,9 +29,9 @@ class Ring:
 
 def test_the_collector_is_off_inside_and_as_before_outside() -> None:
     assert gc.isenabled()
-    with memory.uncollected():
+    with gc_control.uncollected():
         assert not gc.isenabled()
-        with memory.uncollected():
+        with gc_control.uncollected():
             pass
         assert not gc.isenabled(), 'the outer one is not over'
     assert gc.isenabled()
@@ -41,14 +41,14 @@ def test_the_collector_stays_off_until_the_last_thread_is_done() -> None:
     entered, done = threading.Event(), threading.Event()
 
     def first() -> None:
-        with memory.uncollected():
+        with gc_control.uncollected():
             entered.set()
             done.wait(30.0)
 
     thread = threading.Thread(target=first)
     thread.start()
     assert entered.wait(30.0)
-    with memory.uncollected():
+    with gc_control.uncollected():
         done.set()
         thread.join(30.0)
         assert not gc.isenabled()
@@ -56,18 +56,18 @@ def test_the_collector_stays_off_until_the_last_thread_is_done() -> None:
 
 
 def test_whoever_waits_for_a_disk_leaves_the_collector_on() -> None:
-    with memory.collected():
+    with gc_control.collected():
         assert gc.isenabled()
-    with memory.uncollected(), memory.uncollected():
-        with memory.collected():
+    with gc_control.uncollected(), gc_control.uncollected():
+        with gc_control.collected():
             assert gc.isenabled()
         assert not gc.isenabled()
     assert gc.isenabled()
 
 
 def test_what_was_made_and_dropped_meanwhile_is_looked_at_soon() -> None:
-    with memory.uncollected():
-        rings = [Ring() for _ in range(memory.LARGE + 1)]
+    with gc_control.uncollected():
+        rings = [Ring() for _ in range(gc_control.LARGE + 1)]
         gone = weakref.ref(rings[0])
         del rings
     gc.collect(1)
@@ -77,20 +77,20 @@ def test_what_was_made_and_dropped_meanwhile_is_looked_at_soon() -> None:
 def test_what_settled_is_looked_at_again_when_something_was_dropped() -> None:
     ring = Ring()
     gone = weakref.ref(ring)
-    memory.settle(memory.LARGE + 1)
+    gc_control.settle(gc_control.LARGE + 1)
     del ring
     gc.collect()
     assert gone() is not None, 'the collector does not look at it'
-    memory.release([], others=True)
+    gc_control.release([], others=True)
     assert gone() is not None, 'a collection would look through the others'
-    memory.release([], others=False)
+    gc_control.release([], others=False)
     assert gone() is None
     gc.unfreeze()
 
 
 def test_small_ontologies_stay_with_the_collector() -> None:
     before = gc.get_freeze_count()
-    memory.settle(10)
+    gc_control.settle(10)
     assert gc.get_freeze_count() == before
 
 
@@ -101,8 +101,8 @@ def test_a_small_ontology_that_is_dropped_leaves_alone_what_others_keep_from_the
     gone = weakref.ref(ring)
     gc.freeze()
     del ring
-    memory.settle(10)
-    memory.release([], others=False)
+    gc_control.settle(10)
+    gc_control.release([], others=False)
     gc.collect()
     assert gone() is not None
     gc.unfreeze()

@@ -31,8 +31,8 @@ class EvidenceOfValues(Evidence, Protocol):
         """Pairs of individuals each of which, if different, makes `x` and `y` different."""
 
 
-class Difference:
-    """Difference between representatives of individuals.
+class Inequality:
+    """Inequality between representatives of individuals.
 
     Attributes:
         evidence: By which facts two individuals differ.

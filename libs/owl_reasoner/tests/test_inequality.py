@@ -30,7 +30,7 @@ from owl_reasoner.owl.expressions import (
     ObjectMaxCardinality,
     ObjectPropertyAtom,
 )
-from owl_reasoner.reasoner.network import transitive
+from owl_reasoner.reasoner.join_network import transitive
 from owl_reasoner.reasoner.translation import Translation
 
 from .small_ontologies import (

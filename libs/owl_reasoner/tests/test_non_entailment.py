@@ -7,7 +7,7 @@ import pytest
 from owl_reasoner import KnowledgeBase
 from owl_reasoner.owl.axioms import Axiom, ClassAssertion, EquivalentClasses, SubClassOf
 from owl_reasoner.owl.expressions import ObjectIntersectionOf, ObjectSomeValuesFrom
-from owl_reasoner.reasoner.absence import Absence
+from owl_reasoner.reasoner.non_entailment import Absence
 
 from .patrol_map import NOW, VISITS, link, n, seven_rooms, value
 from .small_ontologies import A, B, C, D, P, i, is_a, j, k, rel
