@@ -23,10 +23,10 @@ if str(ROOT) not in sys.path:
 import rclpy
 from rclpy.logging import LoggingSeverity, get_logging_severity_from_string
 
+from launcher.fleet_launch import RobotProcesses, parts
 from launcher.run import NOT_RECORDED, Run
 from launcher.run_configuration import configuration, profile_of
 from launcher.run_processes import node_environ, programs_of, ros_arguments
-from launcher.team import Part, parts
 from surveillance_runtime import logging
 from surveillance_runtime.configuration import split_arguments
 from surveillance_runtime.node import PatrolNode, give_arguments
@@ -102,13 +102,13 @@ class FleetStack:
         """The robots' names."""
         return tuple(self._parts)
 
-    def _files(self, part: Part) -> dict[str, Path]:
+    def _files(self, part: RobotProcesses) -> dict[str, Path]:
         own = part.folder(self.folder)
         own.mkdir(parents=True, exist_ok=True)
         merged = configuration(CONFIG, part.run, own, fleet=part.entries)
         return write_parameters(own / 'parameters', part.run.namespace, merged, part.nodes)
 
-    def _create(self, part: Part) -> None:
+    def _create(self, part: RobotProcesses) -> None:
         files = self._files(part)
         for node in part.nodes:
             kind = getattr(importlib.import_module(node.module), node.class_name)

@@ -36,7 +36,7 @@ sys.path.insert(0, str(ROOT))
 
 from benchmarks.processes import cpu_seconds, end_processes
 from benchmarks.tables import table
-from surveillance_operator.page.hub import Hub
+from surveillance_operator.page.broadcaster import Broadcaster
 from surveillance_operator.recording.bag import METADATA, BagWriter, TopicType
 from surveillance_operator.recording.runs import find_recordings
 from surveillance_operator.recording.schemas import definition
@@ -192,7 +192,9 @@ def replayed(recording: Path, name: str) -> list[Row]:
     """Measure from the command to the first picture, and jumps with lidar and camera."""
     with contextlib.ExitStack() as stack:
         began = time.perf_counter()
-        player = open_player(find_recordings(str(recording), recording.parent), Hub(), stack)
+        player = open_player(
+            find_recordings(str(recording), recording.parent), Broadcaster(), stack
+        )
         ready = time.perf_counter() - began
         thread = threading.Thread(target=player.run, daemon=True)
         thread.start()

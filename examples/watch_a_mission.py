@@ -1,7 +1,7 @@
 """Watch a mission: build snapshots as a feed does, and show what changed and the last one.
 
-No ROS is started. On a robot `MissionFeed` makes the snapshots from topics; here a few lines of
-Python play the robot. The terminal view, the page and the recording all show such snapshots.
+No ROS is started. On a robot `MissionSubscriber` makes the snapshots from topics; here a few lines
+of Python play the robot. The terminal view, the page and the recording all show such snapshots.
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ import numpy as np
 from rich.console import Console
 
 from patrol_policy.world import Decision
-from surveillance_operator.frames import Framer
-from surveillance_operator.snapshot import Snapshot, Status, follow
+from surveillance_operator.mission_state import MissionState, Status, follow
+from surveillance_operator.page_state import PatchMaker
 from surveillance_operator.watch.view import MissionView
 from surveillance_runtime.place.occupancy_grid import Grid
 
@@ -29,7 +29,7 @@ def two_rooms() -> Grid:
 
 def main() -> None:
     """Play a short mission and show it."""
-    snapshot = Snapshot(
+    snapshot = MissionState(
         where='an example',
         now=100.0,
         mode='SIMULATED',
@@ -42,7 +42,7 @@ def main() -> None:
         battery=82.0,
         threshold=50.0,
     )
-    framer = Framer()
+    framer = PatchMaker()
     framer.patch(snapshot)
     reason = 'B has waited 60 s, longer than the threshold of 50 s'
     decision = Decision(100.0, 'A', 'B', 'B', 'URGENT', 'tour', reason, {'B': 60.0, 'A': 2.0})

@@ -30,7 +30,7 @@ from pathlib import Path
 from typing import Any
 
 from launcher import system
-from launcher.progress import Output, Step
+from launcher.progress import Output, SetUpStep
 from state_machines.files import parse_json
 from surveillance_runtime.files import replace_text
 from surveillance_runtime.launch_protocol import NotNowError
@@ -80,7 +80,7 @@ _BYTECODE_SPACE = 100_000_000
 
 
 @dataclass
-class Journal:
+class SetUpJournal:
     """How far the set-up of one environment came, and what it was made for.
 
     Attributes:
@@ -100,7 +100,7 @@ class Journal:
     working: str = ''
 
     @classmethod
-    def read(cls, venv: Path) -> Journal:
+    def read(cls, venv: Path) -> SetUpJournal:
         """Return the journal in `venv`; an empty one where none is, or where it cannot be read."""
         try:
             stored = parse_json((venv / JOURNAL).read_text(encoding='utf-8'))
@@ -146,9 +146,9 @@ def _project(folder: Path) -> dict[str, Any]:
     return dict(found['project'])
 
 
-def complete(checkout: Path, extras: Iterable[str]) -> Journal:
+def complete(checkout: Path, extras: Iterable[str]) -> SetUpJournal:
     """Return the journal of a set-up that fits this checkout and this interpreter."""
-    return Journal(
+    return SetUpJournal(
         python=f'{sys.version_info.major}.{sys.version_info.minor} {sys.base_prefix}',
         checkout=str(checkout),
         extras=sorted(extras),
@@ -208,7 +208,7 @@ class Environment:
         return self._complete(self.venv)
 
     def _complete(self, venv: Path) -> bool:
-        journal = Journal.read(venv)
+        journal = SetUpJournal.read(venv)
         found = (venv / 'bin' / 'python').exists()
         return found and journal == complete(self.checkout, self._extras(journal))
 
@@ -229,7 +229,7 @@ class Environment:
                 self.venv = venv
                 return
         for venv in folders:
-            own = Journal.read(venv).python in ('', python)
+            own = SetUpJournal.read(venv).python in ('', python)
             broken = not (venv / 'bin' / 'python').exists()
             if (own or broken) and not users_of(venv):
                 self.venv = venv
@@ -242,9 +242,9 @@ class Environment:
         """Point `.venv` to this environment, and remove older ones of its interpreter that nobody
         uses.
         """
-        python = Journal.read(self.venv).python
+        python = SetUpJournal.read(self.venv).python
         for venv in self._folders():
-            stale = Journal.read(venv).python == python and not self._complete(venv)
+            stale = SetUpJournal.read(venv).python == python and not self._complete(venv)
             if venv != self.venv and stale and not users_of(venv):
                 shutil.rmtree(venv, ignore_errors=True)
         first = self.checkout / _FIRST
@@ -295,7 +295,7 @@ class Environment:
         sources = [self.checkout / INTERFACES, *self._lacking_messages()]
         # Each build has requirements of its own; they need not agree with those of another one.
         lists = [
-            requirements(self.checkout, Journal.read(self.venv).extras),
+            requirements(self.checkout, SetUpJournal.read(self.venv).extras),
             *(_build_requirements(source) for source in sources),
         ]
         with self._alone() as lock:
@@ -303,7 +303,7 @@ class Environment:
                 words = self._pip('wheel', '--prefer-binary', '-w', str(folder.absolute()), *needed)
                 title = 'Python packages' if number == 1 else 'tools that build the messages'
                 with (
-                    Step(number, len(lists), title) as step,
+                    SetUpStep(number, len(lists), title) as step,
                     _Command(self, words, lock) as command,
                 ):
                     command.watch(step)
@@ -332,7 +332,7 @@ class Environment:
                 )
         return lines
 
-    def _extras(self, journal: Journal) -> list[str]:
+    def _extras(self, journal: SetUpJournal) -> list[str]:
         return sorted({*journal.extras, *self._wanted_extras})
 
     def _set_up(self, lock: int) -> None:
@@ -342,10 +342,10 @@ class Environment:
                 f'{busy[0].name} is in use by process {busy[1]} and stays as it is: '
                 f'{self.venv.name} is set up beside it.'
             )
-        journal = Journal.read(self.venv)
+        journal = SetUpJournal.read(self.venv)
         fresh = not self._usable(journal, python)
         if fresh:
-            journal = Journal()
+            journal = SetUpJournal()
         journal.extras = self._extras(journal)
         wanted = complete(self.checkout, journal.extras)
         journal.python, journal.checkout = wanted.python, wanted.checkout
@@ -368,9 +368,9 @@ class Environment:
         journal.write(self.venv)
 
     def _carry_out(
-        self, titles: Sequence[str], journal: Journal, wanted: Journal, lock: int
+        self, titles: Sequence[str], journal: SetUpJournal, wanted: SetUpJournal, lock: int
     ) -> None:
-        steps = {title: Step(i, len(titles), title) for i, title in enumerate(titles, 1)}
+        steps = {title: SetUpStep(i, len(titles), title) for i, title in enumerate(titles, 1)}
         wheels = self.venv / 'wheels'
         with ExitStack() as under_way:
 
@@ -418,7 +418,7 @@ class Environment:
         if self.venv.exists():
             return None
         for venv in self._folders():
-            if Journal.read(venv).python != python or not (users := users_of(venv)):
+            if SetUpJournal.read(venv).python != python or not (users := users_of(venv)):
                 continue
             draft = self.venv.with_name(self.venv.name.replace(_FIRST, '.draft-venv'))
             shutil.rmtree(draft, ignore_errors=True)
@@ -436,7 +436,7 @@ class Environment:
         options = ['--disable-pip-version-check', '--no-input', '--progress-bar=off']
         return [str(self.python), '-m', 'pip', command, *options, *words]
 
-    def _usable(self, journal: Journal, python: str) -> bool:
+    def _usable(self, journal: SetUpJournal, python: str) -> bool:
         """Tell whether the environment has a working pip and stands on this interpreter."""
         if not self.python.exists() or journal.python not in ('', python):
             return False
@@ -615,7 +615,7 @@ class _Command:
             os.killpg(self._process.pid, signal.SIGTERM)
             self._process.wait()
 
-    def watch(self, step: Step) -> None:
+    def watch(self, step: SetUpStep) -> None:
         """Show what it does until it ends.
 
         Raises:

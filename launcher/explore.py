@@ -95,7 +95,7 @@ def place_of(out: Path) -> Path:
 
 def run_exploration(options: argparse.Namespace, config: Path, runs: Path) -> int:
     """Explore, and make a place of the map; return the exit code."""
-    from launcher.run_mission import Errand, run_mission
+    from launcher.run_mission import RunJob, run_mission
     from surveillance_runtime.configuration import Entry
     from surveillance_runtime.run_parameters import for_node
 
@@ -115,13 +115,13 @@ def run_exploration(options: argparse.Namespace, config: Path, runs: Path) -> in
         yield for_node(EXPLORER, 'mapping', 'topic' if options.slam else 'own', said)
         yield for_node('simulator', 'publish_map', False, said)
 
-    errand = Errand(
+    job = RunJob(
         'exploring',
         EXPLORER,
         lambda folder: tuple(entries(folder)),
         lambda folder: close(folder, options, config),
     )
-    return run_mission(run, config, runs, errand=errand)
+    return run_mission(run, config, runs, job=job)
 
 
 def close(folder: Path, options: argparse.Namespace, config: Path) -> int:

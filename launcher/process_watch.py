@@ -22,7 +22,7 @@ _LEAST_SHARE = 0.02
 
 
 @dataclass(frozen=True)
-class Look:
+class ProcessSample:
     """One look at a process.
 
     Attributes:
@@ -36,7 +36,7 @@ class Look:
     memory: int
 
 
-def look_at(pid: int) -> Look | None:
+def look_at(pid: int) -> ProcessSample | None:
     """Return how a process is, None where the kernel does not say."""
     try:
         with open(f'/proc/{pid}/stat', encoding='utf-8', errors='replace') as file:
@@ -44,7 +44,9 @@ def look_at(pid: int) -> Look | None:
     except (OSError, IndexError):
         return None
     ticks = os.sysconf('SC_CLK_TCK')
-    return Look(fields[0], (int(fields[11]) + int(fields[12])) / ticks, int(fields[21]) * _PAGE)
+    return ProcessSample(
+        fields[0], (int(fields[11]) + int(fields[12])) / ticks, int(fields[21]) * _PAGE
+    )
 
 
 class Activity:
@@ -58,7 +60,7 @@ class Activity:
         self._since = self._cpu = 0.0
         self._begun = False
 
-    def idle(self, now: float, look: Look) -> float:
+    def idle(self, now: float, look: ProcessSample) -> float:
         """Take a look, and return for how many seconds the process has done nothing."""
         used, least = look.cpu - self._cpu, _LEAST_SHARE * (now - self._since)
         if not self._begun or look.state in ('R', 'D') or used > least:
@@ -91,7 +93,7 @@ class Heartbeats:
         self._activity = Activity()
         self._cpu_at_beat: float | None = None
 
-    def problem(self, now: float, look: Look | None) -> str:
+    def problem(self, now: float, look: ProcessSample | None) -> str:
         """Return why the process is to be ended, empty while it is not."""
         quiet = now - self._last
         if look is None:

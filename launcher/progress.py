@@ -40,8 +40,8 @@ def describe(line: str) -> str:
     return ''
 
 
-class Step:
-    """One step of the set-up: `with Step(1, 3, 'Python packages') as step: step.feed(line)`."""
+class SetUpStep:
+    """One step of the set-up: `with SetUpStep(1, 3, 'wheels') as step: step.feed(line)`."""
 
     def __init__(self, number: int, total: int, title: str, stream: TextIO | None = None) -> None:
         self._stream = sys.stdout if stream is None else stream
@@ -50,7 +50,7 @@ class Step:
         self._detail = ''
         self._shown = 0.0
 
-    def __enter__(self) -> Step:
+    def __enter__(self) -> SetUpStep:
         self._start = self._shown = self._heard = time.monotonic()
         if self._live:
             self._draw('...')
@@ -115,7 +115,7 @@ class Output:
                 self._lines.put(line.decode('utf-8', 'replace').rstrip())
         self._lines.put(None)
 
-    def lines(self, step: Step) -> Iterator[str]:
+    def lines(self, step: SetUpStep) -> Iterator[str]:
         """Yield the lines to the last one, while the step's clock is kept going."""
         while True:
             try:

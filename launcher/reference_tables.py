@@ -109,7 +109,7 @@ class Interface:
 
 
 @dataclass
-class Survey:
+class NodeSurvey:
     """What the nodes declare and offer.
 
     Attributes:
@@ -125,7 +125,7 @@ class Survey:
     actions: dict[str, Interface] = field(default_factory=dict)
 
 
-def survey() -> Survey:
+def survey() -> NodeSurvey:
     """Make each node and note what it declares and offers; needs a ROS environment."""
     import rclpy
     from rclpy.logging import LoggingSeverity
@@ -133,7 +133,7 @@ def survey() -> Survey:
 
     from surveillance_runtime.logging import log_level
 
-    found = Survey()
+    found = NodeSurvey()
     context = rclpy.Context()
     # The simulator publishes its map, doors and a scan when it is made.
     rclpy.init(context=context, domain_id=claim_domain())
@@ -196,7 +196,7 @@ def _make(node: node_table.Node, context: Any, overrides: Sequence[Any]) -> Any:
     return made
 
 
-def _note_interfaces(made: Any, name: str, found: Survey) -> None:
+def _note_interfaces(made: Any, name: str, found: NodeSurvey) -> None:
     """Note the topics, services and actions of a node in the graph."""
     from rclpy import action
 
@@ -271,7 +271,7 @@ def _row(spec: ParameterSpec) -> dict[str, Any]:
     return row
 
 
-def interfaces_page(found: Survey) -> str:
+def interfaces_page(found: NodeSurvey) -> str:
     """Return the page docs/interfaces.md."""
     parts = [_INTERFACES]
     for title, head, interfaces in (

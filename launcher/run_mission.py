@@ -12,6 +12,7 @@ from pathlib import Path
 from launcher import run_folder
 from launcher.alarm import Alarm, caller
 from launcher.environment import COMMAND, interpreter
+from launcher.fleet_launch import RobotProcesses, parts, without_parts
 from launcher.instance_lock import claim
 from launcher.log_merge import MergedLog
 from launcher.run import NOT_RECORDED, Run
@@ -28,7 +29,6 @@ from launcher.run_configuration import (
 from launcher.run_processes import COMPOSED, node_environ, programs_of, ros_domain
 from launcher.service import is_service
 from launcher.supervisor import EXIT_CUT, Supervisor
-from launcher.team import Part, parts, without_parts
 from surveillance_behaviour.mission import mission_log
 from surveillance_runtime import node_table
 from surveillance_runtime.configuration import Entry
@@ -50,7 +50,7 @@ EXIT_NOTHING_DONE = 1
 
 
 @dataclass(frozen=True)
-class Errand:
+class RunJob:
     """What a run is for that ends by itself.
 
     Attributes:
@@ -72,7 +72,7 @@ def run_mission(
     config: Path,
     runs: Path,
     resume: Path | None = None,
-    errand: Errand | None = None,
+    job: RunJob | None = None,
 ) -> int:
     """Start the nodes, supervise them to the end, print the summary; return the exit code."""
     run, team = checked(run, config)  # before anything is written
@@ -92,7 +92,7 @@ def run_mission(
     for part in team:
         own = part.folder(folder)
         own.mkdir(exist_ok=True)
-        given = (*part.entries, *(errand.entries(own) if errand is not None else ()))
+        given = (*part.entries, *(job.entries(own) if job is not None else ()))
         merged = configuration(config, part.run, own, fleet=given)
         files = write_parameters(own / 'parameters', part.run.namespace, merged, part.everyone)
         names = [node.name for node in part.nodes]
@@ -100,16 +100,16 @@ def run_mission(
         renamed = (*part.renamed, *remappings(of_robot, names, mode))
         programs += programs_of(part, files, environ, renamed)
         copy_place(place, own / PLACE)
-    if errand is not None:
+    if job is not None:
         programs = [
-            replace(each, leads=True, ends_run=True) if each.name == errand.node else each
+            replace(each, leads=True, ends_run=True) if each.name == job.node else each
             for each in programs
         ]
     names = [part.name(node.name) for part in team for node in part.everyone]
     names += [part.name(COMPOSED) for part in team if run.composed]
     log = MergedLog(None, names, path=folder / LAUNCH_LOG)
     log.say(
-        f'{errand.title if errand is not None else run.behaviour} in mode {mode}, '
+        f'{job.title if job is not None else run.behaviour} in mode {mode}, '
         f'{_robots(team, profile_of(config, run).profile.name)}, place {place.name}, '
         f'ROS domain {ros_domain(run)}, files in {_short(folder)}'
     )
@@ -149,12 +149,12 @@ def run_mission(
     state.end(ended=supervisor.time_is_over or not is_service())
     for descriptor in claims:
         os.close(descriptor)
-    if errand is None or code not in (0, EXIT_CUT):
+    if job is None or code not in (0, EXIT_CUT):
         return code
-    return errand.close(folder) or code
+    return job.close(folder) or code
 
 
-def checked(run: Run, config: Path) -> tuple[Run, tuple[Part, ...]]:
+def checked(run: Run, config: Path) -> tuple[Run, tuple[RobotProcesses, ...]]:
     """Return the run, with what follows for it from files, and its parts.
 
     Raises:
@@ -173,7 +173,7 @@ def checked(run: Run, config: Path) -> tuple[Run, tuple[Part, ...]]:
     return run, team
 
 
-def _look_for_others(run: Run, team: Sequence[Part]) -> None:
+def _look_for_others(run: Run, team: Sequence[RobotProcesses]) -> None:
     """Refuse to start beside a robot of the same names on another machine.
 
     Two of one machine are told apart by their claims, without a wait.
@@ -210,7 +210,7 @@ def chosen_folder(run: Run, runs: Path, resume: Path | None) -> tuple[Path, str]
 
 def _supervised(
     run: Run,
-    team: Sequence[Part],
+    team: Sequence[RobotProcesses],
     supervisor: Supervisor,
     folder: Path,
     log: MergedLog,
@@ -275,7 +275,7 @@ def summary(record: Path) -> str:
         return f'Mission: {error}'
 
 
-def _robots(team: Sequence[Part], profile: str) -> str:
+def _robots(team: Sequence[RobotProcesses], profile: str) -> str:
     """Return which robots a run has, in words."""
     names = [part.robot for part in team if part.robot]
     return f'robots {", ".join(names)} ({profile})' if names else f'robot {profile}'

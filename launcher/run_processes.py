@@ -8,16 +8,16 @@ from dataclasses import replace
 from pathlib import Path
 
 from launcher.environment import interpreter
+from launcher.fleet_launch import RobotProcesses
 from launcher.log_merge import ROS_FORMAT
 from launcher.run import MARKERS, RECORDER, Run
-from launcher.supervisor import Program
-from launcher.team import Part
+from launcher.supervisor import ManagedProcess
 from surveillance_runtime import node_table
 from surveillance_runtime.discovery import LAST_DOMAIN, launched_nodes
 from surveillance_runtime.launch_protocol import ONE_THREAD
 from surveillance_runtime.run_parameters import BEHAVIOUR_NODE
 
-CHILD = Path(__file__).with_name('child.py')
+NODE_PROCESS = Path(__file__).with_name('node_process.py')
 COMPOSED = 'composed'
 COMPOSED_SHARE = 3
 
@@ -88,26 +88,26 @@ def command(nodes: Sequence[node_table.Node], arguments: Sequence[str], parent: 
     # comes last.
     ordered = sorted(nodes, key=lambda node: node.name == BEHAVIOUR_NODE)
     targets = ','.join(f'{n.name}={n.module}:{n.class_name}' for n in ordered)
-    return [interpreter(), '-P', str(CHILD), str(parent), targets, *arguments]
+    return [interpreter(), '-P', str(NODE_PROCESS), str(parent), targets, *arguments]
 
 
 def programs_of(
-    part: Part,
+    part: RobotProcesses,
     files: Mapping[str, Path],
     environ: Mapping[str, str],
     renamed: Sequence[tuple[str, str]] = (),
-) -> list[Program]:
+) -> list[ManagedProcess]:
     """Return the processes of a part of a run, each with the nodes that share it."""
     run, nodes, observers = part.run, part.nodes, part.observers
 
-    def program(members: Sequence[node_table.Node]) -> Program:
+    def program(members: Sequence[node_table.Node]) -> ManagedProcess:
         arguments = ros_arguments([files[node.name] for node in members], run, renamed)
         # It prints into the launcher's log; one of its own, as ROS writes it, grows without bound.
         words = command(members, [*arguments, '--disable-external-lib-logs'], os.getpid())
         memory = run.memory * 2**20
-        return Program(part.name(members[0].name), words, environ, memory=memory)
+        return ManagedProcess(part.name(members[0].name), words, environ, memory=memory)
 
-    programs: list[Program] = []
+    programs: list[ManagedProcess] = []
     if run.composed and nodes:
         everything = program(nodes)
         programs = [

@@ -39,7 +39,7 @@ START_WITHIN = 1.5
 STOP_LEADERS_WITHIN = 1.2
 """Seconds that the processes which use the others have before those are told to stop as well."""
 EXIT_CUT = 1
-"""The exit code of a run that its program has not brought to an end, see `Program.ends_run`."""
+"""The exit code of a run that its process has not brought to an end: `ManagedProcess.ends_run`."""
 STOP_WITHIN, STOP_AT_MOST = 2.5, 12.0
 """Seconds until whatever is left and does nothing, or has done its work, is killed, and until all
 that is left is."""
@@ -57,7 +57,7 @@ _STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 @dataclass(frozen=True)
-class Program:
+class ManagedProcess:
     """A process to run.
 
     It says when it is up, and writes heartbeats (`launch_protocol`). It is ended and started again
@@ -83,10 +83,10 @@ class Program:
 
 
 @dataclass
-class Child:
-    """A program's present process and its history."""
+class RunningProcess:
+    """What runs of a `ManagedProcess` at present, and its history."""
 
-    program: Program
+    program: ManagedProcess
     restarts: Restarts
     process: subprocess.Popen[bytes] | None = None
     started: float = 0.0
@@ -129,15 +129,17 @@ class Supervisor:
 
     def __init__(
         self,
-        programs: Sequence[Program],
+        programs: Sequence[ManagedProcess],
         log: MergedLog,
         pauses: Sequence[float] = PAUSES,
         at_once: int | None = None,
         on_trouble: Callable[[str], None] = lambda _text: None,
         on_restart: Callable[[str], None] = lambda _name: None,
     ) -> None:
-        self.children = {program.name: Child(program, Restarts(pauses)) for program in programs}
-        self._to_start: list[Child] = []
+        self.children = {
+            program.name: RunningProcess(program, Restarts(pauses)) for program in programs
+        }
+        self._to_start: list[RunningProcess] = []
         self._at_once = at_once or (os.cpu_count() or 1) + 1
         self._log = log
         self._on_trouble = on_trouble
@@ -230,7 +232,7 @@ class Supervisor:
         ):
             self._start(self._to_start.pop(0))
 
-    def _start(self, child: Child) -> None:
+    def _start(self, child: RunningProcess) -> None:
         child.finished, child.done, child.ended_for = False, False, ''
         with self._pipe(self._when_it_tells(child)) as writer:
             process = self._spawn(child, writer)
@@ -266,7 +268,7 @@ class Supervisor:
         finally:
             os.close(writer)
 
-    def _when_it_tells(self, child: Child) -> Callable[[bytes], None]:
+    def _when_it_tells(self, child: RunningProcess) -> Callable[[bytes], None]:
         """Return what takes the bytes that a process tells of itself (`launch_protocol`)."""
         child.coming_up = True
         heartbeats = child.heartbeats = Heartbeats(time.monotonic())
@@ -286,7 +288,7 @@ class Supervisor:
 
         return take
 
-    def _spawn(self, child: Child, writer: int) -> subprocess.Popen[bytes]:
+    def _spawn(self, child: RunningProcess, writer: int) -> subprocess.Popen[bytes]:
         environ = {**child.program.environ, HEARTBEAT: str(writer), RESTARTS: str(child.starts)}
         if child.program.memory:
             # What is mapped is more than what is held.
@@ -315,7 +317,7 @@ class Supervisor:
             self._after_death(child, code)
             child.heartbeats = None
 
-    def _close(self, child: Child, process: subprocess.Popen[bytes]) -> None:
+    def _close(self, child: RunningProcess, process: subprocess.Popen[bytes]) -> None:
         """Take what a dead process still printed, then let its pipes go."""
         assert process.stdout is not None
         # A process that left its group may hold the pipe open: its end is not waited for.
@@ -328,7 +330,7 @@ class Supervisor:
                 with contextlib.suppress(OSError):
                     stream.close()
 
-    def _after_death(self, child: Child, code: int) -> None:
+    def _after_death(self, child: RunningProcess, code: int) -> None:
         name = child.program.name
         if self._stopping_since is not None:
             if code not in (0, -signal.SIGTERM) and not child.killed:
@@ -382,14 +384,14 @@ class Supervisor:
             if problem:
                 self._end(child, problem, can_tell=can_tell)
 
-    def _end(self, child: Child, problem: str, *, can_tell: bool = False) -> None:
+    def _end(self, child: RunningProcess, problem: str, *, can_tell: bool = False) -> None:
         """End a process, to be started again as after a death."""
         if child.process is not None and not child.ended_for and self._stopping_since is None:
             child.ended_for = problem
             self._log.warn(f'{child.program.name} {problem}: ending it')
             self._kill(child, can_tell=can_tell)
 
-    def _kill(self, child: Child, *, can_tell: bool) -> None:
+    def _kill(self, child: RunningProcess, *, can_tell: bool) -> None:
         """Kill a process and what it started, at once or after it has told where it hangs."""
         assert child.process is not None
         if can_tell:

@@ -15,7 +15,7 @@ import sysconfig
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from launcher.progress import Output, Step
+from launcher.progress import Output, SetUpStep
 from surveillance_runtime.launch_protocol import NotNowError
 
 ROS_PREFIX = Path('/opt/ros/jazzy')
@@ -130,7 +130,7 @@ def install_packages(packages: Sequence[str]) -> None:
     for number, command in enumerate(commands, 1):
         title = f'system packages: {names}' if command[0] == 'install' else 'lists of packages'
         with (
-            Step(number, len(commands), title) as step,
+            SetUpStep(number, len(commands), title) as step,
             subprocess.Popen(
                 [*prefix, 'apt-get', '-q', *command],
                 env=environ,

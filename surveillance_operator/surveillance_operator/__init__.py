@@ -2,17 +2,17 @@
 
 Free of ROS:
 
-- `Snapshot`, `follow`, `changes`: what is known of a mission, and what changed.
-- `Framer`: snapshots as the page's parts, and patches between them.
+- `MissionState`, `follow`, `changes`: what is known of a mission, and what changed.
+- `PatchMaker`: snapshots as the page's parts, and patches between them.
 
 With ROS:
 
-- `MissionFeed` (`surveillance_operator.mission_feed`) keeps a snapshot of a running mission.
-- `MissionActions` (`surveillance_operator.mission_actions`) does what a person wants.
+- `MissionSubscriber` (in `mission_subscriber`) keeps the state of a running mission.
+- `MissionActions` (in `mission_actions`) does what a person wants.
 """
 
-from surveillance_operator.frames import Framer
-from surveillance_operator.snapshot import Change, Snapshot, Status, changes, follow
+from surveillance_operator.mission_state import Change, MissionState, Status, changes, follow
+from surveillance_operator.page_state import PatchMaker
 from surveillance_runtime.place.occupancy_grid import Grid
 
-__all__ = ['Change', 'Framer', 'Grid', 'Snapshot', 'Status', 'changes', 'follow']
+__all__ = ['Change', 'Grid', 'MissionState', 'PatchMaker', 'Status', 'changes', 'follow']

@@ -263,7 +263,7 @@ _DOES = {command.name: do for command, do in _COMMANDS}
 
 
 @dataclass(frozen=True)
-class Answer:
+class Reply:
     """What came of a line.
 
     Attributes:
@@ -338,7 +338,7 @@ def answer(
     why: Callable[[], str],
     columns: int = 1000,
     fleet: Fleet | None = None,
-) -> list[Answer]:
+) -> list[Reply]:
     """Do what a line says, and return what came of it.
 
     Args:
@@ -350,29 +350,29 @@ def answer(
     """
     words = line.split()
     if [word.lower() for word in words] == ['why']:
-        return [Answer(why())]
+        return [Reply(why())]
     if len(words) == 2 and words[0].lower() == EXIT.name:
         return [_exit(words[1], actions)]
     try:
         command = GRAMMAR.parse(line)
     except CommandError as error:
-        return [Answer(str(error))]
+        return [Reply(str(error))]
     if command is None:
         return []
     if command.name == HELP.name:
-        return [Answer(help_text(columns))]
+        return [Reply(help_text(columns))]
     if command.name == EXIT.name:
-        return [Answer('', ends=True)]
+        return [Reply('', ends=True)]
     if command.name == STATUS.name:
         return [_told(actions, controller, line) for controller in CONTROLLED]
     if command.name in _CONTROLLER_OF:
         return [_told(actions, _CONTROLLER_OF[command.name], line)]
     try:
         if command.name in (_ROBOTS.name, _ROBOT.name, _ALL.name):
-            return [Answer(_of_fleet(command, fleet))]
-        return [Answer(_DOES[command.name](actions, *command.values))]
+            return [Reply(_of_fleet(command, fleet))]
+        return [Reply(_DOES[command.name](actions, *command.values))]
     except (ValueError, CallError) as error:
-        return [Answer(f'{command.name}: {error}')]
+        return [Reply(f'{command.name}: {error}')]
 
 
 def _of_fleet(command: ParsedCommand, fleet: Fleet | None) -> str:
@@ -388,18 +388,18 @@ def _of_fleet(command: ParsedCommand, fleet: Fleet | None) -> str:
     return fleet.tell_all(word)
 
 
-def _exit(name: str, actions: MissionActions) -> Answer:
+def _exit(name: str, actions: MissionActions) -> Reply:
     if name not in CONTROLLED:
-        return Answer(f'exit {name}: expected {nearest(name, CONTROLLED)}')
+        return Reply(f'exit {name}: expected {nearest(name, CONTROLLED)}')
     return _told(actions, name, EXIT.name)
 
 
-def _told(actions: MissionActions, controller: str, line: str) -> Answer:
+def _told(actions: MissionActions, controller: str, line: str) -> Reply:
     try:
-        return Answer(actions.command(controller, line), controller)
+        return Reply(actions.command(controller, line), controller)
     except UnavailableError as error:
-        return Answer(str(error))
+        return Reply(str(error))
     except CallError as error:
-        return Answer(f'{controller} does not answer: {error}')
+        return Reply(f'{controller} does not answer: {error}')
     except ValueError as error:
-        return Answer(str(error), controller)
+        return Reply(str(error), controller)

@@ -25,10 +25,10 @@ from surveillance_operator.console_commands import (
     wrapped,
 )
 from surveillance_operator.fleet_actions import ALL, WORDS, FleetActions
-from surveillance_operator.fleet_feed import FleetFeed
+from surveillance_operator.fleet_subscriber import FleetSubscriber
 from surveillance_operator.fleet_table import fleet_lines
 from surveillance_operator.mission_actions import MissionActions
-from surveillance_operator.snapshot import Snapshot, why
+from surveillance_operator.mission_state import MissionState, why
 from surveillance_runtime.logging import clean, print_lines
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.node_table import name_for
@@ -63,8 +63,10 @@ class ConsoleNode(PatrolNode):
         self._found_by = time.monotonic() + timeout
         self._left_out = 0
         self._met: set[str] = set()
-        self._feed = FleetFeed(self, FEED_PERIOD, lambda name, _new, _told: self._meet(name))
-        self._actions = FleetActions(self, lambda: self._feed.robots, timeout)
+        self._subscriber = FleetSubscriber(
+            self, FEED_PERIOD, lambda name, _new, _told: self._meet(name)
+        )
+        self._actions = FleetActions(self, lambda: self._subscriber.robots, timeout)
         self._meet('')
         self._console = Console(
             'console', self._on_line, completions, source=console_source, status=self._status
@@ -81,17 +83,17 @@ class ConsoleNode(PatrolNode):
         One that was chosen, or was told something, stays chosen while it is not heard, and when
         others come: no other gets its commands.
         """
-        return self._robot or self._feed.robots[0]
+        return self._robot or self._subscriber.robots[0]
 
     def lines(self) -> list[str]:
         """Return what each robot of the fleet does."""
-        if self._feed.robots == ('',):
+        if self._subscriber.robots == ('',):
             raise ValueError('this robot is alone')
-        return fleet_lines(self._feed.see())
+        return fleet_lines(self._subscriber.see())
 
     def choose(self, robot: str) -> str:
         """Speak to another robot of the fleet."""
-        if robot not in (known := self._feed.robots):
+        if robot not in (known := self._subscriber.robots):
             raise ValueError(f'{robot!r}: expected {nearest(robot, filter(None, known))}')
         self._robot = robot
         return f'you speak to {robot}'
@@ -112,9 +114,9 @@ class ConsoleNode(PatrolNode):
 
     def _status(self) -> str:
         name = self.robot
-        if name not in self._feed.robots:
+        if name not in self._subscriber.robots:
             return f' {name} is not heard '
-        return status_line(self._feed.snapshot(name), name)
+        return status_line(self._subscriber.snapshot(name), name)
 
     def _on_announcement(self, controller: str, message: String) -> None:
         allowance = self.get_logger().lines
@@ -134,7 +136,7 @@ class ConsoleNode(PatrolNode):
         if self.ended.is_set():
             return  # a pipe has more lines than the `exit`
         # The robots of a fleet are found some time after the console is opened.
-        while time.monotonic() < self._found_by and self._feed.snapshot('').status is None:
+        while time.monotonic() < self._found_by and self._subscriber.snapshot('').status is None:
             if self.stopping.wait(0.05):
                 return
         try:
@@ -156,7 +158,7 @@ class ConsoleNode(PatrolNode):
         """
         if not is_for_robot(line):
             return self._actions.shared
-        robot, known = self.robot, self._feed.robots
+        robot, known = self.robot, self._subscriber.robots
         if robot in known:
             self._robot = robot
             return self._actions.of(robot)
@@ -165,14 +167,14 @@ class ConsoleNode(PatrolNode):
 
     def _why(self) -> str:
         deadline = time.monotonic() + self._timeout
-        while (said := why(self._feed.snapshot(self.robot))) is None:
+        while (said := why(self._subscriber.snapshot(self.robot))) is None:
             # The feed of a console that was just opened has not heard of it yet.
             if time.monotonic() > deadline or self.stopping.wait(FEED_PERIOD):
                 return 'no decision yet'
         return '\n'.join(said)
 
 
-def status_line(snapshot: Snapshot, robot: str = '') -> str:
+def status_line(snapshot: MissionState, robot: str = '') -> str:
     """Return the mission in one line: what it does, where, how much charge is left."""
     status = snapshot.status
     if status is None or not snapshot.nodes:

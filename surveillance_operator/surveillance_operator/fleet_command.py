@@ -14,7 +14,7 @@ from collections.abc import Sequence
 import rclpy
 
 from surveillance_operator.fleet_actions import ALL, WORDS, FleetActions
-from surveillance_operator.fleet_feed import FleetFeed
+from surveillance_operator.fleet_subscriber import FleetSubscriber
 from surveillance_operator.fleet_table import fleet_lines
 from surveillance_operator.watch_command import mission_parser, ros_arguments
 from surveillance_runtime.node import PatrolNode
@@ -53,7 +53,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         if options.word is not None and options.robot != ALL:
             names = [options.robot]
             return carry_out(options.word, names, FleetActions(node, lambda: names, TIMEOUT))
-        feed = FleetFeed(node, PERIOD)
+        feed = FleetSubscriber(node, PERIOD)
         time.sleep(LISTEN)  # until each robot had time to say a word
         if feed.robots == ('',):
             print('no robot of a fleet was heard: expected a run with --robots')

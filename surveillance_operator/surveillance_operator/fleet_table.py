@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
-from surveillance_operator.snapshot import Snapshot, doing, shares, troubles
+from surveillance_operator.mission_state import MissionState, doing, shares, troubles
 
 SHARED = 'shared'
 """Stands for the programs that all robots share, where something is wrong with them."""
 
 
-def fleet_lines(snapshots: Mapping[str, Snapshot]) -> list[str]:
+def fleet_lines(snapshots: Mapping[str, MissionState]) -> list[str]:
     """Return what each robot does, and below it what a person should look at.
 
     Args:
@@ -20,7 +20,7 @@ def fleet_lines(snapshots: Mapping[str, Snapshot]) -> list[str]:
     return [line for name, each in snapshots.items() for line in _lines(name, each, width)]
 
 
-def _lines(name: str, snapshot: Snapshot, width: int) -> Iterator[str]:
+def _lines(name: str, snapshot: MissionState, width: int) -> Iterator[str]:
     if name:
         place = snapshot.status.place if snapshot.status else ''
         battery = '–' if snapshot.battery is None else f'{snapshot.battery:.0f} %'

@@ -18,8 +18,8 @@ from nav_msgs.msg import Path
 from std_msgs.msg import ColorRGBA, String
 from visualization_msgs.msg import Marker, MarkerArray
 
-from surveillance_operator.mission_feed import MissionFeed
-from surveillance_operator.snapshot import STALE, Snapshot
+from surveillance_operator.mission_state import STALE, MissionState
+from surveillance_operator.mission_subscriber import MissionSubscriber
 from surveillance_operator.topics import URGENT_MARK
 from surveillance_runtime.diagnostics import TOPIC
 from surveillance_runtime.node import PatrolNode
@@ -54,14 +54,14 @@ class MissionMarkers(PatrolNode):
         description.publish(String(data=urdf()))
         if TFMessage is None:
             self.get_logger().info('tf2_msgs is not installed: nothing is published on tf')
-        self._feed = MissionFeed(self, PERIOD)
+        self._subscriber = MissionSubscriber(self, PERIOD)
         self.spawn(self._work, 'markers')
 
     def _work(self) -> None:
         drawn, due = None, 0.0
         made: dict[tuple[str, int], Marker] = {}
         while not self.stopping.wait(PERIOD):
-            snapshot = self._feed.see()
+            snapshot = self._subscriber.see()
             self._markers.publish(markers_of(snapshot, self.get_clock().now().to_msg(), made))
             if snapshot.trail is not drawn and time.monotonic() >= due:
                 drawn, due = snapshot.trail, time.monotonic() + PATH_PERIOD
@@ -72,7 +72,7 @@ class MissionMarkers(PatrolNode):
                 self._diagnostics.publish(message)
 
 
-def silent_of(snapshot: Snapshot) -> list[DiagnosticStatus]:
+def silent_of(snapshot: MissionState) -> list[DiagnosticStatus]:
     """Return a status for each node that reported and does not any more."""
     return [
         DiagnosticStatus(
@@ -87,7 +87,7 @@ def silent_of(snapshot: Snapshot) -> list[DiagnosticStatus]:
 
 
 def markers_of(
-    snapshot: Snapshot, stamp: Any, made: dict[tuple[str, int], Marker] | None = None
+    snapshot: MissionState, stamp: Any, made: dict[tuple[str, int], Marker] | None = None
 ) -> MarkerArray:
     """Return places and doors as markers in the map frame.
 
@@ -134,7 +134,7 @@ def markers_of(
     return MarkerArray(markers=found)
 
 
-def path_of(snapshot: Snapshot, stamp: Any) -> Path:
+def path_of(snapshot: MissionState, stamp: Any) -> Path:
     """Return the way driven as a path in the map frame."""
     path = Path()
     path.header.frame_id, path.header.stamp = 'map', stamp

@@ -23,15 +23,15 @@ from state_machines.exceptions import CallError
 from state_machines.files import read_file
 from surveillance_ontology.patrol_ontology import checked_names
 from surveillance_operator.fleet_actions import WORDS, FleetActions
-from surveillance_operator.fleet_feed import FleetFeed
+from surveillance_operator.fleet_subscriber import FleetSubscriber
 from surveillance_operator.images import ANNOTATED, PLAIN, jpeg_from
 from surveillance_operator.mission_actions import MissionActions
-from surveillance_operator.page.hub import Hub
+from surveillance_operator.mission_state import Change, MissionState
+from surveillance_operator.page.broadcaster import Broadcaster
 from surveillance_operator.page.server import Action, Page
-from surveillance_operator.place_page.desk import PlaceDesk
+from surveillance_operator.place_page.edit_session import EditSession
 from surveillance_operator.polled_subscription import PolledSubscription
 from surveillance_operator.sightings import Sightings
-from surveillance_operator.snapshot import Change, Snapshot
 from surveillance_runtime import parameter_checks
 from surveillance_runtime.files import FileError
 from surveillance_runtime.launch_protocol import NotNowError
@@ -56,7 +56,7 @@ IDLE_SECONDS = 5.0
 
 
 @dataclass(frozen=True)
-class PlaceSettings:
+class EditablePlace:
     """The place that can be edited on the page."""
 
     radius: float = robot_radius()
@@ -107,18 +107,20 @@ class MissionPage(PatrolNode):
             read_only=True,
         )
         self._sightings = Sightings(self, evidence_folder)
-        self._hub = Hub()
-        files = self.declare_fields(PlaceSettings())
-        self._cameras: dict[str, Camera] = {'': Camera(self)}
-        self._feed = FleetFeed(self, self._period, self._on_news, self._hub.forget, streams=True)
-        self._actions = FleetActions(self, lambda: self._feed.robots)
-        desk = self._desk(files) if control and files.place_file else None
+        self._broadcaster = Broadcaster()
+        files = self.declare_fields(EditablePlace())
+        self._cameras: dict[str, CameraView] = {'': CameraView(self)}
+        self._subscriber = FleetSubscriber(
+            self, self._period, self._on_news, self._broadcaster.forget, streams=True
+        )
+        self._actions = FleetActions(self, lambda: self._subscriber.robots)
+        session = self._session(files) if control and files.place_file else None
         try:
             self.page = Page(
-                self._hub,
-                questions=self._questions() | (desk.questions if desk else {}),
+                self._broadcaster,
+                questions=self._questions() | (session.questions if session else {}),
                 actions=(self._offered_actions() if control else {})
-                | (desk.actions if desk else {}),
+                | (session.actions if session else {}),
                 picture=self._picture,
                 evidence=lambda name, robot, leaves: self._sightings.picture(
                     name, robot, blur=leaves
@@ -131,7 +133,7 @@ class MissionPage(PatrolNode):
             )
         except OSError as error:
             raise NotNowError(str(error)) from error
-        self._hub.show(self._feed.snapshot(''))
+        self._broadcaster.show(self._subscriber.snapshot(''))
         self.page.start()
         self.get_logger().info(f'the mission is shown at {self.page.address}')
         self.spawn(self._tick, 'page')
@@ -142,10 +144,10 @@ class MissionPage(PatrolNode):
             self.page.stop()
 
     def _period(self) -> float:
-        return POLL_PERIOD if self._hub.viewers else IDLE_PERIOD
+        return POLL_PERIOD if self._broadcaster.viewers else IDLE_PERIOD
 
-    def _on_news(self, robot: str, new: Snapshot, _told: Sequence[Change]) -> None:
-        self._hub.show(new, robot)
+    def _on_news(self, robot: str, new: MissionState, _told: Sequence[Change]) -> None:
+        self._broadcaster.show(new, robot)
 
     def _picture(self, robot: str) -> bytes | None:
         """Return the newest image of a robot's camera."""
@@ -154,8 +156,8 @@ class MissionPage(PatrolNode):
 
     def _tick(self) -> None:
         while not self.stopping.wait(1.0):
-            for robot, snapshot in self._feed.see().items():
-                self._hub.show(snapshot, robot)
+            for robot, snapshot in self._subscriber.see().items():
+                self._broadcaster.show(snapshot, robot)
                 self._meet(robot)
             for camera in self._cameras.values():
                 camera.rest()
@@ -165,9 +167,9 @@ class MissionPage(PatrolNode):
         if robot not in self._cameras:
             self._actions.of(robot)
             self._sightings.follow(robot)
-            self._cameras[robot] = Camera(self, robot)
+            self._cameras[robot] = CameraView(self, robot)
 
-    def _desk(self, files: PlaceSettings) -> PlaceDesk | None:
+    def _session(self, files: EditablePlace) -> EditSession | None:
         """Let the place be edited; None, with a warning, where its file cannot be."""
         path, copy = Path(files.place_file), files.place_copy
 
@@ -184,7 +186,7 @@ class MissionPage(PatrolNode):
         except FileError as error:
             self.get_logger().warn(f'the place cannot be edited: {error}')
             return None
-        return PlaceDesk(editor, tell)
+        return EditSession(editor, tell)
 
     def _questions(self) -> dict[str, Action]:
         actions = self._actions
@@ -250,7 +252,7 @@ def _kept_token(path: str) -> str:
     return read_file(path, 4096).decode('ascii', 'replace').strip()
 
 
-class Camera:
+class CameraView:
     """Gives the newest image of a node's camera, which is heard only while somebody looks.
 
     Args:

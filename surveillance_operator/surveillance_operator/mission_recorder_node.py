@@ -23,7 +23,7 @@ from rclpy.serialization import serialize_message
 from sensor_msgs.msg import CompressedImage, Image
 
 from surveillance_operator.images import COMPRESSED, KINDS, SUFFIX, jpeg_from
-from surveillance_operator.mission_feed import MissionFeed
+from surveillance_operator.mission_subscriber import MissionSubscriber
 from surveillance_operator.polled_subscription import PolledSubscription
 from surveillance_operator.recording.bag import (
     BagWriter,
@@ -96,7 +96,7 @@ class MissionRecorder(PatrolNode):
         self._images = ImageRecorder(self, self._bag, image_period)
         self._subscriptions_by_topic: dict[str, PolledSubscription] = {}
         self._unknown: set[str] = set()
-        self._feed = MissionFeed(self, FEED_PERIOD)
+        self._subscriber = MissionSubscriber(self, FEED_PERIOD)
         self.spawn(self._record, 'recording')
         if path.name == RECORDING:
             self.spawn(self._repair, 'repair')
@@ -135,7 +135,7 @@ class MissionRecorder(PatrolNode):
         now = time.monotonic()
         self._drain()
         if now >= self._next_line:
-            self._timeline.add(self._feed.see(), time.time())
+            self._timeline.add(self._subscriber.see(), time.time())
             self._next_line = now + FEED_PERIOD
         if now >= self._next_seal:
             self._bag.seal()
@@ -152,7 +152,7 @@ class MissionRecorder(PatrolNode):
     def _end(self) -> None:
         self._drain()
         self._bag.close()
-        self._timeline.add(self._feed.see(), time.time())
+        self._timeline.add(self._subscriber.see(), time.time())
         self._timeline.close()
 
     def _drain(self) -> None:

@@ -15,8 +15,8 @@ from rich.console import Console
 
 from state_machines.exceptions import CallError
 from surveillance_operator.fleet_actions import ALL
-from surveillance_operator.fleet_feed import FleetFeed
-from surveillance_operator.snapshot import Change, Snapshot
+from surveillance_operator.fleet_subscriber import FleetSubscriber
+from surveillance_operator.mission_state import Change, MissionState
 from surveillance_operator.stop_button import StopButton
 from surveillance_operator.watch.view import show_moving, show_once
 from surveillance_runtime.logging import clean, print_lines
@@ -45,7 +45,7 @@ class MissionViewNode(PatrolNode):
         )
         self._said = ''
         self._stops: dict[str, StopButton] = {}
-        self._feed = FleetFeed(self, POLL_PERIOD, self._tell)
+        self._subscriber = FleetSubscriber(self, POLL_PERIOD, self._tell)
         if self._draws:
             if not self._once:
                 self._stops[''] = StopButton(self)
@@ -54,19 +54,19 @@ class MissionViewNode(PatrolNode):
             self._print(f'watching {self.snapshot.where}')
 
     @property
-    def snapshot(self) -> Snapshot:
+    def snapshot(self) -> MissionState:
         """All that is known of the robot that is alone, or of what the robots of a fleet share."""
-        return self._feed.snapshot('')
+        return self._subscriber.snapshot('')
 
-    def see(self) -> dict[str, Snapshot]:
+    def see(self) -> dict[str, MissionState]:
         """Return all that is known, at the mission's present time, or the time of its end."""
-        seen = self._feed.see()
+        seen = self._subscriber.see()
         if self._stops:
             for robot in seen.keys() - self._stops.keys():
                 self._stops[robot] = StopButton(self, robot)  # found before it is needed
         return seen
 
-    def _tell(self, robot: str, _new: Snapshot, told: Sequence[Change]) -> None:
+    def _tell(self, robot: str, _new: MissionState, told: Sequence[Change]) -> None:
         if not self._draws:
             at = time.strftime('%H:%M:%S')
             for each in told:
@@ -109,7 +109,7 @@ class MissionViewNode(PatrolNode):
             self._said = '; '.join(done[each] for each in sorted(done))
 
         self._said = 'stopping' if stop else 'releasing'
-        for name in self._feed.robots if robot == ALL else (robot,):
+        for name in self._subscriber.robots if robot == ALL else (robot,):
             self.spawn(partial(press, name), 'stop')
 
     def _print(self, line: str) -> None:

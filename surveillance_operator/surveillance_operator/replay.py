@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from surveillance_operator.page.hub import Hub
+from surveillance_operator.page.broadcaster import Broadcaster
 from surveillance_operator.page.server import Action, Page
 from surveillance_operator.recording.runs import Recording, find_recordings, run_parser
 from surveillance_operator.recording.timeline import MARKS, Timeline
@@ -60,12 +60,12 @@ class Player:
 
     Args:
         tracks: What is played, by the robots' names; a robot that was alone has none.
-        hub: Where it is shown.
+        broadcaster: Where it is shown.
     """
 
-    def __init__(self, tracks: Mapping[str, Track], hub: Hub) -> None:
+    def __init__(self, tracks: Mapping[str, Track], broadcaster: Broadcaster) -> None:
         self._tracks = dict(tracks)
-        self._hub = hub
+        self._broadcaster = broadcaster
         self._lock = threading.Lock()
         self._begin = min(each.line.times[0] for each in self._tracks.values())
         self._time = self._begin
@@ -113,7 +113,7 @@ class Player:
         for robot, track in self._tracks.items():
             if track.sights is not None:
                 seen = {'scan': track.sights.scan(self._time)}
-                self._hub.show_parts(seen, None, whole=False, robot=robot)
+                self._broadcaster.show_parts(seen, None, whole=False, robot=robot)
 
     def jpeg(self, robot: str) -> bytes | None:
         """Return what a robot's camera saw at this moment of the recording."""
@@ -170,7 +170,7 @@ class Player:
         self._time = min(at, self._end)
         for robot, track in self._tracks.items():
             track.number, now, parts = track.line.at(self._time)
-            self._hub.show_parts(parts, now, whole=True, robot=robot)
+            self._broadcaster.show_parts(parts, now, whole=True, robot=robot)
         self._tell()
 
     def _forward(self, seconds: float) -> None:
@@ -188,7 +188,7 @@ class Player:
                 now = now if then is None else then
                 changed.update(parts)
             track.number = number
-            self._hub.show_parts(changed, now, whole=False, robot=robot)
+            self._broadcaster.show_parts(changed, now, whole=False, robot=robot)
         self._tell()
 
     def _tell(self) -> None:
@@ -201,7 +201,7 @@ class Player:
             'time': round(self._time, 1),
         }
         (robot, *_) = self._tracks
-        self._hub.show_parts({'replay': replay}, None, whole=False, robot=robot)
+        self._broadcaster.show_parts({'replay': replay}, None, whole=False, robot=robot)
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -222,10 +222,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     with contextlib.ExitStack() as stack:
         try:
             recordings = find_recordings(options.run, options.runs)
-            hub = Hub()
-            player = open_player(recordings, hub, stack)
+            broadcaster = Broadcaster()
+            player = open_player(recordings, broadcaster, stack)
             page = Page(
-                hub,
+                broadcaster,
                 questions={},
                 actions=player.actions(),
                 picture=player.jpeg,
@@ -246,13 +246,13 @@ def main(argv: Sequence[str] | None = None) -> int:
             pass
         finally:
             player.stop()
-            hub.close()
+            broadcaster.close()
             thread.join()
     return 0
 
 
 def open_player(
-    recordings: Mapping[str, Recording], hub: Hub, stack: contextlib.ExitStack
+    recordings: Mapping[str, Recording], broadcaster: Broadcaster, stack: contextlib.ExitStack
 ) -> Player:
     """Return a player of the recordings of a run's robots; what it needs ends with the stack.
 
@@ -272,7 +272,7 @@ def open_player(
         raise problems[0]
     for problem in problems:
         print(f'replay: {problem}: it is left out', file=sys.stderr)
-    return Player(tracks, hub)
+    return Player(tracks, broadcaster)
 
 
 def _track(recording: Recording, stack: contextlib.ExitStack) -> Track:

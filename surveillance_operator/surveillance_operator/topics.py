@@ -1,7 +1,8 @@
 """What each topic tells of a mission: from its messages to the fields of a snapshot.
 
-A running mission (`mission_feed`) and a recording (`recording.stored`) are read by the same table.
-A message from the network may hold anything. What cannot be used raises `ValueError` with one line.
+A running mission (`mission_subscriber`) and a recording (`recording.stored`) are read by the same
+table. A message from the network may hold anything. What cannot be used raises `ValueError` with
+one line.
 """
 
 from __future__ import annotations
@@ -39,16 +40,16 @@ from surveillance_interfaces.msg import (
 )
 from surveillance_ontology.armor_client import value_in
 from surveillance_ontology.patrol_ontology import CONNECTIONS, URGENT_PLACES, VISITS
-from surveillance_operator.snapshot import (
+from surveillance_operator.mission_state import (
     NO_POINTS,
     TRAIL_STEP,
-    Container,
-    Health,
+    MachineContainer,
+    MachineTransition,
+    MissionState,
+    NodeReport,
+    PatrolShare,
     Pose,
-    Share,
-    Snapshot,
     Status,
-    Transition,
 )
 from surveillance_runtime.conversions import map_from, points_from_cloud, pose_from, seconds_of
 from surveillance_runtime.fleet_messages import FLEET_TOPIC
@@ -109,7 +110,7 @@ class Topic(NamedTuple):
 
     name: str
     kind: Any
-    read: Callable[[Any, Snapshot], Fields]
+    read: Callable[[Any, MissionState], Fields]
     qos: QoSProfile = STATE_QOS
     stream: bool = False
     beside: str = ''
@@ -117,7 +118,7 @@ class Topic(NamedTuple):
     whose: Callable[[Any], frozenset[str] | None] | None = None
 
 
-def read_message(snapshot: Snapshot, topic: Topic, message: Any) -> Snapshot:
+def read_message(snapshot: MissionState, topic: Topic, message: Any) -> MissionState:
     """Return the snapshot with what a message says, or why it cannot be used."""
     try:
         fields = topic.read(message, snapshot)
@@ -126,7 +127,7 @@ def read_message(snapshot: Snapshot, topic: Topic, message: Any) -> Snapshot:
     return replace(snapshot, **fields) if fields else snapshot
 
 
-def moved(pose: Pose, old: Snapshot) -> Fields:
+def moved(pose: Pose, old: MissionState) -> Fields:
     """Return the fields that a new pose changes: the pose, and the trail."""
     trail = old.trail
     if not len(trail) or math.dist(trail[-1], pose[:2]) >= TRAIL_STEP:
@@ -134,7 +135,7 @@ def moved(pose: Pose, old: Snapshot) -> Fields:
     return {'pose': pose, 'trail': trail}
 
 
-def _fed_back(point: Any, old: Snapshot) -> Fields:
+def _fed_back(point: Any, old: MissionState) -> Fields:
     # Where somebody estimates the pose, it is known better than from the drive's feedback.
     if old.localised and old.mode not in ('RANDOM', 'MANUAL'):
         return {}
@@ -146,16 +147,16 @@ def _fed_back(point: Any, old: Snapshot) -> Fields:
     return moved((x, y, yaw), old)
 
 
-def _on_map(message: OccupancyGrid, _old: Snapshot) -> Fields:
+def _on_map(message: OccupancyGrid, _old: MissionState) -> Fields:
     return {'grid': map_from(message, MOST_CELLS), 'trail': NO_POINTS}
 
 
-def _on_transition(message: FsmTransition, old: Snapshot) -> Fields:
+def _on_transition(message: FsmTransition, old: MissionState) -> Fields:
     transition = transition_from(message)
     return {'transitions': (*old.transitions, transition)[-KEPT_TRANSITIONS:]}
 
 
-def _on_pose(message: PoseWithCovarianceStamped, old: Snapshot) -> Fields:
+def _on_pose(message: PoseWithCovarianceStamped, old: MissionState) -> Fields:
     at = seconds_of(message.header.stamp)
     pose = pose_from(message.pose.pose)
     return {
@@ -167,7 +168,7 @@ def _on_pose(message: PoseWithCovarianceStamped, old: Snapshot) -> Fields:
     }
 
 
-def _on_scan(message: LaserScan, old: Snapshot) -> Fields:
+def _on_scan(message: LaserScan, old: MissionState) -> Fields:
     lidar = seconds_of(message.header.stamp), scan_from(message)
     return {'lidar': lidar, **_seen(old.pose, old.pose_time, lidar)}
 
@@ -184,7 +185,7 @@ def _seen(pose: Pose | None, at: float, lidar: tuple[float, Any] | None) -> Fiel
     return {'scan': lidar[1] @ turn + (x, y)}
 
 
-def _on_joints(message: JointState, _old: Snapshot) -> Fields:
+def _on_joints(message: JointState, _old: MissionState) -> Fields:
     if len(message.name) != len(message.position):
         raise ValueError(f'{len(message.position)} positions came for {len(message.name)} joints')
     if not all(map(math.isfinite, message.position)):
@@ -197,7 +198,7 @@ def _on_joints(message: JointState, _old: Snapshot) -> Fields:
     return {'camera': (seconds_of(message.header.stamp), frame)}
 
 
-def _on_detections(message: MarkerDetectionArray, old: Snapshot) -> Fields:
+def _on_detections(message: MarkerDetectionArray, old: MissionState) -> Fields:
     """Take in the markers of an image, also on the map where robot and camera stood still."""
     found = message.detections[:MOST_NAMES]
     fields: Fields = {
@@ -228,7 +229,7 @@ def _on_detections(message: MarkerDetectionArray, old: Snapshot) -> Fields:
     return {**fields, 'markers': placed} if placed != old.markers else fields
 
 
-def _on_diagnostics(message: DiagnosticArray, old: Snapshot) -> Fields:
+def _on_diagnostics(message: DiagnosticArray, old: MissionState) -> Fields:
     came = health_from(message)
     health = {
         **old.health,
@@ -255,10 +256,10 @@ def _is_of_another(status: str, namespace: str) -> bool:
     return node in BY_NAME and not f'{namespace}/'.startswith(f'{where}/' if where else '')
 
 
-def _on_fleet_robot(message: FleetRobot, old: Snapshot) -> Fields:
+def _on_fleet_robot(message: FleetRobot, old: MissionState) -> Fields:
     if message.robot != old.namespace.rpartition('/')[2]:
         return {}
-    share = Share(
+    share = PatrolShare(
         _names(message.tour, 'places'),
         message.stop,
         message.dock,
@@ -278,7 +279,7 @@ def _whose_parameters(message: ParameterEvent) -> frozenset[str]:
     return frozenset(message.node.strip('/').split('/')[-2:-1])
 
 
-def _on_parameters(message: ParameterEvent, old: Snapshot) -> Fields:
+def _on_parameters(message: ParameterEvent, old: MissionState) -> Fields:
     if message.node.strip('/') != '/'.join(filter(None, (old.namespace, BEHAVIOUR))):
         return {}
     changed = (*message.new_parameters, *message.changed_parameters)
@@ -297,7 +298,7 @@ def behaviour_fields(values: dict[str, Any]) -> Fields:
     return fields
 
 
-def with_fact(snapshot: Snapshot, fact: ShortFact, came: bool) -> Snapshot:
+def with_fact(snapshot: MissionState, fact: ShortFact, came: bool) -> MissionState:
     """Return the snapshot after a fact of the ontology came or went; most facts change nothing."""
     if _URGENT.matches(fact):
         place = frozenset(fact.arguments)
@@ -414,12 +415,12 @@ def scan_from(message: LaserScan) -> NDArray[np.float64]:
     return np.stack([ranges * np.cos(angles), ranges * np.sin(angles)], axis=1)
 
 
-def containers_from(message: FsmStructure) -> tuple[Container, ...]:
+def containers_from(message: FsmStructure) -> tuple[MachineContainer, ...]:
     """Return the containers of a state machine, outermost first."""
     if len(message.containers) > MOST_NAMES:
         raise ValueError(f'a state machine of {len(message.containers)} containers')
     return tuple(
-        Container(
+        MachineContainer(
             each.path,
             each.kind,
             _names(each.states, 'states'),
@@ -431,10 +432,10 @@ def containers_from(message: FsmStructure) -> tuple[Container, ...]:
     )
 
 
-def transition_from(message: FsmTransition) -> Transition:
+def transition_from(message: FsmTransition) -> MachineTransition:
     """Return a transition of the state machine."""
     duration = float(message.duration)
-    return Transition(
+    return MachineTransition(
         message.sequence,
         seconds_of(message.stamp),
         message.path,
@@ -445,11 +446,11 @@ def transition_from(message: FsmTransition) -> Transition:
     )
 
 
-def health_from(message: DiagnosticArray) -> dict[str, Health]:
+def health_from(message: DiagnosticArray) -> dict[str, NodeReport]:
     """Return what each part reports, by name."""
     heard = time.monotonic()
     return {
-        each.name: Health(
+        each.name: NodeReport(
             each.level[0] if isinstance(each.level, bytes) else int(each.level),
             each.message,
             tuple((value.key, value.value) for value in each.values[:50]),
@@ -467,32 +468,32 @@ def _names(names: Iterable[str], what: str) -> tuple[str, ...]:
     return found
 
 
-def _on_request(controller: str) -> Callable[[String, Snapshot], Fields]:
+def _on_request(controller: str) -> Callable[[String, MissionState], Fields]:
     return lambda message, old: {'requests': {**old.requests, controller: message.data}}
 
 
-def _sets(name: str, value: Callable[[Any], Any]) -> Callable[[Any, Snapshot], Fields]:
+def _sets(name: str, value: Callable[[Any], Any]) -> Callable[[Any, MissionState], Fields]:
     """Return how a message sets one field."""
     return lambda message, _: {name: value(message)}
 
 
-def _on_scan_goals(message: GoalStatusArray, _: Snapshot) -> Fields:
+def _on_scan_goals(message: GoalStatusArray, _: MissionState) -> Fields:
     running = any(each.status <= GoalStatus.STATUS_CANCELING for each in message.status_list)
     return {} if running else {'scan_progress': None}
 
 
-def _feedback(action: str, kind: Any, read: Callable[[Any, Snapshot], Fields]) -> Topic:
+def _feedback(action: str, kind: Any, read: Callable[[Any, MissionState], Fields]) -> Topic:
     """Return the topic of an action's feedback, read without its envelope."""
     name, message = f'{action}/_action/feedback', kind.Impl.FeedbackMessage
     return Topic(name, message, lambda m, old: read(m.feedback, old), _NEWEST)
 
 
-def _on_promises(message: DiagnosticArray, _: Snapshot) -> Fields:
+def _on_promises(message: DiagnosticArray, _: MissionState) -> Fields:
     promises, hours = promises_from(message)
     return {'promises': promises, 'hours': hours}
 
 
-def _on_machine(message: FsmStatus, _: Snapshot) -> dict[str, Any]:
+def _on_machine(message: FsmStatus, _: MissionState) -> dict[str, Any]:
     waiting = tuple(f'{each.path}: {each.outcome} -> {each.to_state}' for each in message.questions)
     return {'active': tuple(message.active), 'paused': message.paused, 'waiting': waiting}
 

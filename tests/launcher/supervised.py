@@ -7,7 +7,7 @@ import sys
 
 from launcher import supervisor as module
 from launcher.log_merge import MergedLog
-from launcher.supervisor import Program, Supervisor
+from launcher.supervisor import ManagedProcess, Supervisor
 
 seconds = float(os.environ['SECONDS_TO_RUN']) if 'SECONDS_TO_RUN' in os.environ else None
 module.STOP_AT_MOST = float(os.environ.get('STOP_AT_MOST', module.STOP_AT_MOST))
@@ -17,13 +17,13 @@ for argument in sys.argv[1:]:
     name, _, script = argument.partition('=')
     command = [sys.executable, '-u', '-c', script]
     programs.append(
-        Program(
+        ManagedProcess(
             name,
             command,
             os.environ,
             takes_input=True,
             leads=name.startswith('lead'),
-            ends_run=name.startswith('errand'),
+            ends_run=name.startswith('job'),
             memory=int(os.environ.get('MEMORY', '0')),
         )
     )

@@ -23,7 +23,7 @@ from launcher.environment import (
     clean_environ,
     keep_bytecode,
 )
-from launcher.progress import Step
+from launcher.progress import SetUpStep
 from tests.launcher.conftest import ROOT
 
 # A build backend that needs nothing and waits, when told to, for the test to go on.
@@ -313,7 +313,10 @@ def test_what_a_set_up_runs_leaves_no_compiled_modules_and_finds_those_of_pip(
             'assert pathlib.Path(module.__cached__).parent == beside'
         )
         words = [sys.executable, '-c', code]
-        with _Command(Environment(tmp_path), words, lock) as command, Step(1, 1, 'import') as step:
+        with (
+            _Command(Environment(tmp_path), words, lock) as command,
+            SetUpStep(1, 1, 'import') as step,
+        ):
             command.watch(step)
     finally:
         os.close(lock)

@@ -16,7 +16,7 @@ from launcher.environment import (
     INTERFACES,
     SPACE,
     Environment,
-    Journal,
+    SetUpJournal,
     _Command,
     clean_environ,
     complete,
@@ -24,7 +24,7 @@ from launcher.environment import (
     requirements,
     users_of,
 )
-from launcher.progress import Step
+from launcher.progress import SetUpStep
 from surveillance_runtime.launch_protocol import NotNowError
 
 
@@ -128,7 +128,7 @@ def test_a_new_one_begins_with_what_the_one_in_use_has(
     (first / 'lib').mkdir()
     (first / 'lib' / 'module.py').write_text(f'{first}\n')
     (first / 'bin' / 'program').write_bytes(os.fsencode(f'{first}\0'))
-    python = Journal.read(first).python
+    python = SetUpJournal.read(first).python
     environment = Environment(checkout)
     assert environment._seed(python) is None, 'there is one already'
     environment.venv = checkout / '.venv-3.11-1'
@@ -187,7 +187,7 @@ def test_without_room_on_the_disk_nothing_is_begun(
     environment._set_up(0)
     ((_, titles, journal, wanted, _),) = begun
     assert titles == [module.VENV_STEP, module.PACKAGES_STEP, module.INTERFACES_STEP]
-    assert Journal.read(checkout / '.venv').python == wanted.python
+    assert SetUpJournal.read(checkout / '.venv').python == wanted.python
     assert journal.working == ''
 
 
@@ -239,7 +239,7 @@ def test_why_a_step_failed_is_told_in_one_line(checkout: Path, printed: str, rea
     lock = os.open(checkout, os.O_RDONLY)
     try:
         with (
-            Step(1, 1, 'fail') as step,
+            SetUpStep(1, 1, 'fail') as step,
             _Command(environment, [sys.executable, '-S', '-c', code], lock) as command,
             pytest.raises(NotNowError) as found,
         ):

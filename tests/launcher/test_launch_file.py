@@ -15,9 +15,9 @@ from typing import Any
 
 import pytest
 
+from launcher.fleet_launch import parts
 from launcher.run import Run
 from launcher.run_configuration import configuration, profile_of
-from launcher.team import parts
 from surveillance_runtime.configuration import Configuration, file_layer
 from surveillance_runtime.files import FileError
 from surveillance_runtime.node_table import BEHAVIOURS, MODES, find, select

@@ -5,7 +5,7 @@ import io
 
 import pytest
 
-from launcher.progress import Step, describe
+from launcher.progress import SetUpStep, describe
 
 
 class Terminal(io.StringIO):
@@ -37,7 +37,7 @@ def test_what_a_line_of_output_tells(line, shown):
 
 def test_a_step_on_a_terminal_redraws_one_line():
     stream = Terminal()
-    with Step(1, 3, 'packages', stream) as step:
+    with SetUpStep(1, 3, 'packages', stream) as step:
         step.feed('Collecting numpy')
     assert stream.getvalue().count('\n') == 1
     assert '\r' in stream.getvalue()
@@ -48,7 +48,7 @@ def test_a_step_on_a_terminal_redraws_one_line():
 def test_a_step_on_a_narrow_terminal_keeps_to_one_line(monkeypatch):
     monkeypatch.setenv('COLUMNS', '40')
     stream = Terminal()
-    with Step(1, 3, 'Python packages, ROS 2 Jazzy among them', stream) as step:
+    with SetUpStep(1, 3, 'Python packages, ROS 2 Jazzy among them', stream) as step:
         step.feed('Collecting numpy')
     drawn = stream.getvalue().split('\r\x1b[K')[1:-1]
     assert drawn
@@ -58,7 +58,7 @@ def test_a_step_on_a_narrow_terminal_keeps_to_one_line(monkeypatch):
 def test_a_step_that_printed_nothing_yet_ends_its_line_with_the_time(monkeypatch):
     monkeypatch.setattr('launcher.progress._PLAIN_EVERY', 0.0)
     stream = io.StringIO()
-    with Step(1, 3, 'environment', stream) as step:
+    with SetUpStep(1, 3, 'environment', stream) as step:
         step.tick()
     assert stream.getvalue().splitlines()[1] == '[1/3] environment: 0 s'
 
@@ -67,7 +67,7 @@ def test_a_step_that_hears_nothing_says_for_how_long_and_of_what(monkeypatch):
     now = iter([0.0, 1.0, 2.0, 25.0, 40.0, 41.0])
     monkeypatch.setattr('launcher.progress.time.monotonic', lambda: next(now))
     stream = io.StringIO()
-    with Step(1, 3, 'packages', stream) as step:
+    with SetUpStep(1, 3, 'packages', stream) as step:
         step.feed('Downloading numpy-2.0-cp311.whl')
         step.tick()
     assert stream.getvalue().splitlines()[1] == (
@@ -77,7 +77,7 @@ def test_a_step_that_hears_nothing_says_for_how_long_and_of_what(monkeypatch):
 
 def test_a_step_elsewhere_prints_a_line_at_its_start_and_its_end():
     stream = io.StringIO()
-    with contextlib.suppress(RuntimeError), Step(2, 3, 'interfaces', stream) as step:
+    with contextlib.suppress(RuntimeError), SetUpStep(2, 3, 'interfaces', stream) as step:
         step.feed('[1/2] compiling')
         raise RuntimeError
     assert stream.getvalue().splitlines() == [

@@ -16,6 +16,7 @@ import yaml
 
 from launcher.alarm import caller
 from launcher.cli import CONFIG
+from launcher.fleet_launch import RobotProcesses
 from launcher.log_merge import MergedLog
 from launcher.run import (
     MARKERS,
@@ -34,7 +35,6 @@ from launcher.run_mission import (
     what_to_look_at,
 )
 from launcher.run_processes import command, node_environ, programs_of, ros_arguments
-from launcher.team import Part
 from surveillance_behaviour.mission.mission_log import MissionRecord
 from surveillance_runtime import discovery
 from surveillance_runtime.command_line import page_address
@@ -400,7 +400,7 @@ def test_everything_that_only_looks_on_gets_a_process(tmp_path, composed):
     watch = tmp_path / 'watch.yaml'
     run = Run(web=True, watch=watch, record=str(tmp_path), composed=composed)
     nodes, observers = run.nodes(), run.observers()
-    part = Part(run=run, nodes=nodes, observers=observers)
+    part = RobotProcesses(run=run, nodes=nodes, observers=observers)
     files = {node.name: tmp_path / node.name for node in part.everyone}
     started = ' '.join(word for each in programs_of(part, files, {}) for word in each.command)
     assert {'observer', 'mission_page', 'mission_recorder'} <= {node.name for node in observers}

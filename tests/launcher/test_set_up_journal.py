@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from launcher.environment import INTERFACES, Journal, complete, requirements
+from launcher.environment import INTERFACES, SetUpJournal, complete, requirements
 
 PROJECT = """
 [project]
@@ -59,13 +59,13 @@ def test_what_a_build_leaves_behind_does_not_show(checkout):
 def test_a_journal_is_kept_and_complete_only_when_nothing_is_under_way(tmp_path, checkout):
     journal = complete(checkout, ['test'])
     journal.write(tmp_path)
-    assert Journal.read(tmp_path) == journal
+    assert SetUpJournal.read(tmp_path) == journal
     journal.working = 'packages'
     assert journal != complete(checkout, ['test'])
 
 
 @pytest.mark.parametrize('content', ['', '{', '[]', '{"unknown": 1}', '\x00'])
 def test_a_broken_journal_counts_as_none(content, tmp_path):
-    Journal('x').write(tmp_path)
+    SetUpJournal('x').write(tmp_path)
     next(tmp_path.iterdir()).write_text(content)
-    assert Journal.read(tmp_path) == Journal()
+    assert SetUpJournal.read(tmp_path) == SetUpJournal()

@@ -218,14 +218,14 @@ def test_a_child_that_says_it_has_finished_is_left_alone(start):
 
 
 def test_a_child_whose_work_is_the_run_is_not_begun_anew(start):
-    launch = start(DRIVER, f'errand={WAIT}', f'two={WAIT}')
-    first = int(launch.until(r'started errand \(process (\d+)\)')[1])
-    launch.until(r'errand +\| up')
+    launch = start(DRIVER, f'job={WAIT}', f'two={WAIT}')
+    first = int(launch.until(r'started job \(process (\d+)\)')[1])
+    launch.until(r'job +\| up')
     os.kill(first, signal.SIGKILL)
     assert launch.end()[0] == EXIT_CUT
     output = '\n'.join(launch.lines)
-    assert 'errand died (killed by SIGKILL): the run ends with what there is' in output
-    assert output.count('started errand') == 1
+    assert 'job died (killed by SIGKILL): the run ends with what there is' in output
+    assert output.count('started job') == 1
 
 
 def test_a_line_of_input_reaches_the_named_child(start):
@@ -249,7 +249,7 @@ def test_the_time_to_run_ends_the_launch(start):
 DIES_AS_A_STOP_BEGINS = """
 import os, sys
 from launcher.log_merge import MergedLog
-from launcher.supervisor import Program, Supervisor
+from launcher.supervisor import ManagedProcess, Supervisor
 
 class Log(MergedLog):
     def line(self, name, text):
@@ -257,7 +257,7 @@ class Log(MergedLog):
         os.waitid(os.P_PID, supervisor.children[name].process.pid, os.WEXITED | os.WNOWAIT)
         supervisor.stop()
 
-program = Program('one', [sys.executable, '-c', 'print("bye")'], os.environ)
+program = ManagedProcess('one', [sys.executable, '-c', 'print("bye")'], os.environ)
 supervisor = Supervisor([program], Log(None, ['one'], colour=False))
 sys.exit(supervisor.run())
 """
@@ -287,7 +287,7 @@ def test_a_reader_that_goes_away_ends_the_launch():
 
 
 def test_children_end_with_a_launcher_that_is_killed(start):
-    child = str(ROOT / 'launcher' / 'child.py')
+    child = str(ROOT / 'launcher' / 'node_process.py')
     script = (
         'import os, subprocess, sys\n'
         f'subprocess.run([sys.executable, "-P", {child!r}, str(os.getpid()), '
@@ -303,7 +303,7 @@ def test_children_end_with_a_launcher_that_is_killed(start):
 
 
 def test_a_child_whose_launcher_is_gone_already_does_not_start():
-    child = str(ROOT / 'launcher' / 'child.py')
+    child = str(ROOT / 'launcher' / 'node_process.py')
     done = subprocess.run(
         [sys.executable, '-P', child, '1', 'x=tests.launcher.waiting_node:X'],
         env=USER_ENVIRON,

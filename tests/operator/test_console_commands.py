@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from surveillance_operator.console_commands import Answer, answer, completions, help_text
+from surveillance_operator.console_commands import Reply, answer, completions, help_text
 
 ANSWERS: dict[str, Any] = {
     'why_not': ('R3 can wait', ['URGENT(R3)']),
@@ -31,7 +31,7 @@ class Scripted:
         return act
 
 
-def said(line: str, actions: Any = None) -> list[Answer]:
+def said(line: str, actions: Any = None) -> list[Reply]:
     taken: Any = actions or Scripted()
     return answer(line, taken, lambda: 'because')
 

@@ -33,30 +33,30 @@ from state_machines import Interrupt
 from state_machines.exceptions import CallError
 from surveillance_behaviour.mission.mission_log import MissionRecord
 from surveillance_interfaces.msg import DoorStates, FleetRobot, MissionStatus
-from surveillance_operator import fleet_command, fleet_feed, mission_feed
+from surveillance_operator import fleet_command, fleet_subscriber, mission_subscriber
 from surveillance_operator.console_commands import answer, completions
 from surveillance_operator.console_node import ConsoleNode
 from surveillance_operator.fleet_actions import WORDS, FleetActions
-from surveillance_operator.fleet_feed import FleetFeed
+from surveillance_operator.fleet_subscriber import FleetSubscriber
 from surveillance_operator.fleet_table import fleet_lines
-from surveillance_operator.frames import health, merged_events
 from surveillance_operator.mission_markers_node import markers_of
-from surveillance_operator.page.hub import Hub
-from surveillance_operator.page.server import Page
-from surveillance_operator.recording.runs import find_recordings
-from surveillance_operator.recording.timeline import TimelineWriter
-from surveillance_operator.replay import open_player
-from surveillance_operator.report import draw_picture, write_report
-from surveillance_operator.snapshot import (
+from surveillance_operator.mission_state import (
     Event,
-    Health,
-    Share,
-    Snapshot,
+    MissionState,
+    NodeReport,
+    PatrolShare,
     Status,
     doing,
     follow,
     troubles,
 )
+from surveillance_operator.page.broadcaster import Broadcaster
+from surveillance_operator.page.server import Page
+from surveillance_operator.page_state import health, merged_events
+from surveillance_operator.recording.runs import find_recordings
+from surveillance_operator.recording.timeline import TimelineWriter
+from surveillance_operator.replay import open_player
+from surveillance_operator.report import draw_picture, write_report
 from surveillance_operator.watch.view import MissionView, show_once
 from surveillance_runtime.files import FileError
 from surveillance_runtime.node import PatrolNode
@@ -67,11 +67,11 @@ from tests.launcher.conftest import ROOT
 from tests.operator.browser import CHROMIUM, DESK, DRIVER, MISSING, PHONE, Viewer
 
 
-def robot(name: str, place: str = 'A', x: float = 1.0) -> Snapshot:
+def robot(name: str, place: str = 'A', x: float = 1.0) -> MissionState:
     """Return a robot of a fleet on its way from a place."""
     cells = np.zeros((20, 60), np.int8)
     cells[0] = cells[-1] = cells[:, 0] = cells[:, -1] = 100
-    return Snapshot(
+    return MissionState(
         where='ROS domain 5',
         namespace=name,
         now=100.0,
@@ -85,13 +85,13 @@ def robot(name: str, place: str = 'A', x: float = 1.0) -> Snapshot:
         positions={'A': (1.0, 1.0), 'B': (5.0, 1.0)},
         pose=(x, 1.0, 0.0),
         plan=np.array([(x, 1.0), (5.0, 1.0)]),
-        share=Share(('A', 'B'), 'B', heading_to='B', is_moving=True),
+        share=PatrolShare(('A', 'B'), 'B', heading_to='B', is_moving=True),
         events=(Event(1e9, f'{name} begins'), Event(1e9 + 1.0, 'door D closed', shared=True)),
     )  # fmt: skip
 
 
 FLEET = {
-    '': replace(Snapshot(where='ROS domain 5'), nodes={'armor_server': frozenset('1')}),
+    '': replace(MissionState(where='ROS domain 5'), nodes={'armor_server': frozenset('1')}),
     'anna': robot('anna'),
     'bert': robot('bert', x=2.0),
     'carl': robot('carl', x=3.0),
@@ -117,7 +117,7 @@ def test_one_time_line_names_each_robot_and_tells_of_the_place_once() -> None:
 
 
 def test_a_program_that_robots_share_stands_once_in_the_health_of_each() -> None:
-    good = Health(0, 'up', ())
+    good = NodeReport(0, 'up', ())
     names = ('anna/planner_controller', 'anna/mission_markers', 'simulator', 'armor_server')
     anna = replace(
         FLEET['anna'], nodes=dict.fromkeys(('simulator', 'planner_controller'), frozenset('1'))
@@ -136,14 +136,14 @@ def test_what_a_robot_does_and_what_is_wrong_with_it_is_said_in_words() -> None:
     share = anna.share
     assert share is not None
     assert doing(replace(anna, share=replace(share, is_moving=False))) == 'waits to go to B'
-    out = replace(anna, share=Share(taken_out=True))
+    out = replace(anna, share=PatrolShare(taken_out=True))
     assert doing(out) == 'taken out of the patrol'
     assert [each.text for each in follow(anna, out, 1.0)[1]] == ['taken out of the patrol']
     reports = {
-        'anna/battery_controller': Health(3, 'silent', ()),
-        'anna/motion_controller': Health(2, 'no odometry', ()),
-        'bert/motion_controller': Health(2, 'not mine', ()),
-        'armor_server': Health(2, 'of all', ()),
+        'anna/battery_controller': NodeReport(3, 'silent', ()),
+        'anna/motion_controller': NodeReport(2, 'no odometry', ()),
+        'bert/motion_controller': NodeReport(2, 'not mine', ()),
+        'armor_server': NodeReport(2, 'of all', ()),
     }
     bad = replace(anna, stopped=True, health=reports, ended=frozenset({'robot_behavior'}))
     assert troubles(bad) == [
@@ -170,18 +170,18 @@ def test_what_a_robot_does_and_what_is_wrong_with_it_is_said_in_words() -> None:
 
 
 def test_a_viewer_gets_all_of_one_robot_and_a_glance_of_the_others() -> None:
-    hub = Hub()
+    broadcaster = Broadcaster()
     for name, snapshot in FLEET.items():
-        hub.show(snapshot, name)
+        broadcaster.show(snapshot, name)
 
     async def look() -> tuple[Any, Any, Any]:
-        first = hub.stream('bert')
-        usual = hub.stream()
+        first = broadcaster.stream('bert')
+        usual = broadcaster.stream()
         read: list[Any] = []
         for stream in (first, usual):
             await anext(stream)
             read.append(json.loads((await anext(stream)).removeprefix('data: ')))
-        hub.show(replace(FLEET['anna'], battery=79.0), 'anna')
+        broadcaster.show(replace(FLEET['anna'], battery=79.0), 'anna')
         read.append(json.loads((await anext(first)).removeprefix('data: ')))
         return read[0], read[1], read[2]
 
@@ -197,19 +197,19 @@ def test_a_viewer_gets_all_of_one_robot_and_a_glance_of_the_others() -> None:
 
 
 def test_a_viewer_of_a_robot_that_is_shown_no_longer_sees_another_one_whole() -> None:
-    hub = Hub()
+    broadcaster = Broadcaster()
     for name, snapshot in FLEET.items():
-        hub.show(snapshot, name)
+        broadcaster.show(snapshot, name)
 
     async def look() -> list[Any]:
-        stream = hub.stream('bert')
+        stream = broadcaster.stream('bert')
         await anext(stream)
         read = []
         for leaves in ('nobody', 'bert', 'carl'):
             read.append(json.loads((await anext(stream)).removeprefix('data: ')))
-            hub.forget(leaves)
+            broadcaster.forget(leaves)
             if leaves == 'nobody':
-                hub.show(replace(FLEET['anna'], battery=70.0), 'anna')
+                broadcaster.show(replace(FLEET['anna'], battery=70.0), 'anna')
         return [*read, json.loads((await anext(stream)).removeprefix('data: '))]
 
     whole, same, other, last = asyncio.run(look())
@@ -274,14 +274,14 @@ class Robot:
 
 @pytest.fixture(autouse=True)
 def _look_often(monkeypatch: pytest.MonkeyPatch) -> None:
-    for module in (mission_feed, fleet_feed):
+    for module in (mission_subscriber, fleet_subscriber):
         monkeypatch.setattr(module, 'LOOK_PERIOD', 0.05)
 
 
 def test_robots_are_found_and_told_apart_and_share_the_place(graph: Any) -> None:
     watcher = graph.add(PatrolNode, name='mission_page')
     heard: list[tuple[str, str]] = []
-    feed = FleetFeed(
+    feed = FleetSubscriber(
         watcher, 0.02, lambda name, _new, told: heard.extend((name, each.text) for each in told)
     )
     assert feed.robots == ('',), 'one that is alone has no name'
@@ -306,7 +306,7 @@ def test_robots_are_found_and_told_apart_and_share_the_place(graph: Any) -> None
     assert bertha.status is not None
     assert (anna.status.place, bertha.status.place) == ('place_of_anna', 'place_of_bertha')
     assert (anna.battery, bertha.battery) == (40.0, 60.0)
-    assert anna.share == Share(('A', 'anna'), 'anna', runs_until=9.0)
+    assert anna.share == PatrolShare(('A', 'anna'), 'anna', runs_until=9.0)
     assert anna.doors == bertha.doors == {'D': False}
     assert anna.health.keys() == {'anna/motion_controller', 'armor_server'}
     assert list(feed.see()) == ['anna', 'bertha', ''], 'what they share is last'
@@ -323,7 +323,7 @@ def test_robots_are_found_and_told_apart_and_share_the_place(graph: Any) -> None
 
 
 def test_a_robot_whose_behaviour_is_down_is_found_and_stopped_with_the_others(graph: Any) -> None:
-    feed = FleetFeed(graph.add(PatrolNode, name='hands'), 0.02)
+    feed = FleetSubscriber(graph.add(PatrolNode, name='hands'), 0.02)
     Robot(graph, 'anna')
     monitor = graph.add(PatrolNode, name='collision_monitor', namespace='/bert')
     monitor.create_subscription(String, '/place', lambda _: None, STATE_QOS)
@@ -440,14 +440,14 @@ def test_the_report_of_a_fleet_has_all_robots_and_leads_to_each(fleet_run: Path)
 
 
 def test_a_fleet_is_replayed_in_one_time(fleet_run: Path) -> None:
-    hub = Hub()
+    broadcaster = Broadcaster()
     with contextlib.ExitStack() as stack:
-        player = open_player(find_recordings(str(fleet_run), fleet_run.parent), hub, stack)
+        player = open_player(find_recordings(str(fleet_run), fleet_run.parent), broadcaster, stack)
         assert player.length == 79.0, 'from the first one that begins to the last one that ends'
         player.seek(60.0)
 
         async def look() -> Any:
-            stream = hub.stream('bert')
+            stream = broadcaster.stream('bert')
             await anext(stream)
             return json.loads((await anext(stream)).removeprefix('data: '))
 
@@ -464,12 +464,12 @@ def test_one_damaged_recording_costs_a_line_and_the_others_are_played(
     (fleet_run / 'bert' / 'timeline.jsonl').write_text('garbage\n')
     found = find_recordings(str(fleet_run), fleet_run.parent)
     with contextlib.ExitStack() as stack:
-        assert open_player(found, Hub(), stack).length == 29.0
+        assert open_player(found, Broadcaster(), stack).length == 29.0
     (line,) = capsys.readouterr().err.splitlines()
     assert line.endswith('bert/timeline.jsonl: holds nothing to replay: it is left out')
     (fleet_run / 'anna' / 'timeline.jsonl').write_text('')
     with contextlib.ExitStack() as stack, pytest.raises(FileError, match='anna/timeline'):
-        open_player(found, Hub(), stack)
+        open_player(found, Broadcaster(), stack)
 
 
 def test_a_robot_that_left_nothing_is_named_in_the_report(fleet_run: Path) -> None:
@@ -551,7 +551,7 @@ def test_a_robot_that_joins_takes_no_commands_from_the_one_that_is_spoken_to(
     with os.fdopen(receiver) as source, os.fdopen(sender, 'w'):
         console = graph.add(ConsoleNode, console_source=source)
         known = SimpleNamespace(robots=('bert',))
-        monkeypatch.setattr(console, '_feed', known)
+        monkeypatch.setattr(console, '_subscriber', known)
         console._actions_for('stop')
         known.robots = ('anna', 'bert')
         assert console.robot == 'bert'
@@ -594,12 +594,12 @@ def told() -> list[tuple[str, str]]:
 
 
 @pytest.fixture(scope='module')
-def hub() -> Hub:
-    return Hub()
+def broadcaster() -> Broadcaster:
+    return Broadcaster()
 
 
 @pytest.fixture(scope='module')
-def viewer(hub: Hub, told: list[tuple[str, str]]) -> Iterator[Viewer]:
+def viewer(broadcaster: Broadcaster, told: list[tuple[str, str]]) -> Iterator[Viewer]:
     if not (CHROMIUM and DRIVER):
         pytest.skip(MISSING)
 
@@ -610,17 +610,19 @@ def viewer(hub: Hub, told: list[tuple[str, str]]) -> Iterator[Viewer]:
     def stop(on: bool, robot: str = '') -> str:
         return fleet('stop' if on else 'release', robot)
 
-    page = Page(hub, questions={}, actions={'fleet': fleet, 'stop': stop}, port=0)
+    page = Page(broadcaster, questions={}, actions={'fleet': fleet, 'stop': stop}, port=0)
     page.start()
     for name, snapshot in FLEET.items():
-        hub.show(snapshot, name)
+        broadcaster.show(snapshot, name)
     viewer = Viewer(page.address)
     yield viewer
     viewer.close()
     page.stop()
 
 
-def test_the_page_shows_all_robots_and_one_of_them_whole(hub: Hub, viewer: Viewer) -> None:
+def test_the_page_shows_all_robots_and_one_of_them_whole(
+    broadcaster: Broadcaster, viewer: Viewer
+) -> None:
     viewer.until(lambda: viewer.count('[data-row]') == 4)
     assert viewer.text('#title').startswith('anna')
     assert viewer.text('[data-row=bert] .doing') == (
@@ -638,27 +640,29 @@ def test_the_page_shows_all_robots_and_one_of_them_whole(hub: Hub, viewer: Viewe
     assert viewer.text('#reason') == 'B is for bert'
     assert viewer.attribute('[data-choose=bert]', 'aria-pressed') == 'true'
     assert 'robot=bert' in viewer.driver.current_url
-    hub.show(replace(FLEET['carl'], pose=(4.0, 1.0, 0.0)), 'carl')
+    broadcaster.show(replace(FLEET['carl'], pose=(4.0, 1.0, 0.0)), 'carl')
     viewer.until(lambda: '4px' in viewer.attribute('#map [data-robot=carl]', 'style'))
 
 
 def test_alarms_name_the_robot_and_one_time_line_has_the_events_of_all(
-    hub: Hub, viewer: Viewer
+    broadcaster: Broadcaster, viewer: Viewer
 ) -> None:
     status = FLEET['carl'].status
     assert status is not None
     help_needed = replace(status, waiting_for_help=True, text='shut in')
     events = (*FLEET['carl'].events, Event(1e9 + 9.0, 'battery low'))
-    hub.show(replace(FLEET['carl'], status=help_needed, events=events), 'carl')
+    broadcaster.show(replace(FLEET['carl'], status=help_needed, events=events), 'carl')
     viewer.until(lambda: viewer.text('#alarms') == 'carl: waits for help: shut in')
     viewer.until(lambda: 'battery low' in viewer.text('#events li'))
     assert viewer.text('#events li b') == 'carl'
     assert viewer.text('#events').count('door D closed') == 1
-    hub.show(FLEET['carl'], 'carl')
+    broadcaster.show(FLEET['carl'], 'carl')
     viewer.until(lambda: viewer.js('return document.getElementById("alarms").hidden'))
 
 
-def test_one_robot_or_all_are_told(hub: Hub, viewer: Viewer, told: list[tuple[str, str]]) -> None:
+def test_one_robot_or_all_are_told(
+    broadcaster: Broadcaster, viewer: Viewer, told: list[tuple[str, str]]
+) -> None:
     viewer.until(lambda: viewer.count('[data-row]') == 4)
     for selector in (
         '[data-row=carl] [data-word=out]',
@@ -679,11 +683,13 @@ def test_one_robot_or_all_are_told(hub: Hub, viewer: Viewer, told: list[tuple[st
         ('stop', 'anna'),
     ]
     viewer.until(lambda: viewer.text('#fleet-answer') == '✓ stop anna')
-    hub.show(replace(FLEET['anna'], stopped=True, share=Share(taken_out=True)), 'anna')
+    broadcaster.show(
+        replace(FLEET['anna'], stopped=True, share=PatrolShare(taken_out=True)), 'anna'
+    )
     words = 'return [...document.querySelectorAll("[data-row=anna] [data-word]")]'
     words += '.filter((each) => !each.hidden).map((each) => each.dataset.word)'
     viewer.until(lambda: viewer.js(words) == ['pause', 'release', 'in'])
-    hub.show(FLEET['anna'], 'anna')
+    broadcaster.show(FLEET['anna'], 'anna')
     viewer.click('[data-choose=anna]')
     viewer.until(lambda: viewer.text('#title').startswith('anna'))
     viewer.click('#stop')

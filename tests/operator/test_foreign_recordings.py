@@ -28,12 +28,12 @@ from std_msgs.msg import UInt8
 from surveillance_interfaces.msg import Decision, FactChange, FactChanges, MissionStatus
 from surveillance_interfaces.msg import Fact as FactMessage
 from surveillance_operator.mission_markers_node import markers_of
+from surveillance_operator.mission_state import MissionState
 from surveillance_operator.recording.reading import Messages, files_of
 from surveillance_operator.recording.runs import find_recordings
 from surveillance_operator.recording.schemas import definition
 from surveillance_operator.recording.stored import Conversion, RecordedSights, prefix_of
 from surveillance_operator.recording.timeline import Timeline
-from surveillance_operator.snapshot import Snapshot
 from surveillance_runtime.files import FileError
 
 START = 1_000_000.0
@@ -71,7 +71,7 @@ def visit(place: str, at: float) -> FactChanges:
 
 def said() -> Iterator[tuple[float, str, Any]]:
     """Yield what a mission in the namespace `two` said: seconds, topic, message."""
-    places = Snapshot(
+    places = MissionState(
         positions={'A': (0.0, 0.0), 'B': (9.0, 0.0)}, door_lines={'D': (5.0, -1.0, 5.0, 1.0)}
     )
     yield 0.0, '/two/place_markers', markers_of(places, Time())

@@ -15,9 +15,16 @@ from rich.console import Console
 
 from patrol_policy.world import Decision
 from state_machines import Interrupt
-from surveillance_operator.snapshot import Event, Health, Snapshot, Status, changes, follow
+from surveillance_operator.mission_state import (
+    Event,
+    MissionState,
+    NodeReport,
+    Status,
+    changes,
+    follow,
+)
 from surveillance_operator.watch import raster, view
-from surveillance_operator.watch.raster import Frame, rasterise
+from surveillance_operator.watch.raster import Viewport, rasterise
 from surveillance_operator.watch.view import MissionView, node_page, show_once
 from surveillance_runtime.place.occupancy_grid import Grid
 
@@ -35,8 +42,8 @@ def two_rooms() -> Grid:
     return Grid(cells, 0.05, (-1.0, 2.0))
 
 
-def whole() -> Snapshot:
-    return Snapshot(
+def whole() -> MissionState:
+    return MissionState(
         where='ROS domain 7',
         now=100.0,
         mode='SIMULATED',
@@ -58,7 +65,7 @@ def whole() -> Snapshot:
     )
 
 
-def shown(snapshot: Snapshot, width: int = 100, height: int = 30, colours: bool = False) -> str:
+def shown(snapshot: MissionState, width: int = 100, height: int = 30, colours: bool = False) -> str:
     console = Console(
         width=width,
         height=height,
@@ -89,7 +96,7 @@ def test_every_wall_is_in_the_picture_where_its_points_are(height, width, column
     cells = np.zeros((height, width), np.int8)
     cells[at] = 100
     grid = Grid(cells, 0.1, (-3.0, 5.0))
-    frame = Frame.around(grid.known, columns, rows)
+    frame = Viewport.around(grid.known, columns, rows)
     assert 1 <= frame.columns <= columns
     assert 1 <= frame.rows <= rows
     picture = rasterise(grid, frame)
@@ -105,14 +112,14 @@ def test_a_picture_keeps_the_aspect_and_leaves_out_what_is_not_known():
     cells[50:70, 100:180] = 0
     grid = Grid(cells, 0.5)
     assert grid.known == (50.0, 25.0, 90.0, 35.0)
-    frame = Frame.around(grid.known, 40, 40)
+    frame = Viewport.around(grid.known, 40, 40)
     assert (frame.columns, frame.rows, frame.scale) == (40, 5, 1.0)
     assert (rasterise(grid, frame) == raster.FREE).all()
 
 
 @pytest.mark.parametrize(('width', 'height'), [(100, 30), (80, 24), (40, 30), (40, 12), (7, 3)])
 def test_the_picture_fills_any_terminal_exactly(width, height):
-    for snapshot in (whole(), Snapshot(), replace(whole(), grid=None)):
+    for snapshot in (whole(), MissionState(), replace(whole(), grid=None)):
         lines = shown(snapshot, width, height).split('\n')
         assert [len(line) for line in lines] == [width] * height
 
@@ -158,12 +165,12 @@ def test_colours_tell_an_open_door_from_a_closed_one():
 
 
 def test_what_does_not_come_is_said_in_its_place():
-    text = shown(Snapshot(where='ROS domain 7'))
+    text = shown(MissionState(where='ROS domain 7'))
     assert 'no mission yet: waiting on ROS domain 7' in text
     for topic in ('map', 'mission_status', 'decision', 'battery_level', 'door_states'):
         assert f'nothing on {topic} yet' in text
     assert 'nothing from the ontology yet' in text
-    why = replace(Snapshot(), silent={'map': 'its publisher offers another durability'})
+    why = replace(MissionState(), silent={'map': 'its publisher offers another durability'})
     assert 'nothing on map yet: its publisher offers another durability' in shown(why)
 
 
@@ -215,7 +222,7 @@ def test_a_node_that_is_started_again_is_told_though_the_killed_one_still_seems_
 
 
 def test_each_change_is_told_once_in_one_line():
-    before, after = Snapshot(), whole()
+    before, after = MissionState(), whole()
     first = {change.text: change.detail for change in changes(before, after)}
     assert first['decision 3: A → B [URGENT]'] == 'B waits longest'
     assert {'door D closed', 'B is URGENT', 'arrived in A', 'battery at 80 %'} <= first.keys()
@@ -238,8 +245,8 @@ def test_each_change_is_told_once_in_one_line():
 
 
 def test_each_node_has_one_line_with_the_worst_that_it_reports() -> None:
-    good, late = Health(0, 'up', ()), Health(1, 'late', ())
-    snapshot = Snapshot(
+    good, late = NodeReport(0, 'up', ()), NodeReport(1, 'late', ())
+    snapshot = MissionState(
         nodes={'robot_behavior': frozenset()},
         ended=frozenset({'simulator'}),
         restarts={'robot_behavior': 1},
@@ -289,16 +296,16 @@ def test_a_single_picture_waits_until_all_has_come_and_no_longer_than_it_may(mon
     assert 2.0 <= now[0] < 2.2
     now[0] = 0.0
     nothing = Console(file=io.StringIO())
-    assert not show_once(lambda: {'': Snapshot()}, Passing(), nothing, timeout=3.0)
+    assert not show_once(lambda: {'': MissionState()}, Passing(), nothing, timeout=3.0)
     assert 3.0 <= now[0] < 3.2
 
 
 def test_a_node_that_reports_nothing_is_up_and_each_start_again_is_counted() -> None:
-    def running(process: str, before: Snapshot) -> Snapshot:
+    def running(process: str, before: MissionState) -> MissionState:
         new = replace(before, nodes={'robot_behavior': frozenset({process})})
         return follow(before, new, 0.0)[0]
 
-    snapshot = running('1', Snapshot())
+    snapshot = running('1', MissionState())
     assert [line.plain for line in node_page(snapshot)] == ['● up    robot_behavior']
     snapshot = running('3', running('2', snapshot))
     (line,) = node_page(snapshot)

@@ -24,7 +24,7 @@ from surveillance_interfaces.msg import Decision, DoorStates, MissionStatus
 from surveillance_interfaces.srv import ConsoleCommand
 from surveillance_ontology.armor_server_node import ArmorServer
 from surveillance_ontology.ontology_map_builder_node import OntologyMapBuilder
-from surveillance_operator import mission_feed, mission_view_node
+from surveillance_operator import mission_subscriber, mission_view_node
 from surveillance_operator.mission_view_node import MissionViewNode
 from surveillance_runtime.conversions import cloud_from_points
 from surveillance_runtime.node import PatrolNode
@@ -52,7 +52,7 @@ class Planner(PatrolNode):
 
 @pytest.fixture(autouse=True)
 def _look_often(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(mission_feed, 'LOOK_PERIOD', 0.05)
+    monkeypatch.setattr(mission_subscriber, 'LOOK_PERIOD', 0.05)
     return
 
 
@@ -133,7 +133,7 @@ def test_a_point_that_is_moved_while_it_is_asked_for_is_asked_for_again(
 def test_another_mission_may_have_another_ontology(
     graph: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(mission_feed, 'WHOLE_LOOK_PERIOD', 0.05)
+    monkeypatch.setattr(mission_subscriber, 'WHOLE_LOOK_PERIOD', 0.05)
     graph.add(ArmorServer)
     view = graph.add(MissionViewNode)
     for reference, room in (('first', 'B'), ('second', 'C')):
@@ -265,7 +265,7 @@ def test_that_the_observers_of_an_ended_mission_are_gone_is_no_fault(
     reports = DiagnosticArray(status=[DiagnosticStatus(name=name) for name in names])
     say(graph, '/diagnostics', reports, 10)
     graph.until(lambda: view.snapshot.health.keys() == set(names))
-    monkeypatch.setattr(mission_feed, 'STALE_AFTER', 0.0)
+    monkeypatch.setattr(mission_subscriber, 'STALE_AFTER', 0.0)
     graph.until(lambda: [each.level for each in view.snapshot.health.values()] == [3, 3])
     graph.node.destroy_publisher(status)
     graph.until(lambda: view.snapshot.health.keys() == {'arm_controller'})

@@ -9,9 +9,9 @@ from collections.abc import Iterator
 
 import pytest
 
-from surveillance_operator.page.hub import Hub
+from surveillance_operator.mission_state import MissionState
+from surveillance_operator.page.broadcaster import Broadcaster
 from surveillance_operator.page.server import Page
-from surveillance_operator.snapshot import Snapshot
 
 done: list[object] = []
 told: list[str] = []
@@ -39,7 +39,7 @@ def page() -> Iterator[Page]:
     done.clear()
     told.clear()
     page = Page(
-        Hub(),
+        Broadcaster(),
         questions={'facts': facts, 'broken': broken},
         actions={'door': door, 'refused': refuse},
         port=0,
@@ -159,11 +159,11 @@ def test_who_comes_by_another_address_is_told_which_option_it_takes(page: Page) 
 def test_an_origin_that_is_none_is_refused() -> None:
     for text in ('robot.example.org', 'ftp://x', 'https://', 'https://x/path', 'https://[x'):
         with pytest.raises(ValueError, match=r'expected an origin like https'):
-            Page(Hub(), questions={}, actions={}, port=0, origin=text)
+            Page(Broadcaster(), questions={}, actions={}, port=0, origin=text)
 
 
 def test_beyond_this_machine_even_looking_needs_the_token() -> None:
-    page = Page(Hub(), questions={}, actions={}, host='0.0.0.0', port=0, token='secret')
+    page = Page(Broadcaster(), questions={}, actions={}, host='0.0.0.0', port=0, token='secret')
     page.start()
     try:
         assert page.address.endswith('?token=secret')
@@ -185,7 +185,7 @@ def test_no_other_site_may_be_loaded_or_embed_the_page(page: Page) -> None:
 
 
 def test_a_viewer_gets_everything_and_then_what_changed(page: Page) -> None:
-    page._hub.show(Snapshot(battery=50.0, now=1.0))
+    page._broadcaster.show(MissionState(battery=50.0, now=1.0))
     connection = http.client.HTTPConnection('127.0.0.1', page.port, timeout=60.0)
     connection.request('GET', '/events')
     answer = connection.getresponse()
@@ -199,7 +199,7 @@ def test_a_viewer_gets_everything_and_then_what_changed(page: Page) -> None:
     first = event()
     assert first['whole'] == 1
     assert first['p']['battery'] == {'level': 50.0, 'low': False}  # type: ignore[index]
-    page._hub.show(Snapshot(battery=49.0, now=2.0))
+    page._broadcaster.show(MissionState(battery=49.0, now=2.0))
     second = event()
     battery = {'battery': {'level': 49.0, 'low': False}}
     assert second == {'now': 2.0, 'whole': 0, 'robot': '', 'p': battery, 'r': {}}
@@ -208,7 +208,7 @@ def test_a_viewer_gets_everything_and_then_what_changed(page: Page) -> None:
 
 def test_an_address_that_is_taken_is_one_line(page: Page) -> None:
     with pytest.raises(OSError, match=f'127.0.0.1:{page.port}: Address already in use'):
-        Page(Hub(), questions={}, actions={}, port=page.port)
+        Page(Broadcaster(), questions={}, actions={}, port=page.port)
 
 
 def test_pictures_are_for_whoever_may_look_and_beyond_this_machine_blurred() -> None:
@@ -218,8 +218,8 @@ def test_pictures_are_for_whoever_may_look_and_beyond_this_machine_blurred() -> 
         asked.append((name, robot, leaves))
         return b'jpeg' if name == 'a.jpg' else None
 
-    here = Page(Hub(), questions={}, actions={}, evidence=picture, port=0)
-    away = Page(Hub(), questions={}, actions={}, evidence=picture, host='0.0.0.0', port=0)
+    here = Page(Broadcaster(), questions={}, actions={}, evidence=picture, port=0)
+    away = Page(Broadcaster(), questions={}, actions={}, evidence=picture, host='0.0.0.0', port=0)
     for each in (here, away):
         each.start()
     try:

@@ -10,17 +10,17 @@ import numpy as np
 import pytest
 
 from patrol_policy.world import Decision
-from surveillance_operator.page.hub import Hub
-from surveillance_operator.page.server import Page
-from surveillance_operator.snapshot import (
-    Container,
+from surveillance_operator.mission_state import (
     Event,
-    Health,
-    History,
-    Snapshot,
+    MachineContainer,
+    MachineTransition,
+    MissionHistory,
+    MissionState,
+    NodeReport,
     Status,
-    Transition,
 )
+from surveillance_operator.page.broadcaster import Broadcaster
+from surveillance_operator.page.server import Page
 from surveillance_runtime.place.occupancy_grid import Grid
 from surveillance_runtime.place.zones import Zone
 from tests.operator.browser import CHROMIUM, DESK, DRIVER, MISSING, PHONE, Viewer
@@ -36,7 +36,7 @@ HOSTILE = (
 )
 
 
-def mission(names: tuple[str, ...]) -> Snapshot:
+def mission(names: tuple[str, ...]) -> MissionState:
     """Return a mission whose places, nodes, states and reasons have these names."""
     side = int(np.ceil(np.sqrt(len(names))))
     cells = np.zeros((side * 20, side * 20), np.int8)
@@ -45,7 +45,7 @@ def mission(names: tuple[str, ...]) -> Snapshot:
         name: (2.0 * (n % side) + 1.0, 2.0 * (n // side) + 1.0) for n, name in enumerate(names)
     }
     first, last = names[0], names[-1]
-    return Snapshot(
+    return MissionState(
         where=first,
         now=5000.0,
         mode='SIMULATED',
@@ -67,21 +67,21 @@ def mission(names: tuple[str, ...]) -> Snapshot:
         pose=(1.0, 1.0, 0.5),
         trail=np.array([(1.0, 0.5), (1.0, 1.0)]),
         obstacles=np.array([(1.0, 1.2)]),
-        containers=(Container('m', 'StateMachine', names, names[:1], names, ()),),
+        containers=(MachineContainer('m', 'StateMachine', names, names[:1], names, ()),),
         active=(f'm/{first}',),
-        transitions=(Transition(1, 4999.0, 'm', first, last, last, 1.0),),
+        transitions=(MachineTransition(1, 4999.0, 'm', first, last, last, 1.0),),
         markers={11: (0.5, 0.5)},
-        health={name: Health(2, first, (('memory_mb', '5'),)) for name in names},
+        health={name: NodeReport(2, first, (('memory_mb', '5'),)) for name in names},
         silent={first: last},
         events=(Event(1e9, first),),
-        history=History(((4900.0, last),), ((4000.0, 60.0),), ((4950.0, 'failure', first),)),
+        history=MissionHistory(((4900.0, last),), ((4000.0, 60.0),), ((4950.0, 'failure', first),)),
     )  # fmt: skip
 
 
 ROOMS = tuple(f'R{n}' for n in range(1, 501))
 STATES = {
-    'nothing': Snapshot(where='ROS domain 5'),
-    'begins': replace(Snapshot(), nodes={'armor_server': frozenset('1')}),
+    'nothing': MissionState(where='ROS domain 5'),
+    'begins': replace(MissionState(), nodes={'armor_server': frozenset('1')}),
     'hostile': mission(HOSTILE),
     'large': mission(ROOMS),
     'help': replace(
@@ -93,13 +93,15 @@ STATES = {
 
 
 @pytest.fixture(scope='module')
-def hub() -> Hub:
-    return Hub()
+def broadcaster() -> Broadcaster:
+    return Broadcaster()
 
 
 @pytest.fixture(scope='module')
-def viewer(hub: Hub) -> Iterator[Viewer]:
-    page = Page(hub, questions={}, actions={'threshold': lambda seconds: f'set {seconds}'}, port=0)
+def viewer(broadcaster: Broadcaster) -> Iterator[Viewer]:
+    page = Page(
+        broadcaster, questions={}, actions={'threshold': lambda seconds: f'set {seconds}'}, port=0
+    )
     page.start()
     viewer = Viewer(page.address)
     yield viewer
@@ -107,20 +109,20 @@ def viewer(hub: Hub) -> Iterator[Viewer]:
     page.stop()
 
 
-def show(hub: Hub, viewer: Viewer, name: str) -> None:
+def show(broadcaster: Broadcaster, viewer: Viewer, name: str) -> None:
     """Show a state of a mission, and wait until the page has it."""
-    hub.show(replace(STATES[name], policy=name))
+    broadcaster.show(replace(STATES[name], policy=name))
     viewer.until(lambda: viewer.js('return mission.state.mission?.policy') == name)
 
 
 def test_what_a_waiting_robot_waits_for_stands_in_the_place_of_its_decision(
-    hub: Hub, viewer: Viewer
+    broadcaster: Broadcaster, viewer: Viewer
 ) -> None:
     for name, line, reason, rows in (
         ('ended', 'decision 3: A → B [URGENT]', 'A', 4),
         ('help', 'the robot waits for help', 'shut in', 0),
     ):
-        show(hub, viewer, name)
+        show(broadcaster, viewer, name)
         assert viewer.js('return document.getElementById("decision-line").textContent') == line
         assert viewer.js('return document.getElementById("reason").textContent') == reason
         count = 'return document.querySelectorAll("#scores tr").length'
@@ -128,10 +130,10 @@ def test_what_a_waiting_robot_waits_for_stands_in_the_place_of_its_decision(
 
 
 def test_a_connection_that_falls_silent_is_said_to_and_made_anew(
-    hub: Hub, viewer: Viewer, monkeypatch: pytest.MonkeyPatch
+    broadcaster: Broadcaster, viewer: Viewer, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr('surveillance_operator.page.hub.HEARTBEAT', 1000.0)
-    show(hub, viewer, 'begins')
+    monkeypatch.setattr('surveillance_operator.page.broadcaster.HEARTBEAT', 1000.0)
+    show(broadcaster, viewer, 'begins')
     viewer.js('mission.real = performance.now.bind(performance)')
     try:
         viewer.js('performance.now = () => mission.real() + 10000')
@@ -148,8 +150,10 @@ def visible(viewer: Viewer, selector: str) -> bool:
 
 
 @pytest.mark.parametrize('name', STATES)
-def test_every_state_is_readable_everywhere(name: str, hub: Hub, viewer: Viewer) -> None:
-    show(hub, viewer, name)
+def test_every_state_is_readable_everywhere(
+    name: str, broadcaster: Broadcaster, viewer: Viewer
+) -> None:
+    show(broadcaster, viewer, name)
     for size, dark in ((PHONE, True), (DESK, False)):
         viewer.size(*size, dark=dark)
         assert viewer.js('return document.documentElement.scrollWidth') <= size[0]
@@ -158,25 +162,27 @@ def test_every_state_is_readable_everywhere(name: str, hub: Hub, viewer: Viewer)
     assert viewer.driver.get_log('browser') == []
 
 
-def test_zones_and_stations_are_drawn_and_drawn_anew(hub: Hub, viewer: Viewer) -> None:
+def test_zones_and_stations_are_drawn_and_drawn_anew(
+    broadcaster: Broadcaster, viewer: Viewer
+) -> None:
     zones = {
         'K1': Zone('K1', ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0))),
         'S1': Zone('S1', ((2.0, 0.0), (3.0, 0.0), (3.0, 1.0)), 0.3),
     }
     shown = replace(STATES['large'], zones=zones, stations={'R1': (1.0, 1.5, 0.0)})
-    hub.show(shown)
+    broadcaster.show(shown)
     viewer.until(lambda: viewer.count('#map [data-zone]') == 2)
     assert viewer.text('#map [data-zone=S1] title') == 'S1: at most 0.3 m/s'
     assert viewer.js(
         'return document.querySelector("#map [data-zone=K1]").getAttribute("d")'
     ).startswith('M0 0L1 0L1 -1')
-    hub.show(replace(shown, zones={}, stations={'R2': (3.0, 1.5, 0.0)}))
+    broadcaster.show(replace(shown, zones={}, stations={'R2': (3.0, 1.5, 0.0)}))
     viewer.until(lambda: not viewer.count('#map [data-zone]'))
     viewer.until(lambda: viewer.count('#map [data-station=R2]') == 1)
 
 
-def test_what_is_empty_says_so(hub: Hub, viewer: Viewer) -> None:
-    show(hub, viewer, 'nothing')
+def test_what_is_empty_says_so(broadcaster: Broadcaster, viewer: Viewer) -> None:
+    show(broadcaster, viewer, 'nothing')
     assert viewer.text('#title') == 'no mission yet'
     for each in (
         '#map-section',
@@ -187,13 +193,15 @@ def test_what_is_empty_says_so(hub: Hub, viewer: Viewer) -> None:
     ):
         assert visible(viewer, f'{each} [data-without]'), each
     assert not visible(viewer, '[data-machine=pause]')
-    show(hub, viewer, 'hostile')
+    show(broadcaster, viewer, 'hostile')
     assert visible(viewer, '#map')
     assert not visible(viewer, '#map-section [data-without]')
 
 
-def test_each_link_of_the_head_leads_to_what_is_shown(hub: Hub, viewer: Viewer) -> None:
-    show(hub, viewer, 'begins')
+def test_each_link_of_the_head_leads_to_what_is_shown(
+    broadcaster: Broadcaster, viewer: Viewer
+) -> None:
+    show(broadcaster, viewer, 'begins')
     viewer.size(*PHONE, dark=False)
     links = viewer.js(
         """return [...document.querySelectorAll("header nav a[href^='#']")]
@@ -204,17 +212,21 @@ def test_each_link_of_the_head_leads_to_what_is_shown(hub: Hub, viewer: Viewer) 
     viewer.size(*DESK, dark=False)
 
 
-def test_an_event_has_its_time_of_the_day_in_old_recordings_too(hub: Hub, viewer: Viewer) -> None:
-    show(hub, viewer, 'begins')
+def test_an_event_has_its_time_of_the_day_in_old_recordings_too(
+    broadcaster: Broadcaster, viewer: Viewer
+) -> None:
+    show(broadcaster, viewer, 'begins')
     noon = time.mktime((2026, 1, 1, 12, 0, 0, 0, 0, -1))
-    hub.show_parts({'events': [['11:59:58', 'arrived in A'], [noon, 'left A']]}, 0.0, whole=False)
+    broadcaster.show_parts(
+        {'events': [['11:59:58', 'arrived in A'], [noon, 'left A']]}, 0.0, whole=False
+    )
     viewer.until(lambda: viewer.text('#events') == '12:00:00left A11:59:58arrived in A')
 
 
 def test_what_cannot_be_kept_of_each_place_is_shown_with_its_hours(
-    hub: Hub, viewer: Viewer
+    broadcaster: Broadcaster, viewer: Viewer
 ) -> None:
-    show(hub, viewer, 'begins')
+    show(broadcaster, viewer, 'begins')
     told = {
         'A': {'verdict': 'within', 'threshold': 60, 'wait': 50, 'words': 'A: in time', 'hours': ''},
         'B': {
@@ -225,17 +237,17 @@ def test_what_cannot_be_kept_of_each_place_is_shown_with_its_hours(
             'hours': 'daily 08:00-18:00',
         },
     }
-    hub.show_parts({'promises': told}, 0.0, whole=False)
+    broadcaster.show_parts({'promises': told}, 0.0, whole=False)
     line = '1 of 2 places can be visited within their thresholds'
     viewer.until(lambda: viewer.text('#promises-line') == line)
-    hub.show_parts({'kept': 'all 2 places, or little later'}, 0.0, whole=False)
+    broadcaster.show_parts({'kept': 'all 2 places, or little later'}, 0.0, whole=False)
     viewer.until(lambda: viewer.text('#promises-line') == 'all 2 places, or little later')
     viewer.js('document.getElementById("promises").open = true')
     assert viewer.text('#promises-list') == 'B: never visited (daily 08:00-18:00)A: in time'
 
 
-def test_no_name_becomes_markup_and_each_is_read(hub: Hub, viewer: Viewer) -> None:
-    show(hub, viewer, 'hostile')
+def test_no_name_becomes_markup_and_each_is_read(broadcaster: Broadcaster, viewer: Viewer) -> None:
+    show(broadcaster, viewer, 'hostile')
     viewer.until(lambda: viewer.count('[data-place]') == len(HOSTILE))
     assert viewer.js('return window.broken') is None
     assert viewer.count('main img') == 1
@@ -245,39 +257,45 @@ def test_no_name_becomes_markup_and_each_is_read(hub: Hub, viewer: Viewer) -> No
     assert sorted(shown) == sorted(HOSTILE)
 
 
-def test_a_leap_of_the_clock_makes_nothing_wait_longer(hub: Hub, viewer: Viewer) -> None:
+def test_a_leap_of_the_clock_makes_nothing_wait_longer(
+    broadcaster: Broadcaster, viewer: Viewer
+) -> None:
     for name in ('nothing', 'large'):
-        show(hub, viewer, name)
+        show(broadcaster, viewer, name)
     viewer.until(lambda: viewer.text('[data-value=R2]') not in ('', '0:00'))
     minutes, seconds = map(int, viewer.text('[data-value=R2]').split(':'))
     assert 100 <= 60 * minutes + seconds < 160, 'those of the mission, and those since'
 
 
-def test_an_ended_mission_is_not_taken_for_a_running_one(hub: Hub, viewer: Viewer) -> None:
-    show(hub, viewer, 'ended')
+def test_an_ended_mission_is_not_taken_for_a_running_one(
+    broadcaster: Broadcaster, viewer: Viewer
+) -> None:
+    show(broadcaster, viewer, 'ended')
     assert viewer.text('#state').startswith('the mission has ended')
     assert not visible(viewer, '#control-body')
 
 
-def test_the_next_mission_starts_on_a_clean_page(hub: Hub, viewer: Viewer) -> None:
-    show(hub, viewer, 'hostile')
-    show(hub, viewer, 'begins')
+def test_the_next_mission_starts_on_a_clean_page(broadcaster: Broadcaster, viewer: Viewer) -> None:
+    show(broadcaster, viewer, 'hostile')
+    show(broadcaster, viewer, 'begins')
     assert viewer.js('return mission.state.trail') == []
     assert viewer.text('#decision-line') == 'no decision yet'
     assert viewer.count('#scores td') == 0
 
 
-def test_enter_does_what_a_forms_first_button_does(hub: Hub, viewer: Viewer) -> None:
-    show(hub, viewer, 'large')
+def test_enter_does_what_a_forms_first_button_does(
+    broadcaster: Broadcaster, viewer: Viewer
+) -> None:
+    show(broadcaster, viewer, 'large')
     viewer.driver.find_element('name', 'seconds').clear()
     viewer.driver.find_element('name', 'seconds').send_keys('soon\n')
     viewer.until(lambda: viewer.text('[aria-label=Threshold] #done') == '✓ set soon')
 
 
-def test_no_link_leads_below_the_header(hub: Hub, viewer: Viewer) -> None:
-    show(hub, viewer, 'large')
+def test_no_link_leads_below_the_header(broadcaster: Broadcaster, viewer: Viewer) -> None:
+    show(broadcaster, viewer, 'large')
     long = replace(STATES['large'].status, text='charging, for which there are reasons ' * 20)  # type: ignore[type-var]
-    hub.show(replace(STATES['large'], status=long))
+    broadcaster.show(replace(STATES['large'], status=long))
     viewer.until(lambda: 'reasons' in viewer.text('#state'))
     viewer.size(*PHONE)
     for section in ('why', 'camera-section', 'control', 'machine-section'):
@@ -288,10 +306,12 @@ def test_no_link_leads_below_the_header(hub: Hub, viewer: Viewer) -> None:
     viewer.size(*DESK)
 
 
-def test_a_long_report_leaves_the_names_of_nodes_their_room(hub: Hub, viewer: Viewer) -> None:
+def test_a_long_report_leaves_the_names_of_nodes_their_room(
+    broadcaster: Broadcaster, viewer: Viewer
+) -> None:
     names = ('aruco_detector', 'ontology_map_builder')
-    long = Health(0, 'waiting for the arm to rest', ())
-    hub.show(
+    long = NodeReport(0, 'waiting for the arm to rest', ())
+    broadcaster.show(
         replace(STATES['begins'], nodes=dict.fromkeys(names, frozenset()), health={names[0]: long})
     )
     viewer.size(*PHONE)
@@ -306,7 +326,7 @@ def test_a_jump_that_leads_nowhere_says_so(viewer: Viewer) -> None:
     def jump(kind: str) -> str:
         raise ValueError(f'no {kind} after this moment')
 
-    page = Page(Hub(), questions={}, actions={'jump': jump}, port=0, replay=True)
+    page = Page(Broadcaster(), questions={}, actions={'jump': jump}, port=0, replay=True)
     page.start()
     viewer.driver.get(page.address)
     viewer.until(lambda: viewer.text('#connection') == 'replay')

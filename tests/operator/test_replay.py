@@ -19,7 +19,7 @@ import pytest
 from surveillance_behaviour.mission.mission_log import MissionRecord, read
 from surveillance_operator import replay, report
 from surveillance_operator.map_command import run_of
-from surveillance_operator.page.hub import Hub
+from surveillance_operator.page.broadcaster import Broadcaster
 from surveillance_operator.page.server import Page
 from surveillance_operator.recording import timeline
 from surveillance_operator.recording.runs import find_run
@@ -59,9 +59,9 @@ def run(tmp_path: Path) -> Path:
 
 @pytest.fixture
 def page(run: Path) -> Iterator[Page]:
-    hub = Hub()
-    player = Player({'': Track(Timeline(run / 'timeline.jsonl'))}, hub)
-    page = Page(hub, questions={}, actions=player.actions(), port=0, replay=True)
+    broadcaster = Broadcaster()
+    player = Player({'': Track(Timeline(run / 'timeline.jsonl'))}, broadcaster)
+    page = Page(broadcaster, questions={}, actions=player.actions(), port=0, replay=True)
     page.player = player  # type: ignore[attr-defined]
     page.start()
     yield page
@@ -288,13 +288,13 @@ class Steps:
 def test_a_replay_goes_on_with_time_until_it_is_paused_or_over(
     run: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    lidar, hub, places = Lidar(), Hub(), []
+    lidar, broadcaster, places = Lidar(), Broadcaster(), []
     track = Track(Timeline(run / 'timeline.jsonl'), lidar)  # type: ignore[arg-type]
-    player = Player({'': track}, hub)
+    player = Player({'': track}, broadcaster)
     do = player.actions()
 
     def look() -> None:
-        places.append(json.loads(hub._of_all['replay'][1])['at'])
+        places.append(json.loads(broadcaster._of_all['replay'][1])['at'])
 
     monkeypatch.setattr(
         replay,
@@ -324,12 +324,12 @@ def test_a_replay_goes_on_with_time_until_it_is_paused_or_over(
     assert player.jpeg('') == b'picture of 1199'
     assert player.jpeg('nobody') is None
     assert [do['play'](), do['pause']()] == ['playing', 'paused']
-    assert [do['seek'](-5), json.loads(hub._of_all['replay'][1])['at']] == ['moved', 0.0]
+    assert [do['seek'](-5), json.loads(broadcaster._of_all['replay'][1])['at']] == ['moved', 0.0]
 
 
 @pytest.mark.parametrize('speed', [0.1, 100.0])
 def test_the_slowest_and_the_fastest_speed_are_taken(run: Path, speed: float) -> None:
-    player = Player({'': Track(Timeline(run / 'timeline.jsonl'))}, Hub())
+    player = Player({'': Track(Timeline(run / 'timeline.jsonl'))}, Broadcaster())
     assert player.actions()['speed'](speed) == f'speed {speed:g}'
     for wrong in (speed / 1.01, speed * 1.01):
         if not 0.1 <= wrong <= 100.0:
@@ -340,12 +340,12 @@ def test_the_slowest_and_the_fastest_speed_are_taken(run: Path, speed: float) ->
 def test_a_replay_of_a_recording_that_grows_grows_with_it(
     run: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    path, hub = run / 'timeline.jsonl', Hub()
+    path, broadcaster = run / 'timeline.jsonl', Broadcaster()
     read = [0.5]
-    player = Player({'': Track(Timeline(path), read=lambda: read[0])}, hub)
+    player = Player({'': Track(Timeline(path), read=lambda: read[0])}, broadcaster)
 
     def lengths() -> tuple[float, float]:
-        shown = json.loads(hub._of_all['replay'][1])
+        shown = json.loads(broadcaster._of_all['replay'][1])
         return shown['length'], shown['read']
 
     def add(at: float) -> None:
@@ -383,8 +383,8 @@ def test_a_replay_that_falls_far_behind_jumps(tmp_path: Path) -> None:
             head = f'{{"t":{1e9 + tick},"k":{int(tick % 60 == 0)},"e":"",'
             whole = f'"battery":{{"level":{tick}}},' if tick % 60 == 0 else ''
             file.write(head + f'"now":{tick},"p":{{{whole}"pose":[{tick},0,0]}}}}\n')
-    hub, line = Hub(), Timeline(path)
-    player = Player({'': Track(line)}, hub)
+    broadcaster, line = Broadcaster(), Timeline(path)
+    player = Player({'': Track(line)}, broadcaster)
     read = []
     plain = line.line
     line.line = lambda number: read.append(number) or plain(number)  # type: ignore[method-assign]
@@ -393,6 +393,6 @@ def test_a_replay_that_falls_far_behind_jumps(tmp_path: Path) -> None:
     player._forward(500.0)
     # As many as a step takes, then those since the last whole one.
     assert len(read) == 400 + 400 + 1
-    assert json.loads(hub._robots[''].texts['pose'][1]) == [900, 0, 0]
+    assert json.loads(broadcaster._robots[''].texts['pose'][1]) == [900, 0, 0]
     player._forward(1.0)
     assert read[-1] == 901

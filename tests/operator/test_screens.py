@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from surveillance_operator.snapshot import Event, Snapshot
+from surveillance_operator.mission_state import Event, MissionState
 from surveillance_operator.watch import raster
 from surveillance_operator.watch.raster import Canvas, Frame
 from surveillance_operator.watch.view import (
@@ -29,12 +29,12 @@ from .test_mission_view import DECISION, STATUS, whole
 OTHER = replace(STATUS, place='B', state='CHARGE', heading_to='', text='')
 
 
-def fleet() -> dict[str, Snapshot]:
+def fleet() -> dict[str, MissionState]:
     second = replace(whole(), pose=(4.0, 3.0, 0.0), status=OTHER, battery=15.0, battery_low=True)
     return {'': whole(), 'r1': whole(), 'r2': second}
 
 
-def drawn(snapshot: Snapshot, width: int, height: int, **more: Any) -> list[str]:
+def drawn(snapshot: MissionState, width: int, height: int, **more: Any) -> list[str]:
     """Return the lines of a screen, without the spaces at their ends and the hour of events."""
     console = Console(width=width, height=height, color_system=None)
     with console.capture() as capture:
@@ -151,7 +151,7 @@ hh:mm:ss arrived in A
     ],
 )
 def test_a_screen_looks_as_it_should(
-    screen: str, width: int, snapshot: Snapshot, more: Mapping[str, Any]
+    screen: str, width: int, snapshot: MissionState, more: Mapping[str, Any]
 ) -> None:
     expected = screen.strip('\n').split('\n')
     height = len(screen.split('\n')) - 2
@@ -189,7 +189,7 @@ def test_a_screen_that_is_too_small_keeps_the_state_and_the_last_event() -> None
 @pytest.mark.parametrize(
     ('snapshot', 'words'),
     [
-        (Snapshot(where='here'), ' no mission yet: waiting on here '),
+        (MissionState(where='here'), ' no mission yet: waiting on here '),
         (replace(whole(), nodes={}), ' the mission has ended: waiting on ROS domain 7 '),
         (
             replace(whole(), ended=frozenset({'b', 'a'}), stopped=True),
@@ -203,7 +203,7 @@ def test_a_screen_that_is_too_small_keeps_the_state_and_the_last_event() -> None
         (replace(whole(), mode='', status=None), ' mission · ROS domain 7 '),
     ],
 )
-def test_the_head_says_which_mission_this_is(snapshot: Snapshot, words: str) -> None:
+def test_the_head_says_which_mission_this_is(snapshot: MissionState, words: str) -> None:
     assert drawn(snapshot, 70, 12)[0] == words.rstrip()
     alarmed = 'ended' in words or 'STOPPED' in words or 'no mission' in words
     console = Console(width=70, height=12, color_system='truecolor', force_terminal=True)
@@ -270,7 +270,7 @@ def test_colours_of_a_fleet_repeat_after_five() -> None:
     assert found[5:] == found[:2]
 
 
-def styles(snapshot: Snapshot) -> dict[str, set[str]]:
+def styles(snapshot: MissionState) -> dict[str, set[str]]:
     """Return the styles in which each kind of character of a map is drawn."""
     found: dict[str, set[str]] = {}
     for line in draw_map(snapshot, 60, 11, colours=True):
@@ -358,10 +358,10 @@ def test_a_grid_is_drawn_as_its_own_cells_where_they_are_as_large() -> None:
 
 
 def test_without_anything_there_is_no_map_and_a_note_of_what_is_missing() -> None:
-    lines = draw_map(Snapshot(), 40, 5, colours=False)
+    lines = draw_map(MissionState(), 40, 5, colours=False)
     text = '\n'.join(''.join(each.text for each in line) for line in lines)
     assert text.startswith('nothing on map yet: the simulator or a')
-    assert draw_map(Snapshot(), 40, 1, colours=False)[0][0].text.startswith('nothing on map')
+    assert draw_map(MissionState(), 40, 1, colours=False)[0][0].text.startswith('nothing on map')
     unplaced = draw_map(replace(whole(), pose=None), 60, 8, colours=False)
     assert ''.join(each.text for each in unplaced[-1]) != ''
     rows = [''.join(each.text for each in line) for line in unplaced]

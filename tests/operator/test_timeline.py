@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from patrol_policy.world import Decision
-from surveillance_operator.frames import Framer
+from surveillance_operator.mission_state import MissionState, Status
+from surveillance_operator.page_state import PatchMaker
 from surveillance_operator.recording.timeline import Timeline, TimelineWriter
-from surveillance_operator.snapshot import Snapshot, Status
 from surveillance_runtime.files import FileError
 
 DECISION = Decision(0.0, 'A', 'B', 'B', 'URGENT', 'tour', 'why', {'B': 1.0})
@@ -23,7 +23,7 @@ def record(path: Path, seconds: int = 200) -> None:
     for second in range(seconds):
         pose = (second / 10, 0.0, 0.0)
         writer.add(
-            Snapshot(
+            MissionState(
                 now=float(second),
                 battery=100.0 - second // 10,
                 pose=pose,
@@ -74,13 +74,13 @@ def test_a_full_disk_tears_no_line_that_others_follow(
 ) -> None:
     path = tmp_path / 'timeline.jsonl'
     writer = TimelineWriter(path)
-    writer.add(Snapshot(now=0.0), 1000.0)
+    writer.add(MissionState(now=0.0), 1000.0)
     write = os.write
     with monkeypatch.context() as full:
         full.setattr(os, 'write', lambda file, data: write(file, data[:20]))
         with pytest.raises(OSError, match=r'No space left.*timeline\.jsonl'):
-            writer.add(Snapshot(now=1.0, pose=(1.0, 0.0, 0.0)), 1001.0)
-    writer.add(Snapshot(now=2.0, pose=(1.0, 0.0, 0.0)), 1002.0)
+            writer.add(MissionState(now=1.0, pose=(1.0, 0.0, 0.0)), 1001.0)
+    writer.add(MissionState(now=2.0, pose=(1.0, 0.0, 0.0)), 1002.0)
     writer.close()
     line = Timeline(path)
     assert line.times == [1000.0, 1002.0]
@@ -117,18 +117,18 @@ def test_what_is_no_time_line_is_said_in_one_line(content: str | None, tmp_path:
 
 
 def test_a_patch_holds_what_changed_alone() -> None:
-    framer = Framer()
-    first = framer.patch(Snapshot(battery=50.0, decision=DECISION, number=1))
+    framer = PatchMaker()
+    first = framer.patch(MissionState(battery=50.0, decision=DECISION, number=1))
     assert first['battery'] == {'level': 50.0, 'low': False}
-    assert framer.patch(replace(Snapshot(), battery=50.0, decision=DECISION, number=1)) == {}
-    after = framer.patch(replace(Snapshot(), battery=49.0, decision=DECISION, number=1))
+    assert framer.patch(replace(MissionState(), battery=50.0, decision=DECISION, number=1)) == {}
+    after = framer.patch(replace(MissionState(), battery=49.0, decision=DECISION, number=1))
     assert after == {'battery': {'level': 49.0, 'low': False}}
 
 
 def test_a_robot_that_waits_for_help_has_no_plan() -> None:
-    framer = Framer()
+    framer = PatchMaker()
     moving = Status(0.0, 'm', 'MOVE', 'A', 'B', False, '', ())
-    snapshot = Snapshot(status=moving, plan=np.array([(0.0, 0.0), (1.0, 0.0)]))
+    snapshot = MissionState(status=moving, plan=np.array([(0.0, 0.0), (1.0, 0.0)]))
     assert framer.patch(snapshot)['plan'] == [[0.0, 0.0], [1.0, 0.0]]
     stuck = replace(snapshot, status=replace(moving, waiting_for_help=True))
     assert framer.patch(stuck)['plan'] == []

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from surveillance_operator.page.hub import Hub
+from surveillance_operator.page.broadcaster import Broadcaster
 from surveillance_operator.page.server import Page
 from tests.operator.ports import await_listening, free_port
 
@@ -60,7 +60,9 @@ def proxied(
     if shutil.which(command[0]) is None:
         pytest.skip(f'{command[0]} is not installed')
     done.clear()
-    page = Page(Hub(), questions={}, actions={'door': door}, port=0, token='secret', origin=ORIGIN)
+    page = Page(
+        Broadcaster(), questions={}, actions={'door': door}, port=0, token='secret', origin=ORIGIN
+    )
     page.start()
     port = free_port()
     text = (PROXY / request.param).read_text()

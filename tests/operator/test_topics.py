@@ -16,9 +16,9 @@ from std_msgs.msg import String
 from armor_service.facts import parse_fact
 from surveillance_interfaces.action import ScanSurroundings
 from surveillance_interfaces.msg import MarkerDetection, MarkerDetectionArray
-from surveillance_operator import mission_feed
-from surveillance_operator.mission_feed import MissionFeed
-from surveillance_operator.snapshot import Snapshot
+from surveillance_operator import mission_subscriber
+from surveillance_operator.mission_state import MissionState
+from surveillance_operator.mission_subscriber import MissionSubscriber
 from surveillance_operator.topics import DETECTIONS_TOPIC, TOPICS, read_message, with_fact
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.place_changes import description_text, follow_place
@@ -51,8 +51,8 @@ def seen(second: int = 5, *, confirmed: bool = True) -> MarkerDetectionArray:
     return message
 
 
-def told(*messages: tuple[str, Any]) -> Snapshot:
-    snapshot = Snapshot()
+def told(*messages: tuple[str, Any]) -> MissionState:
+    snapshot = MissionState()
     for name, message in messages:
         snapshot = read_message(snapshot, TOPIC[name], message)
     assert not snapshot.silent
@@ -93,7 +93,7 @@ def test_a_pose_in_utm_is_known() -> None:
 
 
 def test_facts_come_and_go() -> None:
-    snapshot = Snapshot()
+    snapshot = MissionState()
     for text in ('URGENT(R1)', 'connectedTo(R1, C1)', 'visitedAt(R1, "7"^^xsd:long)', 'ROBOT(x)'):
         snapshot = with_fact(snapshot, parse_fact(text), came=True)
     assert snapshot.urgent == {'R1'}
@@ -110,13 +110,13 @@ class Watcher(PatrolNode):
 
     def __init__(self, **options: Any) -> None:
         super().__init__('mission_watcher', **options)
-        self.feed = MissionFeed(self, 0.05, streams=True)
+        self.feed = MissionSubscriber(self, 0.05, streams=True)
 
 
 def test_robots_of_other_namespaces_appear_and_go(
     graph: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(mission_feed, 'LOOK_PERIOD', 0.05)
+    monkeypatch.setattr(mission_subscriber, 'LOOK_PERIOD', 0.05)
     watcher = graph.add(Watcher)
     publishers = {
         name: graph.node.create_publisher(PoseWithCovarianceStamped, topic, STATE_QOS)
@@ -135,7 +135,7 @@ def test_who_leaves_a_mission_hears_nothing_more(
     graph: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A fleet's page leaves robots that go: their topics would come in for ever."""
-    monkeypatch.setattr(mission_feed, 'LOOK_PERIOD', 0.05)
+    monkeypatch.setattr(mission_subscriber, 'LOOK_PERIOD', 0.05)
     watcher = graph.add(Watcher)
     publisher = graph.node.create_publisher(PoseWithCovarianceStamped, 'amcl_pose', STATE_QOS)
     publisher.publish(pose(1.0, 0.0))
@@ -149,8 +149,8 @@ def test_who_leaves_a_mission_hears_nothing_more(
 
 def test_a_place_that_is_changed_brings_no_robot_back_that_was_left(graph: Any) -> None:
     """The page showed the robots of an earlier fleet again after an edit of the place."""
-    heard: list[Snapshot] = []
-    feed = MissionFeed(graph.node, 0.05, lambda new, _told: heard.append(new), robot='anna')
+    heard: list[MissionState] = []
+    feed = MissionSubscriber(graph.node, 0.05, lambda new, _told: heard.append(new), robot='anna')
     sender = graph.node.create_publisher(String, 'place', STATE_QOS)
 
     def changed(x: float) -> None:
@@ -175,6 +175,6 @@ def test_the_progress_of_a_scan_ends_with_its_goal() -> None:
     goals = TOPIC['scan_surroundings/_action/status']
     running = GoalStatusArray(status_list=[GoalStatus(status=GoalStatus.STATUS_EXECUTING)])
     ended = GoalStatusArray(status_list=[GoalStatus(status=GoalStatus.STATUS_CANCELED)])
-    snapshot = read_message(Snapshot(), TOPIC['scan_surroundings/_action/feedback'], feedback)
+    snapshot = read_message(MissionState(), TOPIC['scan_surroundings/_action/feedback'], feedback)
     assert read_message(snapshot, goals, running).scan_progress == (4, 7)
     assert read_message(snapshot, goals, ended).scan_progress is None

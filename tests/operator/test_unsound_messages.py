@@ -13,7 +13,7 @@ from sensor_msgs.msg import LaserScan, PointCloud2
 from std_msgs.msg import UInt8
 
 from surveillance_interfaces.msg import Decision
-from surveillance_operator.snapshot import Snapshot
+from surveillance_operator.mission_state import MissionState
 from surveillance_operator.topics import TOPICS, read_message, scan_from
 from surveillance_runtime.conversions import pose_from
 
@@ -45,7 +45,7 @@ def grid(**info: Any) -> OccupancyGrid:
 def test_a_message_that_cannot_be_used_is_said_and_changes_nothing(
     topic: str, message: Any, words: str
 ) -> None:
-    before = Snapshot(pose=(0.0, 0.0, 0.0), battery=50.0)
+    before = MissionState(pose=(0.0, 0.0, 0.0), battery=50.0)
     after = read_message(before, TOPIC[topic], message)
     assert words in after.silent[topic]
     assert after.battery == 50.0

@@ -39,7 +39,7 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 
 from state_machines.exceptions import CallError
 from state_machines.files import parse_json
-from surveillance_operator.page.hub import Hub
+from surveillance_operator.page.broadcaster import Broadcaster
 from surveillance_runtime import parameter_checks
 
 STATIC = Path(__file__).with_name('static')
@@ -62,7 +62,7 @@ class Page:
     """What is served.
 
     Args:
-        hub: What viewers see.
+        broadcaster: What viewers see.
         questions: Answered to whoever may look, by name.
         actions: Done for whoever may act, by name; none without control.
         picture: The image of a robot's camera as JPEG, or None when there is none; of a robot that
@@ -86,7 +86,7 @@ class Page:
 
     def __init__(
         self,
-        hub: Hub,
+        broadcaster: Broadcaster,
         *,
         questions: Mapping[str, Action],
         actions: Mapping[str, Action],
@@ -101,7 +101,7 @@ class Page:
         longest: Mapping[str, int] | None = None,
         report: Callable[[str], Any] = lambda _: None,
     ) -> None:
-        self._hub = hub
+        self._broadcaster = broadcaster
         self._questions, self._actions = questions, actions
         self._picture = picture
         self._evidence_of = evidence
@@ -162,7 +162,7 @@ class Page:
 
     def stop(self) -> None:
         """End the streams and the server."""
-        self._hub.close()
+        self._broadcaster.close()
         self._server.should_exit = True
         if self._thread is not None:
             self._thread.join(3.0)
@@ -222,7 +222,7 @@ class Page:
         return Response(text, media_type='text/html')
 
     async def _events(self, request: Request) -> Response:
-        stream = self._hub.stream(request.query_params.get('robot'))
+        stream = self._broadcaster.stream(request.query_params.get('robot'))
         return StreamingResponse(stream, media_type='text/event-stream')
 
     async def _camera(self, request: Request) -> Response:

@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import Any
 
 from surveillance_ontology.patrol_ontology import checked_names
-from surveillance_operator.page.hub import Hub
+from surveillance_operator.page.broadcaster import Broadcaster
 from surveillance_operator.page.server import Page
-from surveillance_operator.place_page.desk import PlaceDesk
 from surveillance_operator.place_page.dropped_map import MOST_BYTES, import_dropped
+from surveillance_operator.place_page.edit_session import EditSession
 from surveillance_runtime.command_line import EXIT_BAD_INPUT, CommandParser
 from surveillance_runtime.place_editor import PlaceEditor
 from surveillance_runtime.robot_base import ROBOT_RADIUS
@@ -78,11 +78,11 @@ def editor_page(place: Path | None, host: str, port: int, radius: float, token: 
         path, said = import_dropped(files, folder, radius, resolution, level)
         return opened(path), said
 
-    desk = PlaceDesk(None if place is None else opened(place), import_map=import_map)
+    session = EditSession(None if place is None else opened(place), import_map=import_map)
     return Page(
-        Hub(),
-        questions=desk.questions,
-        actions=desk.actions,
+        Broadcaster(),
+        questions=session.questions,
+        actions=session.actions,
         host=host,
         port=port,
         token=token,

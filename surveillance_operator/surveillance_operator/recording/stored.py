@@ -26,9 +26,9 @@ from visualization_msgs.msg import MarkerArray
 from surveillance_interfaces.msg import FactChanges
 from surveillance_ontology.conversions import changes_from_ros
 from surveillance_operator.images import ANNOTATED, KINDS, PLAIN, SUFFIX, jpeg_from
+from surveillance_operator.mission_state import STALE, MissionState, follow
 from surveillance_operator.recording.reading import Messages
 from surveillance_operator.recording.timeline import TimelineWriter
-from surveillance_operator.snapshot import STALE, Snapshot, follow
 from surveillance_operator.topics import (
     BEHAVIOUR,
     MOST_NAMES,
@@ -52,14 +52,14 @@ RECENT = 2.5
 SCAN_TOPIC = 'scan'
 
 
-def _on_fact_changes(message: FactChanges, old: Snapshot) -> Fields:
+def _on_fact_changes(message: FactChanges, old: MissionState) -> Fields:
     new = old
     for fact, came, _ in changes_from_ros(message):
         new = with_fact(new, fact, came)
     return {name: getattr(new, name) for name in ('urgent', 'links', 'visited_at')}
 
 
-def _on_place_markers(message: MarkerArray, _old: Snapshot) -> Fields:
+def _on_place_markers(message: MarkerArray, _old: MissionState) -> Fields:
     """Take in the places' points and the doors' lines, metres."""
     positions, lines = {}, {}
     for each in message.markers[:MOST_NAMES]:
@@ -115,7 +115,7 @@ class Conversion:
         self._thread = threading.Thread(target=self._run, name='conversion', daemon=True)
         self._clock: float | None = None
         prefix = prefix_of(self._messages.types)
-        self._snapshot = Snapshot(where='a recording', namespace=prefix.strip('/'))
+        self._snapshot = MissionState(where='a recording', namespace=prefix.strip('/'))
         self._topics = {
             _recorded_name(each.name, prefix, self._messages.types): each for each in STORED_TOPICS
         }
@@ -194,7 +194,7 @@ class Conversion:
         writer.add(self._snapshot, at)
 
 
-def read_stored(snapshot: Snapshot, topic: Topic, data: bytes) -> Snapshot:
+def read_stored(snapshot: MissionState, topic: Topic, data: bytes) -> MissionState:
     """Return the snapshot with what a serialised message says, or why it cannot be used."""
     try:
         message = deserialize_message(data, topic.kind)
@@ -225,7 +225,7 @@ class RecordedSights:
     def scan(self, at: float) -> list[list[float]]:
         """Return the points that the lidar saw, metres, map frame; none where it was silent."""
         poses = [
-            read_stored(Snapshot(), self._pose, data)
+            read_stored(MissionState(), self._pose, data)
             for _, _, data in self._messages.before([self._prefix + POSE_TOPIC], at, RECENT)
         ]
         for _, _, data in self._messages.before([self._prefix + SCAN_TOPIC], at, RECENT):

@@ -15,8 +15,8 @@ from pathlib import Path
 from typing import Any
 
 from state_machines.files import parse_json
-from surveillance_operator.frames import Framer, Parts, lengthen
-from surveillance_operator.snapshot import Snapshot
+from surveillance_operator.mission_state import MissionState
+from surveillance_operator.page_state import Parts, PatchMaker, lengthen
 from surveillance_runtime.files import FileError, LineFile
 
 LEFT_OUT = frozenset({'scan', 'figures'})
@@ -38,11 +38,11 @@ class TimelineWriter:
     def __init__(self, path: Path) -> None:
         self._path = path
         self._file: LineFile | None = None
-        self._framer = Framer(without=LEFT_OUT)
+        self._framer = PatchMaker(without=LEFT_OUT)
         self._whole = 0.0
-        self._before: Snapshot | None = None
+        self._before: MissionState | None = None
 
-    def add(self, snapshot: Snapshot, at: float) -> None:
+    def add(self, snapshot: MissionState, at: float) -> None:
         """Write what changed, if anything did.
 
         Args:
@@ -76,7 +76,7 @@ class TimelineWriter:
             self._file.close()
             self._file = None
 
-    def _event(self, snapshot: Snapshot) -> str:
+    def _event(self, snapshot: MissionState) -> str:
         """Return the most important thing that happened since the last line."""
         before = self._before
         marks = snapshot.history.marks

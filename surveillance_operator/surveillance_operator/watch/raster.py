@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from rich.segment import Segment
 from rich.style import Style
 
-from surveillance_operator.snapshot import Pose
+from surveillance_operator.mission_state import Pose
 from surveillance_runtime.place.occupancy_grid import Box, Grid
 
 UNKNOWN, FREE, WALL, LINK, OLD_TRAIL, TRAIL, OPEN_DOOR, CLOSED_DOOR, OBSTACLE = range(9)
@@ -37,11 +37,11 @@ ARROWS = '→↗↑↖←↙↓↘'
 
 
 @dataclass(frozen=True)
-class Frame:
+class Viewport:
     """Which part of the world a picture shows.
 
     Attributes:
-        left, top: Its upper left corner, metres, map frame.
+        left, top: Its upper left corner, metres, map viewport.
         scale: Side of a pixel, metres.
         columns, rows: Its size in terminal cells.
     """
@@ -53,7 +53,7 @@ class Frame:
     rows: int
 
     @classmethod
-    def around(cls, box: Box, columns: int, rows: int) -> Frame:
+    def around(cls, box: Box, columns: int, rows: int) -> Viewport:
         """Return the largest picture of a box that fits into so many cells, its aspect kept."""
         left, bottom, right, top = box
         scale = max((right - left) / columns, (top - bottom) / (2 * rows), 1e-6)
@@ -64,7 +64,7 @@ class Frame:
         """Return the row and column of each point's pixel, which may lie outside the picture.
 
         Args:
-            points: Shape (n, 2), metres, map frame.
+            points: Shape (n, 2), metres, map viewport.
         """
         x, y = np.asarray(points, dtype=float).reshape(-1, 2).T
         offsets = np.stack([self.top - y, x - self.left], axis=1)
@@ -72,20 +72,20 @@ class Frame:
 
 
 @lru_cache(maxsize=4)
-def rasterise(grid: Grid, frame: Frame) -> NDArray[np.uint8]:
+def rasterise(grid: Grid, viewport: Viewport) -> NDArray[np.uint8]:
     """Return what each pixel of a picture shows of a grid: a wall, however thin, before all else.
 
     Returns:
-        Shape (2 * frame.rows, frame.columns), north first; not to be written to.
+        Shape (2 * viewport.rows, viewport.columns), north first; not to be written to.
     """
     kinds = np.where(grid.occupied, WALL, np.where(grid.free, FREE, UNKNOWN))
     kinds = kinds.astype(np.uint8)[::-1]
     west, north = grid.origin[0], grid.origin[1] + len(kinds) * grid.resolution
     for axis, offset, count in (
-        (0, north - frame.top, 2 * frame.rows),
-        (1, frame.left - west, frame.columns),
+        (0, north - viewport.top, 2 * viewport.rows),
+        (1, viewport.left - west, viewport.columns),
     ):
-        edges = (offset + np.arange(count + 1) * frame.scale) / grid.resolution
+        edges = (offset + np.arange(count + 1) * viewport.scale) / grid.resolution
         starts = np.floor(edges + 1e-6).astype(np.intp)
         size = min(kinds.shape[axis], max(1, int(starts[-1])))
         starts = starts[:-1][starts[:-1] < size].clip(0)
@@ -98,36 +98,36 @@ def rasterise(grid: Grid, frame: Frame) -> NDArray[np.uint8]:
     return kinds
 
 
-class Canvas:
+class CharacterCanvas:
     """A picture on which more is drawn.
 
     Args:
-        frame: What it shows.
+        viewport: What it shows.
         ground: Its pixels, see `rasterise`; all free unless given.
     """
 
-    def __init__(self, frame: Frame, ground: NDArray[np.uint8] | None = None) -> None:
-        self.frame = frame
-        shape = (2 * frame.rows, frame.columns)
+    def __init__(self, viewport: Viewport, ground: NDArray[np.uint8] | None = None) -> None:
+        self.viewport = viewport
+        shape = (2 * viewport.rows, viewport.columns)
         self.pixels = np.full(shape, FREE, np.uint8) if ground is None else ground.copy()
         self._ground = np.minimum(self.pixels, FREE)
         self._characters: dict[tuple[int, int], tuple[str, Style]] = {}
 
     def dots(self, points: ArrayLike, kind: int) -> None:
         """Draw points, shape (n, 2), metres."""
-        at = self.frame.pixels(points)
+        at = self.viewport.pixels(points)
         at = at[((at >= 0) & (at < self.pixels.shape)).all(axis=1)]
         self.pixels[at[:, 0], at[:, 1]] = kind
 
     def line(self, start: ArrayLike, end: ArrayLike, kind: int) -> None:
         """Draw a straight line from one point to another."""
         ends = np.array([start, end], dtype=float)
-        steps = 2 + int(2 * np.abs(ends[1] - ends[0]).max() / self.frame.scale)
+        steps = 2 + int(2 * np.abs(ends[1] - ends[0]).max() / self.viewport.scale)
         self.dots(ends[0] + np.linspace(0.0, 1.0, steps)[:, None] * (ends[1] - ends[0]), kind)
 
     def mark(self, x: float, y: float, character: str, style: Style) -> None:
         """Put one character where a point is, over whatever is there."""
-        row, column = self.frame.pixels([(x, y)])[0]
+        row, column = self.viewport.pixels([(x, y)])[0]
         self._characters[row // 2, column] = character, style
 
     def label(self, x: float, y: float, text: str, style: Style) -> None:
@@ -135,8 +135,8 @@ class Canvas:
 
         Where that would be over another label, or the picture is too narrow, it is left out.
         """
-        row, column = self.frame.pixels([(x, y)])[0]
-        first = min(max(0, column - (len(text) - 1) // 2), self.frame.columns - len(text))
+        row, column = self.viewport.pixels([(x, y)])[0]
+        first = min(max(0, column - (len(text) - 1) // 2), self.viewport.columns - len(text))
         columns = range(first, first + len(text))
         near = [row // 2 + offset for offset in (-1, 1, 0, -2, 2)]
         unwritten = [r for r in near if first >= 0 and self._is_unwritten(r, columns)]
@@ -150,8 +150,8 @@ class Canvas:
         self.mark(x, y, ARROWS[round(yaw / (math.pi / 4)) % 8], style)
 
     def lines(self, *, colours: bool = True) -> Iterator[list[Segment]]:
-        """Yield the picture, row by row, each as wide as the frame."""
-        for row in range(self.frame.rows):
+        """Yield the picture, row by row, each as wide as the viewport."""
+        for row in range(self.viewport.rows):
             upper, lower, ground = (
                 line.tolist()
                 for line in (*self.pixels[2 * row : 2 * row + 2], self._ground[2 * row])
@@ -169,7 +169,7 @@ class Canvas:
 
     def _is_unwritten(self, row: int, columns: range) -> bool:
         taken = any((row, column) in self._characters for column in columns)
-        return 0 <= row < self.frame.rows and not taken
+        return 0 <= row < self.viewport.rows and not taken
 
     def _is_drawn(self, row: int, columns: range) -> bool:
         pixels = self.pixels[2 * row : 2 * row + 2, columns.start : columns.stop]

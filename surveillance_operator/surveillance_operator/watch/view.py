@@ -30,10 +30,10 @@ from rich.text import Text
 from state_machines import Interrupt
 from surveillance_operator.fleet_actions import ALL
 from surveillance_operator.fleet_table import fleet_lines
-from surveillance_operator.frames import events_of, health, merged_events
-from surveillance_operator.snapshot import Pose, Snapshot, doing, troubles, why
+from surveillance_operator.mission_state import MissionState, Pose, doing, troubles, why
+from surveillance_operator.page_state import events_of, health, merged_events
 from surveillance_operator.watch import raster
-from surveillance_operator.watch.raster import Canvas, Frame, rasterise
+from surveillance_operator.watch.raster import CharacterCanvas, Viewport, rasterise
 from surveillance_runtime.place.occupancy_grid import Box
 
 SIDE_BY_SIDE = 76
@@ -106,12 +106,12 @@ class MissionView:
 
     def __init__(
         self,
-        snapshot: Snapshot,
+        snapshot: MissionState,
         *,
         whole: bool = True,
         page: str = 'map',
         note: str = '',
-        fleet: Mapping[str, Snapshot] | None = None,
+        fleet: Mapping[str, MissionState] | None = None,
         robot: str = '',
     ) -> None:
         self._snapshot = snapshot
@@ -230,7 +230,7 @@ def robot_colour(names: Sequence[str], name: str) -> str:
     return FLEET_COLOURS[list(names).index(name) % len(FLEET_COLOURS)]
 
 
-def header_line(snapshot: Snapshot, robot: str = '') -> Text:
+def header_line(snapshot: MissionState, robot: str = '') -> Text:
     """Return which mission this is, or that there is none."""
     if not snapshot.nodes:
         text = 'the mission has ended' if snapshot.status else 'no mission yet'
@@ -249,7 +249,7 @@ def header_line(snapshot: Snapshot, robot: str = '') -> Text:
     return Text(f' {name}{mode} · {snapshot.where} ', style=HEADER)
 
 
-def state_lines(snapshot: Snapshot) -> list[Text]:
+def state_lines(snapshot: MissionState) -> list[Text]:
     """Return what the state machine does."""
     status = snapshot.status
     if status is None:
@@ -264,7 +264,7 @@ def state_lines(snapshot: Snapshot) -> list[Text]:
     return lines
 
 
-def battery_line(snapshot: Snapshot, width: int) -> Text:
+def battery_line(snapshot: MissionState, width: int) -> Text:
     """Return the battery as a bar."""
     if snapshot.battery is None:
         return _nothing(snapshot, 'battery_level')
@@ -276,7 +276,7 @@ def battery_line(snapshot: Snapshot, width: int) -> Text:
     return Text.assemble('battery ', *bar, f' {snapshot.battery:.0f} %', low)
 
 
-def decision_lines(snapshot: Snapshot) -> list[Text]:
+def decision_lines(snapshot: MissionState) -> list[Text]:
     """Return the present decision and its reason, or what the robot waits for."""
     said = why(snapshot)
     if said is None:
@@ -285,7 +285,7 @@ def decision_lines(snapshot: Snapshot) -> list[Text]:
     return [Text(said[0], URGENT if waits else 'bold'), Text(said[1])]
 
 
-def doors_line(snapshot: Snapshot) -> Text:
+def doors_line(snapshot: MissionState) -> Text:
     """Return which doors are open, and which closed."""
     if snapshot.doors is None:
         return _nothing(snapshot, 'door_states')
@@ -298,7 +298,7 @@ def doors_line(snapshot: Snapshot) -> Text:
     )
 
 
-def decision_page(snapshot: Snapshot) -> list[Text]:
+def decision_page(snapshot: MissionState) -> list[Text]:
     """Return the decision in full, with the score of each candidate."""
     lines = decision_lines(snapshot)
     status, decision = snapshot.status, snapshot.decision
@@ -311,7 +311,7 @@ def decision_page(snapshot: Snapshot) -> list[Text]:
     return lines
 
 
-def node_page(snapshot: Snapshot) -> list[Text]:
+def node_page(snapshot: MissionState) -> list[Text]:
     """Return the nodes: up or ended, how often started again, the worst that they report."""
     known = health(snapshot)
     others = {name: {'up': True, 'reports': [each]} for name, each in known['others'].items()}
@@ -335,13 +335,13 @@ def _event(event: Sequence[Any]) -> Text:
     return Text.assemble((time.strftime('%H:%M:%S', time.localtime(at)), DIM), ' ', who, text)
 
 
-PAGES: dict[str, Callable[[Snapshot], list[Text]]] = {
+PAGES: dict[str, Callable[[MissionState], list[Text]]] = {
     'decision': decision_page,
     'nodes': node_page,
 }
 
 
-def place_lines(snapshot: Snapshot, width: int) -> list[Text]:
+def place_lines(snapshot: MissionState, width: int) -> list[Text]:
     """Return places by the time since their last visit, in as many columns as fit."""
     known = snapshot.visited_at
     names = sorted({*known, *snapshot.positions}, key=lambda name: (known.get(name, 0.0), name))
@@ -369,7 +369,7 @@ def place_lines(snapshot: Snapshot, width: int) -> list[Text]:
 
 
 def draw_map(
-    snapshot: Snapshot,
+    snapshot: MissionState,
     columns: int,
     rows: int,
     *,
@@ -394,8 +394,10 @@ def draw_map(
     box = snapshot.grid.known if snapshot.grid else _box_around(snapshot)
     if box is None or rows - len(captions) < 1:
         return captions[:rows] or [[]]
-    frame = Frame.around(box, columns, rows - len(captions))
-    canvas = Canvas(frame, rasterise(snapshot.grid, frame) if snapshot.grid else None)
+    viewport = Viewport.around(box, columns, rows - len(captions))
+    canvas = CharacterCanvas(
+        viewport, rasterise(snapshot.grid, viewport) if snapshot.grid else None
+    )
     if snapshot.grid is None:
         for first, second in snapshot.links:
             if {first, second} <= snapshot.positions.keys():
@@ -428,7 +430,7 @@ def draw_map(
     return [*canvas.lines(colours=colours), *captions]
 
 
-def _box_around(snapshot: Snapshot) -> Box | None:
+def _box_around(snapshot: MissionState) -> Box | None:
     if not snapshot.positions:
         return None
     points = np.array([*snapshot.positions.values(), *snapshot.trail])
@@ -436,7 +438,7 @@ def _box_around(snapshot: Snapshot) -> Box | None:
     return float(left), float(bottom), float(right), float(top)
 
 
-def _nothing(snapshot: Snapshot, topic: str, *, sketched: bool = False) -> Text:
+def _nothing(snapshot: MissionState, topic: str, *, sketched: bool = False) -> Text:
     why = snapshot.silent.get(topic) or PUBLISHERS[topic]
     return _dim(f'{"sketched: " if sketched else ""}nothing on {topic} yet: {why}')
 
@@ -473,7 +475,7 @@ def _rendered(
     return rendered
 
 
-See = Callable[[], Mapping[str, Snapshot]]
+See = Callable[[], Mapping[str, MissionState]]
 """Returns all robots by their names; one that is alone has none."""
 
 
@@ -483,14 +485,14 @@ class _Chosen:
 
     page: str = 'map'
     robot: str = ''
-    held: Mapping[str, Snapshot] | None = None
+    held: Mapping[str, MissionState] | None = None
     ended: bool = False
 
-    def drawn(self, seen: Mapping[str, Snapshot]) -> str:
+    def drawn(self, seen: Mapping[str, MissionState]) -> str:
         """Return the name of the robot that is drawn."""
         return self.robot if self.robot in seen else next(iter(seen), '')
 
-    def press(self, key: str, seen: Mapping[str, Snapshot]) -> None:
+    def press(self, key: str, seen: Mapping[str, MissionState]) -> None:
         """Handle a key; one without a meaning changes nothing."""
         names = [name for name in seen if name]
         if key == 'q':
@@ -595,12 +597,12 @@ def show_once(
     return True
 
 
-def _are_complete(seen: Mapping[str, Snapshot]) -> bool:
+def _are_complete(seen: Mapping[str, MissionState]) -> bool:
     """Tell whether all that each robot of a simulated mission tells has come."""
     return all(_is_complete(each) for name, each in seen.items() if name or len(seen) == 1)
 
 
-def _is_complete(snapshot: Snapshot) -> bool:
+def _is_complete(snapshot: MissionState) -> bool:
     """Tell whether all that a simulated mission tells has come."""
     parts = (snapshot.battery, snapshot.decision, snapshot.grid, snapshot.pose, snapshot.doors)
     placed = snapshot.positions and snapshot.visited_at.keys() <= snapshot.positions.keys()

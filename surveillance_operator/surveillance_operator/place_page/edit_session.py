@@ -29,7 +29,7 @@ _COLOURS = (
 )
 
 
-class PlaceDesk:
+class EditSession:
     """Lets any number of browsers edit one place, one change after the other.
 
     Args:

@@ -12,26 +12,26 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable, Sequence
 
-from surveillance_operator.mission_feed import LOOK_PERIOD, MissionFeed
-from surveillance_operator.snapshot import Change, Snapshot
+from surveillance_operator.mission_state import Change, MissionState
+from surveillance_operator.mission_subscriber import LOOK_PERIOD, MissionSubscriber
 from surveillance_runtime.fleet_messages import FLEET_TOPIC
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.place.fleet import problem_in_robot_name
 from surveillance_runtime.place_changes import TOPIC as PLACE_TOPIC
 
-OnChange = Callable[[str, Snapshot, Sequence[Change]], None]
+OnChange = Callable[[str, MissionState, Sequence[Change]], None]
 """Takes a robot's name, its snapshot, and what changed."""
 
 
-class FleetFeed:
+class FleetSubscriber:
     """Keeps a snapshot of each robot.
 
     Args:
         node: The node that watches.
-        period: As of a `MissionFeed`.
+        period: As of a `MissionSubscriber`.
         on_change: Called on a feed's thread.
         on_leave: Called when a robot of an earlier mission is no longer shown.
-        streams: As of a `MissionFeed`.
+        streams: As of a `MissionSubscriber`.
     """
 
     def __init__(
@@ -47,8 +47,8 @@ class FleetFeed:
         self._period, self._streams = period, streams
         self._on_change, self._on_leave = on_change, on_leave
         self._lock = threading.Lock()
-        self._feeds: dict[str, MissionFeed] = {}
-        self._place = MissionFeed(node, period, self._on_place, streams=streams)
+        self._feeds: dict[str, MissionSubscriber] = {}
+        self._place = MissionSubscriber(node, period, self._on_place, streams=streams)
         self._feeds[''] = self._place
         node.spawn(self._run, 'fleet feed')
 
@@ -58,7 +58,7 @@ class FleetFeed:
         with self._lock:
             return tuple(sorted(self._feeds.keys() - {''})) or ('',)
 
-    def snapshot(self, robot: str) -> Snapshot:
+    def snapshot(self, robot: str) -> MissionState:
         """Return all that is known of a robot, with the time of the last change.
 
         Raises:
@@ -66,7 +66,7 @@ class FleetFeed:
         """
         return self._feeds[robot].snapshot
 
-    def see(self) -> dict[str, Snapshot]:
+    def see(self) -> dict[str, MissionState]:
         """Return the snapshot of each robot at the mission's present time.
 
         Of a fleet, what the robots share is there, too, last and without a name.
@@ -75,7 +75,7 @@ class FleetFeed:
             feeds = sorted(self._feeds.items(), key=lambda each: (not each[0], each[0]))
         return {name: feed.see() for name, feed in feeds}
 
-    def _on_place(self, new: Snapshot, told: Sequence[Change]) -> None:
+    def _on_place(self, new: MissionState, told: Sequence[Change]) -> None:
         self._on_change('', new, told)
         for name, feed in list(self._feeds.items()):
             if name:
@@ -114,10 +114,10 @@ class FleetFeed:
         return {name for name in below if not problem_in_robot_name(name)}
 
     def _follow(self, name: str) -> None:
-        def on_change(new: Snapshot, told: Sequence[Change]) -> None:
+        def on_change(new: MissionState, told: Sequence[Change]) -> None:
             self._on_change(name, new, told)
 
-        feed = MissionFeed(
+        feed = MissionSubscriber(
             self._node,
             self._period,
             on_change,

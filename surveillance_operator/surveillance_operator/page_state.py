@@ -19,17 +19,17 @@ from PIL import Image
 
 from patrol_policy.policies import POLICIES
 from patrol_policy.promises import lines as promise_lines
-from surveillance_operator.room_outlines import room_outlines
-from surveillance_operator.snapshot import (
+from surveillance_operator.mission_state import (
     NO_POINTS,
     TRAIL_STEP,
-    Health,
-    Snapshot,
+    MissionState,
+    NodeReport,
     doing,
     is_out,
     shares,
     troubles,
 )
+from surveillance_operator.room_outlines import room_outlines
 from surveillance_runtime.place.occupancy_grid import Grid
 
 Parts = dict[str, Any]
@@ -68,7 +68,7 @@ def _grid(grid: Grid | None) -> Any:
     }
 
 
-def _decision(snapshot: Snapshot) -> Any:
+def _decision(snapshot: MissionState) -> Any:
     decision = snapshot.decision
     if decision is None:
         return None
@@ -77,7 +77,7 @@ def _decision(snapshot: Snapshot) -> Any:
     return {**vars(decision), **more}
 
 
-def _promises(snapshot: Snapshot) -> Any:
+def _promises(snapshot: MissionState) -> Any:
     return {
         each.place: {
             'verdict': each.verdict,
@@ -95,18 +95,18 @@ def _seconds(value: float) -> float | None:
     return None if math.isinf(value) else round(value, 1)
 
 
-def _status(snapshot: Snapshot) -> Any:
+def _status(snapshot: MissionState) -> Any:
     status = snapshot.status
     return status and {**vars(status), 'whereabouts': status.whereabouts}
 
 
-def _plan(snapshot: Snapshot) -> Any:
+def _plan(snapshot: MissionState) -> Any:
     """Return the way that the robot means to drive; none while it waits for help."""
     waits = snapshot.status is not None and snapshot.status.waiting_for_help
     return [] if waits else _points(snapshot.plan)
 
 
-def _places(snapshot: Snapshot) -> Any:
+def _places(snapshot: MissionState) -> Any:
     names = sorted({*snapshot.positions, *snapshot.visited_at})
     return {
         name: {
@@ -118,7 +118,7 @@ def _places(snapshot: Snapshot) -> Any:
     }
 
 
-def _transitions(snapshot: Snapshot) -> Any:
+def _transitions(snapshot: MissionState) -> Any:
     return [
         [
             each.sequence,
@@ -133,7 +133,7 @@ def _transitions(snapshot: Snapshot) -> Any:
     ]
 
 
-def _regions(snapshot: Snapshot) -> Any:
+def _regions(snapshot: MissionState) -> Any:
     if snapshot.grid is None:
         return {}
     found = room_outlines(snapshot.grid, snapshot.positions, snapshot.door_lines)
@@ -147,7 +147,7 @@ def _regions(snapshot: Snapshot) -> Any:
     }
 
 
-def health(snapshot: Snapshot) -> Any:
+def health(snapshot: MissionState) -> Any:
     """Return what is known of each node, with its own reports, and what else is reported.
 
     A program that robots share, as the simulator, may have a node in the namespace of each: its
@@ -167,16 +167,16 @@ def health(snapshot: Snapshot) -> Any:
     return {'nodes': nodes, 'others': others, 'silent': dict(snapshot.silent)}
 
 
-def _in_namespace(name: str, snapshot: Snapshot) -> str:
+def _in_namespace(name: str, snapshot: MissionState) -> str:
     """Return the name of who reports, without the namespace of the robot that is shown."""
     return name.removeprefix(f'{snapshot.namespace}/') if snapshot.namespace else name
 
 
-def _report(health: Health) -> Any:
+def _report(health: NodeReport) -> Any:
     return {'level': health.level, 'message': health.message}
 
 
-def _figures(snapshot: Snapshot) -> Any:
+def _figures(snapshot: MissionState) -> Any:
     """Return what viewers are shown of the figures that nodes report of themselves."""
     return {
         _in_namespace(name, snapshot): {key: value for key, value in each.values if key in FIGURES}
@@ -185,7 +185,7 @@ def _figures(snapshot: Snapshot) -> Any:
     }
 
 
-def _history(snapshot: Snapshot) -> Any:
+def _history(snapshot: MissionState) -> Any:
     history = snapshot.history
     return {
         'visits': [[round(at, 1), place] for at, place in history.visits],
@@ -194,13 +194,13 @@ def _history(snapshot: Snapshot) -> Any:
     }
 
 
-def events_of(snapshot: Snapshot) -> Any:
+def events_of(snapshot: MissionState) -> Any:
     """Return the latest events, as `merged_events` takes them."""
     # A third value says that the event is of the place.
     return [[round(at, 1), text, *([1] if shared else [])] for at, text, shared in snapshot.events]
 
 
-PARTS: Mapping[str, tuple[tuple[str, ...], Callable[[Snapshot], Any]]] = {
+PARTS: Mapping[str, tuple[tuple[str, ...], Callable[[MissionState], Any]]] = {
     'mission': (
         ('where', 'mode', 'threshold', 'policy', 'nodes'),
         lambda s: {
@@ -321,11 +321,11 @@ def merged_events(events: Mapping[str, Any]) -> list[list[Any]]:
 
 
 assert {name for sources, _ in PARTS.values() for name in sources} <= {
-    field.name for field in fields(Snapshot)
+    field.name for field in fields(MissionState)
 }
 
 
-class Framer:
+class PatchMaker:
     """Turns a series of snapshots into patches.
 
     Args:
@@ -334,11 +334,11 @@ class Framer:
 
     def __init__(self, without: frozenset[str] = frozenset()) -> None:
         self._parts = {name: part for name, part in PARTS.items() if name not in without}
-        self._last: Snapshot | None = None
+        self._last: MissionState | None = None
         self._seen: dict[str, tuple[Any, ...]] = {}
         self.parts: Parts = {}
 
-    def patch(self, snapshot: Snapshot, only: frozenset[str] | None = None) -> Parts:
+    def patch(self, snapshot: MissionState, only: frozenset[str] | None = None) -> Parts:
         """Return the parts that differ from the last snapshot's, and a trail that begins anew.
 
         Args:

@@ -1,7 +1,7 @@
 """What is known of a mission at one moment, and in words what changed between two moments.
 
-Every view shows a `Snapshot`: the terminal, the page, the recording's time line. It is immutable;
-`follow` gives the next one its events and its history.
+Every view shows a `MissionState`: the terminal, the page, the recording's time line. It is
+immutable; `follow` gives the next one its events and its history.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ class Status:
 
 
 @dataclass(frozen=True)
-class Container:
+class MachineContainer:
     """One container of the state machine: its states, and the transitions between them.
 
     Attributes:
@@ -82,7 +82,7 @@ class Container:
 
 
 @dataclass(frozen=True)
-class Transition:
+class MachineTransition:
     """One transition of the state machine; see FsmTransition.msg."""
 
     sequence: int
@@ -95,7 +95,7 @@ class Transition:
 
 
 @dataclass(frozen=True)
-class Health:
+class NodeReport:
     """What one node reports on `/diagnostics`.
 
     Attributes:
@@ -114,7 +114,7 @@ class Health:
 
 
 @dataclass(frozen=True)
-class History:
+class MissionHistory:
     """What happened in the last hour of the mission's time; oldest first, times in seconds.
 
     Attributes:
@@ -160,7 +160,7 @@ class Event(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Share:
+class PatrolShare:
     """What a robot of a fleet tells the others; see FleetRobot.msg.
 
     Attributes:
@@ -183,7 +183,7 @@ class Share:
 
 
 @dataclass(frozen=True)
-class Snapshot:
+class MissionState:
     """All that came so far; None and empty for what did not.
 
     Attributes:
@@ -273,26 +273,26 @@ class Snapshot:
     lidar: tuple[float, NDArray[np.float64]] | None = None
     scan: NDArray[np.float64] = field(default_factory=lambda: NO_POINTS)
     obstacles: NDArray[np.float64] | None = None
-    containers: tuple[Container, ...] = ()
+    containers: tuple[MachineContainer, ...] = ()
     active: tuple[str, ...] = ()
     paused: bool = False
     waiting: tuple[str, ...] = ()
     stopped: bool = False
-    transitions: tuple[Transition, ...] = ()
+    transitions: tuple[MachineTransition, ...] = ()
     detections: tuple[tuple[int, bool, bool, float], ...] = ()
     markers: Mapping[int, tuple[float, float]] = field(default_factory=dict)
     camera: tuple[float, NDArray[np.float64]] | None = None
     stands: bool = False
     scan_progress: tuple[int, int] | None = None
     requests: Mapping[str, str] = field(default_factory=dict)
-    health: Mapping[str, Health] = field(default_factory=dict)
+    health: Mapping[str, NodeReport] = field(default_factory=dict)
     silent: Mapping[str, str] = field(default_factory=dict)
-    share: Share | None = None
+    share: PatrolShare | None = None
     events: tuple[Event, ...] = ()
-    history: History = History()
+    history: MissionHistory = MissionHistory()
 
 
-def follow(old: Snapshot, new: Snapshot, at: float) -> tuple[Snapshot, list[Change]]:
+def follow(old: MissionState, new: MissionState, at: float) -> tuple[MissionState, list[Change]]:
     """Return `new` with its events, restarts and history, and what changed since `old`.
 
     Args:
@@ -312,7 +312,7 @@ def follow(old: Snapshot, new: Snapshot, at: float) -> tuple[Snapshot, list[Chan
     return (replace(new, **more) if more else new), told  # type: ignore[arg-type]
 
 
-def restarted(old: Snapshot, new: Snapshot) -> list[str]:
+def restarted(old: MissionState, new: MissionState) -> list[str]:
     """Return the nodes that came back, or of which a new process is there."""
     back = old.ended & new.nodes.keys()
     renewed = {
@@ -323,7 +323,7 @@ def restarted(old: Snapshot, new: Snapshot) -> list[str]:
     return sorted(back | renewed)
 
 
-def changes(old: Snapshot, new: Snapshot) -> Iterator[Change]:
+def changes(old: MissionState, new: MissionState) -> Iterator[Change]:
     """Yield what is new in a snapshot, one line each, as a log would tell it."""
     if new.status is not None and new.status != old.status:
         yield from _status_changes(old.status, new.status)
@@ -371,12 +371,12 @@ def _waits(decision: Decision) -> bool:
     return decision.place == decision.from_place
 
 
-def is_out(snapshot: Snapshot) -> bool:
+def is_out(snapshot: MissionState) -> bool:
     """Tell whether a person took the robot out of its fleet's patrol."""
     return snapshot.share is not None and snapshot.share.taken_out
 
 
-def doing(snapshot: Snapshot) -> str:
+def doing(snapshot: MissionState) -> str:
     """Return in a few words what the robot is about."""
     status, share = snapshot.status, snapshot.share
     if status is None:
@@ -402,7 +402,7 @@ def doing(snapshot: Snapshot) -> str:
     return (status.state or 'begins').lower().replace('_', ' ')
 
 
-def shares(snapshot: Snapshot) -> str:
+def shares(snapshot: MissionState) -> str:
     """Return which places of a fleet's patrol are the robot's; empty: it is in no fleet."""
     share = snapshot.share
     if share is None:
@@ -412,7 +412,7 @@ def shares(snapshot: Snapshot) -> str:
     return f'shares {", ".join(share.tour)}, next {share.stop}'
 
 
-def troubles(snapshot: Snapshot) -> list[str]:
+def troubles(snapshot: MissionState) -> list[str]:
     """Return what a person should look at, in words, the most important first."""
     found = []
     status = snapshot.status
@@ -440,14 +440,14 @@ def troubles(snapshot: Snapshot) -> list[str]:
     return found
 
 
-def _decision_line(snapshot: Snapshot) -> str:
+def _decision_line(snapshot: MissionState) -> str:
     """Return the decision without its reason."""
     decision = snapshot.decision
     assert decision is not None
     return f'decision {snapshot.number}: {decision.from_place} → {decision.place} [{decision.rule}]'
 
 
-def why(snapshot: Snapshot) -> tuple[str, str] | None:
+def why(snapshot: MissionState) -> tuple[str, str] | None:
     """Return what the robot is about and the reason: the decision, or what it waits for."""
     status, decision = snapshot.status, snapshot.decision
     if snapshot.stopped:
@@ -457,7 +457,7 @@ def why(snapshot: Snapshot) -> tuple[str, str] | None:
     return None if decision is None else (_decision_line(snapshot), decision.reason)
 
 
-def _node_changes(old: Snapshot, new: Snapshot) -> Iterator[Change]:
+def _node_changes(old: MissionState, new: MissionState) -> Iterator[Change]:
     if old.nodes is new.nodes and old.ended is new.ended:
         return
     if old.nodes and not new.nodes:
@@ -480,7 +480,7 @@ def _status_changes(old: Status | None, new: Status) -> Iterator[Change]:
         yield Change(f'{WAITS_FOR_HELP}: {new.text}' if new.waiting_for_help else new.text)
 
 
-def _history(old: Snapshot, new: Snapshot) -> History:
+def _history(old: MissionState, new: MissionState) -> MissionHistory:
     history = new.history
     if (
         new.visited_at is old.visited_at
@@ -508,14 +508,14 @@ def _history(old: Snapshot, new: Snapshot) -> History:
     def recent(entries: Iterable[Any]) -> tuple[Any, ...]:
         return tuple(each for each in entries if each[0] >= since)[-MOST_HISTORY:]
 
-    return History(
+    return MissionHistory(
         recent((*history.visits, *sorted(visits))),
         recent((*history.battery, *battery)),
         recent((*history.marks, *marks)),
     )
 
 
-def _marks(transition: Transition) -> Iterator[tuple[float, str, str]]:
+def _marks(transition: MachineTransition) -> Iterator[tuple[float, str, str]]:
     """Yield the marks of a transition on the strips of time."""
     if re.search('RECHARG|CHARGING', transition.to_state):
         yield transition.time, 'recharge', transition.to_state

@@ -27,8 +27,8 @@ from state_machines.ros import CallError, ServiceCaller
 from surveillance_interfaces.srv import ReferenceName, RoomPosition
 from surveillance_ontology.armor_client import ArmorClient, FactSubscription
 from surveillance_ontology.patrol_ontology import CONNECTIONS, PLACES, URGENT_PLACES, VISITS
+from surveillance_operator.mission_state import STALE, Change, MissionState, Pose, follow
 from surveillance_operator.polled_subscription import PolledSubscription, await_message
-from surveillance_operator.snapshot import STALE, Change, Pose, Snapshot, follow
 from surveillance_operator.topics import (
     BEHAVIOUR,
     POSE_TOPIC,
@@ -77,7 +77,7 @@ TERMINALS = ('mission_view', 'console', 'fleet_')
 """And of those that are a person's terminal: they may go at any time."""
 
 
-class MissionFeed:
+class MissionSubscriber:
     """Keeps a snapshot of the mission that a node listens to.
 
     Args:
@@ -98,11 +98,11 @@ class MissionFeed:
         self,
         node: PatrolNode,
         period: float | Callable[[], float],
-        on_change: Callable[[Snapshot, Sequence[Change]], None] = lambda _new, _told: None,
+        on_change: Callable[[MissionState, Sequence[Change]], None] = lambda _new, _told: None,
         *,
         streams: bool = False,
         robot: str = '',
-        place: MissionFeed | None = None,
+        place: MissionSubscriber | None = None,
     ) -> None:
         self._node = node
         self._place = place
@@ -112,7 +112,7 @@ class MissionFeed:
         namespace = self._prefix.strip('/')
         where = f'ROS domain {node.context.get_domain_id()}'
         where += f', namespace {namespace}' if namespace else ''
-        self._empty = Snapshot(where=where, namespace=namespace)
+        self._empty = MissionState(where=where, namespace=namespace)
         self._snapshot = self._empty
         self._lock = threading.Lock()
         self._over = False
@@ -135,7 +135,7 @@ class MissionFeed:
         self._left = threading.Event()
         self._facts = _Facts(node, self.update, robot)
         self._others = _OtherRobots(node) if streams and not robot else None
-        self.robots: Mapping[str, MissionFeed] = {}
+        self.robots: Mapping[str, MissionSubscriber] = {}
         self._passed_on: deque[tuple[Topic, Any]] = deque(maxlen=MOST_PASSED_ON)
         self._publishers: Sequence[TopicEndpointInfo] = ()
         self._next_look = self._next_whole_look = self._changed_at = 0.0
@@ -144,16 +144,18 @@ class MissionFeed:
         node.spawn(self._run, 'mission feed')
 
     @property
-    def snapshot(self) -> Snapshot:
+    def snapshot(self) -> MissionState:
         """All that is known, with the time of the last change."""
         return self._snapshot
 
-    def see(self) -> Snapshot:
+    def see(self) -> MissionState:
         """Return all that is known, at the mission's present time, or the time of its end."""
         with self._lock:
             return self._snapshot if self._over else replace(self._snapshot, now=self._now())
 
-    def update(self, change: Callable[[Snapshot], Snapshot], *, begins: bool = True) -> None:
+    def update(
+        self, change: Callable[[MissionState], MissionState], *, begins: bool = True
+    ) -> None:
         """Take a change into the snapshot; from any thread.
 
         Args:
@@ -179,7 +181,7 @@ class MissionFeed:
         """Follow the mission no longer: nothing more is told of it, and no topic heard."""
         self._left.set()
 
-    def _with_place(self, snapshot: Snapshot) -> Snapshot:
+    def _with_place(self, snapshot: MissionState) -> MissionState:
         """Return the snapshot of a robot with what the robots of its fleet share."""
         if self._place is None:
             return snapshot
@@ -191,7 +193,7 @@ class MissionFeed:
         }
         return replace(snapshot, **fields) if fields else snapshot
 
-    def _begin_anew(self) -> Snapshot:
+    def _begin_anew(self) -> MissionState:
         """Return what is still known when another mission begins."""
         self._over = False
         self._facts.forget()
@@ -244,7 +246,7 @@ class MissionFeed:
         if not came and not others:
             return
 
-        def changed(snapshot: Snapshot) -> Snapshot:
+        def changed(snapshot: MissionState) -> MissionState:
             for topic, message in came:
                 snapshot = read_message(snapshot, topic, message)
             return replace(snapshot, others={**snapshot.others, **others}) if others else snapshot
@@ -347,7 +349,7 @@ class _Facts:
     def __init__(
         self,
         node: PatrolNode,
-        update: Callable[[Callable[[Snapshot], Snapshot]], None],
+        update: Callable[[Callable[[MissionState], MissionState]], None],
         robot: str = '',
     ) -> None:
         self._node = node
@@ -576,5 +578,7 @@ def _mismatch(reason: str) -> str:
     return f'its publisher does not fit: {reason}'
 
 
-def _with_position(place: str, point: tuple[float, float]) -> Callable[[Snapshot], Snapshot]:
+def _with_position(
+    place: str, point: tuple[float, float]
+) -> Callable[[MissionState], MissionState]:
     return lambda old: replace(old, positions={**old.positions, place: point})

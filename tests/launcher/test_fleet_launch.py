@@ -9,10 +9,10 @@ from pathlib import Path
 
 import pytest
 
+from launcher.fleet_launch import parts
 from launcher.run import Run, make_parser, wanted_run
 from launcher.run_configuration import configuration, profile_of
 from launcher.run_mission import checked
-from launcher.team import parts
 from surveillance_runtime.files import FileError
 from surveillance_runtime.place import read_place_file
 

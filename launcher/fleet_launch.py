@@ -14,7 +14,7 @@ from surveillance_runtime.team import Choice, TeamPart, team_parts
 
 
 @dataclass(frozen=True, kw_only=True)
-class Part(TeamPart):
+class RobotProcesses(TeamPart):
     """A part with what is asked of it.
 
     Attributes:
@@ -24,7 +24,7 @@ class Part(TeamPart):
     run: Run
 
 
-def parts(run: Run, config: Path, robot: ProfileFile) -> tuple[Part, ...]:
+def parts(run: Run, config: Path, robot: ProfileFile) -> tuple[RobotProcesses, ...]:
     """Return the parts of a run, what is shared first.
 
     Raises:
@@ -40,7 +40,7 @@ def parts(run: Run, config: Path, robot: ProfileFile) -> tuple[Part, ...]:
     path = place_file(config, run.behaviour, run.place)
     found = team_parts(path, run.robots, robot.profile.body.reach, run.namespace, choice)
     return tuple(
-        Part(
+        RobotProcesses(
             **vars(part),
             run=replace(
                 run,

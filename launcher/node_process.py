@@ -1,6 +1,6 @@
 """What a supervised process runs: one node, or several on one executor.
 
-    python child.py PARENT_PID TARGET[,TARGET...] [ROS arguments]
+    python node_process.py PARENT_PID TARGET[,TARGET...] [ROS arguments]
 
 with TARGET as `name=module:Class`. Started as a file, so it imports nothing of the launcher.
 """

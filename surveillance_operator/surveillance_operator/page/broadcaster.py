@@ -15,8 +15,15 @@ import threading
 from collections.abc import AsyncIterator
 from typing import Any
 
-from surveillance_operator.frames import GLANCE, PARTS, Framer, Parts, lengthen, merged_events
-from surveillance_operator.snapshot import Snapshot
+from surveillance_operator.mission_state import MissionState
+from surveillance_operator.page_state import (
+    GLANCE,
+    PARTS,
+    Parts,
+    PatchMaker,
+    lengthen,
+    merged_events,
+)
 
 LEAST_PERIOD = 0.015
 """Seconds between two messages to one viewer."""
@@ -33,15 +40,15 @@ class _Robot:
     """What viewers are shown of one robot."""
 
     def __init__(self) -> None:
-        self.framer = Framer()
-        self.snapshot: Snapshot | None = None
+        self.framer = PatchMaker()
+        self.snapshot: MissionState | None = None
         self.now = 0.0
         self.texts: Texts = {}
         self.trail: list[list[float]] = []
         self.events: list[Any] = []
 
 
-class Hub:
+class Broadcaster:
     """The newest parts, for all viewers."""
 
     def __init__(self) -> None:
@@ -58,7 +65,7 @@ class Hub:
         """How many there are."""
         return len(self._waiting)
 
-    def show(self, snapshot: Snapshot, robot: str = '') -> None:
+    def show(self, snapshot: MissionState, robot: str = '') -> None:
         """Take a new snapshot of a robot; from any thread."""
         with self._lock:
             shown = self._robots.setdefault(robot, _Robot())
