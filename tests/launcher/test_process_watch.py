@@ -14,7 +14,7 @@ from launcher.process_watch import (
     STOPPED_AFTER,
     STUCK_AFTER,
     Heartbeats,
-    Look,
+    ProcessSample,
     look_at,
 )
 from tests.launcher.conftest import USER_ENVIRON, gone
@@ -29,7 +29,7 @@ BEATING = (
 ENDING = 'import os; os.write(int(os.environ["LAUNCH_HEARTBEAT"]), b".")'
 
 
-def after(seconds: float, *looks: Look) -> str:
+def after(seconds: float, *looks: ProcessSample) -> str:
     """Return the judgement that long after a heartbeat, with looks spread over the time."""
     heartbeats = Heartbeats(0.0)
     heartbeats.beat(0.0)
@@ -41,43 +41,43 @@ def after(seconds: float, *looks: Look) -> str:
 
 
 def test_a_process_that_beats_is_well_whatever_it_does():
-    assert after(STOPPED_AFTER / 2, Look('T', 0.0, 0)) == ''
+    assert after(STOPPED_AFTER / 2, ProcessSample('T', 0.0, 0)) == ''
 
 
 def test_a_stopped_process_is_found_soon():
-    assert 'was stopped' in after(STOPPED_AFTER + 0.1, Look('T', 0.0, 0))
+    assert 'was stopped' in after(STOPPED_AFTER + 0.1, ProcessSample('T', 0.0, 0))
 
 
 def test_a_process_that_only_sleeps_is_stuck():
-    looks = [Look('S', 1.0, 0)] * 10
+    looks = [ProcessSample('S', 1.0, 0)] * 10
     assert 'hangs' in after(STUCK_AFTER + 2.0, *looks)
 
 
 def test_a_process_that_gets_little_of_a_processor_is_given_time():
-    waiting = [Look('R', 1.0, 0)] * 10
+    waiting = [ProcessSample('R', 1.0, 0)] * 10
     assert after(STUCK_AFTER + 5.0, *waiting) == ''
-    slow = [Look('S', 0.3 * number, 0) for number in range(10)]
+    slow = [ProcessSample('S', 0.3 * number, 0) for number in range(10)]
     assert after(STUCK_AFTER + 5.0, *slow) == ''
     assert 'hangs' in after(STARVED_AFTER + 0.1, *waiting)
 
 
 def test_an_endless_loop_is_found_by_its_own_time():
-    looping = [Look('R', 10.0 + 0.4 * number, 0) for number in range(11)]
+    looping = [ProcessSample('R', 10.0 + 0.4 * number, 0) for number in range(11)]
     assert 'hangs' in after(4.4, *looping)
     assert after(3.0, *looping[:8]) == ''
 
 
 def test_a_start_may_take_long_but_not_for_ever():
     heartbeats = Heartbeats(0.0)
-    assert heartbeats.problem(SILENT_START - 1.0, Look('S', 0.0, 0)) == ''
-    assert 'did not come up' in heartbeats.problem(SILENT_START + 1.0, Look('S', 0.0, 0))
+    assert heartbeats.problem(SILENT_START - 1.0, ProcessSample('S', 0.0, 0)) == ''
+    assert 'did not come up' in heartbeats.problem(SILENT_START + 1.0, ProcessSample('S', 0.0, 0))
 
 
 def test_a_watcher_that_slept_begins_to_count_anew():
     heartbeats = Heartbeats(0.0)
     heartbeats.beat(0.0)
     heartbeats.excuse(100.0)
-    assert heartbeats.problem(100.5, Look('T', 0.0, 0)) == ''
+    assert heartbeats.problem(100.5, ProcessSample('T', 0.0, 0)) == ''
 
 
 def test_the_kernel_knows_this_process_and_no_other_of_its_number():

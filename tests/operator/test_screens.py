@@ -13,7 +13,7 @@ from rich.console import Console
 
 from surveillance_operator.mission_state import Event, MissionState
 from surveillance_operator.watch import raster
-from surveillance_operator.watch.raster import Canvas, Frame
+from surveillance_operator.watch.raster import CharacterCanvas, Viewport
 from surveillance_operator.watch.view import (
     MissionView,
     battery_line,
@@ -313,14 +313,14 @@ def test_the_colours_of_a_map_tell_what_is_what() -> None:
 def test_a_frame_is_the_largest_that_fits(
     box: tuple[float, float, float, float], size: tuple[int, int], expected: tuple[float, int, int]
 ) -> None:
-    frame = Frame.around(box, *size)
+    frame = Viewport.around(box, *size)
     assert (frame.left, frame.top) == (box[0], box[3])
     assert (frame.scale, frame.columns, frame.rows) == pytest.approx(expected)
 
 
 def test_a_canvas_draws_dots_lines_marks_and_arrows_where_they_are() -> None:
-    frame = Frame(0.0, 4.0, 0.5, 8, 4)
-    canvas = Canvas(frame)
+    frame = Viewport(0.0, 4.0, 0.5, 8, 4)
+    canvas = CharacterCanvas(frame)
     canvas.dots([(0.1, 3.9), (3.9, 0.1), (-0.1, 2.0), (4.1, 2.0), (2.0, 4.1)], raster.OBSTACLE)
     canvas.line((0.25, 1.25), (3.75, 1.25), raster.LINK)
     canvas.line((1.25, 3.75), (1.25, 2.25), raster.TRAIL)
@@ -329,12 +329,12 @@ def test_a_canvas_draws_dots_lines_marks_and_arrows_where_they_are() -> None:
     for number, arrow in enumerate('→↗↑↖←↙↓↘'):
         canvas.arrow((2.1, 2.9, number * math.pi / 4 + 0.3), raster.Style())
         assert ''.join(each.text for each in [*canvas.lines(colours=False)][1])[4] == arrow
-    labelled = Canvas(Frame(0.0, 4.0, 0.5, 8, 4))
+    labelled = CharacterCanvas(Viewport(0.0, 4.0, 0.5, 8, 4))
     for _ in range(6):
         labelled.label(2.1, 2.1, 'name', raster.Style())
     rows = [''.join(each.text for each in line) for line in labelled.lines(colours=False)]
     assert rows == ['   name ', '   name ', '   name ', '   name ']
-    narrow = Canvas(Frame(0.0, 4.0, 0.5, 3, 4))
+    narrow = CharacterCanvas(Viewport(0.0, 4.0, 0.5, 3, 4))
     narrow.label(0.1, 2.1, 'name', raster.Style())
     assert not any(''.join(each.text for each in line).strip() for line in narrow.lines())
 
@@ -343,15 +343,15 @@ def test_a_grid_is_drawn_as_its_own_cells_where_they_are_as_large() -> None:
     rng = np.random.default_rng(3)
     cells = rng.choice(np.array([-1, 0, 100], np.int8), (12, 9))
     grid = Grid(cells, 0.5, (1.0, 2.0))
-    picture = raster.rasterise(grid, Frame(1.0, 8.0, 0.5, 9, 6))
+    picture = raster.rasterise(grid, Viewport(1.0, 8.0, 0.5, 9, 6))
     kinds = np.where(cells == 100, raster.WALL, np.where(cells == 0, raster.FREE, raster.UNKNOWN))
     assert (picture == kinds[::-1]).all()
-    halved = raster.rasterise(grid, Frame(1.0, 8.0, 1.0, 5, 3))
+    halved = raster.rasterise(grid, Viewport(1.0, 8.0, 1.0, 5, 3))
     for row in range(6):
         for column in range(5):
             block = kinds[::-1][2 * row : 2 * row + 2, 2 * column : 2 * column + 2]
             assert halved[row, column] == block.max()
-    beyond = raster.rasterise(grid, Frame(1.0, 8.0, 0.5, 11, 7))
+    beyond = raster.rasterise(grid, Viewport(1.0, 8.0, 0.5, 11, 7))
     assert (beyond[:12, :9] == picture).all()
     assert (beyond[12:] == raster.UNKNOWN).all()
     assert (beyond[:, 9:] == raster.UNKNOWN).all()
