@@ -158,13 +158,17 @@ def _service_rows(label: str, store: Any, rounds: int, *, worlds: bool = False) 
     from armor_service.access import Settings
     from armor_service.client import ArmorClient, InProcessTransport
     from armor_service.service import ArmorService
-    from surveillance_ontology.patrol_ontology import DATA, PatrolOntology
+    from surveillance_ontology.map_ontology import MapOntology
+    from surveillance_ontology.patrol_vocabulary import DATA
+    from surveillance_ontology.robot_ontology import RobotOntology
     from surveillance_runtime.place import read_place_file
 
     service = ArmorService(Settings(worlds=worlds), store=store)
     client = ArmorClient('benchmark', 'map', InProcessTransport(service))
-    ontology = PatrolOntology(client)
-    ontology.build(read_place_file(PLACE).place, str(DATA / 'surveillance.owl'), IRI, 2_000_000_000)
+    MapOntology(client).build(
+        read_place_file(PLACE).place, str(DATA / 'surveillance.owl'), IRI, 2_000_000_000
+    )
+    ontology = RobotOntology(client)
     ontology.record_place('E', 2_000_000_000)
     corridors = f'SELECT ?x WHERE {{ ?x a <{IRI}#CORRIDOR> }}'
     calls: dict[str, Callable[[], Any]] = {

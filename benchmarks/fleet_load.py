@@ -35,7 +35,7 @@ from launcher.run_processes import node_environ
 from state_machines.ros import ServiceCaller
 from surveillance_interfaces.srv import ReferenceName
 from surveillance_ontology.armor_client import ArmorClient
-from surveillance_ontology.patrol_ontology import PatrolOntology
+from surveillance_ontology.robot_ontology import RobotOntology
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.place import read_place_file
 from surveillance_runtime.process import ExecutorThread
@@ -153,7 +153,7 @@ def armor_under(robots: int, seconds: float, place: Path) -> None:
                     draw = random.Random(number)
                     own = f'robot{number + 1}'
                     armor = ArmorClient(node, own, reference, timeout=60.0)
-                    ontology = PatrolOntology(armor, own)
+                    ontology = RobotOntology(armor, own)
                     here = plan.start
                     time.sleep(draw.uniform(0.0, BETWEEN_DECISIONS))
                     while time.monotonic() < end:

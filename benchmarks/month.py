@@ -35,7 +35,9 @@ from armor_service.client import ArmorClient, InProcessTransport
 from armor_service.service import ArmorService
 from armor_service.store import Store
 from surveillance_behaviour.mission import mission_log
-from surveillance_ontology.patrol_ontology import DATA, PatrolOntology
+from surveillance_ontology.map_ontology import MapOntology
+from surveillance_ontology.patrol_vocabulary import DATA
+from surveillance_ontology.robot_ontology import RobotOntology
 from surveillance_runtime.place import read_place_file
 
 DAY = 86400.0
@@ -63,15 +65,14 @@ class Month:
         self._chance = random.Random(seed)
         self._place = read_place_file(ROOT / 'config' / 'seven_rooms.yaml').place
         self._service = ArmorService(Settings(), store=Store(folder / 'armor_store'))
-        self._ontology = PatrolOntology(
-            ArmorClient('month', REFERENCE, InProcessTransport(self._service))
-        )
+        client = ArmorClient('month', REFERENCE, InProcessTransport(self._service))
+        self._map, self._ontology = MapOntology(client), RobotOntology(client)
         self.record = mission_log.MissionRecord(folder / 'mission.jsonl')
 
     def begin(self) -> None:
         """Build the map and begin the record."""
         uri = 'http://bnc/exp-rob-lab/2022-23'
-        self._ontology.build(self._place, str(DATA / 'surveillance.owl'), uri, int(START))
+        self._map.build(self._place, str(DATA / 'surveillance.owl'), uri, int(START))
         names = sorted(self._place.positions)
         self.record.write('start', START, machine='surveillance', place=names[0], places=names)
 

@@ -38,7 +38,7 @@ from surveillance_interfaces.srv import ConsoleCommand, Reason, ReferenceName
 from surveillance_ontology.armor_client import ArmorClient
 from surveillance_ontology.armor_server_node import ArmorServer
 from surveillance_ontology.ontology_map_builder_node import OntologyMapBuilder
-from surveillance_ontology.patrol_ontology import PatrolOntology
+from surveillance_ontology.robot_ontology import RobotOntology
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.process import run_nodes
 from surveillance_runtime.qos import STATE_QOS
@@ -146,7 +146,7 @@ class Guide(PatrolNode):
         try:
             name = self._name.call(ReferenceName.Request(), PATIENCE).name
             stamp = self.get_clock().now()
-            PatrolOntology(ArmorClient(self, 'walks', name)).record_place('E', stamp.nanoseconds)
+            RobotOntology(ArmorClient(self, 'walks', name)).record_place('E', stamp.nanoseconds)
             message = RobotPlace(place='E')
             message.header.stamp = stamp.to_msg()
             self._place.publish(message)

@@ -130,7 +130,7 @@ def run_mission(
         log.say(f'or in RViz: rviz2 -d {_short(layout)}')
     outbox, tell = None, None
     if run.notify is not None:
-        from surveillance_ontology.patrol_ontology import ROBOT
+        from surveillance_ontology.patrol_vocabulary import ROBOT
         from surveillance_operator.notify.pipeline import notifier
 
         robot = (run.namespace or '').strip('/') or ('fleet' if robots else ROBOT)

@@ -16,7 +16,7 @@ from patrol_policy.promises import Promise
 from patrol_policy.world import Decision
 from state_machines import Interrupt
 from state_machines.exceptions import CallError
-from surveillance_ontology.patrol_ontology import Snapshot
+from surveillance_ontology.robot_ontology import Snapshot
 
 Point = tuple[float, float, float]
 """x, y, z in metres, world frame."""

@@ -45,7 +45,7 @@ from surveillance_behaviour.charging import BatteryMonitor
 from surveillance_behaviour.experience import Experience
 from surveillance_behaviour.fleet import FleetKnowledge, share_of
 from surveillance_behaviour.ports import Ontology, Places, Point, UnknownPlaceError
-from surveillance_ontology.patrol_ontology import Snapshot
+from surveillance_ontology.robot_ontology import Snapshot
 from surveillance_runtime.place.patrol_rules import PatrolRules
 from surveillance_runtime.place.stations import Station
 from surveillance_runtime.suggestions import nearest

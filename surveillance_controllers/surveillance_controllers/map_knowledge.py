@@ -23,7 +23,8 @@ from surveillance_ontology.armor_client import (
     FactSubscription,
     declared_robot_name,
 )
-from surveillance_ontology.patrol_ontology import DOORS, OntologyNotReadyError, PatrolOntology
+from surveillance_ontology.patrol_vocabulary import DOORS, OntologyNotReadyError
+from surveillance_ontology.robot_ontology import RobotOntology
 from surveillance_runtime.conversions import seconds_of
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.state_topics import StateSubscription
@@ -52,7 +53,7 @@ class MapKnowledge:
         self._connecting = threading.Lock()
         self._changed = threading.Condition()
         self._armor: ArmorClient | None = None
-        self._ontology: PatrolOntology | None = None
+        self._ontology: RobotOntology | None = None
         self._doors: FactSubscription | None = None
         self._on_doors: list[Callable[[], None]] = []
         self._known: dict[str, Points] = {}
@@ -107,7 +108,7 @@ class MapKnowledge:
 
     # --- what the ontology knows ---
 
-    def connect(self, interrupt: Interrupt) -> PatrolOntology:
+    def connect(self, interrupt: Interrupt) -> RobotOntology:
         """Return the ontology, once the map is built.
 
         Raises:
@@ -126,7 +127,7 @@ class MapKnowledge:
                 self._doors = FactSubscription(
                     self._node, self._armor, DOORS, lambda _fact, _came: self._doors_changed()
                 )
-                self._ontology = PatrolOntology(self._armor, self._robot)
+                self._ontology = RobotOntology(self._armor, self._robot)
             return self._ontology
 
     @property

@@ -25,7 +25,7 @@ from surveillance_controllers.motion.holding import Hold
 from surveillance_controllers.motion.place_recording import PlaceRecorder
 from surveillance_controllers.stimuli import glide
 from surveillance_interfaces.action import Control, FollowPath
-from surveillance_ontology.patrol_ontology import OntologyNotReadyError
+from surveillance_ontology.patrol_vocabulary import OntologyNotReadyError
 from surveillance_runtime.conversions import FARTHEST, point_message
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.process import run_node

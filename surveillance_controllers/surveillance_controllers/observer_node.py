@@ -46,7 +46,7 @@ from surveillance_ontology.armor_client import (
     ArmorServiceInternalError,
 )
 from surveillance_ontology.event_facts import EventFact, EventOntology, Sighting
-from surveillance_ontology.patrol_ontology import LONGEST_THRESHOLD, ROBOT
+from surveillance_ontology.patrol_vocabulary import LONGEST_THRESHOLD, ROBOT
 from surveillance_perception.conversions import (
     camera_from_ros,
     doubt_from,

@@ -23,7 +23,7 @@ from surveillance_controllers.manual.commands import PLANNER, ParsedCommand, Poi
 from surveillance_controllers.manual.requests import CommandConsole
 from surveillance_controllers.map_knowledge import MapKnowledge
 from surveillance_interfaces.action import ComputePath, Plan
-from surveillance_ontology.patrol_ontology import OntologyNotReadyError
+from surveillance_ontology.patrol_vocabulary import OntologyNotReadyError
 from surveillance_runtime.conversions import point_messages
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.place.stations import AT_STATION

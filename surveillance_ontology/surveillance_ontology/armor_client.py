@@ -43,7 +43,7 @@ from surveillance_ontology.conversions import (
     request_to_ros,
     response_from_ros,
 )
-from surveillance_ontology.patrol_ontology import ROBOT
+from surveillance_ontology.patrol_vocabulary import ROBOT
 from surveillance_runtime.node import PatrolNode
 
 __all__ = [

@@ -21,7 +21,7 @@ from dataclasses import dataclass
 
 from armor_service.client import ArmorClient, ArmorServiceInternalError
 from armor_service.protocol import DirectiveRequest, DirectiveResponse, name_in
-from surveillance_ontology.patrol_ontology import ROBOT
+from surveillance_ontology.patrol_vocabulary import ROBOT
 
 KINDS = ('Door', 'Object', 'Marker', 'Person', 'Light', 'View', 'Way')
 STATES = ('Open', 'Acknowledged', 'Normal', 'False', 'Over')

@@ -16,13 +16,9 @@ from armor_service.client import (
     ArmorServiceCallError,
     ArmorServiceInternalError,
 )
-from surveillance_ontology.patrol_ontology import (
-    ONTOLOGY,
-    PatrolOntology,
-    checked_names,
-    is_gone,
-    never_visited,
-)
+from surveillance_ontology.map_ontology import MapOntology
+from surveillance_ontology.patrol_directives import is_gone
+from surveillance_ontology.patrol_vocabulary import ONTOLOGY, checked_names, never_visited
 from surveillance_runtime.files import KeptFile
 from surveillance_runtime.parameters import parameter
 from surveillance_runtime.place import (
@@ -149,7 +145,7 @@ class MapKeeper:
 
     def __init__(
         self,
-        ontology: PatrolOntology,
+        ontology: MapOntology,
         source: Source,
         place: Place | None,
         now: Callable[[], int],

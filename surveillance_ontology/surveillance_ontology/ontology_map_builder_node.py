@@ -37,7 +37,9 @@ from surveillance_ontology.armor_client import (
 )
 from surveillance_ontology.conversions import room_note_from_ros
 from surveillance_ontology.map_keeper import MapKeeper, Reports, Source
-from surveillance_ontology.patrol_ontology import ROBOT, PatrolOntology, checked_names
+from surveillance_ontology.map_ontology import MapOntology
+from surveillance_ontology.patrol_vocabulary import ROBOT, checked_names
+from surveillance_ontology.robot_ontology import RobotOntology
 from surveillance_runtime.conversions import point_from, point_message
 from surveillance_runtime.files import in_one_line, replace_text
 from surveillance_runtime.namesakes import NamesakeWatch
@@ -106,7 +108,7 @@ class OntologyMapBuilder(PatrolNode):
         self._built = AwaitedEvent(self)
         log = self.get_logger()
         self._keeper = MapKeeper(
-            PatrolOntology(armor, robot, fleet),
+            MapOntology(armor, robot, fleet),
             source,
             place,
             lambda: int(self.get_clock().now().nanoseconds // 1_000_000_000),
@@ -128,7 +130,7 @@ class OntologyMapBuilder(PatrolNode):
         self._placed = FactSubscription(
             self,
             armor,
-            PatrolOntology(armor, robot, fleet).robot_place_facts,
+            RobotOntology(armor, robot, fleet).robot_place_facts,
             lambda _fact, _came: self._built.happen(),
             self._look,
         )

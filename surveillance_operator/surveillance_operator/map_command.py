@@ -17,7 +17,7 @@ from patrol_policy.promises import Promise, promises
 from patrol_policy.promises import lines as promise_lines
 from patrol_policy.world import World
 from surveillance_behaviour.mission import mission_log
-from surveillance_ontology.patrol_ontology import checked_names
+from surveillance_ontology.patrol_vocabulary import checked_names
 from surveillance_runtime.command_line import EXIT_BAD_INPUT, CommandParser
 from surveillance_runtime.files import RECORD, FileError
 from surveillance_runtime.place import Place, PlaceError, PlaceFile, read_place_file

@@ -39,7 +39,8 @@ from surveillance_ontology.armor_client import (
     ArmorServiceCallError,
     ArmorServiceInternalError,
 )
-from surveillance_ontology.patrol_ontology import PatrolOntology, facts_of
+from surveillance_ontology.map_ontology import MapOntology
+from surveillance_ontology.patrol_vocabulary import facts_of
 from surveillance_operator.stop_button import StopButton
 from surveillance_operator.topics import BEHAVIOUR, CONTROLLERS
 from surveillance_runtime.configuration import argument_value, declared
@@ -287,7 +288,7 @@ class MissionActions:
         queries = facts_of(_name(place))
         found = self._ask(lambda armor: [armor.query.facts_by_origin(each) for each in queries])
         if not any(every for every, _ in found):
-            places = self._ask(lambda armor: PatrolOntology(armor).places())
+            places = self._ask(lambda armor: MapOntology(armor).places())
             raise ValueError(f'nothing is known of {place}: expected {nearest(place, places)}')
         return [(str(fact), fact in asserted) for every, asserted in found for fact in every]
 

@@ -21,7 +21,7 @@ from sensor_msgs.msg import Image as ImageMessage
 
 from state_machines.exceptions import CallError
 from state_machines.files import read_file
-from surveillance_ontology.patrol_ontology import checked_names
+from surveillance_ontology.patrol_vocabulary import checked_names
 from surveillance_operator.fleet_actions import WORDS, FleetActions
 from surveillance_operator.fleet_subscriber import FleetSubscriber
 from surveillance_operator.images import ANNOTATED, PLAIN, jpeg_from

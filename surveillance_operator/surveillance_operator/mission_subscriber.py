@@ -26,7 +26,7 @@ from armor_service.facts import ShortFact
 from state_machines.ros import CallError, ServiceCaller
 from surveillance_interfaces.srv import ReferenceName, RoomPosition
 from surveillance_ontology.armor_client import ArmorClient, FactSubscription
-from surveillance_ontology.patrol_ontology import CONNECTIONS, PLACES, URGENT_PLACES, VISITS
+from surveillance_ontology.patrol_vocabulary import CONNECTIONS, PLACES, URGENT_PLACES, VISITS
 from surveillance_operator.mission_state import STALE, Change, MissionState, Pose, follow
 from surveillance_operator.polled_subscription import PolledSubscription, await_message
 from surveillance_operator.topics import (

@@ -39,7 +39,7 @@ from surveillance_interfaces.msg import (
     MissionStatus,
 )
 from surveillance_ontology.armor_client import value_in
-from surveillance_ontology.patrol_ontology import CONNECTIONS, URGENT_PLACES, VISITS
+from surveillance_ontology.patrol_vocabulary import CONNECTIONS, URGENT_PLACES, VISITS
 from surveillance_operator.mission_state import (
     NO_POINTS,
     TRAIL_STEP,

@@ -21,7 +21,7 @@ from surveillance_behaviour.mission.mission import Mission, MissionSettings
 from surveillance_behaviour.mission.mission_log import MissionRecord
 from surveillance_behaviour.ports import Point, Ports, UnknownPlaceError
 from surveillance_behaviour.world_model import WorldModel
-from surveillance_ontology.patrol_ontology import Snapshot
+from surveillance_ontology.robot_ontology import Snapshot
 from surveillance_runtime.place.stations import AT_STATION
 from tests.seven_rooms import SEVEN_ROOMS
 

@@ -15,7 +15,9 @@ from armor_service.service import ArmorService
 from state_machines import Interrupt
 from state_machines.exceptions import CallError, CallInterruptedError
 from surveillance_behaviour.ros_adapters.armor_knowledge import ArmorKnowledge, Whereabouts
-from surveillance_ontology.patrol_ontology import DATA, PatrolOntology, Snapshot
+from surveillance_ontology.map_ontology import MapOntology
+from surveillance_ontology.patrol_vocabulary import DATA
+from surveillance_ontology.robot_ontology import RobotOntology, Snapshot
 from surveillance_runtime.place import read_place_file
 
 PLACE = read_place_file(Path(__file__).parents[2] / 'config' / 'seven_rooms.yaml').place
@@ -26,9 +28,11 @@ NOBODY = Interrupt()
 @pytest.fixture
 def transport() -> InProcessTransport:
     transport = InProcessTransport(ArmorService())
-    ontology = PatrolOntology(ArmorClient('builder', 'map', transport))
-    ontology.build(PLACE, str(DATA / 'surveillance.owl'), 'http://bnc/exp-rob-lab/2022-23', 100)
-    ontology.record_place('E', 1)
+    armor = ArmorClient('builder', 'map', transport)
+    MapOntology(armor).build(
+        PLACE, str(DATA / 'surveillance.owl'), 'http://bnc/exp-rob-lab/2022-23', 100
+    )
+    RobotOntology(armor).record_place('E', 1)
     return transport
 
 
@@ -81,7 +85,7 @@ def test_the_answer_knows_where_the_robot_was_heard_of_last(
     knowledge = ArmorKnowledge('test', transport, Interrupt(), lambda _interrupt: 'map', heard)
     with pytest.raises(CallError, match='nobody told it where the robot is'):
         ask(knowledge, 110.0)
-    PatrolOntology(armor).record_place('C1', 5_000_000_000)
+    RobotOntology(armor).record_place('C1', 5_000_000_000)
     assert ask(knowledge, 110.0).place == 'C1'
     assert knowledge.await_place('C1', 5.0, NOBODY) == 'C1'
     assert knowledge.await_place('C2', 0.0, NOBODY) == 'C1'
@@ -172,8 +176,10 @@ def test_a_threshold_that_somebody_sets_in_the_ontology_overrides_the_place_file
 def test_an_ontology_without_the_rule_for_places_is_told_nothing_of_them() -> None:
     transport = InProcessTransport(ArmorService())
     armor = ArmorClient('builder', 'map', transport)
-    ontology = PatrolOntology(armor)
-    ontology.build(PLACE, str(DATA / 'surveillance.owl'), 'http://bnc/exp-rob-lab/2022-23', 100)
+    MapOntology(armor).build(
+        PLACE, str(DATA / 'surveillance.owl'), 'http://bnc/exp-rob-lab/2022-23', 100
+    )
+    ontology = RobotOntology(armor)
     (rule,) = (each for each in armor.query.rules() if 'acceptedWait' in each)
     armor.manipulation.remove_rule(rule)
     ontology.record_place('E', 1)

@@ -18,7 +18,7 @@ from state_machines import Interrupt
 from surveillance_behaviour.experience import Experience
 from surveillance_behaviour.mission.mission_log import MissionRecord
 from surveillance_behaviour.world_model import WorldModel
-from surveillance_ontology.patrol_ontology import Snapshot
+from surveillance_ontology.robot_ontology import Snapshot
 from surveillance_runtime.place.patrol_rules import PatrolRules
 
 from .scripted_world import World

@@ -18,7 +18,7 @@ from surveillance_interfaces.srv import ConsoleCommand, ReferenceName
 from surveillance_ontology.armor_client import ArmorClient
 from surveillance_ontology.armor_server_node import ArmorServer
 from surveillance_ontology.ontology_map_builder_node import OntologyMapBuilder
-from surveillance_ontology.patrol_ontology import PatrolOntology
+from surveillance_ontology.robot_ontology import RobotOntology
 from surveillance_runtime.qos import STATE_QOS
 
 
@@ -30,7 +30,7 @@ def armor(graph: Any, seven_rooms: dict[str, Any]) -> ArmorClient:
         ReferenceName.Request(), 60.0
     )
     armor = ArmorClient(graph.node, 'test', 'surveillance', timeout=60.0)
-    PatrolOntology(armor).record_place('E', 1)
+    RobotOntology(armor).record_place('E', 1)
     return armor
 
 

@@ -13,7 +13,9 @@ from armor_service.protocol import DirectiveRequest, ListResponse
 from armor_service.service import ArmorService
 from libs.armor_service.tests.seven_rooms import IRI
 from surveillance_ontology.event_facts import MOST_EVENTS, EventFact, EventOntology, Sighting
-from surveillance_ontology.patrol_ontology import ONTOLOGY, PatrolOntology
+from surveillance_ontology.map_ontology import MapOntology
+from surveillance_ontology.patrol_vocabulary import ONTOLOGY
+from surveillance_ontology.robot_ontology import RobotOntology
 from surveillance_runtime.place import read_place_file
 
 PLACE = read_place_file(Path(__file__).parents[2] / 'config' / 'seven_rooms.yaml').place
@@ -31,15 +33,15 @@ def armor() -> Iterator[ArmorClient]:
 
 
 def build(armor: ArmorClient) -> None:
-    ontology = PatrolOntology(armor)
-    ontology.build(PLACE, str(ONTOLOGY), IRI, now=100)
+    MapOntology(armor).build(PLACE, str(ONTOLOGY), IRI, now=100)
+    ontology = RobotOntology(armor)
     ontology.record_place('E', 100)
 
 
 def urgent(armor: ArmorClient, now: float, **visits: float) -> set[str]:
     """Return the URGENT places where all were visited at 120, or when it says."""
     visited = dict.fromkeys(PLACE.rooms, 120.0) | visits
-    snapshot = PatrolOntology(armor).snapshot(now, ['URGENT'], visits=visited, threshold=1000.0)
+    snapshot = RobotOntology(armor).snapshot(now, ['URGENT'], visits=visited, threshold=1000.0)
     return {place for place, classes in snapshot.classes.items() if classes}
 
 

@@ -12,7 +12,8 @@ import pytest
 
 from armor_service.client import ArmorServiceCallError, ArmorServiceInternalError
 from surveillance_ontology.map_keeper import MapKeeper, Reports, RoomNote, Source
-from surveillance_ontology.patrol_ontology import PatrolOntology, never_visited
+from surveillance_ontology.map_ontology import MapOntology
+from surveillance_ontology.patrol_vocabulary import never_visited
 from surveillance_runtime.place import Place, PlaceError, make_place
 
 AWAY = ArmorServiceCallError('no server')
@@ -92,7 +93,7 @@ class Kept:
             return lambda line: self.said.append(f'{kind}: {line}')
 
         self.keeper = MapKeeper(
-            cast(PatrolOntology, ontology),
+            cast(MapOntology, ontology),
             Source('file.owl', 'iri', **source),
             place,
             self._now,

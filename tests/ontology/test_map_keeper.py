@@ -21,7 +21,8 @@ from armor_service.protocol import DirectiveRequest
 from armor_service.service import ArmorService
 from libs.armor_service.tests.seven_rooms import IRI, ONTOLOGY, SEVEN_ROOMS
 from surveillance_ontology.map_keeper import MapKeeper, Reports, RoomNote, Source, extended
-from surveillance_ontology.patrol_ontology import PatrolOntology, closed_doors, shown_doors
+from surveillance_ontology.map_ontology import MapOntology, closed_doors, shown_doors
+from surveillance_ontology.robot_ontology import RobotOntology
 from surveillance_runtime.place import Place, PlaceError, description_of, make_place
 
 ROOMS = [*SEVEN_ROOMS, 'N1', 'N2']
@@ -54,9 +55,9 @@ EDITS = st.one_of(
 def test_connections_are_those_of_the_place_after_any_edits(edits: list[Edit]) -> None:
     service = ArmorService(warn=lambda _: None)
     client = ArmorClient('test', 'map', InProcessTransport(service))
-    ontology = PatrolOntology(client)
+    ontology = MapOntology(client)
     place = ontology.build(seven(), ONTOLOGY, IRI)
-    ontology.record_place('E', 100)
+    RobotOntology(client).record_place('E', 100)
     for edit in edits:
         try:
             after = edit(place)
@@ -70,9 +71,7 @@ def test_connections_are_those_of_the_place_after_any_edits(edits: list[Edit]) -
         neighbours = {other for door in doors for other in place.doors[door]} - {room}
         assert client.query.objectprop_b2_ind('connectedTo', room) == sorted(neighbours)
     assert client.utils.sync_buffered_reasoner(), 'consistent'
-    assert ontology.build(place, ONTOLOGY, IRI).closed == {
-        door for door in place.closed if len(place.doors[door]) > 1
-    }
+    assert ontology.build(place, ONTOLOGY, IRI).closed == place.closed
     service.close()
 
 
@@ -148,7 +147,7 @@ class Replaced(InProcessTransport):
 
 
 def keeper_of(
-    ontology: PatrolOntology, path: str, built: list[int]
+    ontology: MapOntology, path: str, built: list[int]
 ) -> tuple[MapKeeper, dict[str, list[str]]]:
     """Return a keeper of the seven rooms, and what it says."""
     said: dict[str, list[str]] = {'info': [], 'warn': [], 'refused': [], 'failed': []}
@@ -162,13 +161,13 @@ def keeper_of(
 def test_a_server_that_is_replaced_behind_the_load_is_loaded_again() -> None:
     client = ArmorClient('test', 'map', Replaced(2))
     built: list[int] = []
-    keeper, said = keeper_of(PatrolOntology(client), ONTOLOGY, built)
+    keeper, said = keeper_of(MapOntology(client), ONTOLOGY, built)
     keeper.ensure_built()
     assert (keeper.is_built, built, said['failed']) == (True, [1], [])
     assert len(said['warn']) == 2
     assert "unknown reference 'map'" in said['warn'][0]
     for times, warned, failed in ((9, 9, 0), (1000, 9, 1)):
-        replaced = PatrolOntology(ArmorClient('test', 'map', Replaced(times)))
+        replaced = MapOntology(ArmorClient('test', 'map', Replaced(times)))
         keeper, said = keeper_of(replaced, ONTOLOGY, built)
         keeper.ensure_built()
         assert (len(said['warn']), len(said['failed'])) == (warned, failed), 'it ends after ten'
@@ -179,7 +178,7 @@ def test_a_server_that_is_replaced_behind_the_load_is_loaded_again() -> None:
 def test_places_may_count_as_visited_when_the_map_was_first_built() -> None:
     """With `urgent_at_start` off nothing is URGENT at once, also after a server was lost."""
     client = ArmorClient('test', 'map', InProcessTransport(ArmorService(warn=lambda _: None)))
-    ontology, now = PatrolOntology(client), [100]
+    ontology, now = MapOntology(client), [100]
     for at_start, visited in ((False, dict.fromkeys(SEVEN_ROOMS, 100.0)), (True, {})):
         now[0] = 100
         client.utils.drop_ref()
@@ -194,8 +193,8 @@ def test_places_may_count_as_visited_when_the_map_was_first_built() -> None:
         )
         for now[0] in (100, 150):
             keeper.ensure_built()
-            ontology.record_place('E', now[0])
-            found = ontology.snapshot(now[0] + 1.0, ('URGENT',), threshold=1000.0)
+            RobotOntology(client).record_place('E', now[0])
+            found = RobotOntology(client).snapshot(now[0] + 1.0, ('URGENT',), threshold=1000.0)
             assert found.visited_at == visited
             assert all(bool(each) is at_start for each in found.classes.values())
             client.utils.drop_ref()
@@ -205,7 +204,7 @@ def test_the_keeper_goes_on_until_the_server_is_there(tmp_path: Path) -> None:
     service = ArmorService(warn=lambda _: None)
     transport = Flaky(service, away=3)
     client = ArmorClient('test', 'map', transport)
-    ontology = PatrolOntology(client)
+    ontology = MapOntology(client)
     built: list[int] = []
     kept, said = keeper_of(ontology, ONTOLOGY, built)
     kept.ensure_built()
@@ -216,7 +215,7 @@ def test_the_keeper_goes_on_until_the_server_is_there(tmp_path: Path) -> None:
     client.utils.drop_ref()
     kept.ensure_built()
     assert client.query.objectprop_b2_ind('isIn', 'Robot1') == [], 'who knows it tells it'
-    ontology.record_place('C1', 5)
+    RobotOntology(client).record_place('C1', 5)
     assert client.query.objectprop_b2_ind('canReach', 'Robot1') == ['C2', 'E', 'R2']
     transport.away = 100
     assert kept.edit(lambda place: place.with_door('D1', is_open=True)).startswith(
@@ -252,7 +251,7 @@ def test_a_state_file_that_cannot_be_used_is_told_and_left(tmp_path: Path, conte
     path.write_text(content.replace('%s', json.dumps(description_of(seven()))))
     said: list[str] = []
     keeper = MapKeeper(
-        PatrolOntology(ArmorClient('test', 'map', Replaced(0))),
+        MapOntology(ArmorClient('test', 'map', Replaced(0))),
         Source(ONTOLOGY, IRI, state_file=str(path)),
         seven(),
         lambda: 100,
@@ -283,7 +282,7 @@ def kept(service: ArmorService, path: str, place: Place | None) -> tuple[MapKeep
     client = ArmorClient('test', 'map', Dies(service))
     reports = Reports(lambda _: None, said.append, said.append, said.append)
     keeper = MapKeeper(
-        PatrolOntology(client), source, place, lambda: 100, lambda: False, reports, lambda: None
+        MapOntology(client), source, place, lambda: 100, lambda: False, reports, lambda: None
     )
     keeper.ensure_built()
     return keeper, said

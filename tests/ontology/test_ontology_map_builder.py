@@ -26,7 +26,7 @@ from surveillance_ontology.armor_client import (
 )
 from surveillance_ontology.armor_server_node import ArmorServer
 from surveillance_ontology.ontology_map_builder_node import OntologyMapBuilder
-from surveillance_ontology.patrol_ontology import PatrolOntology
+from surveillance_ontology.robot_ontology import RobotOntology
 from surveillance_runtime.conversions import point_message
 from surveillance_runtime.parameters import ParameterError
 from surveillance_runtime.place_changes import described_in_text, description_text
@@ -87,7 +87,7 @@ def built(graph: Any, call: Caller) -> OntologyMapBuilder:
     builder: OntologyMapBuilder = graph.add(OntologyMapBuilder, PLACE)
     assert call('reference_name').name == 'surveillance'
     armor = ArmorClient(graph.node, 'test', 'surveillance', timeout=60.0)
-    PatrolOntology(armor).record_place('E', 1)
+    RobotOntology(armor).record_place('E', 1)
     return builder
 
 
@@ -147,7 +147,7 @@ def test_places_that_nobody_visited_are_urgent_where_simulated_time_begins(
     graph.add(OntologyMapBuilder, {**PLACE, 'use_sim_time': True})
     assert call('reference_name').name == 'surveillance'
     assert armor.query.ind_b2_class('URGENT') == sorted(SEVEN_ROOMS)
-    ontology = PatrolOntology(armor)
+    ontology = RobotOntology(armor)
     ontology.record_place('E', 1)
     assert ontology.snapshot(0.0, ['URGENT']).visited_at == {}
 
@@ -258,7 +258,7 @@ def test_rooms_that_were_added_and_removed_are_there_after_a_restart(
     assert call('room_position', room_name='R5').position.y == 2.0
     assert not call('room_position', room_name='R1').valid
     assert not armor.query.check_ind_exists('R1')
-    PatrolOntology(armor).record_place('E', 1)
+    RobotOntology(armor).record_place('E', 1)
     assert reach(armor) == ['C1', 'C2', 'R5']
     assert call('remove_room', room_name='R6').success
     graph.remove(builder)
@@ -284,7 +284,7 @@ def test_a_map_comes_over_the_topic_in_parts(graph: Any, armor: ArmorClient, cal
     first = [room('E', ('A', 'D1')), room('A', ('E', 'D1'), ('B', 'D2'))]
     publisher.publish(OntologyMap(places=first, robot_room='E'))
     assert call('reference_name').name == 'surveillance'
-    PatrolOntology(armor).record_place('E', 1)
+    RobotOntology(armor).record_place('E', 1)
     assert reach(armor) == ['A']
     publisher.publish(OntologyMap(places=[room('X', ('X', 'D7'))]))
     publisher.publish(OntologyMap(places=[room('B', ('A', 'D2'), ('E', 'D3'))]))
@@ -414,13 +414,13 @@ def test_robots_of_a_fleet_share_the_map_and_each_has_its_own_place(
     assert call('reference_name').name == 'surveillance'
     graph.until(lambda: call('room_position', room_name='B').valid)
     graph.until(lambda: call('room_position', room_name='E').valid)
-    PatrolOntology(armor, 'anna').record_place('E', 1)
-    PatrolOntology(armor, 'bert').record_place('A', 1)
-    graph.until(lambda: PatrolOntology(armor, 'anna').reachable() == {'A'})
-    assert PatrolOntology(armor, 'bert').reachable() == {'B', 'E'}
-    first = PatrolOntology(armor, 'anna').snapshot(1000.0, ['URGENT'], visits={'E': 1000.0})
+    RobotOntology(armor, 'anna').record_place('E', 1)
+    RobotOntology(armor, 'bert').record_place('A', 1)
+    graph.until(lambda: RobotOntology(armor, 'anna').reachable() == {'A'})
+    assert RobotOntology(armor, 'bert').reachable() == {'B', 'E'}
+    first = RobotOntology(armor, 'anna').snapshot(1000.0, ['URGENT'], visits={'E': 1000.0})
     # A visit of one is known to the other, and neither is taken for the robot of the seeds.
-    second = PatrolOntology(armor, 'bert').snapshot(1001.0, ['URGENT'], threshold=240.0)
+    second = RobotOntology(armor, 'bert').snapshot(1001.0, ['URGENT'], threshold=240.0)
     assert (first.place, second.place) == ('E', 'A')
     assert second.visited_at['E'] == 1000.0
     assert armor.query.ind_b2_class('ROBOT') == ['anna', 'bert']

@@ -16,10 +16,9 @@ from armor_service.client import (
 )
 from armor_service.service import ArmorService
 from libs.armor_service.tests.seven_rooms import IRI, ONTOLOGY
-from surveillance_ontology.patrol_ontology import (
-    OntologyNotReadyError,
-    PatrolOntology,
-)
+from surveillance_ontology.map_ontology import MapOntology
+from surveillance_ontology.patrol_vocabulary import OntologyNotReadyError
+from surveillance_ontology.robot_ontology import RobotOntology
 from surveillance_runtime.place import read_place_file
 
 PLACE = read_place_file(Path(__file__).parents[2] / 'config' / 'seven_rooms.yaml').place
@@ -49,11 +48,11 @@ def armor(transport: Counting) -> ArmorClient:
 
 
 @pytest.fixture
-def ontology(armor: ArmorClient) -> PatrolOntology:
-    ontology = PatrolOntology(armor)
-    ontology.build(PLACE, ONTOLOGY, IRI, now=100)
+def ontology(armor: ArmorClient) -> RobotOntology:
+    MapOntology(armor).build(PLACE, ONTOLOGY, IRI, now=100)
+    ontology = RobotOntology(armor)
     ontology.record_place('E', 100)
-    PatrolOntology(armor).snapshot(100.0, (), threshold=30.0)  # by somebody else
+    RobotOntology(armor).snapshot(100.0, (), threshold=30.0)  # by somebody else
     return ontology
 
 
@@ -65,11 +64,11 @@ def tell_visits(transport: Counting, visits: dict[str, float]) -> None:
     armor.utils.sync_buffered_reasoner()
 
 
-def test_the_classes_of_places_are_those_below_location(ontology: PatrolOntology) -> None:
+def test_the_classes_of_places_are_those_below_location(ontology: RobotOntology) -> None:
     assert set(ontology.place_classes()) == {'LOCATION', 'ROOM', 'CORRIDOR', 'URGENT'}
 
 
-def test_a_snapshot_is_what_the_ontology_infers(ontology: PatrolOntology) -> None:
+def test_a_snapshot_is_what_the_ontology_infers(ontology: RobotOntology) -> None:
     found = ontology.snapshot(110.7, RULES)
     assert (found.place, found.seen_at, found.reachable) == ('E', 100, ('C1', 'C2'))
     assert found.connections['C1'] == ('C2', 'E', 'R1', 'R2')
@@ -80,13 +79,13 @@ def test_a_snapshot_is_what_the_ontology_infers(ontology: PatrolOntology) -> Non
 
 @pytest.mark.parametrize(('now', 'urgent'), [(130.0, False), (131.0, True)])
 def test_places_become_urgent_beyond_the_threshold(
-    ontology: PatrolOntology, transport: Counting, now: float, urgent: bool
+    ontology: RobotOntology, transport: Counting, now: float, urgent: bool
 ) -> None:
     tell_visits(transport, {'R1': 100.0})
     assert ('URGENT' in ontology.snapshot(now, RULES).classes['R1']) is urgent
 
 
-def test_each_verb_is_one_round_trip(ontology: PatrolOntology, transport: Counting) -> None:
+def test_each_verb_is_one_round_trip(ontology: RobotOntology, transport: Counting) -> None:
     ontology.snapshot(110.0, RULES)
     before = transport.trips
     ontology.record_place('C1', 200)
@@ -97,14 +96,14 @@ def test_each_verb_is_one_round_trip(ontology: PatrolOntology, transport: Counti
 
 def test_the_robot_is_in_one_place_whoever_tells_it(transport: Counting) -> None:
     # Two clients, an ontology that is built again in between, and foreign assertions.
-    first, second = (PatrolOntology(ArmorClient(name, 'map', transport)) for name in ('one', 'two'))
+    first, second = (RobotOntology(ArmorClient(name, 'map', transport)) for name in ('one', 'two'))
     armor = ArmorClient('foreign', 'map', transport)
-    first.build(PLACE, ONTOLOGY, IRI, now=100)
+    MapOntology(ArmorClient('one', 'map', transport)).build(PLACE, ONTOLOGY, IRI, now=100)
     for order in itertools.permutations(('build', 'first', 'second', 'foreign')):
         for step in order:
             match step:
                 case 'build':
-                    first.build(PLACE, ONTOLOGY, IRI)
+                    MapOntology(ArmorClient('one', 'map', transport)).build(PLACE, ONTOLOGY, IRI)
                 case 'first':
                     first.record_place('E', 1)
                 case 'second':
@@ -117,12 +116,12 @@ def test_the_robot_is_in_one_place_whoever_tells_it(transport: Counting) -> None
 
 
 def test_a_server_that_comes_back_empty_during_a_leg_never_has_two_places(
-    ontology: PatrolOntology, transport: Counting, armor: ArmorClient
+    ontology: RobotOntology, transport: Counting, armor: ArmorClient
 ) -> None:
     """The defect: the builder entered the start, the behaviour its arrival, for good."""
     tell_visits(transport, {'E': 110.0})
-    ontology.forget()
-    builder = PatrolOntology(ArmorClient('builder', 'map', transport))
+    MapOntology(armor).forget()
+    builder = MapOntology(ArmorClient('builder', 'map', transport))
     builder.build(PLACE, ONTOLOGY, IRI, now=115)
     with pytest.raises(OntologyNotReadyError, match='has Robot1 in no place'):
         ontology.snapshot(116.0, RULES, not_before=116)
@@ -135,26 +134,24 @@ def test_a_server_that_comes_back_empty_during_a_leg_never_has_two_places(
 
 
 def test_visits_that_the_ontology_forgot_are_told_and_later_ones_are_left(
-    ontology: PatrolOntology, transport: Counting
+    ontology: RobotOntology, transport: Counting, armor: ArmorClient
 ) -> None:
     visits = {'E': 105.0, 'C1': 109.9, 'R9': 3.0}
     ontology.snapshot(110.0, RULES, visits=visits)
     tell_visits(transport, {'E': 111.0})
     found = ontology.snapshot(112.0, RULES, visits=visits)
     assert found.visited_at == {'E': 111.0, 'C1': 109.0}
-    ontology.forget()
-    ontology.build(PLACE, ONTOLOGY, IRI)
+    MapOntology(armor).forget()
+    MapOntology(armor).build(PLACE, ONTOLOGY, IRI)
     ontology.record_place('E', 112)
     found = ontology.snapshot(113.0, RULES, visits=visits)
     assert found.visited_at == {'E': 105.0, 'C1': 109.0}
     assert 'R9' not in found.connections, 'a place that is not on the map does not come to be'
 
 
-def test_a_later_visit_of_somebody_else_stays(
-    ontology: PatrolOntology, transport: Counting
-) -> None:
+def test_a_later_visit_of_somebody_else_stays(ontology: RobotOntology, transport: Counting) -> None:
     tell_visits(transport, {'E': 111.0})
-    fresh = PatrolOntology(ArmorClient('fresh', 'map', transport))
+    fresh = RobotOntology(ArmorClient('fresh', 'map', transport))
     found = fresh.snapshot(112.0, RULES, visits={'E': 105.0, 'C1': 106.0})
     assert found.visited_at == {'E': 111.0, 'C1': 106.0}, 'at the first snapshot'
     tell_visits(transport, {'R1': 118.0})
@@ -163,7 +160,7 @@ def test_a_later_visit_of_somebody_else_stays(
 
 
 def test_visits_that_lie_ahead_of_a_clock_that_was_set_back_are_told_anew(
-    ontology: PatrolOntology,
+    ontology: RobotOntology,
 ) -> None:
     ontology.snapshot(110.0, RULES, visits={'E': 105.0, 'C1': 109.0})
     found = ontology.snapshot(60.0, RULES, visits={'E': 55.0, 'C1': 59.0})
@@ -171,16 +168,16 @@ def test_visits_that_lie_ahead_of_a_clock_that_was_set_back_are_told_anew(
 
 
 def test_a_room_that_was_taken_away_does_not_come_back_by_a_visit(
-    ontology: PatrolOntology,
+    ontology: RobotOntology, armor: ArmorClient
 ) -> None:
     ontology.snapshot(110.0, RULES)
-    ontology.change(PLACE, PLACE.without_room('R4'))
+    MapOntology(armor).change(PLACE, PLACE.without_room('R4'))
     found = ontology.snapshot(120.0, RULES, visits={'R4': 115.0, 'E': 120.0})
     assert 'R4' not in found.connections
-    assert 'R4' not in ontology.places()
+    assert 'R4' not in MapOntology(armor).places()
 
 
-def test_a_snapshot_waits_for_the_place_that_is_on_its_way(ontology: PatrolOntology) -> None:
+def test_a_snapshot_waits_for_the_place_that_is_on_its_way(ontology: RobotOntology) -> None:
     ontology.snapshot(110.0, RULES)
     with pytest.raises(OntologyNotReadyError, match='nobody told it where'):
         ontology.snapshot(110.0, RULES, not_before=500_000_000)
@@ -195,16 +192,16 @@ def test_a_snapshot_waits_for_the_place_that_is_on_its_way(ontology: PatrolOntol
         ontology.snapshot(111.0, RULES, not_before=10**18, patience=10.0, interrupt=ended)
 
 
-def test_what_clashes_is_named(ontology: PatrolOntology, armor: ArmorClient) -> None:
-    assert ontology.contradiction() == ''
+def test_what_clashes_is_named(ontology: RobotOntology, armor: ArmorClient) -> None:
+    assert MapOntology(armor).contradiction() == ''
     armor.manipulation.add_ind_to_class('R1', 'DOOR')
     with pytest.raises(OntologyNotReadyError, match='ontology map is inconsistent'):
         ontology.snapshot(110.0, RULES)
-    assert 'R1 is LOCATION and R1 is DOOR' in ontology.contradiction()
+    assert 'R1 is LOCATION and R1 is DOOR' in MapOntology(armor).contradiction()
 
 
 def test_a_contradiction_is_named_while_it_lasts_and_the_last_map_serves(
-    ontology: PatrolOntology, armor: ArmorClient
+    ontology: RobotOntology, armor: ArmorClient
 ) -> None:
     def clash() -> None:
         armor.manipulation.add_ind_to_class('R4', 'DOOR')
@@ -229,7 +226,7 @@ def test_a_contradiction_is_named_while_it_lasts_and_the_last_map_serves(
 
 
 def test_a_contradiction_that_ends_while_it_is_waited_for_is_named_once(
-    ontology: PatrolOntology, armor: ArmorClient
+    ontology: RobotOntology, armor: ArmorClient
 ) -> None:
     class Mended(threading.Event):
         def wait(self, timeout: float | None = None) -> bool:
@@ -243,9 +240,7 @@ def test_a_contradiction_that_ends_while_it_is_waited_for_is_named_once(
     assert ontology.snapshot(131.0, RULES).contradiction == ''
 
 
-def test_a_time_of_visit_that_is_none_is_named(
-    ontology: PatrolOntology, armor: ArmorClient
-) -> None:
+def test_a_time_of_visit_that_is_none_is_named(ontology: RobotOntology, armor: ArmorClient) -> None:
     armor.manipulation.add_dataprop_to_ind('visitedAt', 'R1', 'STRING', 'yesterday')
     with pytest.raises(OntologyNotReadyError, match=r'inconsistent|visitedAt of R1'):
         ontology.snapshot(110.0, RULES)
@@ -255,18 +250,18 @@ def test_a_map_that_is_built_after_the_robot_told_its_place_keeps_its_closed_doo
     armor: ArmorClient, transport: Counting
 ) -> None:
     armor.utils.load_ref_from_file(ONTOLOGY, IRI, False, 'PELLET', True)
-    ontology = PatrolOntology(armor)
+    ontology = RobotOntology(armor)
     ontology.record_place('C1', 1)
     tell_visits(transport, {'C1': 90.0})
     closed = PLACE.with_door('D1', is_open=False)
-    assert ontology.build(closed, ONTOLOGY, IRI).closed == {'D1'}
+    assert MapOntology(armor).build(closed, ONTOLOGY, IRI).closed == {'D1'}
     found = ontology.snapshot(110.0, RULES)
     assert (found.place, found.visited_at) == ('C1', {'C1': 90.0})
     assert found.reachable == ('C2', 'E', 'R2')
 
 
 def test_a_place_that_joins_is_in_the_next_snapshot(
-    ontology: PatrolOntology, armor: ArmorClient
+    ontology: RobotOntology, armor: ArmorClient
 ) -> None:
     before = ontology.snapshot(110.0, RULES)
     armor.manipulation.add_objectprop_to_ind('hasDoor', 'R9', 'D1')
@@ -276,9 +271,9 @@ def test_a_place_that_joins_is_in_the_next_snapshot(
 
 
 def test_several_robots_share_an_ontology(transport: Counting) -> None:
-    one = PatrolOntology(ArmorClient('one', 'map', transport))
-    two = PatrolOntology(ArmorClient('two', 'map', transport), robot='Robot2')
-    one.build(PLACE, ONTOLOGY, IRI)
+    one = RobotOntology(ArmorClient('one', 'map', transport))
+    two = RobotOntology(ArmorClient('two', 'map', transport), robot='Robot2')
+    MapOntology(ArmorClient('one', 'map', transport)).build(PLACE, ONTOLOGY, IRI)
     one.record_place('E', 1)
     two.record_place('C1', 2)
     tell_visits(transport, {'C1': 50.0})
@@ -288,9 +283,9 @@ def test_several_robots_share_an_ontology(transport: Counting) -> None:
 
 
 def test_a_snapshot_waits_for_an_ontology_that_is_built_anew(
-    ontology: PatrolOntology, transport: Counting
+    ontology: RobotOntology, transport: Counting
 ) -> None:
-    builder = PatrolOntology(ArmorClient('builder', 'map', transport))
+    builder = MapOntology(ArmorClient('builder', 'map', transport))
     steps = iter(
         (
             lambda: None,
@@ -298,7 +293,7 @@ def test_a_snapshot_waits_for_an_ontology_that_is_built_anew(
                 ONTOLOGY, IRI, False, 'PELLET', True
             ),
             lambda: builder.build(PLACE, ONTOLOGY, IRI),
-            lambda: builder.record_place('C1', 120),
+            lambda: RobotOntology(ArmorClient('builder', 'map', transport)).record_place('C1', 120),
         )
     )
 
@@ -326,6 +321,6 @@ def test_a_snapshot_waits_for_an_ontology_that_is_built_anew(
 
 
 def test_an_ontology_that_is_not_there_is_refused_with_its_name(transport: Counting) -> None:
-    ontology = PatrolOntology(ArmorClient('one', 'none', transport))
+    ontology = RobotOntology(ArmorClient('one', 'none', transport))
     with pytest.raises(ArmorServiceInternalError, match="unknown reference 'none'"):
         ontology.record_place('E', 1)

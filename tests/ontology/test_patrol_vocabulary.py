@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import pytest
 
@@ -17,17 +17,16 @@ from armor_service.client import (
 from armor_service.protocol import DirectiveRequest, DirectiveResponse, ListResponse
 from armor_service.service import ArmorService
 from libs.armor_service.tests.seven_rooms import IRI, ONTOLOGY
-from surveillance_ontology import patrol_ontology
+from surveillance_ontology import patrol_directives
 from surveillance_ontology.map_keeper import MapKeeper, Reports, RoomNote, Source
-from surveillance_ontology.patrol_ontology import (
+from surveillance_ontology.map_ontology import MapOntology, closed_doors, shown_doors
+from surveillance_ontology.patrol_vocabulary import (
     OntologyNotReadyError,
-    PatrolOntology,
     checked_names,
-    closed_doors,
     facts_of,
     never_visited,
-    shown_doors,
 )
+from surveillance_ontology.robot_ontology import RobotOntology
 from surveillance_runtime.place import Place, PlaceError, read_place_file
 
 SEVEN = read_place_file(Path(__file__).parents[2] / 'config' / 'seven_rooms.yaml').place
@@ -77,8 +76,16 @@ def transport() -> Iterator[Listening]:
     transport.service.close()
 
 
-def ontology_at(transport: Listening, **more: Any) -> PatrolOntology:
-    return PatrolOntology(ArmorClient('test', 'map', transport), **more)
+class Halves(NamedTuple):
+    """Both halves of one ontology."""
+
+    map: MapOntology
+    robot: RobotOntology
+
+
+def ontology_at(transport: Listening, **more: Any) -> Halves:
+    client = ArmorClient('test', 'map', transport)
+    return Halves(MapOntology(client, **more), RobotOntology(client, **more))
 
 
 def test_neither_a_room_nor_a_door_may_have_the_robots_name() -> None:
@@ -124,25 +131,24 @@ def test_what_an_ontology_does_not_tell_of_a_door_stays_as_it_was() -> None:
 
 def test_places_classes_and_doors_are_those_of_the_map(transport: Listening) -> None:
     ontology = ontology_at(transport)
-    assert not ontology.is_loaded()
-    ontology.build(SEVEN, ONTOLOGY, IRI)
-    assert ontology.is_loaded()
-    assert ontology.reference == 'map'
-    assert ontology.places() == tuple(sorted(SEVEN.rooms))
-    assert ontology.place_classes() == ('LOCATION', 'CORRIDOR', 'ROOM', 'URGENT')
-    assert ontology.doors() == {door: set(rooms) for door, rooms in SEVEN.doors.items()}
-    assert ontology.robot_places() == ()
-    ontology.record_place('E', 7)
-    assert ontology.robot_places() == ('E',)
-    assert ontology.reachable() == {'C1', 'C2'}
-    ontology.forget()
-    assert not ontology.is_loaded()
+    assert not ontology.map.is_loaded()
+    ontology.map.build(SEVEN, ONTOLOGY, IRI)
+    assert ontology.map.is_loaded()
+    assert ontology.robot.reference == 'map'
+    assert ontology.map.places() == tuple(sorted(SEVEN.rooms))
+    assert ontology.robot.place_classes() == ('LOCATION', 'CORRIDOR', 'ROOM', 'URGENT')
+    assert ontology.robot.robot_places() == ()
+    ontology.robot.record_place('E', 7)
+    assert ontology.robot.robot_places() == ('E',)
+    assert ontology.robot.reachable() == {'C1', 'C2'}
+    ontology.map.forget()
+    assert not ontology.map.is_loaded()
 
 
 def test_a_subscription_follows_one_robot_or_those_of_a_fleet(transport: Listening) -> None:
-    assert ontology_at(transport).robot_place_facts == 'isIn(Robot1, ?)'
-    assert ontology_at(transport, robot='tb2').robot_place_facts == 'isIn(tb2, ?)'
-    assert ontology_at(transport, fleet=('a', 'b')).robot_place_facts == 'isIn(?, ?)'
+    assert ontology_at(transport).robot.robot_place_facts == 'isIn(Robot1, ?)'
+    assert ontology_at(transport, robot='tb2').robot.robot_place_facts == 'isIn(tb2, ?)'
+    assert ontology_at(transport, fleet=('a', 'b')).robot.robot_place_facts == 'isIn(?, ?)'
     assert facts_of('R1') == (
         'URGENT(R1)',
         'ROOM(R1)',
@@ -158,12 +164,12 @@ def test_a_subscription_follows_one_robot_or_those_of_a_fleet(transport: Listeni
 
 def test_the_time_is_told_to_each_robot_when_the_map_is_new(transport: Listening) -> None:
     ontology = ontology_at(transport, robot='a', fleet=('a', 'b'))
-    ontology.build(SEVEN, ONTOLOGY, IRI, now=90)
+    ontology.map.build(SEVEN, ONTOLOGY, IRI, now=90)
     lines = transport.lines()
     told = [line for line in lines if line.startswith('SET DATAPROP IND now')]
     assert told == ['SET DATAPROP IND now a LONG 90', 'SET DATAPROP IND now b LONG 90']
     assert lines.count('REMOVE IND Robot1') == 1, 'the one of the file is none of them'
-    ontology.build(SEVEN, ONTOLOGY, IRI, now=95, gone=('R9', 'D9'))
+    ontology.map.build(SEVEN, ONTOLOGY, IRI, now=95, gone=('R9', 'D9'))
     lines = transport.lines()
     assert not any('SET DATAPROP IND' in line for line in lines), 'what it knows stays'
     assert [line for line in lines if 'REMOVE IND' in line] == [
@@ -172,8 +178,8 @@ def test_the_time_is_told_to_each_robot_when_the_map_is_new(transport: Listening
         'REMOVE IND Robot1',
     ]
     alone = ontology_at(transport)
-    alone.forget()
-    alone.build(SEVEN, ONTOLOGY, IRI, first_visit=12)
+    alone.map.forget()
+    alone.map.build(SEVEN, ONTOLOGY, IRI, first_visit=12)
     lines = transport.lines()
     assert not any('REMOVE' in line or ' now ' in line for line in lines)
     assert lines.count('SET DATAPROP IND visitedAt R1 LONG 12') == 1
@@ -182,13 +188,13 @@ def test_the_time_is_told_to_each_robot_when_the_map_is_new(transport: Listening
 def test_a_change_tells_what_differs_and_no_more(transport: Listening) -> None:
     before = place_of({'A': ['D1', 'D2'], 'B': ['D1'], 'C': ['D2']})
     ontology = ontology_at(transport)
-    ontology.build(before, ONTOLOGY, IRI)
+    ontology.map.build(before, ONTOLOGY, IRI)
     transport.lines()
     closed = before.with_door('D1', is_open=False)
-    ontology.change(before, closed)
+    ontology.map.change(before, closed)
     assert transport.lines() == ['REMOVE OBJECTPROP IND hasDoor A D1', 'REASON']
     grown = closed.with_room('E', (4.0, 0.0, 0.0), ['D3'])
-    ontology.change(closed, grown, 33)
+    ontology.map.change(closed, grown, 33)
     assert transport.lines() == [
         'ADD OBJECTPROP IND hasDoor E D3',
         'SET DATAPROP IND visitedAt E LONG 33',
@@ -198,9 +204,9 @@ def test_a_change_tells_what_differs_and_no_more(transport: Listening) -> None:
         'REASON',
     ]
     joined = grown.with_room('C', (2.0, 0.0, 0.0), ['D3'])
-    ontology.change(grown, joined)
+    ontology.map.change(grown, joined)
     assert transport.lines() == ['ADD OBJECTPROP IND hasDoor C D3', 'REASON']
-    ontology.change(joined, joined.with_room('E', (4.0, 0.0, 0.0), ['D4']))
+    ontology.map.change(joined, joined.with_room('E', (4.0, 0.0, 0.0), ['D4']))
     assert transport.lines() == [
         'ADD OBJECTPROP IND hasDoor E D4',
         'REASON',
@@ -208,22 +214,22 @@ def test_a_change_tells_what_differs_and_no_more(transport: Listening) -> None:
         'REASON',
     ]
     # D4 was in that room alone, D3 has its other side still.
-    ontology.change(joined.with_room('E', (4.0, 0.0, 0.0), ['D4']), joined.without_room('E'))
+    ontology.map.change(joined.with_room('E', (4.0, 0.0, 0.0), ['D4']), joined.without_room('E'))
     assert transport.lines() == ['REMOVE IND E', 'REMOVE IND D4', 'REASON']
 
 
 def test_a_large_map_goes_in_pieces_and_a_snapshot_in_one(
     transport: Listening, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(patrol_ontology, 'CHUNK', 4)
+    monkeypatch.setattr(patrol_directives, 'CHUNK', 4)
     ontology = ontology_at(transport)
-    ontology.build(SEVEN, ONTOLOGY, IRI)
+    ontology.map.build(SEVEN, ONTOLOGY, IRI)
     sizes = [len(batch) for batch in transport.batches]
     assert max(sizes) == 4
     assert sum(sizes) > 30
-    assert ontology.places() == tuple(sorted(SEVEN.rooms))
-    ontology.record_place('E', 1)
-    ontology.snapshot(5.0, ('URGENT',))
+    assert ontology.map.places() == tuple(sorted(SEVEN.rooms))
+    ontology.robot.record_place('E', 1)
+    ontology.robot.snapshot(5.0, ('URGENT',))
     assert max(map(len, transport.batches)) > 4
 
 
@@ -238,23 +244,23 @@ def test_a_server_that_answers_too_little_is_told(
     transport: Listening, left_out: int, text: str
 ) -> None:
     ontology = ontology_at(transport)
-    ontology.build(SEVEN, ONTOLOGY, IRI)
+    ontology.map.build(SEVEN, ONTOLOGY, IRI)
     transport.left_out = left_out
     with pytest.raises(ArmorServiceInternalError, match=text):
-        ontology.record_place('E', 1)
+        ontology.robot.record_place('E', 1)
 
 
 def test_of_several_times_of_a_visit_the_latest_counts(transport: Listening) -> None:
     ontology = ontology_at(transport)
-    ontology.build(SEVEN, ONTOLOGY, IRI)
-    ontology.record_place('E', 1)
+    ontology.map.build(SEVEN, ONTOLOGY, IRI)
+    ontology.robot.record_place('E', 1)
     armor = ArmorClient('other', 'map', transport)
     for at in (40, 60, 50):
         armor.manipulation.add_dataprop_to_ind('seenAt', 'Robot1', 'LONG', str(at))
-    assert ontology.snapshot(70.0, ()).seen_at == 60
+    assert ontology.robot.snapshot(70.0, ()).seen_at == 60
     armor.manipulation.add_dataprop_to_ind('seenAt', 'Robot1', 'STRING', 'noon')
     with pytest.raises(OntologyNotReadyError, match=r'seenAt of Robot1 is .*: expected a whole'):
-        ontology.snapshot(70.0, ())
+        ontology.robot.snapshot(70.0, ())
 
 
 def test_a_place_that_nobody_visited_is_urgent_by_any_clock() -> None:
@@ -267,27 +273,27 @@ def test_a_place_that_nobody_visited_is_urgent_by_any_clock() -> None:
 @pytest.mark.parametrize('first_visit', [0, never_visited(5)])
 def test_a_time_that_stands_for_no_visit_is_none(transport: Listening, first_visit: int) -> None:
     ontology = ontology_at(transport)
-    ontology.build(SEVEN, ONTOLOGY, IRI, first_visit)
-    ontology.record_place('E', 1)
-    assert ontology.snapshot(5.0, (), visits={'R1': 1.0}).visited_at == {'R1': 1.0}
+    ontology.map.build(SEVEN, ONTOLOGY, IRI, first_visit)
+    ontology.robot.record_place('E', 1)
+    assert ontology.robot.snapshot(5.0, (), visits={'R1': 1.0}).visited_at == {'R1': 1.0}
 
 
 def test_a_place_without_the_robot_is_waited_for(transport: Listening) -> None:
     ontology = ontology_at(transport)
-    ontology.build(SEVEN, ONTOLOGY, IRI)
+    ontology.map.build(SEVEN, ONTOLOGY, IRI)
     with pytest.raises(OntologyNotReadyError, match=r'^ontology map has Robot1 in no place$'):
-        ontology.snapshot(5.0, ())
-    ontology.record_place('E', 2_500_000_000)
-    assert ontology.snapshot(5.0, (), not_before=2_500_000_000).seen_at == 2_500_000_000
+        ontology.robot.snapshot(5.0, ())
+    ontology.robot.record_place('E', 2_500_000_000)
+    assert ontology.robot.snapshot(5.0, (), not_before=2_500_000_000).seen_at == 2_500_000_000
     with pytest.raises(OntologyNotReadyError, match=r'since 2\.5 s$'):
-        ontology.snapshot(5.0, (), not_before=2_500_000_001)
+        ontology.robot.snapshot(5.0, (), not_before=2_500_000_001)
 
 
 def keeper_at(transport: Listening, place: Place | None) -> tuple[MapKeeper, list[str]]:
     said: list[str] = []
     reports = Reports(*[said.append] * 4)
     return MapKeeper(
-        ontology_at(transport),
+        ontology_at(transport).map,
         Source(ONTOLOGY, IRI),
         place,
         lambda: 100,
@@ -311,7 +317,7 @@ def test_a_keeper_says_what_it_built_and_what_cannot_be_edited(transport: Listen
         'A',
     )
     assert said == ['the map is built: 3 rooms, 2 doors', 'built']
-    ontology_at(transport).record_place('C', 1)
+    ontology_at(transport).robot.record_place('C', 1)
 
     def without(name: str) -> str:
         return keeper.edit(lambda place: keeper.without_room(place, name))
@@ -320,9 +326,9 @@ def test_a_keeper_says_what_it_built_and_what_cannot_be_edited(transport: Listen
     assert without('Z').startswith('map.Z: ')
     assert keeper.place is not None
     assert sorted(keeper.place.rooms) == ['A', 'B', 'C']
-    ontology_at(transport).record_place('B', 2)
+    ontology_at(transport).robot.record_place('B', 2)
     assert without('C') == ''
-    assert ontology_at(transport).places() == ('A', 'B')
+    assert ontology_at(transport).map.places() == ('A', 'B')
     assert said[2:] == []
 
 

@@ -16,12 +16,8 @@ from armor_service.client import (
     Transport,
 )
 from state_machines.exceptions import CallError, CallInterruptedError, UnavailableError
-from surveillance_ontology.patrol_ontology import (
-    ROBOT,
-    OntologyNotReadyError,
-    PatrolOntology,
-    Snapshot,
-)
+from surveillance_ontology.patrol_vocabulary import ROBOT, OntologyNotReadyError
+from surveillance_ontology.robot_ontology import RobotOntology, Snapshot
 
 ANSWER_PATIENCE = 0.3
 """How long a server that did not answer is waited for when it is looked at again, seconds."""
@@ -112,7 +108,7 @@ class ArmorKnowledge:
         self._look_for_answer = look_for_answer
         self._answers: Callable[[float], bool] | None = None
         self._armor = ArmorClient(client_id, '', transport)
-        self._ontology = PatrolOntology(self._armor, robot)
+        self._ontology = RobotOntology(self._armor, robot)
         self._wake = wake
         self._ask_reference = reference
         self._whereabouts = whereabouts or Whereabouts()

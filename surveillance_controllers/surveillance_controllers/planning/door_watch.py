@@ -14,7 +14,7 @@ from state_machines.ros import ServiceCaller
 from surveillance_controllers.map_knowledge import MapKnowledge, keep_up
 from surveillance_interfaces.msg import DoorStates
 from surveillance_interfaces.srv import SetDoor
-from surveillance_ontology.patrol_ontology import OntologyNotReadyError
+from surveillance_ontology.patrol_vocabulary import OntologyNotReadyError
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.place.floor_plan import Segment
 from surveillance_runtime.state_topics import StateSubscription

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from surveillance_ontology.patrol_ontology import checked_names
+from surveillance_ontology.patrol_vocabulary import checked_names
 from surveillance_operator.page.broadcaster import Broadcaster
 from surveillance_operator.page.server import Page
 from surveillance_operator.place_page.dropped_map import MOST_BYTES, import_dropped
