@@ -30,7 +30,7 @@ from sensor_msgs.msg import BatteryState
 from whole_stack import ROOT, Stack
 
 from state_machines.ros import ServiceCaller
-from surveillance_behaviour.mission.mission_log import Event, read_all, summarize
+from surveillance_behaviour.mission.mission_log import summarize
 from surveillance_controllers.battery import BatteryParameters
 from surveillance_interfaces.msg import FactChanges
 from surveillance_interfaces.srv import (
@@ -44,6 +44,7 @@ from surveillance_interfaces.srv import (
 from surveillance_ontology.armor_client import CHANGES_QOS, CHANGES_TOPIC
 from surveillance_operator.map_command import graph_over_doors
 from surveillance_runtime.conversions import seconds_of
+from surveillance_runtime.event_log import RecordEntry, read_all
 from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
 from surveillance_simulation.world.world import read_world
 
@@ -306,7 +307,7 @@ def run(
     log_level: str = 'fatal',
     people: int = 0,
     ranges: float | None = None,
-) -> tuple[Watch, Trouble, list[Event]]:
+) -> tuple[Watch, Trouble, list[RecordEntry]]:
     """Patrol for simulated seconds with trouble every `pause` seconds.
 
     The seconds count from when the robot first drives. A KeyboardInterrupt ends them early.
@@ -331,7 +332,7 @@ def run(
     if ranges is not None:
         parameters['battery_controller'] = {'battery.capacity': capacity_for(place, ranges)}
     with tempfile.TemporaryDirectory() as folder:
-        record = Path(folder) / 'mission.jsonl'
+        record = Path(folder) / 'events.jsonl'
         parameters['robot_behavior'] = {'record': str(record)}
         stack = Stack(place, parameters, log_level=log_level)
         watch = Watch(stack)

@@ -245,7 +245,7 @@ def composed(robots: int, seconds: float, place: Path) -> None:
             deadline = time.monotonic() + START_SECONDS
             while len(record) < robots and time.monotonic() < deadline:
                 time.sleep(1.0)
-                found = Path(name).glob('runs/*/*/mission.jsonl')
+                found = Path(name).glob('runs/*/*/events.jsonl')
                 record = [each for each in found if b'"decision"' in each.read_bytes()]
             if len(record) < robots:
                 print(launched.text)

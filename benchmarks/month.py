@@ -38,6 +38,7 @@ from surveillance_behaviour.mission import mission_log
 from surveillance_ontology.map_ontology import MapOntology
 from surveillance_ontology.patrol_vocabulary import DATA
 from surveillance_ontology.robot_ontology import RobotOntology
+from surveillance_runtime import event_log
 from surveillance_runtime.place import read_place_file
 
 DAY = 86400.0
@@ -67,7 +68,7 @@ class Month:
         self._service = ArmorService(Settings(), store=Store(folder / 'armor_store'))
         client = ArmorClient('month', REFERENCE, InProcessTransport(self._service))
         self._map, self._ontology = MapOntology(client), RobotOntology(client)
-        self.record = mission_log.MissionRecord(folder / 'mission.jsonl')
+        self.record = mission_log.MissionRecord(folder / 'events.jsonl')
 
     def begin(self) -> None:
         """Build the map and begin the record."""
@@ -112,8 +113,8 @@ class Month:
 def reads(folder: Path) -> tuple[float, float, str]:
     """Return processor seconds to read record and store at a start, and where the record ends."""
     began = time.process_time()
-    with mission_log.MissionRecord(folder / 'mission.jsonl'):
-        events = mission_log.read(folder / 'mission.jsonl')
+    with mission_log.MissionRecord(folder / 'events.jsonl'):
+        events = event_log.read(folder / 'events.jsonl')
     cut_off = mission_log.cut_off(events)
     middle = time.process_time()
     service = ArmorService(Settings(), store=Store(folder / 'armor_store'))

@@ -684,7 +684,7 @@ class Leg:
 def mission(place: Path, seconds: float, *, real_time: bool = False) -> list[Leg]:
     """Patrol a place for simulated seconds; return the drives between which nothing else came."""
     with tempfile.TemporaryDirectory() as folder:
-        record = Path(folder) / 'mission.jsonl'
+        record = Path(folder) / 'events.jsonl'
         given: dict[str, dict[str, Any]] = {'robot_behavior': {'record': str(record)}}
         patrol = Stack(place, given | (IN_REAL_TIME if real_time else {}))
         patrol.start()

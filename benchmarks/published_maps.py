@@ -51,7 +51,7 @@ def patrolled(place: Path, seconds: float) -> Patrol:
     """Patrol a place for simulated seconds."""
     rooms = read_place_file(place).plan.place.rooms
     with tempfile.TemporaryDirectory() as folder:
-        record = Path(folder) / 'mission.jsonl'
+        record = Path(folder) / 'events.jsonl'
         stack = Stack(place, {'robot_behavior': {'record': str(record)}})
         stack.start()
         error = ''

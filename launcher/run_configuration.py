@@ -17,7 +17,8 @@ from surveillance_runtime.configuration import (
     argument_layer,
     resolved_text,
 )
-from surveillance_runtime.files import RECORD, RECORDING, TRUTH, FileError
+from surveillance_runtime.event_log import record_in
+from surveillance_runtime.files import RECORDING, TRUTH, FileError
 from surveillance_runtime.profile import (
     ProfileFile,
     RobotProfile,
@@ -147,7 +148,7 @@ def _option_entries(config: Path, run: Run, folder: Path | None) -> Iterator[Ent
     """Yield what the options say as parameters, for the nodes that they concern."""
     yield from simulator_entries(run.simulator)
     if folder is not None:
-        yield from record_entries(folder / RECORD)
+        yield from record_entries(record_in(folder))
         yield from _observer_entries(config, run, folder)
     if run.stage is not None:
         yield stage_entry(run.stage)

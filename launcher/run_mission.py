@@ -30,9 +30,10 @@ from launcher.run_processes import COMPOSED, node_environ, programs_of, ros_doma
 from launcher.service import is_service
 from launcher.supervisor import EXIT_CUT, Supervisor
 from surveillance_behaviour.mission import mission_log
-from surveillance_runtime import node_table
+from surveillance_runtime import event_log, node_table
 from surveillance_runtime.configuration import Entry
-from surveillance_runtime.files import LAUNCH_LOG, PLACE, RECORD, TIMELINE, FileError
+from surveillance_runtime.event_log import record_in
+from surveillance_runtime.files import LAUNCH_LOG, PLACE, TIMELINE, FileError
 from surveillance_runtime.launch_protocol import EXIT_THERE, NotNowError
 from surveillance_runtime.place.writing import copy_place
 from surveillance_runtime.profile import remappings
@@ -231,7 +232,7 @@ def _supervised(
     for part in team:
         if all(node.name != BEHAVIOUR_NODE for node in part.nodes):
             continue
-        done = summary(part.folder(folder) / RECORD)
+        done = summary(record_in(part.folder(folder)))
         log.plain(f'{part.robot}: {done}' if part.robot else done)
         if supervisor.time_is_over and done == NOTHING_RECORDED:
             code = code or EXIT_NOTHING_DONE
@@ -245,7 +246,7 @@ def what_to_look_at(folder: Path) -> list[str]:
 
     lines = []
     robots = robots_of(folder).values()
-    if any(summary(own / RECORD) != NOTHING_RECORDED for own in robots):
+    if any(summary(record_in(own)) != NOTHING_RECORDED for own in robots):
         try:
             lines.append(f'report: {_short(write_report(folder))}')
         except FileError as error:
@@ -270,7 +271,7 @@ def summary(record: Path) -> str:
     if not record.exists():
         return NOTHING_RECORDED
     try:
-        return str(mission_log.summarize(mission_log.read(record)))
+        return str(mission_log.summarize(event_log.read(record)))
     except FileError as error:
         return f'Mission: {error}'
 

@@ -23,7 +23,8 @@ from launch_ros.actions import Node
 
 from launch import LaunchContext, LaunchDescription
 from surveillance_runtime.configuration import Configuration, Entry, Layer
-from surveillance_runtime.files import PLACE, RECORD, RECORDING
+from surveillance_runtime.event_log import record_in
+from surveillance_runtime.files import PLACE, RECORDING
 from surveillance_runtime.launch_protocol import EXIT_CANNOT_START, EXIT_NOT_NOW
 from surveillance_runtime.node_table import MARKERS, RECORDER, find, select
 from surveillance_runtime.node_table import Node as NodeOfTable
@@ -211,7 +212,7 @@ def _traces(given: Mapping[str, str], folder: Path, part: TeamPart, place: Path)
     if given['record']:
         kept.mkdir(parents=True, exist_ok=True)
         copy_place(place, kept / PLACE)
-        yield from record_entries(kept / RECORD)
+        yield from record_entries(record_in(kept))
         yield for_node(RECORDER, 'folder', str(kept / RECORDING), 'record')
     if given['watch']:
         yield from watch_entries(kept, Path(given['watch']))

@@ -33,8 +33,8 @@ from surveillance_behaviour.mission.mission_log import (
     account_of,
     is_other_simulation,
     on_present_clock,
-    read,
 )
+from surveillance_runtime.event_log import read
 from surveillance_runtime.files import FileError, KeptFile
 
 SIMULTANEOUS = 1.0

@@ -18,8 +18,10 @@ from patrol_policy.promises import lines as promise_lines
 from patrol_policy.world import World
 from surveillance_behaviour.mission import mission_log
 from surveillance_ontology.patrol_vocabulary import checked_names
+from surveillance_runtime import event_log
 from surveillance_runtime.command_line import EXIT_BAD_INPUT, CommandParser
-from surveillance_runtime.files import RECORD, FileError
+from surveillance_runtime.event_log import record_in
+from surveillance_runtime.files import FileError
 from surveillance_runtime.place import Place, PlaceError, PlaceFile, read_place_file
 from surveillance_runtime.place.drawing import Run, draw_place
 from surveillance_runtime.place.filter_masks import write_filter_masks
@@ -116,7 +118,7 @@ def promised(
     return promises(world, battery, settings, sorted(place.rooms))
 
 
-def run_of(events: Sequence[mission_log.Event], place: Place, source: str) -> Run:
+def run_of(events: Sequence[event_log.RecordEntry], place: Place, source: str) -> Run:
     """Return what a mission's record adds to the picture of its place.
 
     Raises:
@@ -160,7 +162,7 @@ def in_words(summary: mission_log.Summary) -> str:
     return ' · '.join(parts)
 
 
-def _way(event: mission_log.Event, field: str) -> Way:
+def _way(event: event_log.RecordEntry, field: str) -> Way:
     points = event.fields.get(field)
     return [(float(x), float(y)) for x, y in points] if isinstance(points, list) else []
 
@@ -171,7 +173,7 @@ def _position(place: Place, name: str) -> Spot | None:
 
 
 def _drives(
-    events: Sequence[mission_log.Event], place: Place
+    events: Sequence[event_log.RecordEntry], place: Place
 ) -> tuple[list[Way], list[Way], list[Spot]]:
     """Return the ways driven, those planned, and where something failed.
 
@@ -210,7 +212,7 @@ def _parse(argv: Sequence[str] | None) -> argparse.Namespace:
     )
     parser.add_argument('place', type=Path, metavar='FILE', help='the place, a file of config/')
     parser.add_argument(
-        '--record', type=Path, metavar='RUN', help='draw this run: its folder or its mission.jsonl'
+        '--record', type=Path, metavar='RUN', help='draw this run: its folder or its events.jsonl'
     )
     parser.add_argument(
         '-o', '--output', type=Path, metavar='PNG', help='the picture (default: FILE.png here)'
@@ -263,8 +265,8 @@ def _draw(options: argparse.Namespace) -> list[str]:
     run = None
     lines = [f'{options.place}: {facts(plan)}']
     if options.record:
-        record = options.record / RECORD if options.record.is_dir() else options.record
-        run = run_of(mission_log.read(record), plan.place, str(record))
+        record = record_in(options.record) if options.record.is_dir() else options.record
+        run = run_of(event_log.read(record), plan.place, str(record))
         unknown = sorted(set(run.visits) - set(plan.place.rooms))
         # A run whose map a room was added to knows all of the place's rooms, too.
         if unknown and not set(plan.place.rooms) <= set(run.visits):
@@ -273,7 +275,7 @@ def _draw(options: argparse.Namespace) -> list[str]:
                 f'expected the record of a run through {", ".join(plan.place.rooms)}'
             )
         lines.append(f'{options.record}: {run.summary}')
-        told = mission_log.last_promises(mission_log.read(record))
+        told = mission_log.last_promises(event_log.read(record))
         lines += promise_lines(told) if told else []
     elif options.threshold is not None:
         found = promised(file, options.threshold, options.charge_lasts, time.time())

@@ -5,7 +5,6 @@ from __future__ import annotations
 import base64
 import contextlib
 import io
-import json
 import math
 import sys
 import time
@@ -18,12 +17,13 @@ from pathlib import Path
 
 from patrol_policy.promises import lines as promise_lines
 from surveillance_behaviour.mission import mission_log
-from surveillance_behaviour.mission.mission_log import Event
 from surveillance_operator.map_command import counted, facts, graph_over_doors, in_words, run_of
 from surveillance_operator.recording import bag
 from surveillance_operator.recording.runs import find_run, robots_of, run_parser
+from surveillance_operator.run_entries import RunEntries, entries_of_run, incidents_of
 from surveillance_runtime.command_line import EXIT_BAD_INPUT
-from surveillance_runtime.files import INCIDENTS, PLACE, RECORD, RECORDING, FileError, replace_text
+from surveillance_runtime.event_log import KINDS, RECORD, RecordEntry, Section, record_in
+from surveillance_runtime.files import PLACE, RECORDING, FileError, replace_text
 from surveillance_runtime.place import read_place_file
 from surveillance_runtime.place.drawing import Run, draw_place
 from surveillance_runtime.place.floor_plan import FloorPlan
@@ -59,14 +59,15 @@ def write_report(folder: Path) -> Path:
     with _one_line(folder):
         if robots and '' not in robots:
             return _write_fleet(folder, robots)
-        events, plan, run = _material(folder)
+        happened, plan, run = _material(folder)
+        events = happened.of_mission
         if not any(mission_log.summarize(events).visits.values()):
-            raise FileError(f'no visit was recorded in {folder / RECORD}')
+            raise FileError(f'no visit was recorded in {record_in(folder)}')
         drawn = _map(plan, run) if plan is not None and run is not None else ''
         speed = _fastest(events)
         bound = graph_over_doors(plan).tour.bound / speed if plan is not None and speed else None
         path = folder / NAME
-        replace_text(path, _page(folder, events, drawn, bound))
+        replace_text(path, _page(folder, happened, drawn, bound))
     return path
 
 
@@ -100,14 +101,14 @@ def _one_line(folder: Path) -> Iterator[None]:
         raise FileError(f'{error.filename or folder}: {error.strerror or error}') from None
 
 
-def _material(folder: Path) -> tuple[Sequence[Event], FloorPlan | None, Run | None]:
+def _material(folder: Path) -> tuple[RunEntries, FloorPlan | None, Run | None]:
     """Return what happened in a run, its place, and what it did there; no place: none of that."""
-    events = mission_log.read(folder / RECORD)
+    happened = entries_of_run(folder)
     file = folder / PLACE
-    if not file.exists() or not events:
-        return events, None, None
+    if not file.exists() or not happened.of_mission:
+        return happened, None, None
     plan = read_place_file(file).plan
-    return events, plan, run_of(events, plan.place, str(folder / RECORD))
+    return happened, plan, run_of(happened.of_mission, plan.place, str(record_in(folder)))
 
 
 def _write_fleet(folder: Path, robots: Mapping[str, Path]) -> Path:
@@ -122,17 +123,28 @@ def _write_fleet(folder: Path, robots: Mapping[str, Path]) -> Path:
             links[robot] = f'{robot}/{write_report(own).name}'
     drawn = _map(plan, _together(runs)) if plan is not None else ''
     path = folder / NAME
-    replace_text(path, _fleet_page(folder, records, problems, drawn, links))
+    everything = [each for own in (folder, *robots.values()) for each in _read_or_nothing(own)]
+    replace_text(path, _fleet_page(folder, records, problems, drawn, links, everything))
     return path
 
 
-def _records(robots: Mapping[str, Path]) -> tuple[dict[str, Sequence[Event]], list[str]]:
-    """Return what happened to each robot, and what cannot be read."""
-    records: dict[str, Sequence[Event]] = {}
+def _read_or_nothing(folder: Path) -> list[RecordEntry]:
+    """Return what happened, nothing where that cannot be read: it is told elsewhere."""
+    with contextlib.suppress(FileError):
+        return entries_of_run(folder).entries
+    return []
+
+
+def _records(robots: Mapping[str, Path]) -> tuple[dict[str, Sequence[RecordEntry]], list[str]]:
+    """Return what each robot's mission was, and what cannot be read."""
+    records: dict[str, Sequence[RecordEntry]] = {}
     problems = []
     for robot, own in robots.items():
         try:
-            records[robot] = mission_log.read(own / RECORD)
+            happened = entries_of_run(own)
+            records[robot] = happened.of_mission
+            if told := happened.problem():
+                problems.append(f'{robot}: {told}')
         except FileError as error:
             records[robot] = ()
             problems.append(f'{robot}: {error}')
@@ -140,7 +152,7 @@ def _records(robots: Mapping[str, Path]) -> tuple[dict[str, Sequence[Event]], li
 
 
 def _ways(
-    folder: Path, records: Mapping[str, Sequence[Event]]
+    folder: Path, records: Mapping[str, Sequence[RecordEntry]]
 ) -> tuple[FloorPlan | None, list[Run]]:
     """Return the place of a fleet, and what each robot did there."""
     if not (folder / PLACE).exists():
@@ -180,10 +192,11 @@ def _robots(each: Sized) -> str:
 
 def _fleet_page(
     folder: Path,
-    records: Mapping[str, Sequence[Event]],
+    records: Mapping[str, Sequence[RecordEntry]],
     problems: Sequence[str],
     drawn: str,
     links: Mapping[str, str],
+    everything: Sequence[RecordEntry],
 ) -> str:
     events = [event for own in records.values() for event in own]
     begin, end = min(e.time for e in events), max(e.time for e in events)
@@ -208,13 +221,13 @@ def _fleet_page(
         _idleness_of_all(records, summaries, threshold, begin, end),
         f'<details open><summary>What happened ({len(lines)})</summary>{table}'
         f'{more if left_out > 0 else ""}</details>',
-        _incidents(folder),
+        _incidents(everything),
     ]
     return _document(folder, body)
 
 
 def _idleness_of_all(
-    records: Mapping[str, Sequence[Event]],
+    records: Mapping[str, Sequence[RecordEntry]],
     summaries: Mapping[str, mission_log.Summary],
     threshold: float | None,
     begin: float,
@@ -250,30 +263,21 @@ def _idleness_of_all(
     )
 
 
-def _one_time_line(records: Mapping[str, Sequence[Event]], begin: float) -> list[list[str]]:
+def _one_time_line(records: Mapping[str, Sequence[RecordEntry]], begin: float) -> list[list[str]]:
     """Return what happened to all robots in one order; equal lines of a robot stand once."""
     told: list[tuple[float, str, list[str]]] = []
     for robot, events in records.items():
         before: list[str] = []
         for event in events:
-            if event.name not in _TOLD:
+            if not event.kind.words:
                 continue
-            head, words = _TOLD[event.name]
+            head, *words = event.kind.words
             cells = [_cell(event.fields[head]), ', '.join(_cell(event.fields[k]) for k in words)]
             line = [robot, f'{event.name} {cells[0]}', cells[1]]
             if line != before:
                 told.append((event.time, robot, line))
             before = line
     return [[_clock(at - begin), *line] for at, _, line in sorted(told)]
-
-
-_TOLD = {
-    'visit': ('place', ()),
-    'decision': ('place', ('rule', 'reason')),
-    'recharge': ('place', ('seconds',)),
-    'failure': ('what', ('reason',)),
-}
-"""What stands in a fleet's time line: events, what each is of, and its words."""
 
 
 def _map(plan: FloorPlan, run: Run) -> str:
@@ -290,7 +294,7 @@ def _map(plan: FloorPlan, run: Run) -> str:
     )
 
 
-def _fastest(events: Sequence[Event]) -> float:
+def _fastest(events: Sequence[RecordEntry]) -> float:
     """Return the highest mean speed of a leg, from decision to arrival, m/s."""
     fastest, began = 0.0, math.inf
     for event in events:
@@ -303,7 +307,8 @@ def _fastest(events: Sequence[Event]) -> float:
     return fastest
 
 
-def _page(folder: Path, events: Sequence[Event], drawn: str, bound: float | None) -> str:
+def _page(folder: Path, happened: RunEntries, drawn: str, bound: float | None) -> str:
+    events = happened.of_mission
     summary = mission_log.summarize(events)
     threshold = summary.threshold
     begin, end = events[0].time, max(event.time for event in events)
@@ -311,6 +316,8 @@ def _page(folder: Path, events: Sequence[Event], drawn: str, bound: float | None
     start = begin if is_whole else end - summary.seconds
     body = [f'<h1>Mission {escape(folder.name)}</h1>']
     body += [f'<p>{escape(line)}</p>' for line in _overview(summary, threshold, bound)]
+    if told := happened.problem():
+        body.append(f'<p class="late">{escape(told)}</p>')
     if not is_whole:
         body.append(
             f'<p>All figures are of the whole mission; map, strips and lists begin at '
@@ -320,25 +327,40 @@ def _page(folder: Path, events: Sequence[Event], drawn: str, bound: float | None
     body.append(_promises(events))
     body.append('<h2>Idleness</h2>')
     body.append(_idleness(events, summary, threshold, begin, end))
-    for title, name, number, columns, is_open in (
-        ('Recharges', 'recharge', summary.recharges, ('place', 'seconds'), True),
-        ('Failures', 'failure', summary.failures.total(), ('what', 'reason'), True),
-        ('Decisions', 'decision', summary.rules.total(), ('place', 'rule', 'reason'), False),
-        ('Visits', 'visit', summary.visits.total(), ('place', 'distance'), False),
-    ):
-        found = [event for event in events if event.name == name]
-        if not found:
-            body.append(f'<h2>{title} ({number})</h2>')
-            continue
-        rows = _rows(found, columns, start)
-        table = _table(['at', *columns], rows[:MOST_LINES])
-        if len(rows) > MOST_LINES:
-            table += f'<p>and {len(rows) - MOST_LINES} more: see {RECORD}.</p>'
-        opened = ' open' if is_open else ''
-        head = f'<summary>{title} ({number})</summary>'
-        body.append(f'<details{opened}>{head}{table}</details>')
-    body.append(_incidents(folder))
+    counts = {
+        'recharge': summary.recharges,
+        'failure': summary.failures.total(),
+        'decision': summary.rules.total(),
+        'visit': summary.visits.total(),
+    }
+    for name, kind in KINDS.items():
+        if kind.section is not None:
+            found = [each for each in happened.entries if each.name == name]
+            body.append(_listed(kind.section, found, counts.get(name), start))
+    body.append(_incidents(happened.entries))
     return _document(folder, body)
+
+
+def _listed(
+    section: Section, found: Sequence[RecordEntry], number: int | None, start: float
+) -> str:
+    """Return the list of a kind of entries.
+
+    Args:
+        section: How they are listed.
+        found: The entries.
+        number: How many there were in the whole mission; None: these, and none are not mentioned.
+        start: When the mission began, seconds.
+    """
+    if not found:
+        return '' if number is None else f'<h2>{section.title} ({number})</h2>'
+    rows = _rows(found, section.columns, start)
+    table = _table(['at', *section.columns], rows[:MOST_LINES])
+    if len(rows) > MOST_LINES:
+        table += f'<p>and {len(rows) - MOST_LINES} more: see {RECORD}.</p>'
+    opened = ' open' if section.is_open else ''
+    head = f'<summary>{section.title} ({len(found) if number is None else number})</summary>'
+    return f'<details{opened}>{head}{table}</details>'
 
 
 def _document(folder: Path, body: Sequence[str]) -> str:
@@ -352,7 +374,7 @@ def _document(folder: Path, body: Sequence[str]) -> str:
     )
 
 
-def _promises(events: Sequence[Event]) -> str:
+def _promises(events: Sequence[RecordEntry]) -> str:
     """Return what was said last of what can be kept of each place."""
     found = mission_log.last_promises(events)
     if not found:
@@ -365,36 +387,23 @@ def _promises(events: Sequence[Event]) -> str:
     return f'<details{opened}><summary>{head}</summary>{table}</details>'
 
 
-def _incidents(folder: Path) -> str:
-    """Return what the nodes told of what went wrong, from the run's `incidents.jsonl`."""
-    rows: list[list[str]] = []
-    begun: dict[tuple[str, str, str], int] = {}
-    for line in _lines_of(folder / INCIDENTS):
-        try:
-            told = json.loads(line)
-            key = told['node'], told['kind'], told['name']
-            lasted, at = told['seconds'], time.localtime(float(told['at']))
-            cause = f'{told["kind"]} {told["name"]}'
-            text, severity = str(told['text']), str(told['severity'])
-        except (ValueError, KeyError, TypeError):
-            continue  # a line that was cut off
-        if lasted is None:
-            begun[key] = len(rows)
-            when = time.strftime('%H:%M:%S', at)
-            rows.append([when, cause, severity, 'goes on', text])
-        elif key in begun:
-            rows[begun.pop(key)][3] = f'{lasted:.0f} s'
-    if not rows:
+def _incidents(entries: Iterable[RecordEntry]) -> str:
+    """Return what went wrong, and what people were called for."""
+    found = sorted(incidents_of(entries), key=lambda each: each.at)
+    if not found:
         return '<h2>Incidents (0)</h2>'
-    table = _table(['at', 'cause', 'severity', 'lasted', 'what'], rows[-MOST_LINES:])
-    return f'<details open><summary>Incidents ({len(rows)})</summary>{table}</details>'
-
-
-def _lines_of(path: Path) -> list[str]:
-    try:
-        return path.read_text(encoding='utf-8', errors='replace').splitlines()
-    except OSError:
-        return []
+    rows = [
+        [
+            time.strftime('%H:%M:%S', time.localtime(each.at)),
+            each.cause,
+            each.severity,
+            'goes on' if each.lasted is None else f'{each.lasted:.0f} s',
+            each.text,
+        ]
+        for each in found[-MOST_LINES:]
+    ]
+    table = _table(['at', 'cause', 'severity', 'lasted', 'what'], rows)
+    return f'<details open><summary>Incidents ({len(found)})</summary>{table}</details>'
 
 
 def _overview(
@@ -410,7 +419,7 @@ def _overview(
 
 
 def _idleness(
-    events: Sequence[Event],
+    events: Sequence[RecordEntry],
     summary: mission_log.Summary,
     threshold: float | None,
     start: float,
@@ -453,7 +462,7 @@ def _strip(times: Iterable[float], threshold: float | None, start: float, end: f
     )
 
 
-def _rows(found: Sequence[Event], columns: Sequence[str], start: float) -> list[list[str]]:
+def _rows(found: Sequence[RecordEntry], columns: Sequence[str], start: float) -> list[list[str]]:
     """Return a row for each event; equal ones that follow each other share one."""
     rows = []
     for cells, group in groupby(found, lambda event: [_cell(event.fields[k]) for k in columns]):

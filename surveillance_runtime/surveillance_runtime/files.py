@@ -15,10 +15,10 @@ from typing import Any
 from state_machines import files
 from surveillance_runtime.suggestions import like
 
-RECORD, PLACE = 'mission.jsonl', 'place.yaml'
+PLACE = 'place.yaml'
 INCIDENTS, TRUTH = 'incidents.jsonl', 'truth.jsonl'
 RECORDING, TIMELINE, LAUNCH_LOG = 'recording', 'timeline.jsonl', 'launch.log'
-"""In the folder of a run: the mission's record, the place, the recording, its time line, the log of
+"""In the folder of a run: the place, the recording, its time line, the log of
 all programs."""
 
 

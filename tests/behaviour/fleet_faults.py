@@ -102,7 +102,7 @@ class Robot:
 
     def __init__(self, fleet: Fleet, name: str, start: str, folder: Path) -> None:
         self.fleet, self.name = fleet, name
-        self.record = folder / name / 'mission.jsonl'
+        self.record = folder / name / 'events.jsonl'
         self.world = RemoteWorld(start_place=start)
         self.world.fleet, self.world.name = fleet, name
         self.world.visited_at = fleet.visited_at

@@ -22,7 +22,8 @@ from patrol_policy.world import Decision
 from state_machines.exceptions import CallError, UnavailableError
 from surveillance_behaviour.machines import MACHINES
 from surveillance_behaviour.mission.mission import MissionSettings
-from surveillance_behaviour.mission.mission_log import MissionRecord, read
+from surveillance_behaviour.mission.mission_log import MissionRecord
+from surveillance_runtime.event_log import read
 
 from .scripted_world import World
 
@@ -78,7 +79,7 @@ class AnyOrder(RuleBasedStateMachine):
     @initialize()
     def begin(self) -> None:
         self.folder = tempfile.TemporaryDirectory()
-        self.path = Path(self.folder.name) / 'mission.jsonl'
+        self.path = Path(self.folder.name) / 'events.jsonl'
         self.world = CheckedWorld(draw=0.1, low_below=20.0)
         self.faults: dict[str, tuple[int, type[CallError]]] = {}
         self.refused_when_low = False

@@ -7,10 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from surveillance_behaviour.mission.mission_log import (
-    read,
-    summarize,
-)
+from surveillance_behaviour.mission.mission_log import summarize
+from surveillance_runtime.event_log import read
 
 from .machine_runs import CALLS, Killed, Run, settings, visited
 from .scripted_world import POSITIONS, SEVEN_ROOMS, World

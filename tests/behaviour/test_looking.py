@@ -14,8 +14,9 @@ from state_machines import Interrupt
 from state_machines.exceptions import CallError, CallInterruptedError
 from surveillance_behaviour.machines import MACHINES
 from surveillance_behaviour.mission.looking import RoomLook, one_way
-from surveillance_behaviour.mission.mission_log import MissionRecord, read
+from surveillance_behaviour.mission.mission_log import MissionRecord
 from surveillance_behaviour.ports import Check, Doubt, Point
+from surveillance_runtime.event_log import read
 
 from .machine_runs import settings
 from .scripted_world import World
@@ -277,7 +278,7 @@ def test_the_first_look_waits_until_somebody_watches(machine: str):
 
 @pytest.mark.parametrize('machine', ['surveillance', 'patrol'])
 def test_a_look_that_was_cut_off_is_gone_on_with_where_it_was(machine: str, tmp_path: Path):
-    file = tmp_path / 'mission.jsonl'
+    file = tmp_path / 'events.jsonl'
     first = Watched(machine, record=MissionRecord(file), exploration_seconds=24.0)
     first.looking.arm = True
     after = 7.0
@@ -304,7 +305,7 @@ def test_a_look_that_was_cut_off_is_gone_on_with_where_it_was(machine: str, tmp_
 
 
 def test_a_patrol_that_begins_anew_does_not_look_where_it_has_just_looked_around(tmp_path: Path):
-    record = MissionRecord(tmp_path / 'mission.jsonl')
+    record = MissionRecord(tmp_path / 'events.jsonl')
     run = Watched('patrol', record=record, exploration_seconds=40.0)
     run.looking.arm = True
     run.until(100.0)
@@ -377,7 +378,7 @@ def stays(record: MissionRecord, place: str) -> list[dict[str, object]]:
 def test_a_viewpoint_that_one_stay_leaves_out_comes_first_in_the_next_also_after_a_restart(
     tmp_path: Path,
 ):
-    file = tmp_path / 'mission.jsonl'
+    file = tmp_path / 'events.jsonl'
     points: list[Point] = [(12.0, 8.0, 0.0), (8.0, 8.0, 0.0), (10.0, 10.0, 0.0)]
 
     def watched(world: World | None = None) -> Watched:
@@ -419,7 +420,7 @@ def test_a_camera_that_shows_little_is_turned_to_more_sides():
 
 
 def test_a_side_of_which_no_picture_was_looked_at_is_not_called_looked_at(tmp_path: Path):
-    record = MissionRecord(tmp_path / 'mission.jsonl')
+    record = MissionRecord(tmp_path / 'events.jsonl')
     run = Watched('surveillance', record=record, exploration_seconds=60.0)
     run.looking.arm, run.looking.blind = True, {90, 180}
     run.until(70.0)
@@ -435,7 +436,7 @@ def test_a_side_of_which_no_picture_was_looked_at_is_not_called_looked_at(tmp_pa
 
 @pytest.mark.parametrize('arm', [False, True])
 def test_what_the_rules_ask_for_is_looked_at_before_all_else(arm: bool, tmp_path: Path):
-    record = MissionRecord(tmp_path / 'mission.jsonl')
+    record = MissionRecord(tmp_path / 'events.jsonl')
     run = Watched('surveillance', record=record, exploration_seconds=40.0)
     run.looking.arm = arm
     here = (12.0, 8.0, 0.0)

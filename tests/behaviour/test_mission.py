@@ -11,12 +11,8 @@ import pytest
 from patrol_policy.decision import Rules
 from state_machines.exceptions import CallError, UnavailableError
 from surveillance_behaviour.experience import Experience
-from surveillance_behaviour.mission.mission_log import (
-    MissionRecord,
-    read,
-    read_all,
-    summarize,
-)
+from surveillance_behaviour.mission.mission_log import MissionRecord, summarize
+from surveillance_runtime.event_log import read, read_all
 
 from .machine_runs import Killed, Run, settings
 from .scripted_world import SEVEN_ROOMS, World
@@ -107,7 +103,7 @@ def test_visits_are_known_to_a_process_that_starts_again(machine: str, tmp_path:
 
 def test_the_record_holds_what_happened(machine: str, tmp_path: Path) -> None:
     world = World(draw=0.4)
-    path = tmp_path / 'mission.jsonl'
+    path = tmp_path / 'events.jsonl'
     with MissionRecord(path) as record:
         Run(machine, world, record=record).until(1800.0)
     events = read(path)

@@ -16,22 +16,21 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from surveillance_behaviour.mission import mission_log
 from surveillance_behaviour.mission.mission_log import (
     CutOff,
     MissionRecord,
     account_of,
     cut_off,
-    read,
-    read_all,
     summarize,
 )
-from surveillance_runtime.files import FileError, LineFile
+from surveillance_runtime import event_log
+from surveillance_runtime.event_log import Clocks, on_one_clock, read, read_all
+from surveillance_runtime.files import FileError
 
 
 @pytest.fixture
 def path(tmp_path: Path) -> Path:
-    return tmp_path / 'runs' / 'mission.jsonl'
+    return tmp_path / 'runs' / 'events.jsonl'
 
 
 def test_what_was_written_is_read_back(path: Path) -> None:
@@ -93,7 +92,7 @@ def test_a_broken_line_is_named(path: Path, line: str) -> None:
     path.parent.mkdir()
     path.write_text(f'{{"event": "end", "time": 1}}\n{line}\n')
     shown = re.escape(line[:60])
-    with pytest.raises(FileError, match=rf'mission\.jsonl:2: expected a JSON object .*{shown}'):
+    with pytest.raises(FileError, match=rf'events\.jsonl:2: expected a JSON object .*{shown}'):
         read(path)
     path.write_text('{"event": "visit", "time": 1, "place": "E"}\n')
     with pytest.raises(FileError, match=r"jsonl:1: event 'visit' lacks distance"):
@@ -188,15 +187,15 @@ def test_a_record_tells_where_its_mission_was_cut_off(
 def test_what_a_full_disk_did_not_take_is_written_when_it_does(
     path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(mission_log, 'MOST_WAITING', 200)
-    append, full = LineFile.append, [False]
+    monkeypatch.setattr(event_log, 'MOST_WAITING', 420)
+    write, full = os.write, [False]
 
-    def append_unless_full(self: LineFile, line: bytes) -> int:
+    def write_unless_full(descriptor: int, data: bytes) -> int:
         if full[0]:
-            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path))
-        return append(self, line)
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        return write(descriptor, data)
 
-    monkeypatch.setattr(LineFile, 'append', append_unless_full)
+    monkeypatch.setattr(event_log.os, 'write', write_unless_full)
     with MissionRecord(path) as record:
         record.write('start', 0.0, machine='surveillance', place='E', places=['E', 'C1'])
         for seconds in (10, 20):  # one, then more than may wait
@@ -222,16 +221,61 @@ def test_what_another_simulation_wrote_says_nothing(path: Path) -> None:
     assert cut_off(read(path)) == CutOff(1.0, 'C1')
 
 
-def test_a_clock_that_is_set_back_changes_no_visit_and_no_wait(path: Path) -> None:
-    date = 1.7e9
-    with MissionRecord(path) as record:
-        record.write('start', date, **START[1])
-        record.write('visit', date + 10.0, place='C1', distance=0.0)
-        record.write('visit', date + 30.0, place='E', distance=0.0)
-        record.write('decision', date - 3570.0, **DECISION[1])
+DATE = 1.7e9
+
+
+@pytest.mark.parametrize('step', [-3600.0, 3600.0])
+def test_a_clock_that_is_set_changes_no_visit_and_no_wait(path: Path, step: float) -> None:
+    wall, steady = DATE, 500.0
+
+    def pass_by(seconds: float, set_by: float = 0.0) -> float:
+        nonlocal wall, steady
+        steady += seconds
+        wall += seconds + set_by
+        return wall
+
+    with MissionRecord(path, clocks=Clocks(lambda: wall, lambda: steady)) as record:
+        record.write('start', wall, **START[1])
+        record.write('visit', pass_by(10.0), place='C1', distance=0.0)
+        record.write('visit', pass_by(20.0), place='E', distance=0.0)
+        now = pass_by(30.0, step)
+        record.write('decision', now, **DECISION[1])
     account = account_of(read(path))
-    assert account.visits == {'C1': date - 3590.0, 'E': date - 3570.0}
-    assert cut_off(read(path)) == CutOff(date - 3570.0, 'E', math.inf, left=True)
+    assert account.visits == {'C1': now - 50.0, 'E': now - 30.0}
+    assert cut_off(read(path)) == CutOff(now, 'E', math.inf, left=True)
+    summary = summarize(read(path))
+    assert summary.seconds == 60.0
+    assert summary.unvisited == {'C1': 50.0, 'E': 30.0}
+    times = [each.time for each in on_one_clock(read(path))]
+    assert [time - times[0] for time in times] == [0.0, 10.0, 30.0, 60.0]
+
+
+def when(seconds: float, steady: float, boot: str) -> dict[str, object]:
+    """Return the times of an entry so long after `DATE`, seconds."""
+    return {'time': DATE + seconds, 'at': DATE + seconds, 'steady': steady, 'boot': boot}
+
+
+def test_a_machine_that_was_started_anew_counts_by_its_date(path: Path) -> None:
+    lines = [
+        {'event': 'start', **when(0.0, 900.0, 'a'), **START[1]},
+        {'event': 'visit', **when(5000.0, 950.0, 'b'), **VISIT[1]},
+    ]
+    path.parent.mkdir()
+    path.write_text(''.join(json.dumps(each) + '\n' for each in lines))
+    assert summarize(read(path)).seconds == 5000.0
+
+
+def test_an_old_record_whose_clock_went_back_is_counted_without_the_steady_one(path: Path) -> None:
+    lines = [
+        {'event': 'start', 'time': DATE, **START[1]},
+        {'event': 'visit', 'time': DATE + 10.0, 'place': 'C1', 'distance': 0.0},
+        {'event': 'visit', 'time': DATE + 30.0, 'place': 'E', 'distance': 0.0},
+        {'event': 'decision', 'time': DATE - 3570.0, **DECISION[1]},
+    ]
+    path.parent.mkdir()
+    path.write_text(''.join(json.dumps(each) + '\n' for each in lines))
+    account = account_of(read(path))
+    assert account.visits == {'C1': DATE - 3590.0, 'E': DATE - 3570.0}
     assert summarize(read(path)).seconds == 30.0
     assert summarize(read(path)).unvisited == {'C1': 20.0, 'E': 30.0}
 
@@ -247,13 +291,14 @@ def test_a_long_record_is_read_from_its_last_file_and_sums_up_all(path: Path) ->
                 place = 'C1' if turn % 2 else 'R1'
                 each.write('visit', 2.0 * turn + 1.0, place=place, distance=1.5)
             each.write('failure', 700.0, what='moving', reason='a door is closed')
-    packed = sorted(path.parent.glob('mission.jsonl.*.gz'))
+    packed = sorted(path.parent.glob('events.jsonl.*.gz'))
     assert len(packed) >= 8
     assert path.stat().st_size < 6000
     assert str(summarize(read(path))) == str(summarize(read(whole)))
     assert cut_off(read(path)) == cut_off(read(whole))
     assert account_of(read(path)).visits == account_of(read(whole)).visits
-    assert list(read_all(path)) == read(whole)
+    told = [[(e.name, e.time, e.fields) for e in some] for some in (read_all(path), read(whole))]
+    assert told[0] == told[1]
     with MissionRecord(path, segment_bytes=3000) as record:
         record.write('visit', 800.0, place='E', distance=0.0)
     assert summarize(read(path)).visits['E'] == 1
@@ -262,7 +307,7 @@ def test_a_long_record_is_read_from_its_last_file_and_sums_up_all(path: Path) ->
 def test_a_writer_that_was_killed_between_two_files_loses_nothing(path: Path) -> None:
     with MissionRecord(path) as record:
         record.write('start', 0.0, machine='patrol', place='E', places=['E'])
-    os.rename(path, path.with_name('mission.jsonl.next'))
+    os.rename(path, path.with_name('events.jsonl.next'))
     with MissionRecord(path) as record:
         record.write('visit', 1.0, place='E', distance=0.0)
     assert [event.name for event in read(path)] == ['start', 'visit']
@@ -313,7 +358,7 @@ def test_an_empty_record_says_so(path: Path) -> None:
 def test_no_finished_line_is_ever_lost(
     tmp_path_factory: pytest.TempPathFactory, legs: list[tuple[float, str]], cut: int
 ) -> None:
-    path = tmp_path_factory.mktemp('record') / 'mission.jsonl'
+    path = tmp_path_factory.mktemp('record') / 'events.jsonl'
     with MissionRecord(path) as record:
         for seconds, place in legs:
             record.write('visit', seconds, place=place, distance=0.0)

@@ -10,8 +10,9 @@ from builtin_interfaces.msg import Time
 
 from patrol_policy.promises import LATER, NEVER, UNKNOWN, WITHIN, Promise, lines, summary, verdicts
 from surveillance_behaviour.conversions import promises_from, promises_message
-from surveillance_behaviour.mission.mission_log import last_promises, read
+from surveillance_behaviour.mission.mission_log import last_promises
 from surveillance_operator.report import write_report
+from surveillance_runtime.event_log import read
 
 from .machine_runs import Killed
 from .scripted_world import World
@@ -51,7 +52,7 @@ def test_promises_pass_through_their_message_with_the_hours():
 
 
 def test_the_record_and_the_report_tell_what_cannot_be_kept(tmp_path: Path):
-    world, path = World(), tmp_path / 'mission.jsonl'
+    world, path = World(), tmp_path / 'events.jsonl'
     Killed('surveillance', world, path, urgency_threshold=20.0, policy='tour').run(120.0)
     found = last_promises(read(path))
     told = {each.place: each for each in found}

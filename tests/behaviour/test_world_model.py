@@ -34,7 +34,7 @@ def world_model(world: World, record: Path) -> WorldModel:
 
 def test_a_robot_between_two_places_visits_none(tmp_path: Path) -> None:
     world = World()
-    model = world_model(world, tmp_path / 'mission.jsonl')
+    model = world_model(world, tmp_path / 'events.jsonl')
     model.begin(1.0, NOBODY)
     world.seen_at = 2_500_000_000
     model.decide(4.0, NOBODY)
@@ -50,7 +50,7 @@ def test_a_robot_between_two_places_visits_none(tmp_path: Path) -> None:
 
 
 def test_a_request_outlives_the_node_that_took_it(tmp_path: Path) -> None:
-    world, record = World(), tmp_path / 'mission.jsonl'
+    world, record = World(), tmp_path / 'events.jsonl'
     first = world_model(world, record)
     first.begin(1.0, NOBODY)
     assert 'goes to R4' in first.request('R4')
@@ -62,7 +62,7 @@ def test_a_request_outlives_the_node_that_took_it(tmp_path: Path) -> None:
 def test_a_request_ends_when_the_robot_has_been_there_or_cannot_go(
     tmp_path: Path, avoided: frozenset[str]
 ) -> None:
-    world, record = World(), tmp_path / 'mission.jsonl'
+    world, record = World(), tmp_path / 'events.jsonl'
     first = world_model(world, record)
     first.begin(1.0, NOBODY)
     first.request('R4')
@@ -110,7 +110,7 @@ def test_the_ontology_knows_until_when_the_robot_was_in_a_place() -> None:
 def test_a_clock_that_is_set_back_while_nobody_decides_empties_no_visit(
     tmp_path: Path, after: float
 ) -> None:
-    world, path, date = World(), tmp_path / 'mission.jsonl', 1.7e9
+    world, path, date = World(), tmp_path / 'events.jsonl', 1.7e9
     with MissionRecord(path) as record:
         record.write('start', date, machine='surveillance', place='E', places=['C1', 'E'])
         record.write('visit', date + 10.0, place='C1', distance=0.0)
@@ -126,7 +126,7 @@ def test_a_decision_says_which_facts_clash_while_they_do(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     world = World()
-    told = world_model(world, tmp_path / 'mission.jsonl')
+    told = world_model(world, tmp_path / 'events.jsonl')
     told.begin(1.0, NOBODY)
     clash, right = 'ontology map is inconsistent because R4 is ROOM and R4 is DOOR', world.snapshot
     monkeypatch.setattr(world, 'snapshot', lambda *args: replace(right(*args), contradiction=clash))
@@ -180,7 +180,7 @@ def test_a_place_is_urgent_beyond_its_own_threshold_and_not_at_it(
 
 def test_a_request_is_taken_while_somebody_looks(tmp_path: Path) -> None:
     world = World()
-    told = world_model(world, tmp_path / 'mission.jsonl')
+    told = world_model(world, tmp_path / 'events.jsonl')
     told.begin(1.0, NOBODY)
     answered, asked, right = threading.Event(), threading.Event(), world.snapshot
 
@@ -246,8 +246,8 @@ NOT_FINITE = json.dumps(
 def test_what_was_learned_and_cannot_be_read_is_said(
     tmp_path: Path, damage: Callable[[Path], object]
 ) -> None:
-    record = tmp_path / 'mission.jsonl'
-    damage(tmp_path / 'mission.jsonl.experience.json')
+    record = tmp_path / 'events.jsonl'
+    damage(tmp_path / 'events.jsonl.experience.json')
     experience = Experience.of_record(str(record))
     assert 'what was learned before is not used' in experience.problem
 

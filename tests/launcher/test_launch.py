@@ -99,7 +99,7 @@ def test_a_mission_goes_on_after_kills_and_ctrl_c_ends_it_with_its_summary_and_n
     assert 'visits' in output
     assert 'decisions by rule' in output
     (folder,) = (tmp_path / 'runs').iterdir()
-    assert {'mission.jsonl', 'launch.log', 'parameters'} <= {p.name for p in folder.iterdir()}
+    assert {'events.jsonl', 'launch.log', 'parameters'} <= {p.name for p in folder.iterdir()}
 
 
 def test_a_mission_that_did_not_begin_in_its_time_is_a_failure(launch):

@@ -110,7 +110,7 @@ def test_the_users_place_parameters_record_and_namespace_reach_the_nodes(start, 
     office = str(ROOT / 'config' / 'office.yaml')
     nodes = start(map=office, params=str(own), record=str(tmp_path / 'it'), namespace='/robot1')
     by_name = {node.name: settings(node) for node in nodes}
-    assert by_name['robot_behavior']['record'] == str(tmp_path / 'it' / 'mission.jsonl')
+    assert by_name['robot_behavior']['record'] == str(tmp_path / 'it' / 'events.jsonl')
     assert by_name['mission_recorder']['folder'] == str(tmp_path / 'it' / 'recording')
     assert 33 in [values.get('urgency_threshold') for values in by_name.values()]
     assert 'office.yaml' in Path(nodes[1].parameters[0]).read_text()

@@ -38,7 +38,8 @@ from launcher.run_processes import command, node_environ, programs_of, ros_argum
 from surveillance_behaviour.mission.mission_log import MissionRecord
 from surveillance_runtime import discovery
 from surveillance_runtime.command_line import page_address
-from surveillance_runtime.files import RECORD, TIMELINE
+from surveillance_runtime.event_log import record_in
+from surveillance_runtime.files import TIMELINE
 from surveillance_runtime.incidents import Call, Cause, Incident, Severity
 from surveillance_runtime.node_table import DEFAULT_MODE
 from surveillance_runtime.profile import read_profile
@@ -273,7 +274,7 @@ def test_the_last_lines_of_a_run_can_be_typed_and_tell_what_could_not_be_written
     folder = tmp_path / 'ein Lauf é'
     (folder / 'report.html').mkdir(parents=True)
     (folder / TIMELINE).touch()
-    with MissionRecord(folder / RECORD) as record:
+    with MissionRecord(record_in(folder)) as record:
         record.write('start', 0.0, machine='surveillance', place='E', places=['E'])
         record.write('visit', 9.0, place='E', distance=1.0)
     report, replay = what_to_look_at(folder)

@@ -13,7 +13,7 @@ from rclpy.parameter import Parameter
 
 from surveillance_behaviour.charging import BatteryMonitor
 from surveillance_behaviour.initial_state_node import InitialState
-from surveillance_behaviour.mission.mission_log import Event, Summary, read, summarize
+from surveillance_behaviour.mission.mission_log import Summary, summarize
 from surveillance_behaviour.reasoner_node import Reasoner
 from surveillance_behaviour.robot_behavior_node import RobotBehavior
 from surveillance_controllers.battery_controller_node import BatteryController
@@ -21,6 +21,7 @@ from surveillance_controllers.motion_controller_node import MotionController
 from surveillance_controllers.planner_controller_node import PlannerController
 from surveillance_ontology.armor_server_node import ArmorServer
 from surveillance_ontology.ontology_map_builder_node import OntologyMapBuilder
+from surveillance_runtime.event_log import RecordEntry, read
 
 from .simulated_time import START, SimulatedTime, simulated_time
 
@@ -169,7 +170,7 @@ class Robot:
         """Return what the record says."""
         return summarize(read(self.record))
 
-    def events(self) -> list[Event]:
+    def events(self) -> list[RecordEntry]:
         """Return the record."""
         return read(self.record)
 

@@ -34,7 +34,7 @@ def behaviour(request: pytest.FixtureRequest) -> str:
 def robot(
     behaviour: str, graph: Any, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> Iterator[Robot]:
-    with mission(graph, monkeypatch, behaviour, tmp_path / 'mission.jsonl') as robot:
+    with mission(graph, monkeypatch, behaviour, tmp_path / 'events.jsonl') as robot:
         yield robot
 
 

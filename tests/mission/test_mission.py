@@ -40,7 +40,7 @@ BEHAVIOURS = ['surveillance', 'patrol']
 def robot(
     request: pytest.FixtureRequest, graph: Any, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> Iterator[Robot]:
-    with mission(graph, monkeypatch, request.param, tmp_path / 'mission.jsonl') as robot:
+    with mission(graph, monkeypatch, request.param, tmp_path / 'events.jsonl') as robot:
         yield robot
 
 
@@ -88,7 +88,7 @@ def test_an_initial_state_that_dies_while_it_looks_around_is_missed_at_once(
 
     first = graph.add(PatrolNode, name='initial_state')
     first.create_service(Empty, 'start', look_around)
-    with mission(graph, monkeypatch, 'patrol', tmp_path / 'mission.jsonl') as robot:
+    with mission(graph, monkeypatch, 'patrol', tmp_path / 'events.jsonl') as robot:
         robot.begin('initial_state')
         graph.until(asked.is_set)
         graph.drop(first)

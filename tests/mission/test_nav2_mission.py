@@ -40,7 +40,7 @@ def robot(graph: Any, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterat
         for kind in ('doors', 'room_positions')
         for name, value in place[kind].items()
     }
-    with mission(graph, monkeypatch, 'surveillance', tmp_path / 'mission.jsonl') as robot:
+    with mission(graph, monkeypatch, 'surveillance', tmp_path / 'events.jsonl') as robot:
         simulated = {'execution_mode': 'SIMULATED', **drawn}
         robot.configure('planner_controller', **simulated)
         robot.configure('motion_controller', navigator='nav2', **simulated)

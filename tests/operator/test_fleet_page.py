@@ -414,7 +414,7 @@ def fleet_run(tmp_path: Path) -> Path:
             snapshot = replace(FLEET[name], now=at, pose=(float(second), 1.0, 0.0), number=second)
             writer.add(snapshot, at)
         writer.close()
-        with MissionRecord(own / 'mission.jsonl') as record:
+        with MissionRecord(own / 'events.jsonl') as record:
             places = ['C1', 'R1', 'R2']
             record.write('start', begin, machine='surveillance', places=places, place='C1')
             for n in range(3):
@@ -475,7 +475,7 @@ def test_one_damaged_recording_costs_a_line_and_the_others_are_played(
 def test_a_robot_that_left_nothing_is_named_in_the_report(fleet_run: Path) -> None:
     bert = fleet_run / 'bert'
     (bert / 'place.yaml').write_text((fleet_run / 'place.yaml').read_text())
-    for name in ('mission.jsonl', 'timeline.jsonl'):
+    for name in ('events.jsonl', 'timeline.jsonl'):
         (bert / name).unlink()
     text = write_report(fleet_run).read_text()
     assert '2 robots' in text

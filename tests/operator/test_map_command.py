@@ -89,7 +89,7 @@ def test_the_tour_of_a_place_is_measured_over_the_doors() -> None:
 def test_a_run_is_drawn_with_its_waits(
     record: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    record.rename(tmp_path / 'mission.jsonl')
+    record.rename(tmp_path / 'events.jsonl')
     output = tmp_path / 'run.png'
     place = CONFIG / 'seven_rooms.yaml'
     assert map_command.main([str(place), '--record', str(tmp_path), '-o', str(output)]) == 0
@@ -133,10 +133,10 @@ def test_the_names_of_places_end_before_their_bars(
 
 
 def test_ways_and_failures_come_from_the_record(record: Path) -> None:
-    from surveillance_behaviour.mission import mission_log
+    from surveillance_runtime import event_log
 
     place = read_world(CONFIG / 'seven_rooms.yaml').plan.place
-    run = map_command.run_of(mission_log.read(record), place, 'run')
+    run = map_command.run_of(event_log.read(record), place, 'run')
     assert run.planned == [
         [(5.0, 10.0), (10.0, 8.0)],
         [(10.0, 8.0), (10.0, 6.5), (10.0, 5.0)],
@@ -149,13 +149,13 @@ def test_ways_and_failures_come_from_the_record(record: Path) -> None:
     with record.open('a') as file:
         fields = {'place': 'E', 'rule': 'URGENT', 'reason': '', 'urgency_threshold': 90}
         file.write(json.dumps({'event': 'decision', 'time': 70.0, **fields}) + '\n')
-    assert map_command.run_of(mission_log.read(record), place, 'run').threshold == 90.0
+    assert map_command.run_of(event_log.read(record), place, 'run').threshold == 90.0
 
 
 def test_a_room_that_was_added_during_the_run_keeps_nothing_from_being_drawn(
     record: Path, tmp_path: Path
 ) -> None:
-    from surveillance_behaviour.mission import mission_log
+    from surveillance_runtime import event_log
 
     place = read_world(CONFIG / 'seven_rooms.yaml').plan.place
     with MissionRecord(record) as mission:
@@ -164,7 +164,7 @@ def test_a_room_that_was_added_during_the_run_keeps_nothing_from_being_drawn(
         mission.write('visit', 62.0, place='New', distance=2.0, path=way)
         mission.write('visit', 64.0, place='E', distance=2.0)
         mission.write('end', 70.0)
-    run = map_command.run_of(mission_log.read(record), place, 'run')
+    run = map_command.run_of(event_log.read(record), place, 'run')
     assert run.visits['New'] == 1
     assert run.planned[-2:] == [[(5, 10), (4, 10), (3, 10)], [(3, 10), (5, 10)]]
     picture = tmp_path / 'run.png'

@@ -16,7 +16,7 @@ from typing import Any
 
 import pytest
 
-from surveillance_behaviour.mission.mission_log import MissionRecord, read
+from surveillance_behaviour.mission.mission_log import MissionRecord
 from surveillance_operator import replay, report
 from surveillance_operator.map_command import run_of
 from surveillance_operator.page.broadcaster import Broadcaster
@@ -26,6 +26,7 @@ from surveillance_operator.recording.runs import find_run
 from surveillance_operator.recording.timeline import Timeline
 from surveillance_operator.replay import Player, Track
 from surveillance_operator.report import draw_picture, write_report
+from surveillance_runtime.event_log import read
 from surveillance_runtime.files import FileError
 from surveillance_runtime.place import read_place_file
 from tests.operator.test_timeline import record
@@ -39,7 +40,7 @@ def run(tmp_path: Path) -> Path:
     folder.mkdir(parents=True)
     record(folder / 'timeline.jsonl')
     (folder / 'place.yaml').write_bytes((ROOT / 'config/seven_rooms.yaml').read_bytes())
-    with MissionRecord(folder / 'mission.jsonl') as mission:
+    with MissionRecord(folder / 'events.jsonl') as mission:
         mission.write(
             'start',
             0.0,
@@ -149,7 +150,7 @@ def test_a_report_that_a_full_disk_does_not_take_leaves_the_old_one(run: Path) -
 
 
 def test_what_failed_again_and_again_is_one_row_of_the_report(run: Path) -> None:
-    with MissionRecord(run / 'mission.jsonl') as mission:
+    with MissionRecord(run / 'events.jsonl') as mission:
         for second in range(100, 200):
             mission.write('failure', float(second), what='MOVE', reason='shut')
     text = write_report(run).read_text()
@@ -159,12 +160,12 @@ def test_what_failed_again_and_again_is_one_row_of_the_report(run: Path) -> None
 
 
 def test_the_report_of_a_long_mission_counts_all_and_says_what_it_lists(run: Path) -> None:
-    with MissionRecord(run / 'mission.jsonl', segment_bytes=4000) as mission:
+    with MissionRecord(run / 'events.jsonl', segment_bytes=4000) as mission:
         for second in range(3600, 8000, 20):
             mission.write('visit', float(second), place='C2', distance=5.0)
             mission.write('recharge', float(second) + 10.0, place='E', seconds=5.0)
         mission.write('failure', 8000.0, what='MOVE', reason='shut')
-    assert list(run.glob('mission.jsonl.*.gz'))
+    assert list(run.glob('events.jsonl.*.gz'))
     text = write_report(run).read_text()
     assert 'Recharges (221)' in text
     assert 'Visits (221)' in text
@@ -175,7 +176,7 @@ def test_the_report_of_a_long_mission_counts_all_and_says_what_it_lists(run: Pat
     assert '<td>2:13:20</td><td>MOVE</td><td>shut</td>' in text  # by the mission's own time
     plan = read_place_file(run / 'place.yaml').plan
     assert plan is not None
-    assert 'the ways of the last 0.' in run_of(read(run / 'mission.jsonl'), plan.place, '').summary
+    assert 'the ways of the last 0.' in run_of(read(run / 'events.jsonl'), plan.place, '').summary
 
 
 def test_the_commands_find_runs_and_say_what_is_wrong(
@@ -213,18 +214,18 @@ def test_a_recording_that_cannot_be_repaired_keeps_no_report_back(
 def test_a_run_is_found_by_what_it_holds_and_not_by_a_wrong_name(
     run: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    assert find_run(str(run / 'mission.jsonl'), run.parent) == run
+    assert find_run(str(run / 'events.jsonl'), run.parent) == run
     monkeypatch.chdir(run)  # the folder of a run itself
     with pytest.raises(FileError, match='nowhere'):
         find_run('nowhere', run.parent)
     (other := run.with_name('20260102-000000')).mkdir()
-    (other / 'mission.jsonl').touch()
+    (other / 'events.jsonl').touch()
     with pytest.raises(FileError, match=f'e.g. {run.name}, or last'):
         find_run('20260101-00000', run.parent)
 
 
 def test_a_run_without_a_visit_has_no_report(run: Path) -> None:
-    (run / 'mission.jsonl').write_text('')
+    (run / 'events.jsonl').write_text('')
     with pytest.raises(FileError, match='no visit was recorded'):
         write_report(run)
 

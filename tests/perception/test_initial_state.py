@@ -153,10 +153,10 @@ def test_an_arm_that_takes_a_scan_and_says_nothing_holds_nothing_up(
 def test_a_scan_whose_node_was_killed_goes_on_where_it_was(graph: Any, tmp_path: Path) -> None:
     robot = Robot(graph, {1: [11, 12, 13], 2: [14, 15, 16, 17]})
     graph.add(MarkerServer)
-    options = {'robot_room': 'E', 'patience': 0.3, 'record': str(tmp_path / 'mission.jsonl')}
+    options = {'robot_room': 'E', 'patience': 0.3, 'record': str(tmp_path / 'events.jsonl')}
     first = graph.add(InitialState, parameters=options)
     robot.start()
-    kept = tmp_path / 'mission.jsonl.survey.json'
+    kept = tmp_path / 'events.jsonl.survey.json'
     graph.until(lambda: kept.exists() and '"poses": [1]' in kept.read_text())
     graph.remove(first)
     done = len(robot.poses)
@@ -178,8 +178,8 @@ def test_a_scan_whose_node_was_killed_goes_on_where_it_was(graph: Any, tmp_path:
 def test_what_was_found_and_is_damaged_counts_for_nothing(
     graph: Any, tmp_path: Path, damage: str
 ) -> None:
-    (tmp_path / 'mission.jsonl.survey.json').write_text(damage)
-    node = graph.add(InitialState, parameters={'record': str(tmp_path / 'mission.jsonl')})
+    (tmp_path / 'events.jsonl.survey.json').write_text(damage)
+    node = graph.add(InitialState, parameters={'record': str(tmp_path / 'events.jsonl')})
     assert node._survey.to_json() == {'notes': {}}
     assert node._progress.poses == []
 

@@ -1,12 +1,7 @@
-"""What happened on a mission, one JSON object per line, and the summary printed at its end.
+"""What a mission's entries of the log add up to: its summary, and where it was cut off.
 
-A record has to outlive whoever writes it: every line goes to the operating system in one
-piece as soon as it is known, so a process that is killed loses nothing, and a machine that
-loses power loses at most the line it was writing. A reader skips such a torn line, and the
-next writer cuts it off before it goes on.
-
-Each line holds ``event`` (one of :data:`EVENTS`), ``time`` (seconds on the mission's clock)
-and the event's own fields::
+The behaviour writes them (`MissionRecord`), in the form that `surveillance_runtime.event_log`
+describes. Some of their fields::
 
     {"event": "start", "time": 0.0, "machine": "surveillance", "place": "E", "places": ["C1", "E"]}
     {"event": "exploring", "time": 1.0, "place": "E", "seconds": 1.0}
@@ -23,10 +18,7 @@ looked at a picture of it. ``promises`` says what can be kept of each place:
 ``place``, ``verdict``, ``words``, and ``threshold`` and ``wait`` in seconds, null where they have
 no end.
 
-A record of a month stays small to read: a file that has grown to :data:`SEGMENT_BYTES` is packed as
-``FILE.0001.gz``, ``FILE.0002.gz``, ..., and the new one begins with a ``snapshot`` of all that was
-counted. `read` takes the last file only, which tells how the mission stands and sums up all of it;
-`read_all` gives every event.
+A file that has grown is packed away, and the next one begins with a ``snapshot`` of the `Account`.
 
 To go on with a mission (``launch.py --resume``), hand the same file to `robot_behavior` and
 `reasoner` as the parameter ``record``: the one goes on where `MissionRecord.left_at` says, and the
@@ -42,115 +34,58 @@ before the robot has looked where it is, what the rules allow now, and whether i
 from __future__ import annotations
 
 import dataclasses
-import glob
-import gzip
-import json
 import math
-import os
-import shutil
-import zlib
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 from patrol_policy.decision import RECHARGE
 from patrol_policy.promises import Promise
-from state_machines.files import parse_json
-from surveillance_runtime.files import FileError, LineFile, read_file
-
-EVENTS: Mapping[str, tuple[str, ...]] = {
-    'start': ('machine', 'place', 'places'),
-    'map': ('places',),
-    'exploring': ('place', 'seconds'),
-    'viewpoint': ('place', 'point'),
-    'look': ('place', 'sides', 'left_out'),
-    'verify': ('place', 'number', 'found'),
-    'visit': ('place', 'distance'),
-    'decision': ('place', 'rule', 'reason'),
-    'recharge': ('place', 'seconds'),
-    'promises': ('places',),
-    'failure': ('what', 'reason'),
-    'end': (),
-    'snapshot': ('account',),
-}
-"""The events of a record with the fields each must have, beside ``event`` and ``time``."""
-_NUMBERS = frozenset({'distance', 'seconds'})
-"""Which of the fields are numbers, metres and seconds."""
-
-
-A_DATE = 1e9
-"""From here on, in seconds, a time is a date of a machine's clock; a simulation counts from 0."""
-SEGMENT_BYTES = 4_000_000
-"""Size from which on a record's file is packed away and a new one begun."""
-MOST_WAITING = 4_000_000
-"""Bytes of events that wait until the disk takes more; of more than these the newest."""
-LARGEST = 1_000_000_000
-"""Bytes of a record's file that are read at most."""
-
-
-@dataclass(frozen=True)
-class Event:
-    """One line of a record.
-
-    Attributes:
-        name: One of :data:`EVENTS`.
-        time: Seconds on the mission's clock.
-        fields: The event's own fields.
-    """
-
-    name: str
-    time: float
-    fields: Mapping[str, object]
-
-    def text(self, key: str) -> str:
-        """Return the field ``key`` as text."""
-        return str(self.fields[key])
-
-    def number(self, key: str) -> float:
-        """Return the field ``key`` as a number."""
-        return float(str(self.fields[key]))
-
-    def names(self, key: str) -> tuple[str, ...]:
-        """Return the field ``key`` as a sequence of names."""
-        value = self.fields[key]
-        return tuple(str(name) for name in value) if isinstance(value, list) else ()
+from surveillance_runtime.event_log import (
+    A_DATE,
+    CLOCKS,
+    SEGMENT_BYTES,
+    Clocks,
+    EventLog,
+    RecordEntry,
+    clock_step,
+    of_mission,
+    read,
+)
+from surveillance_runtime.files import FileError
 
 
 class MissionRecord:
-    """Appends events to a record file, each in one write.
+    """Writes what happens on a mission, and knows what it adds up to.
 
     Args:
-        path: The file; made with its directory when missing, continued when it exists.
-        segment_bytes: Size from which on it is packed away and a new one begun.
+        path: The log; made with its folder when missing, continued when it exists.
+        segment_bytes: Size from which on its file is packed away and a new one begun.
+        clocks: Those of the machine.
 
     Attributes:
-        path: The file.
-        problem: Why nothing is known of what the file holds already; empty: it is known.
+        path: The log.
+        problem: Why nothing is known of what the log holds already; empty: it is known.
 
     Raises:
-        FileError: The file cannot be opened for writing.
+        FileError: The log cannot be opened for writing.
     """
 
-    def __init__(self, path: str | Path, segment_bytes: int = SEGMENT_BYTES) -> None:
-        self.path = Path(path)
+    def __init__(
+        self,
+        path: str | Path,
+        segment_bytes: int = SEGMENT_BYTES,
+        clocks: Clocks = CLOCKS,
+    ) -> None:
+        self._log = EventLog(path, clocks)
+        self.path = self._log.path
         self._segment_bytes = segment_bytes
         self._account = Account()
-        self._waiting, self._lost = b'', ''
-        self._next = self.path.with_name(self.path.name + '.next')
-        try:
-            self.path.parent.mkdir(parents=True, exist_ok=True)
-            if self._next.exists() and not self.path.exists():
-                # A writer was killed between the two steps of a change of files.
-                os.replace(self._next, self.path)
-            self._file = LineFile(self.path)
-            content = self.path.read_bytes()
-        except OSError as error:
-            raise FileError(f'cannot write the mission record {path}: {error.strerror}') from None
         self.problem = ''
         try:
-            self._account = account_of(_events(content, f'{self.path}'))
+            self._account = account_of(read(self.path))
         except FileError as error:
             self.problem = str(error)
 
@@ -169,130 +104,33 @@ class MissionRecord:
         """What was looked at in each place."""
         return self._account.looked
 
-    def write(self, name: str, time: float, **fields: object) -> None:
-        """Append one event, after those that the disk did not take before.
+    def write(self, name: str, time: float, /, **fields: object) -> None:
+        """Append one entry, after those that the disk did not take before.
 
         Args:
-            name: One of :data:`EVENTS`.
+            name: One of `event_log.KINDS`.
             time: Seconds on the mission's clock.
-            fields: The event's own fields; those of :data:`EVENTS` are required.
+            fields: The entry's own fields.
 
         Raises:
-            FileError: Unknown event, a required field is missing, or the file takes no more: then
-                the event waits for the next one.
+            FileError: Unknown kind, a required field is missing, or the file takes no more: then
+                the entry waits for the next one.
         """
-        _check(name, fields, f'{self.path}')
-        line = json.dumps({'event': name, 'time': round(time, 3), **fields}) + '\n'
-        self._account.take(Event(name, round(time, 3), json.loads(line)))
-        self._waiting += line.encode()
-        try:
-            size = self._file.append(self._waiting)
-        except OSError as error:
-            if len(self._waiting) > MOST_WAITING:
-                self._waiting = self._waiting[-MOST_WAITING:].partition(b'\n')[2]
-                self._lost = '; the oldest events that waited for it are lost'
-            raise FileError(
-                f'cannot write the mission record {self.path}: {error.strerror}{self._lost}'
-            ) from None
-        self._waiting, self._lost = b'', ''
-        if size >= self._segment_bytes:
-            self._begin_segment(time)
-
-    def _begin_segment(self, time: float) -> None:
-        """Pack the file away and begin a new one; if that cannot be done now, it is done later."""
-        snapshot = {'event': 'snapshot', 'time': round(time, 3), 'account': self._account.to_json()}
-        number = 1 + len(_segments(self.path))
-        packed = self.path.with_name(f'{self.path.name}.{number:04}.gz')
-        try:
-            with open(self.path, 'rb') as old, gzip.open(packed, 'wb', 6) as new:
-                shutil.copyfileobj(old, new)
-            self._next.write_text(json.dumps(snapshot) + '\n', encoding='utf-8')
-            file = LineFile(self._next)
-            os.replace(self._next, self.path)
-        except OSError:
-            packed.unlink(missing_ok=True)
-            return
-        self._file.close()
-        self._file = file
+        entry = self._log.entry(name, time, **fields)
+        self._account.take(entry)
+        if self._log.append(entry) >= self._segment_bytes:
+            account = self._account.to_json()
+            self._log.begin_segment(self._log.entry('snapshot', time, account=account))
 
     def close(self) -> None:
         """Close the file; nothing is lost without it."""
-        self._file.close()
+        self._log.close()
 
     def __enter__(self) -> MissionRecord:
         return self
 
     def __exit__(self, *_: object) -> None:
         self.close()
-
-
-def _check(name: str, fields: Mapping[str, object], where: str) -> None:
-    if name not in EVENTS:
-        raise FileError(f'{where}: unknown event {name!r}, expected one of {", ".join(EVENTS)}')
-    missing = [key for key in EVENTS[name] if key not in fields]
-    if missing:
-        raise FileError(f'{where}: event {name!r} lacks {", ".join(missing)}')
-    for key in _NUMBERS.intersection(EVENTS[name]):
-        try:
-            found = math.isfinite(float(str(fields[key])))
-        except ValueError:
-            found = False
-        if not found:
-            shown = str(fields[key])[:40]
-            raise FileError(f'{where}: event {name!r}: {key} is {shown!r}, expected a number')
-
-
-def read(path: str | Path) -> list[Event]:
-    """Read a record, without an unfinished last line.
-
-    Raises:
-        FileError: The file cannot be read, or a finished line is not an event.
-    """
-    try:
-        content = read_file(Path(path), LARGEST)
-    except FileError as error:
-        raise FileError(f'cannot read the mission record {error}') from None
-    return list(_events(content, f'{path}'))
-
-
-def read_all(path: str | Path) -> Iterator[Event]:
-    """Give every event of a record, those that were packed away too, one file at a time.
-
-    Raises:
-        FileError: A file cannot be read, or a finished line is not an event.
-    """
-    for packed in _segments(Path(path)):
-        try:
-            content = gzip.decompress(packed.read_bytes())
-        except (OSError, EOFError, zlib.error) as error:
-            raise FileError(f'cannot read the mission record {packed}: {error}') from None
-        yield from (e for e in _events(content, f'{packed}') if e.name != 'snapshot')
-    yield from (event for event in read(path) if event.name != 'snapshot')
-
-
-def _segments(path: Path) -> list[Path]:
-    return sorted(path.parent.glob(glob.escape(path.name) + '.[0-9][0-9][0-9][0-9]*.gz'))
-
-
-def _events(content: bytes, where: str) -> Iterator[Event]:
-    for number, line in enumerate(content.split(b'\n')[:-1], start=1):
-        if line.strip():
-            yield _event(line, f'{where}:{number}')
-
-
-def _event(line: bytes, where: str) -> Event:
-    try:
-        values = parse_json(line)
-        name, time = str(values.pop('event')), float(values.pop('time'))
-        if not math.isfinite(time):
-            raise ValueError
-    except (ValueError, KeyError, TypeError, AttributeError, OverflowError):
-        shown = line.decode(errors='replace')[:60]
-        raise FileError(
-            f'{where}: expected a JSON object with event and time, got {shown!r}'
-        ) from None
-    _check(name, values, where)
-    return Event(name, time, values)
 
 
 @dataclass
@@ -398,7 +236,7 @@ def side_name(bearing: int, point: Sequence[float] | None) -> str:
     return f'{bearing}' if point is None else f'{bearing} from {stand_name(point)}'
 
 
-def _looked_at(event: Event) -> list[str]:
+def _looked_at(event: RecordEntry) -> list[str]:
     """Return what an event tells to have been looked at."""
     fields, at = event.fields, None
     if isinstance(check := fields.get('check'), str):
@@ -414,12 +252,12 @@ def _looked_at(event: Event) -> list[str]:
 
 @dataclass
 class Account:
-    """What is counted and known of a mission while its events are taken one by one.
+    """What is counted and known of a mission while its entries are taken one by one.
 
     Attributes:
         summary: Counts, without the waits that go on.
         last_seen: Since when each place waits, seconds.
-        now: Time of the last event; None: there was none.
+        last: The last entry; None: there was none.
         left_at: Where the mission stands; None: it ended as told, or never began.
         visits: When the robot was in each place last, seconds on the present clock.
         looked: What was looked at in each place.
@@ -427,12 +265,12 @@ class Account:
 
     summary: Summary = field(default_factory=Summary)
     last_seen: dict[str, float] = field(default_factory=dict)
-    now: float | None = None
+    last: RecordEntry | None = None
     left_at: CutOff | None = None
     visits: dict[str, float] = field(default_factory=dict)
     looked: Looked = field(default_factory=Looked)
 
-    def take(self, event: Event) -> None:
+    def take(self, event: RecordEntry) -> None:
         """Count one event.
 
         Raises:
@@ -440,18 +278,19 @@ class Account:
         """
         if event.name == 'snapshot':
             self._restore(event.fields['account'])
-            self.now = event.time
+            self.last = event
             return
-        summary, before = self.summary, event.time if self.now is None else self.now
+        summary, last = self.summary, event if self.last is None else self.last
+        before, self.last = last.time, event
+        step = clock_step(last, event)
         if is_other_simulation(before, event.time):
-            _close_gaps(summary, self.last_seen, self.now)
+            _close_gaps(summary, self.last_seen, before)
             self.last_seen = dict.fromkeys(summary.visits, event.time)
             self.left_at = None
         else:
-            summary.seconds += max(0.0, event.time - before)
-            self.last_seen = on_present_clock(self.last_seen, before, event.time)
-        self.visits = on_present_clock(self.visits, before, event.time)
-        self.now = event.time
+            summary.seconds += max(0.0, event.time - before - step)
+            self.last_seen = on_present_clock(self.last_seen, before, event.time, step)
+        self.visits = on_present_clock(self.visits, before, event.time, step)
         _count(summary, event, self.last_seen)
         if event.name == 'visit':
             self.visits[event.text('place')] = event.time
@@ -460,6 +299,11 @@ class Account:
         self.left_at = _after(self.left_at, event)
         if self.left_at is not None:
             self.left_at = replace(self.left_at, time=event.time)
+
+    @property
+    def now(self) -> float | None:
+        """Time of the last entry; None: there was none."""
+        return None if self.last is None else self.last.time
 
     def to_json(self) -> dict[str, object]:
         """Return everything, for a snapshot."""
@@ -505,18 +349,27 @@ def is_other_simulation(before: float, now: float) -> bool:
     return now < min(before, A_DATE)
 
 
-def on_present_clock(times: Mapping[str, float], before: float, now: float) -> dict[str, float]:
+def on_present_clock(
+    times: Mapping[str, float], before: float, now: float, step: float | None = None
+) -> dict[str, float]:
     """Return times by a clock that has gone from one time to another.
 
-    A machine's clock that was set back takes them with it. Of what was on the clock of another
+    A machine's clock that was set takes them with it. Of what was on the clock of another
     simulation, nothing is known.
+
+    Args:
+        times: By the clock as it was.
+        before, now: Two times of it, seconds.
+        step: By how much it was set in between, seconds, see `event_log.clock_step`;
+            None: nobody knows, and one that has gone back was set by that much.
     """
     if is_other_simulation(before, now):
         return {name: at for name, at in times.items() if at <= now}
-    return {name: at - max(0.0, before - now) for name, at in times.items()}
+    by = min(0.0, now - before) if step is None else step
+    return {name: at + by for name, at in times.items()}
 
 
-def last_promises(events: Iterable[Event]) -> tuple[Promise, ...]:
+def last_promises(events: Iterable[RecordEntry]) -> tuple[Promise, ...]:
     """Return what was said last of what can be kept; may be empty."""
     found: tuple[Promise, ...] = ()
     for event in events:
@@ -539,28 +392,28 @@ def _promise(kept: Any) -> Promise | None:
     return Promise(str(kept['place']), str(kept['verdict']), threshold, wait, str(kept['words']))
 
 
-def account_of(events: Iterable[Event]) -> Account:
+def account_of(events: Iterable[RecordEntry]) -> Account:
     """Count a record."""
     account = Account()
-    for event in events:
+    for event in of_mission(events):
         account.take(event)
     return account
 
 
-def summarize(events: Iterable[Event]) -> Summary:
+def summarize(events: Iterable[RecordEntry]) -> Summary:
     """Sum up a record.
 
     The time a place went unvisited runs from start to first visit, from visit to visit, and from
     the last visit to the end. When another simulation writes to the same file, the events from
     there on count as a mission of their own and their times add up. A machine's clock that is set
-    back adds nothing, and no wait ends.
+    changes neither what it took nor how long a place waited.
     """
     account = account_of(events)
     _close_gaps(account.summary, account.last_seen, account.now)
     return account.summary
 
 
-def _count(summary: Summary, event: Event, last_seen: dict[str, float]) -> None:
+def _count(summary: Summary, event: RecordEntry, last_seen: dict[str, float]) -> None:
     if isinstance(threshold := event.fields.get('urgency_threshold'), int | float):
         summary.threshold = float(threshold)
     match event.name:
@@ -586,7 +439,7 @@ def _count(summary: Summary, event: Event, last_seen: dict[str, float]) -> None:
 
 
 def _count_places(
-    summary: Summary, places: set[str], event: Event, last_seen: dict[str, float]
+    summary: Summary, places: set[str], event: RecordEntry, last_seen: dict[str, float]
 ) -> None:
     """Count the places that there are from now on; nobody waits for those that went."""
     for place in [place for place in last_seen if place not in places]:
@@ -645,12 +498,12 @@ class CutOff:
         return ', '.join(parts)
 
 
-def cut_off(events: Iterable[Event]) -> CutOff | None:
+def cut_off(events: Iterable[RecordEntry]) -> CutOff | None:
     """Return where the last mission of a record stood; None: it ended as told, or never began."""
     return account_of(events).left_at
 
 
-def _after(known: CutOff | None, event: Event) -> CutOff | None:
+def _after(known: CutOff | None, event: RecordEntry) -> CutOff | None:
     match event.name:
         case 'end':
             return None

@@ -7,10 +7,10 @@ from pathlib import Path
 
 from surveillance_operator.recording.reading import SUFFIX, files_of
 from surveillance_runtime.command_line import CommandParser
+from surveillance_runtime.event_log import record_in
 from surveillance_runtime.files import (
     LAUNCH_LOG,
     PLACE,
-    RECORD,
     RECORDING,
     TIMELINE,
     FileError,
@@ -109,18 +109,16 @@ def robots_of(folder: Path) -> dict[str, Path]:
 
     One of a fleet that left nothing but its copy of the place is named, too.
     """
-    if _is_of_robot(folder):
-        return {'': folder}
-    if not any((folder / file).is_file() for file in (PLACE, LAUNCH_LOG)):
-        return {}
-    below = sorted(folder.iterdir())
-    if not any(map(_is_of_robot, below)):
-        return {}
-    return {own.name: own for own in below if _is_of_robot(own) or (own / PLACE).is_file()}
+    # What a fleet shares has a log of its own in the folder of the run.
+    if any((folder / file).is_file() for file in (PLACE, LAUNCH_LOG)):
+        below = sorted(folder.iterdir())
+        if any(map(_is_of_robot, below)):
+            return {own.name: own for own in below if _is_of_robot(own) or (own / PLACE).is_file()}
+    return {'': folder} if _is_of_robot(folder) else {}
 
 
 def _is_of_robot(folder: Path) -> bool:
-    return any((folder / file).is_file() for file in (TIMELINE, RECORD))
+    return (folder / TIMELINE).is_file() or record_in(folder).is_file()
 
 
 def run_parser(name: str, description: str) -> CommandParser:

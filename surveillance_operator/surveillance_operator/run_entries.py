@@ -1,0 +1,137 @@
+"""What happened on a robot's run, as reports and replays read it, also of an older version."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from surveillance_operator.map_command import counted
+from surveillance_runtime.event_log import (
+    RecordEntry,
+    on_one_clock,
+    read,
+    read_all,
+    record_in,
+)
+
+OLD_INCIDENTS = 'incidents.jsonl'
+"""Where an earlier version kept what the log has now."""
+
+
+@dataclass(frozen=True)
+class RunEntries:
+    """The entries of a run.
+
+    Attributes:
+        entries: On one clock, so that what lies between two of them is how long it took.
+        passed: How many lines of which kind were passed over.
+    """
+
+    entries: list[RecordEntry]
+    passed: Mapping[str, int]
+
+    @property
+    def of_mission(self) -> list[RecordEntry]:
+        """Those that the behaviour wrote."""
+        return [each for each in self.entries if each.kind.is_of_mission]
+
+    def problem(self) -> str:
+        """Return what is not in it; empty: nothing."""
+        if not self.passed:
+            return ''
+        kinds = ', '.join(f'{name} {count}' for name, count in sorted(self.passed.items()))
+        lines = counted(sum(self.passed.values()), 'line')
+        return f'{lines} of the record passed over, which this version does not know: {kinds}'
+
+
+def entries_of_run(folder: Path, *, whole: bool = False) -> RunEntries:
+    """Return what happened to a robot.
+
+    Args:
+        folder: Of its run.
+        whole: Whether what was packed away is read, too.
+
+    Raises:
+        FileError: There is no log, or it cannot be read.
+    """
+    path, passed = record_in(folder), Counter[str]()
+    found = list(read_all(path, passed)) if whole else read(path, passed)
+    old = list(_old_incidents(folder / OLD_INCIDENTS, passed))
+    return RunEntries([*old, *on_one_clock(found)], passed)
+
+
+def _old_incidents(path: Path, passed: Counter[str]) -> Iterator[RecordEntry]:
+    """Give the incidents of a run of an earlier version, whose clock the log does not share."""
+    try:
+        lines = path.read_bytes().splitlines()
+    except OSError:
+        return
+    for number, line in enumerate(lines):
+        try:
+            told = json.loads(line)
+            at, lasted = float(told['at']), told['seconds']
+            fields = {key: str(told[key]) for key in ('node', 'kind', 'name', 'severity', 'text')}
+        except (ValueError, KeyError, TypeError):
+            passed['incident'] += 1
+            continue
+        phase = 'begin' if lasted is None else 'end'
+        more = {'id': f'{fields["node"]} {fields["kind"]} {fields["name"]}', 'phase': phase}
+        if lasted is not None:
+            more['seconds'] = lasted
+        yield RecordEntry('incident', math.nan, {**fields, **more, 'line': number}, at)
+
+
+@dataclass(frozen=True)
+class PastIncident:
+    """An incident as the log tells it.
+
+    Attributes:
+        at: When it began, seconds since 1970.
+        cause: What it was about.
+        severity: How much it mattered, at its worst.
+        text: What was said of it.
+        lasted: For how long, seconds; None: it goes on.
+        calls: How often somebody was called.
+    """
+
+    at: float
+    cause: str
+    severity: str
+    text: str
+    lasted: float | None = None
+    calls: int = 0
+
+
+def incidents_of(entries: Iterable[RecordEntry]) -> list[PastIncident]:
+    """Return the incidents of a run, in the order in which they began."""
+    found: list[dict[str, Any]] = []
+    begun: dict[str, dict[str, Any]] = {}
+    for entry in entries:
+        if entry.name != 'incident':
+            continue
+        phase, number = entry.text('phase'), entry.text('id')
+        if phase == 'begin' or number not in begun:
+            if phase == 'end':
+                continue  # its beginning is in a file that was packed away
+            begun[number] = {
+                'at': entry.at or 0.0,
+                'cause': f'{entry.text("kind")} {entry.text("name")}',
+                'severity': entry.text('severity'),
+                'text': entry.text('text'),
+            }
+            found.append(begun[number])
+        if phase == 'call':
+            begun[number]['calls'] = begun[number].get('calls', 0) + 1
+            begun[number]['severity'] = entry.text('severity')
+        elif phase == 'end':
+            begun.pop(number)['lasted'] = _number(entry.fields.get('seconds'))
+    return [PastIncident(**each) for each in found]
+
+
+def _number(value: object) -> float | None:
+    return float(value) if isinstance(value, int | float) else None

@@ -1,0 +1,602 @@
+"""What happened on a run: a log for each robot, to which whoever owns a fact appends its line.
+
+The behaviour writes visits and decisions, the launcher restarts, the observer what it found, the
+node `alarm` incidents and parameters. Each of them appends its own lines:
+
+    log = EventLog(folder / RECORD)
+    log.write('restart', node='observer', why='killed by SIGKILL')
+
+A line is a JSON object. It holds ``event`` (one of :data:`KINDS`), ``time`` (seconds on the
+mission's clock, which is that of a simulation where there is one), ``at`` (seconds since 1970),
+``steady`` (seconds since the machine was started, which no setting of a clock changes) and the
+kind's own fields::
+
+    {"event": "visit", "time": 9.4, "at": 1767222009.4, "steady": 811.2, "place": "C1",
+     "distance": 5.4}
+
+Several processes append rather than one that hears of everything on topics: a line goes to the
+operating system in one piece before its owner goes on, so that a process that is killed, the
+owner's or any other, loses nothing of what was known. A lock of the file keeps lines whole: who
+holds it may cut off a torn line or pack the file away. It is never waited for long. A machine that
+loses power loses at most the line that it was writing.
+
+The log of a month stays small to read: a file that has grown is packed as ``FILE.0001.gz``,
+``FILE.0002.gz``, ..., and the new one begins with a ``snapshot`` of all that was counted
+(`EventLog.begin_segment`). `read` takes the last file only; `read_all` gives every entry.
+
+A reader passes over kinds that it does not know, and counts them: they are of a later version.
+"""
+
+from __future__ import annotations
+
+import errno
+import fcntl
+import glob
+import gzip
+import json
+import math
+import os
+import shutil
+import threading
+import time
+import zlib
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import NamedTuple
+
+from state_machines import files
+from state_machines.files import parse_json
+from surveillance_runtime.files import FileError, read_file
+
+
+@dataclass(frozen=True)
+class Section:
+    """How a report lists the entries of a kind.
+
+    Attributes:
+        title: Of the list.
+        columns: The fields that it shows, the last one in words.
+        is_open: Whether the list is unfolded.
+    """
+
+    title: str
+    columns: tuple[str, ...]
+    is_open: bool = False
+
+
+@dataclass(frozen=True)
+class Kind:
+    """One kind of entry.
+
+    Attributes:
+        fields: Those that each entry has.
+        numbers: Which of them are numbers, metres or seconds.
+        is_of_mission: Whether the behaviour writes it, so that the mission's clock and what is
+            counted of the mission follow from it.
+        section: How a report lists it; None: it tells of it in another way, or not at all.
+        words: The fields that say in one line what happened, the first as its subject; none: it is
+            not told in the time line of a fleet.
+        mark: What a replay calls it that can jump to it; empty: it cannot.
+    """
+
+    fields: tuple[str, ...]
+    numbers: frozenset[str] = frozenset()
+    is_of_mission: bool = True
+    section: Section | None = None
+    words: tuple[str, ...] = ()
+    mark: str = ''
+
+
+KINDS: Mapping[str, Kind] = {
+    'start': Kind(('machine', 'place', 'places')),
+    'map': Kind(('places',)),
+    'exploring': Kind(('place', 'seconds'), frozenset({'seconds'})),
+    'viewpoint': Kind(('place', 'point')),
+    'look': Kind(('place', 'sides', 'left_out')),
+    'verify': Kind(('place', 'number', 'found')),
+    'recharge': Kind(
+        ('place', 'seconds'),
+        frozenset({'seconds'}),
+        section=Section('Recharges', ('place', 'seconds'), is_open=True),
+        words=('place', 'seconds'),
+        mark='recharge',
+    ),
+    'failure': Kind(
+        ('what', 'reason'),
+        section=Section('Failures', ('what', 'reason'), is_open=True),
+        words=('what', 'reason'),
+        mark='failure',
+    ),
+    'decision': Kind(
+        ('place', 'rule', 'reason'),
+        section=Section('Decisions', ('place', 'rule', 'reason')),
+        words=('place', 'rule', 'reason'),
+        mark='decision',
+    ),
+    'visit': Kind(
+        ('place', 'distance'),
+        frozenset({'distance'}),
+        section=Section('Visits', ('place', 'distance')),
+        words=('place',),
+    ),
+    'promises': Kind(('places',)),
+    'end': Kind(()),
+    'snapshot': Kind(('account',)),
+    'incident': Kind(
+        ('id', 'phase', 'node', 'kind', 'name', 'severity', 'text'), is_of_mission=False
+    ),
+    'finding': Kind(('number', 'kind', 'seen', 'place', 'state', 'severity'), is_of_mission=False),
+    'answer': Kind(
+        ('line', 'answer'), is_of_mission=False, section=Section('Answers', ('line', 'answer'))
+    ),
+    'restart': Kind(
+        ('node', 'why'), is_of_mission=False, section=Section('Restarts', ('node', 'why'))
+    ),
+    'parameter': Kind(
+        ('node', 'name', 'value'),
+        is_of_mission=False,
+        section=Section('Parameters changed', ('node', 'name', 'value')),
+    ),
+}
+"""Every kind of entry. A new one is an entry here: the check of its fields, the lists of the
+report, the time line of a fleet and the marks of a replay follow from it."""
+
+RECORD, OLD_RECORD = 'events.jsonl', 'mission.jsonl'
+"""The log in the folder of a robot's run, and how it was called when it was the mission's alone."""
+SEGMENT_BYTES = 4_000_000
+"""Size from which on a log's file is packed away and a new one begun."""
+MOST_WAITING = 4_000_000
+"""Bytes of entries that wait until the disk takes more; of more than these the newest."""
+LARGEST = 1_000_000_000
+"""Bytes of a log's file that are read at most."""
+LOCK_PATIENCE = 0.5
+"""How long another process that writes is waited for, seconds; after that the entry waits."""
+A_DATE = 1e9
+"""From here on, in seconds, a time is a date of a machine's clock; a simulation counts from 0."""
+SAME_CLOCK = 60.0
+"""A mission's time is the machine's where it differs by less from it, seconds; else a simulation
+counts it, whose clock no machine sets."""
+LEAST_STEP = 0.5
+"""A clock that differs from the steady one by less was not set, seconds: it is slewed, or the two
+were read apart."""
+
+
+@dataclass(frozen=True)
+class RecordEntry:
+    """One line of a log.
+
+    Attributes:
+        name: One of :data:`KINDS`.
+        time: Seconds on the mission's clock.
+        fields: The entry's own fields.
+        at: Seconds since 1970; None: an old log does not say.
+        steady: Seconds since the machine was started; None: not known.
+        boot: Which start of the machine that is; empty: that of the line before.
+    """
+
+    name: str
+    time: float
+    fields: Mapping[str, object]
+    at: float | None = None
+    steady: float | None = None
+    boot: str = ''
+
+    @property
+    def kind(self) -> Kind:
+        """What is known of entries like this."""
+        return KINDS[self.name]
+
+    def text(self, key: str) -> str:
+        """Return the field ``key`` as text."""
+        return str(self.fields[key])
+
+    def number(self, key: str) -> float:
+        """Return the field ``key`` as a number."""
+        return float(str(self.fields[key]))
+
+    def names(self, key: str) -> tuple[str, ...]:
+        """Return the field ``key`` as a sequence of names."""
+        value = self.fields[key]
+        return tuple(str(name) for name in value) if isinstance(value, list) else ()
+
+
+# --- writing ---
+
+
+def steady_now() -> float:
+    """Return the seconds since the machine was started, those that it slept included."""
+    return time.clock_gettime(time.CLOCK_BOOTTIME)
+
+
+class Clocks(NamedTuple):
+    """What tells the time of an entry.
+
+    Attributes:
+        wall: Returns the seconds since 1970.
+        steady: Returns the seconds since the machine was started.
+    """
+
+    wall: Callable[[], float] = time.time
+    steady: Callable[[], float] = steady_now
+
+
+CLOCKS = Clocks()
+
+
+class EventLog:
+    """Appends entries to a log that other processes append to as well; safe from any thread.
+
+    Args:
+        path: The file; made with its folder when missing, continued when it exists.
+        clocks: Those of the machine.
+
+    Attributes:
+        path: The file.
+
+    Raises:
+        FileError: The file cannot be opened for writing.
+    """
+
+    def __init__(self, path: str | Path, clocks: Clocks = CLOCKS) -> None:
+        self.path = Path(path)
+        self._clocks = clocks
+        self._lock = threading.Lock()
+        self._waiting, self._lost = b'', ''
+        self._next = self.path.with_name(self.path.name + '.next')
+        self._descriptor = -1
+        self._boot = _boot()
+        try:
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            files.file_to_write(self.path)
+            if self._next.exists() and not self.path.exists():
+                # A writer was killed between the two steps of a change of files.
+                os.replace(self._next, self.path)
+            with self._locked():
+                pass
+        except OSError as error:
+            raise FileError(f'cannot write the mission record {path}: {error.strerror}') from None
+
+    def write(self, name: str, time: float | None = None, /, **fields: object) -> RecordEntry:
+        """Append one entry, after those that the disk did not take before.
+
+        Args:
+            name: One of :data:`KINDS`.
+            time: Seconds on the mission's clock; None: who writes has none, and a reader takes that
+                of the line before.
+            fields: The entry's own fields; those of :data:`KINDS` are required.
+
+        Returns:
+            The entry, as it is read back.
+
+        Raises:
+            FileError: Unknown kind, a required field is missing, or the file takes no more: then
+                the entry waits for the next one.
+        """
+        entry = self.entry(name, time, **fields)
+        self.append(entry)
+        return entry
+
+    def entry(self, name: str, at: float | None = None, /, **fields: object) -> RecordEntry:
+        """Return an entry of now, which is not written; see `write`."""
+        check(name, fields, f'{self.path}')
+        stamp = math.nan if at is None else round(at, 3)
+        plain = json.loads(json.dumps(fields))
+        at, steady = self._clocks.wall(), self._clocks.steady()
+        return RecordEntry(name, stamp, plain, round(at, 3), round(steady, 3))
+
+    def append(self, entry: RecordEntry) -> int:
+        """Append an entry as it is; return the size of the file.
+
+        Raises:
+            FileError: The file takes no more; the entry waits for the next one.
+        """
+        with self._lock:
+            if self._boot:
+                entry, self._boot = replace(entry, boot=self._boot), ''
+            self._waiting += line_of(entry)
+            try:
+                size = self._append(self._waiting)
+            except OSError as error:
+                if len(self._waiting) > MOST_WAITING:
+                    self._waiting = self._waiting[-MOST_WAITING:].partition(b'\n')[2]
+                    self._lost = '; the oldest events that waited for it are lost'
+                raise FileError(
+                    f'cannot write the mission record {self.path}: {error.strerror}{self._lost}'
+                ) from None
+            self._waiting, self._lost = b'', ''
+            return size
+
+    def _append(self, lines: bytes) -> int:
+        with self._locked() as descriptor:
+            written = os.write(descriptor, lines)
+            size = os.fstat(descriptor).st_size
+            if written != len(lines):
+                # Nobody has written behind it: the lock is held.
+                os.ftruncate(descriptor, size - written)
+                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+            return size
+
+    @contextmanager
+    def _locked(self) -> Iterator[int]:
+        """Give the file, which nobody else changes meanwhile and which ends with a whole line.
+
+        Raises:
+            OSError: It cannot be opened, or another process holds it for too long.
+        """
+        until = time.monotonic() + LOCK_PATIENCE
+        while True:
+            if self._descriptor < 0:
+                flags = os.O_RDWR | os.O_CREAT | os.O_APPEND | os.O_CLOEXEC
+                self._descriptor = os.open(self.path, flags, 0o644)
+            descriptor = self._descriptor
+            try:
+                fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                if time.monotonic() >= until:
+                    raise
+                time.sleep(0.001)
+                continue
+            if self._is_current(descriptor):
+                break
+            self.close()  # it was packed away meanwhile
+        try:
+            _end_whole(descriptor)
+            yield descriptor
+        finally:
+            fcntl.flock(descriptor, fcntl.LOCK_UN)
+
+    def _is_current(self, descriptor: int) -> bool:
+        try:
+            there = os.stat(self.path)
+        except FileNotFoundError:
+            return False
+        return os.path.samestat(there, os.fstat(descriptor))
+
+    def begin_segment(self, first: RecordEntry) -> None:
+        """Pack the file away and begin a new one; if that cannot be done now, it is done later.
+
+        Args:
+            first: What the new file begins with: a snapshot of all that was counted.
+        """
+        number = 1 + len(segments(self.path))
+        packed = self.path.with_name(f'{self.path.name}.{number:04}.gz')
+        with self._lock:
+            try:
+                with self._locked():
+                    with open(self.path, 'rb') as old, gzip.open(packed, 'wb', 6) as new:
+                        shutil.copyfileobj(old, new)
+                    boot = replace(first, boot=_boot())
+                    self._next.write_bytes(line_of(boot))
+                    os.replace(self._next, self.path)
+            except OSError:
+                packed.unlink(missing_ok=True)
+
+    def close(self) -> None:
+        """Close the file; nothing is lost without it."""
+        if self._descriptor >= 0:
+            os.close(self._descriptor)
+            self._descriptor = -1
+
+    def __enter__(self) -> EventLog:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+
+def _end_whole(descriptor: int) -> None:
+    """Cut off a torn last line, which a machine that lost power left."""
+    size = os.fstat(descriptor).st_size
+    if not size or os.pread(descriptor, 1, size - 1) == b'\n':
+        return
+    end = size
+    while end > 0:
+        begin = max(0, end - 65536)
+        found = os.pread(descriptor, end - begin, begin).rfind(b'\n')
+        if found >= 0:
+            os.ftruncate(descriptor, begin + found + 1)
+            return
+        end = begin
+    os.ftruncate(descriptor, 0)
+
+
+def line_of(entry: RecordEntry) -> bytes:
+    """Return an entry as a line of a log."""
+    values: dict[str, object] = {'event': entry.name}
+    if not math.isnan(entry.time):
+        values['time'] = entry.time
+    if entry.at is not None:
+        values['at'] = entry.at
+    if entry.steady is not None:
+        values['steady'] = entry.steady
+    if entry.boot:
+        values['boot'] = entry.boot
+    return (json.dumps({**values, **entry.fields}) + '\n').encode()
+
+
+def _boot() -> str:
+    """Return which start of the machine this is; what is steady is so until the next one."""
+    try:
+        return Path('/proc/sys/kernel/random/boot_id').read_text('ascii').strip()[:8]
+    except OSError:
+        return 'unknown'
+
+
+# --- reading ---
+
+
+def record_in(folder: Path) -> Path:
+    """Return the log of a robot's run; a run of an earlier version goes on with the one it has."""
+    old = folder / OLD_RECORD
+    return old if old.is_file() and not (folder / RECORD).exists() else folder / RECORD
+
+
+def check(name: str, fields: Mapping[str, object], where: str) -> None:
+    """Make sure that an entry has what its kind requires.
+
+    Raises:
+        FileError: One line that says what is wrong.
+    """
+    kind = KINDS.get(name)
+    if kind is None:
+        raise FileError(f'{where}: unknown event {name!r}, expected one of {", ".join(KINDS)}')
+    missing = [key for key in kind.fields if key not in fields]
+    if missing:
+        raise FileError(f'{where}: event {name!r} lacks {", ".join(missing)}')
+    for key in kind.numbers:
+        try:
+            found = math.isfinite(float(str(fields[key])))
+        except ValueError:
+            found = False
+        if not found:
+            shown = str(fields[key])[:40]
+            raise FileError(f'{where}: event {name!r}: {key} is {shown!r}, expected a number')
+
+
+def read(path: str | Path, passed: Counter[str] | None = None) -> list[RecordEntry]:
+    """Read the last file of a log, without an unfinished last line.
+
+    Args:
+        path: The file.
+        passed: Gets how many lines of which kind are passed over: of kinds that are not known, and
+            of others' than the mission's that lack a field.
+
+    Raises:
+        FileError: The file cannot be read, or a finished line is not an entry.
+    """
+    try:
+        content = read_file(Path(path), LARGEST)
+    except FileError as error:
+        raise FileError(f'cannot read the mission record {error}') from None
+    return list(entries_of(content, f'{path}', passed))
+
+
+def read_all(path: str | Path, passed: Counter[str] | None = None) -> Iterator[RecordEntry]:
+    """Give every entry of a log, those that were packed away too, one file at a time.
+
+    Raises:
+        FileError: A file cannot be read, or a finished line is not an entry.
+    """
+    for packed in segments(Path(path)):
+        try:
+            content = gzip.decompress(packed.read_bytes())
+        except (OSError, EOFError, zlib.error) as error:
+            raise FileError(f'cannot read the mission record {packed}: {error}') from None
+        yield from (e for e in entries_of(content, f'{packed}', passed) if e.name != 'snapshot')
+    yield from (entry for entry in read(path, passed) if entry.name != 'snapshot')
+
+
+def segments(path: Path) -> list[Path]:
+    """Return the files of a log that were packed away, the oldest first."""
+    return sorted(path.parent.glob(glob.escape(path.name) + '.[0-9][0-9][0-9][0-9]*.gz'))
+
+
+def entries_of(
+    content: bytes, where: str, passed: Counter[str] | None = None
+) -> Iterator[RecordEntry]:
+    """Give the entries of a file's content, see `read`.
+
+    Raises:
+        FileError: A finished line is not an entry.
+    """
+    before, boot = 0.0, ''
+    for number, line in enumerate(content.split(b'\n')[:-1], start=1):
+        if not line.strip():
+            continue
+        entry = _entry_of(line, f'{where}:{number}', before, passed)
+        if entry is not None:
+            before, boot = entry.time, entry.boot or boot
+            yield replace(entry, boot=boot) if boot else entry
+
+
+def _entry_of(
+    line: bytes, where: str, before: float, passed: Counter[str] | None
+) -> RecordEntry | None:
+    try:
+        values = parse_json(line)
+        name = values.pop('event')
+        if not isinstance(name, str):
+            raise ValueError
+        time = _seconds(values.pop('time', before))
+        at, steady = values.pop('at', None), values.pop('steady', None)
+        at, steady = (None if each is None else _seconds(each) for each in (at, steady))
+        boot = str(values.pop('boot', ''))
+    except (ValueError, KeyError, TypeError, AttributeError, OverflowError):
+        shown = line.decode(errors='replace')[:60]
+        raise FileError(
+            f'{where}: expected a JSON object with event and time, got {shown!r}'
+        ) from None
+    kind = KINDS.get(name)
+    try:
+        if kind is not None:
+            check(name, values, where)
+    except FileError:
+        # What the mission is gone on with must be whole; the rest is told without that line.
+        if kind is None or kind.is_of_mission:
+            raise
+        kind = None
+    if kind is None:
+        if passed is not None:
+            passed[name] += 1
+        return None
+    return RecordEntry(name, time, values, at, steady, boot)
+
+
+def _seconds(value: object) -> float:
+    seconds = float(value)  # type: ignore[arg-type]  # whatever it is: a TypeError is caught
+    if not math.isfinite(seconds):
+        raise ValueError
+    return seconds
+
+
+def of_mission(entries: Iterable[RecordEntry]) -> Iterator[RecordEntry]:
+    """Give the entries that the behaviour wrote."""
+    return (entry for entry in entries if entry.kind.is_of_mission)
+
+
+# --- clocks ---
+
+
+def clock_step(before: RecordEntry, after: RecordEntry) -> float:
+    """Return by how much the mission's clock was set between two entries, seconds; 0: it was not.
+
+    Of a machine's clock the steady one says by how much, as long as the machine was not started
+    anew in between. Without it, a clock that has gone back was set by that much.
+    """
+    passed = after.time - before.time
+    if min(before.time, after.time) < A_DATE:
+        return 0.0
+    if before.boot != after.boot or not _is_of_machine(before) or not _is_of_machine(after):
+        return min(0.0, passed)
+    assert before.steady is not None
+    assert after.steady is not None
+    step = passed - max(0.0, after.steady - before.steady)
+    return step if abs(step) >= LEAST_STEP else 0.0
+
+
+def _is_of_machine(entry: RecordEntry) -> bool:
+    """Tell whether an entry's time is that of the machine, and its steady one is known."""
+    if entry.steady is None or entry.at is None:
+        return False
+    return abs(entry.time - entry.at) < SAME_CLOCK
+
+
+def on_one_clock(entries: Iterable[RecordEntry]) -> list[RecordEntry]:
+    """Return entries with their times as if the mission's clock had never been set.
+
+    So that what lies between two of them is how long it took. All are on the clock of the last one.
+    """
+    found = list(entries)
+    steps, before, total = [], None, 0.0
+    for entry in found:
+        if entry.kind.is_of_mission:
+            total += 0.0 if before is None else clock_step(before, entry)
+            before = entry
+        steps.append(total)
+    return [
+        replace(entry, time=entry.time + total - step) if total != step else entry
+        for entry, step in zip(found, steps, strict=True)
+    ]

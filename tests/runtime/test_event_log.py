@@ -1,0 +1,145 @@
+"""The log of what happened: several processes append to it, and a reader knows what it knows."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from collections import Counter
+from pathlib import Path
+
+import pytest
+
+from surveillance_behaviour.mission.mission_log import MissionRecord, summarize
+from surveillance_runtime import event_log
+from surveillance_runtime.event_log import KINDS, EventLog, check, read, read_all
+from surveillance_runtime.files import FileError
+
+pytestmark = pytest.mark.unit
+
+RESERVED = {'event', 'time', 'at', 'steady', 'boot'}
+VISIT = {'event': 'visit', 'time': 2.0, 'place': 'E', 'distance': 1.0}
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    return tmp_path / 'events.jsonl'
+
+
+@pytest.mark.parametrize(
+    'line',
+    [
+        {'event': 'incident', 'time': 1.0},
+        {'event': 'of a later version', 'time': 1.0, 'what': [1, 2]},
+        {'event': 'restart', 'node': 'observer'},
+    ],
+)
+def test_a_line_that_is_not_known_is_passed_over_and_counted(
+    path: Path, line: dict[str, object]
+) -> None:
+    path.write_text(f'{json.dumps(VISIT)}\n{json.dumps(line)}\n{json.dumps(VISIT)}\n')
+    passed: Counter[str] = Counter()
+    assert [each.name for each in read(path, passed)] == ['visit', 'visit']
+    assert passed == {line['event']: 1}
+    with MissionRecord(path) as record:
+        assert not record.problem
+        record.write('visit', 3.0, place='E', distance=1.0)
+    assert summarize(read(path)).visits == {'E': 3}
+
+
+def test_a_line_of_the_mission_that_lacks_something_is_named(path: Path) -> None:
+    path.write_text('{"event": "visit", "time": 1.0}\n')
+    with pytest.raises(FileError, match=r"jsonl:1: event 'visit' lacks place, distance"):
+        read(path)
+
+
+def test_processes_that_append_at_once_lose_no_line_over_many_files(path: Path) -> None:
+    program = (
+        'import sys\n'
+        'from surveillance_runtime.event_log import EventLog\n'
+        'log = EventLog(sys.argv[1])\n'
+        'for turn in range(300):\n'
+        '    try:\n'
+        '        log.write("restart", node=sys.argv[2], why=str(turn))\n'
+        '    except ValueError:\n'
+        '        pass  # it waits\n'
+        'while True:\n'
+        '    try:\n'
+        '        log.write("answer", line="over", answer=sys.argv[2])\n'
+        '        break\n'
+        '    except ValueError:\n'
+        '        pass\n'
+    )
+    writers = [
+        subprocess.Popen([sys.executable, '-c', program, str(path), str(number)])
+        for number in range(3)
+    ]
+    with MissionRecord(path, segment_bytes=10_000) as record:
+        record.write('start', 0.0, machine='patrol', place='E', places=['E'])
+        turn = 0
+        while any(each.poll() is None for each in writers) or turn < 300:
+            turn += 1
+            try:
+                record.write('visit', float(turn), place='E', distance=1.0)
+            except FileError:
+                continue  # it waits
+        record.write('end', float(turn + 1))
+    assert [each.wait() for each in writers] == [0, 0, 0]
+    found = list(read_all(path))
+    told = Counter(each.text('node') for each in found if each.name == 'restart')
+    assert told == {'0': 300, '1': 300, '2': 300}
+    assert sum(each.name == 'visit' for each in found) == turn
+    assert summarize(read(path)).visits == {'E': turn}
+    assert len(event_log.segments(path)) > 1
+
+
+def test_a_writer_without_a_clock_takes_the_mission_s_time(path: Path) -> None:
+    with EventLog(path) as mission, EventLog(path) as launcher:
+        mission.write('start', 7.5, machine='patrol', place='E', places=['E'])
+        launcher.write('restart', node='observer', why='killed by SIGKILL')
+    assert [(each.name, each.time) for each in read(path)] == [('start', 7.5), ('restart', 7.5)]
+
+
+def test_a_torn_line_is_cut_off_by_whoever_writes_next(path: Path) -> None:
+    with EventLog(path) as first, EventLog(path) as second:
+        first.write('restart', node='a', why='x')
+        os.truncate(path, path.stat().st_size - 3)
+        second.write('restart', node='b', why='x')
+        first.write('restart', node='c', why='x')
+    assert [each.text('node') for each in read(path)] == ['b', 'c']
+
+
+def test_what_another_process_holds_is_written_later(path: Path) -> None:
+    holder = (
+        'import fcntl, os, sys\n'
+        'descriptor = os.open(sys.argv[1], os.O_RDWR | os.O_CREAT)\n'
+        'fcntl.flock(descriptor, fcntl.LOCK_EX)\n'
+        'print("held", flush=True)\n'
+        'sys.stdin.read()\n'
+    )
+    with EventLog(path) as log:
+        with subprocess.Popen(
+            [sys.executable, '-c', holder, str(path)],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+        ) as process:
+            assert process.stdout is not None
+            assert process.stdout.readline() == 'held\n'
+            with pytest.raises(FileError, match='Resource temporarily unavailable'):
+                log.write('restart', node='a', why='x')
+        log.write('restart', node='b', why='x')
+    assert [each.text('node') for each in read(path)] == ['a', 'b']
+
+
+@pytest.mark.parametrize('name', KINDS)
+def test_each_kind_of_the_table_is_complete(name: str) -> None:
+    kind = KINDS[name]
+    assert not RESERVED & set(kind.fields)
+    assert kind.numbers <= set(kind.fields)
+    assert set(kind.words) <= set(kind.fields)
+    assert kind.section is None or set(kind.section.columns) <= set(kind.fields)
+    if kind.fields:
+        with pytest.raises(FileError, match='lacks'):
+            check(name, {}, 'here')
