@@ -15,7 +15,6 @@ is loaded and saved. Its calls are beside the same calls on an idle server. Larg
 
 from __future__ import annotations
 
-import argparse
 import os
 import random
 import statistics
@@ -33,6 +32,7 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
 from benchmarks.patrol_facts import IRI, SCHEMA, Patrol, schema
+from benchmarks.sizes import Size, sized_parser
 from owl_reasoner import write_ontology
 
 PLACE = ROOT / 'config' / 'seven_rooms.yaml'
@@ -477,23 +477,21 @@ def large(axioms: int, rounds: int) -> list[Row]:
     return found
 
 
-def rows(quick: bool) -> list[Row]:
+def rows(size: Size) -> list[Row]:
     """Return all rows of the table."""
     return [
-        *inside(200 if quick else 2000),
-        *through_ros(200 if quick else 2000),
-        *under_load(2.0 if quick else 20.0, 10_000 if quick else 100_000),
-        *large(10_000 if quick else 100_000, 5 if quick else 20),
+        *inside(size.of(2000, 200, 5)),
+        *through_ros(size.of(2000, 200, 5)),
+        *under_load(size.of(20.0, 2.0, 0.2), size.of(100_000, 10_000, 1_000)),
+        *large(size.of(100_000, 10_000, 1_000), size.of(20, 5, 1)),
     ]
 
 
 def main() -> None:
     """Print the table."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument('--quick', action='store_true', help='fewer calls')
-    options = parser.parse_args()
+    options = sized_parser(__doc__, quick='fewer calls').parse_args()
     print(f'{"call (seven rooms)":48}{"median":>12}')
-    for name, milliseconds, comparison in rows(options.quick):
+    for name, milliseconds, comparison in rows(options.size):
         print(f'{name:48}{milliseconds:9.3f} ms  {comparison}')
 
 

@@ -14,7 +14,6 @@ there that was not sent. At the end all rounds are looked at once more.
 
 from __future__ import annotations
 
-import argparse
 import os
 import random
 import statistics
@@ -30,6 +29,10 @@ from pathlib import Path
 from typing import Any
 
 ROOT = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(ROOT))
+
+from benchmarks.sizes import sized_parser
+
 IRI = 'http://bnc/exp-rob-lab/2022-23'
 ONTOLOGY = ROOT / 'surveillance_ontology' / 'surveillance_ontology' / 'data' / 'surveillance.owl'
 LIST = 5
@@ -228,12 +231,11 @@ def import_seconds() -> float:
 
 def main() -> None:
     """Run the rounds and print the table."""
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = sized_parser(__doc__, quick='8 kills')
     parser.add_argument('--kills', type=int, default=100)
     parser.add_argument('--seed', type=int, default=1)
-    parser.add_argument('--quick', action='store_true', help='8 kills')
     options = parser.parse_args()
-    kills = 8 if options.quick else options.kills
+    kills = options.size.of(options.kills, 8, 1)
     back: list[float] = []
     bare: list[float] = []
     sums = [0, 0, 0]

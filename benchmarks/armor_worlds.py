@@ -11,10 +11,10 @@ its journal and without, in turn. Last, what a program that opens the World does
 
 from __future__ import annotations
 
-import argparse
 import random
 import sqlite3
 import statistics
+import sys
 import tempfile
 import time
 from collections.abc import Callable
@@ -23,17 +23,20 @@ from typing import Any
 
 import owlready2
 
+ROOT = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(ROOT))
+
 from armor_service.access import Settings
 from armor_service.changes import AddAxiom, Change, RemoveAxiom
 from armor_service.protocol import DirectiveRequest
 from armor_service.service import ArmorService
 from armor_service.store import Journal, Store, encode
+from benchmarks.sizes import sized_parser
 from owl_reasoner.owl.axioms import Axiom, ClassAssertion, DataPropertyAssertion
 from owl_reasoner.owl.expressions import Literal
 from owl_reasoner.owl.vocabulary import XSD
 from owl_reasoner.owlready.quads import OntologyWriter
 
-ROOT = Path(__file__).resolve().parents[1]
 ONTOLOGY = ROOT / 'surveillance_ontology' / 'surveillance_ontology' / 'data' / 'surveillance.owl'
 IRI = 'http://bnc/exp-rob-lab/2022-23'
 
@@ -146,13 +149,15 @@ def beside(path: Path, **options: Any) -> str:
 
 def main() -> None:
     """Measure and print."""
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = sized_parser(__doc__)
     parser.add_argument('--rounds', type=int, default=300)
     parser.add_argument('--places', type=int, default=1000)
     options = parser.parse_args()
     with tempfile.TemporaryDirectory(dir=ROOT) as name:
         folder = Path(name)
-        places = options.places
+        size = options.size
+        places = size.of(options.places, options.places, 20)
+        rounds = size.of(options.rounds, options.rounds, 3)
         stores: dict[str, Callable[[int], None]] = {
             'journal': journal_store(folder / 'journal'),
             'World, pages of 4 KiB': WorldStore(folder / 'small.sqlite3', places, 4096),
@@ -164,7 +169,7 @@ def main() -> None:
         }
         print(f'{"durable visit":40} median ms   95 %')
         for calls in (stores, services):
-            for call, times in taken(calls, options.rounds).items():
+            for call, times in taken(calls, rounds).items():
                 high = sorted(times)[int(len(times) * 0.95)]
                 print(f'{call:40} {statistics.median(times):9.3f} {high:6.2f}')
         written = folder / 'b' / 'store' / 'worlds' / 'map.sqlite3'

@@ -63,6 +63,7 @@ from benchmarks.decisions import Comparison, SetClock, compare, legs_of, wrongly
 from benchmarks.hosts import Host, Network, may_be_made
 from benchmarks.machine_faults import SmallDisk, SteppedClock
 from benchmarks.processes import end_processes, memory_mb
+from benchmarks.sizes import Size, sized_parser
 from state_machines.ros import ServiceCaller
 from surveillance_interfaces.srv import ArmorDirective
 from surveillance_runtime.discovery import prefer_quick_discovery
@@ -798,8 +799,11 @@ def _quantile(values: Sequence[float], share: float) -> float:
 
 def main(words: Sequence[str] | None = None) -> int:
     """Run a campaign, print its table, return the exit code."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawTextHelpFormatter
+    parser = sized_parser(
+        __doc__,
+        quick='25 s of hits',
+        description=__doc__,
+        formatter_class=argparse.RawTextHelpFormatter,
     )
     parser.add_argument('--hours', type=float, default=0.1)
     parser.add_argument('--seed', type=int, default=1)
@@ -821,12 +825,15 @@ def main(words: Sequence[str] | None = None) -> int:
         '--steps-every', type=float, default=0.0, help='only set the clock, each so many seconds'
     )
     parser.add_argument('--freeze', type=float, default=30.0, help='how long those last, s')
-    parser.add_argument('--quick', action='store_true', help='25 s of hits')
     parser.add_argument('--keep', type=Path, default=ROOT / 'runs', help='folder for the log')
     chosen = parser.parse_args(words)
     chosen.clock_steps |= chosen.steps_every > 0.0
-    if chosen.quick:
-        chosen.hours, chosen.pause, chosen.freeze = 25.0 / 3600.0, 3.0, 4.0
+    if chosen.size is not Size.FULL:
+        chosen.hours, chosen.pause, chosen.freeze = (
+            chosen.size.of(0.0, 25.0, 1.0) / 3600.0,
+            3.0,
+            4.0,
+        )
     chosen.keep.mkdir(parents=True, exist_ok=True)
     scratch = chosen.keep / time.strftime('campaign-%Y%m%d-%H%M%S')
     scratch.mkdir()
@@ -849,7 +856,9 @@ def main(words: Sequence[str] | None = None) -> int:
 
 def run_on_two_hosts(chosen: argparse.Namespace, scratch: Path) -> LinkResults:
     """Run the campaign on a failing link."""
-    seconds, cuts, cut_seconds = (20.0, 0, 0.0) if chosen.quick else (120.0, chosen.cuts, 120.0)
+    seconds, cuts, cut_seconds = (
+        (20.0, 0, 0.0) if chosen.size is not Size.FULL else (120.0, chosen.cuts, 120.0)
+    )
     campaign = LinkCampaign(scratch, chosen.seed)
     try:
         return campaign.run(seconds, cuts, cut_seconds)

@@ -10,7 +10,6 @@ the same file.
 
 from __future__ import annotations
 
-import argparse
 import array
 import contextlib
 import importlib
@@ -33,6 +32,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 import rclpy
 import yaml
 
+from benchmarks.sizes import sized_parser
 from launcher import cli
 from surveillance_runtime import node as runtime_node
 from surveillance_runtime import node_table
@@ -277,12 +277,11 @@ def run(count: int, seed: int) -> tuple[Counter[str], list[str], float]:
 
 def main() -> int:
     """Print a table of what came of the lines."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = sized_parser(__doc__, quick='100 lines')
     parser.add_argument('--count', type=int, default=1000)
     parser.add_argument('--seed', type=int, default=1)
-    parser.add_argument('--quick', action='store_true', help='100 lines')
     options = parser.parse_args()
-    outcomes, bad, longest = run(100 if options.quick else options.count, options.seed)
+    outcomes, bad, longest = run(options.size.of(options.count, 100, 5), options.seed)
     for line in bad:
         print(line)
     for kind, number in outcomes.most_common():

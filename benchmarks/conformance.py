@@ -30,6 +30,7 @@ from typing import Any
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
+from benchmarks.sizes import Size, sized_parser
 from libs.owl_reasoner.tests.java_reasoner import KINDS, JavaReasoner, JavaReasonerError, absent
 from owl_reasoner import (
     KnowledgeBase,
@@ -43,6 +44,7 @@ from owl_reasoner.owl.axioms import (
     Axiom,
     Declaration,
     Import,
+    SubClassOf,
 )
 from owl_reasoner.owl.entities import entities_of
 from owl_reasoner.owl.vocabulary import NOTHING, THING
@@ -237,9 +239,10 @@ def run_ontologies(paths: list[Path], limit: int, java: list[str]) -> None:
 
 def main() -> None:
     """Read the arguments and print the tables."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument('folder', type=Path, help='where the ontologies and test cases are')
-    parser.add_argument('--quick', action='store_true', help=f'about {QUICK} of the test cases')
+    parser = sized_parser(__doc__, quick=f'about {QUICK} of the test cases')
+    parser.add_argument(
+        'folder', type=Path, nargs='?', help='where the ontologies and test cases are'
+    )
     parser.add_argument(
         '--seconds', type=int, default=20, help='longest processor time for a document'
     )
@@ -250,20 +253,47 @@ def main() -> None:
         resource.setrlimit(resource.RLIMIT_CPU, (arguments.seconds, resource.RLIM_INFINITY))
         print(json.dumps([asdict(result) for result in work(arguments.folder, arguments.one)]))
         return
-    if not arguments.folder.is_dir():
-        parser.error(f'{arguments.folder} is not a folder')
+    if arguments.size is Size.SMOKE:
+        with tempfile.TemporaryDirectory() as folder:
+            write_example(Path(folder))
+            judge_folder(Path(folder), None, arguments.seconds, [])
+        return
+    if arguments.folder is None or not arguments.folder.is_dir():
+        parser.error(f'{arguments.folder or "FOLDER"} is not a folder')
     java: list[str] = []
     if arguments.java and not absent():
         java = list(KINDS)
     elif arguments.java:
         print(f'without Java reasoners: {absent()}')
-    places = list(cases_in(arguments.folder, QUICK if arguments.quick else None))
-    paths = ontologies_in(arguments.folder)
-    if not places and not paths:
+    most = QUICK if arguments.size is Size.QUICK else None
+    if not judge_folder(arguments.folder, most, arguments.seconds, java):
         parser.error(f'{arguments.folder} holds no test cases and no ontologies')
+
+
+def judge_folder(folder: Path, most: int | None, limit: int, java: list[str]) -> bool:
+    """Print both tables of a folder; tell whether it holds anything."""
+    places, paths = list(cases_in(folder, most)), ontologies_in(folder)
     if places:
-        run_cases(places, arguments.seconds)
-    run_ontologies(paths, arguments.seconds, java)
+        run_cases(places, limit)
+    run_ontologies(paths, limit, java)
+    return bool(places or paths)
+
+
+def write_example(folder: Path) -> None:
+    """Write an ontology and a test case about it into a folder."""
+    texts = []
+    for axiom in (SubClassOf(f'{BASE}A', f'{BASE}B'), SubClassOf(f'{BASE}A', f'{BASE}C')):
+        path = folder / 'example.owl'
+        write_ontology([axiom], BASE, path)
+        texts.append(path.read_text(encoding='utf-8'))
+    case = {
+        'name': 'example',
+        'kinds': ['ConsistencyTest', 'PositiveEntailmentTest', 'NegativeEntailmentTest'],
+        'premise': texts[0],
+        'conclusion': texts[0],
+        'non_conclusion': texts[1],
+    }
+    (folder / 'cases.json').write_text(json.dumps([case]), encoding='utf-8')
 
 
 if __name__ == '__main__':

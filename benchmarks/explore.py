@@ -8,7 +8,6 @@ rooms of a place that one knows; nobody can visit them in less.
 
 from __future__ import annotations
 
-import argparse
 import math
 import sys
 import time
@@ -19,9 +18,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
-from tables import table
-from whole_stack import ROOT
 
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from benchmarks.sizes import sized_parser
+from benchmarks.tables import table
+from benchmarks.whole_stack import ROOT
 from surveillance_controllers.exploration.exploration import Exploration, Phase
 from surveillance_controllers.exploration.frontiers import FrontierParameters
 from surveillance_controllers.exploration.map_building import MapBuilder
@@ -202,8 +204,7 @@ def picture(grid: Grid) -> NDArray[np.uint8]:
 
 def main() -> int:
     """Explore the places and print the table."""
-    parser = argparse.ArgumentParser(description='Exploring, measured.')
-    parser.add_argument('--quick', action='store_true', help='the seven rooms once')
+    parser = sized_parser('Exploring, measured.', quick='the seven rooms once')
     parser.add_argument('--place', action='append', type=Path, help='another place')
     parser.add_argument('--seeds', type=int, default=1)
     parser.add_argument('--errors', type=float, default=None, help='of the odometry, times')
@@ -214,7 +215,7 @@ def main() -> int:
         logs(options.log, options.keep)
         return 0
     names = options.place or [
-        ROOT / 'config' / f'{name}.yaml' for name in (PLACES[:1] if options.quick else PLACES)
+        ROOT / 'config' / f'{name}.yaml' for name in options.size.of(PLACES, PLACES[:1], PLACES[:1])
     ]
     rows = []
     kinds = (1.0, 5.0) if options.errors is None else (options.errors,)
@@ -224,7 +225,8 @@ def main() -> int:
             noise = 0.01 if errors == 1.0 else 0.03
             for seed in range(options.seeds):
                 begun = time.process_time()
-                did = explore(read_world(file), seed, errors=errors, noise=noise)
+                most = options.size.of(3600.0, 3600.0, 10.0)
+                did = explore(read_world(file), seed, errors=errors, noise=noise, most=most)
                 cpu = time.process_time() - begun
                 least = tour / BaseModel().speed
                 rows.append(

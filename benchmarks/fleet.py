@@ -38,7 +38,6 @@ SEBS      gain against others' intentions (Portugal and Rocha 2013); its gain li
 
 from __future__ import annotations
 
-import argparse
 import math
 import random
 import sys
@@ -49,9 +48,11 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
-from patrol import EXPLORATION_SECONDS, SPEED, random_graph
-from tables import table
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
+from benchmarks.patrol import EXPLORATION_SECONDS, SPEED, random_graph
+from benchmarks.sizes import Size, sized_parser
+from benchmarks.tables import table
 from patrol_policy.decision import DecisionSettings, Rules
 from patrol_policy.fleet.assignment import FleetChoice, FleetRobot, FleetSettings, choose
 from patrol_policy.fleet.charging_bound import PROVEN_UP_TO, charging_wait
@@ -318,8 +319,7 @@ def _silent(robot: FleetRobot) -> FleetRobot:
 
 def main() -> None:
     """Run as a command."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
-    parser.add_argument('--quick', action='store_true', help='fewer maps')
+    parser = sized_parser(__doc__, quick='fewer maps')
     parser.add_argument('--graph', type=Path, help='a folder of patrolling_sim maps')
     parser.add_argument('--faults', type=int, metavar='N', help='kills and cuts')
     parser.add_argument('--armor', type=float, metavar='SECONDS', help='calls of ten robots')
@@ -337,16 +337,18 @@ def main() -> None:
         fail(words.faults)
         return
     if words.page is not None:
-        from fleet_page import page_under
+        from benchmarks.fleet_page import page_under
 
         page_under((2, 8, 20), words.page, PLACE)
         return
     if words.hosts:
-        from fleet_hosts import fail_hosts
+        from benchmarks.fleet_hosts import fail_hosts
 
-        raise SystemExit(fail_hosts(words.robots or 2, quick=words.quick, keep=words.keep))
+        raise SystemExit(
+            fail_hosts(words.robots or 2, quick=words.size is not Size.FULL, keep=words.keep)
+        )
     if words.armor is not None or words.composed is not None:
-        from fleet_load import CONFIG, armor_under, composed
+        from benchmarks.fleet_load import CONFIG, armor_under, composed
 
         place = words.map[0] if words.map else CONFIG / 'office.yaml'
         if words.armor is not None:
@@ -355,7 +357,7 @@ def main() -> None:
             composed(words.robots or 8, words.composed, place)
         return
     if words.live:
-        from fleet_live import CONFIG, compare_places
+        from benchmarks.fleet_live import CONFIG, compare_places
 
         places = words.map or [CONFIG / 'seven_rooms.yaml', CONFIG / 'office.yaml']
         compare_places(places, words.robots or 4, 3600.0 * words.hours, words.people)
@@ -368,10 +370,12 @@ def main() -> None:
             (file.stem, read_patrolling_sim(file, SPEED, EXPLORATION_SECONDS)) for file in files
         ]
     else:
-        sizes = (8, 10, 20) if words.quick else (8, 9, 10, 12, 20, 35, 60, 100)
+        sizes = words.size.of((8, 9, 10, 12, 20, 35, 60, 100), (8, 10, 20), (8,))
         maps = [(f'random {size}', random_graph(size, SEED).graph) for size in sizes]
     compare(maps)
-    scale(1000, 100)
+    scale(*words.size.of((1000, 100), (1000, 100), (30, 4)))
+    if words.size is Size.SMOKE:
+        fail(1)
 
 
 if __name__ == '__main__':

@@ -21,6 +21,7 @@ import contextlib
 import math
 import os
 import shutil
+import sys
 import tempfile
 import threading
 import time
@@ -29,10 +30,11 @@ from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 
-from campaign import CLOSE_IN_TIME, Launcher, events_of, visited_at
-from hosts import Link, Network, may_be_made
-from tables import table
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
+from benchmarks.campaign import CLOSE_IN_TIME, Launcher, events_of, visited_at
+from benchmarks.hosts import Link, Network, may_be_made
+from benchmarks.tables import table
 from surveillance_runtime.discovery import launched_nodes
 
 os.environ |= launched_nodes(os.environ, network=True)

@@ -15,6 +15,7 @@ keep up. Seen from outside:
 from __future__ import annotations
 
 import math
+import sys
 import threading
 import time
 from collections import Counter, defaultdict
@@ -23,10 +24,12 @@ from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 
-from fleet_stack import CONFIG, FleetStack
 from nav_msgs.msg import Odometry
-from tables import table
 
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from benchmarks.fleet_stack import CONFIG, FleetStack
+from benchmarks.tables import table
 from patrol_policy.fleet.partition import fleet_plan
 from surveillance_interfaces.msg import Decision, FleetRobot
 from surveillance_operator.map_command import graph_over_doors

@@ -28,8 +28,8 @@ if str(ROOT) not in sys.path:
 import rclpy
 from rosgraph_msgs.msg import Clock
 from std_srvs.srv import Trigger
-from tables import table
 
+from benchmarks.tables import table
 from launcher.run import Run
 from launcher.run_processes import node_environ
 from state_machines.ros import ServiceCaller

@@ -12,7 +12,6 @@ depend on the computer: what counts is the ratio within one run.
 
 from __future__ import annotations
 
-import argparse
 import contextlib
 import gc
 import importlib
@@ -30,9 +29,11 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 CHECKOUT = Path(__file__).resolve().parent.parent
+sys.path.insert(0, str(CHECKOUT))
 sys.path.insert(0, str(CHECKOUT / 'libs' / 'state_machines'))
 
 import state_machines as fsm
+from benchmarks.sizes import sized_parser
 from state_machines.checkpoint import Checkpointer, load
 from state_machines.transitions import TransitionFeed
 from state_machines.verify import verify
@@ -952,8 +953,7 @@ def sizes(measured: dict[str, float], deepest: dict[str, int]) -> None:
 
 def main() -> int:
     """Measure and print."""
-    parser = argparse.ArgumentParser(description=(__doc__ or '').splitlines()[0])
-    parser.add_argument('--quick', action='store_true', help='a run below 60 s')
+    parser = sized_parser(__doc__, quick='a run below 60 s')
     parser.add_argument(
         '--peers', nargs='+', default=[], metavar='FOLDER', help='where peers are imported from'
     )
@@ -962,22 +962,22 @@ def main() -> int:
     )
     options = parser.parse_args()
     sys.path += options.peers
-    quick, only = options.quick, options.only
+    size, only = options.size, options.only
     if only in (None, 'kills'):
         # Before anything else: the processes that are forked have one thread then.
-        kills, repeated, lost = faults_of_killed_missions(100 if quick else 1_000)
+        kills, repeated, lost = faults_of_killed_missions(size.of(1_000, 100, 2))
         print(
             f'SIGKILLs of a checkpointed mission, {kills:,}: {repeated} items repeated, {lost} lost'
         )
     if only in (None, 'sizes'):
         sizes(*in_processes_of_their_own())
     if only in (None, 'rates'):
-        throughput(60_000 if quick else 600_000, 20_000 if quick else 120_000, 3 if quick else 7)
+        throughput(size.of(600_000, 60_000, 600), size.of(120_000, 20_000, 200), size.of(7, 3, 1))
     if only in (None, 'single'):
         single_executions()
     if only in (None, 'preempts'):
-        preempts(300 if quick else 3_000)
-        count = 1_000 if quick else 10_000
+        preempts(size.of(3_000, 300, 10))
+        count = size.of(10_000, 1_000, 10)
         print(f'\npreempts at random moments, {count:,}: {lost_preempts(count)} lost')
     return 0
 

@@ -53,6 +53,7 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 
 from benchmarks.processes import end_processes, memory_mb
+from benchmarks.sizes import sized_parser
 from benchmarks.whole_stack import ros_arguments
 from surveillance_runtime import node_table
 from surveillance_runtime.process import ExecutorThread
@@ -438,8 +439,11 @@ def show(report: Report) -> None:
 
 def main(words: Sequence[str] | None = None) -> int:
     """Fuzz the nodes, print the table, return the exit code."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawTextHelpFormatter
+    parser = sized_parser(
+        __doc__,
+        quick='100 messages a node',
+        description=__doc__,
+        formatter_class=argparse.RawTextHelpFormatter,
     )
     parser.add_argument(
         '--messages', type=int, default=26000, help='over all nodes (default 26000)'
@@ -448,11 +452,11 @@ def main(words: Sequence[str] | None = None) -> int:
     parser.add_argument('--node', action='append', help='only this node; may be repeated')
     parser.add_argument('--longest', type=int, default=100_000, help='array and string elements')
     parser.add_argument('--jobs', type=int, default=3, help='nodes at a time')
-    parser.add_argument('--quick', action='store_true', help='100 messages a node')
     parser.add_argument('--keep', type=Path, help='folder for the logs (default: thrown away)')
     chosen = parser.parse_args(words)
-    names = chosen.node or [node.name for node in node_table.NODES]
-    each = 100 if chosen.quick else max(1, chosen.messages // len(names))
+    every = [node.name for node in node_table.NODES]
+    names = chosen.node or chosen.size.of(every, every, ['battery_controller'])
+    each = chosen.size.of(max(1, chosen.messages // len(names)), 100, 20)
     reports = []
     print(f'{"node":22} {"targets":>7} {"sent":>8} {"deaths":>6} {"answers":>7} '
           f'{"lines/s":>7} {"most":>6} {"MB":>6} {"slowest s":>9}')  # fmt: skip

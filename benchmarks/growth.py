@@ -24,6 +24,7 @@ ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
 from benchmarks.patrol_facts import IRI, Patrol, schema
+from benchmarks.sizes import sized_parser
 from benchmarks.tables import table
 from libs.owl_reasoner.tests.java_reasoner import JavaReasoner, JavaReasonerError, absent
 from owl_reasoner import KnowledgeBase, ReasoningBudgetError, read_ontology, write_ontology
@@ -166,8 +167,7 @@ def apart(*words: str) -> list[str]:
 
 def main() -> None:
     """Read the arguments and print the tables."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument('--quick', action='store_true', help='the smallest size of each kind')
+    parser = sized_parser(__doc__, quick='the smallest size of each kind')
     parser.add_argument('--seconds', type=float, default=60.0, help='longest time for a row')
     parser.add_argument('--java', action='store_true', help='HermiT beside it')
     parser.add_argument('--one', nargs=2, metavar=('KIND', 'SIZE'), help=argparse.SUPPRESS)
@@ -181,15 +181,16 @@ def main() -> None:
         return
     java = arguments.java and not absent()
     rows = [['kind', 'size', 'here', 'HermiT', 'named']]
-    for kind, (_, sizes) in KINDS.items():
-        for size in sizes[:1] if arguments.quick else sizes:
+    part = arguments.size.of(None, None, 1)
+    for kind, (_, sizes) in list(KINDS.items())[:part]:
+        for size in arguments.size.of(sizes, sizes[:1], sizes[:1]):
             here, left_out = apart('--one', kind, str(size), '--seconds', str(arguments.seconds))
             beside = measure_java(kind, size, arguments.seconds) if java else '-'
             rows.append([kind, str(size), here, beside, left_out])
     print(f'Seconds of the first reasoning\n\n{table(rows)}\n')
     rows = [['axiom beside the map', 'places', 'first', 'change of now']]
-    for name in BESIDE_MAP:
-        for places in (50,) if arguments.quick else (50, 200):
+    for name in list(BESIDE_MAP)[:part]:
+        for places in arguments.size.of((50, 200), (50,), (50,)):
             rows.append([name, str(places), *apart('--one', name, str(places))])
     print(f'Milliseconds\n\n{table(rows)}')
 

@@ -10,7 +10,6 @@ does so from no part that lacks one axiom; where HermiT does not confirm that, P
 
 from __future__ import annotations
 
-import argparse
 import random
 import sys
 import tempfile
@@ -22,6 +21,7 @@ ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
 from benchmarks.random_agreement import IRI, drawn_axioms, spelt_out, words_for
+from benchmarks.sizes import Size, sized_parser, skip
 from libs.owl_reasoner.tests.java_reasoner import JavaReasoner, JavaReasonerError, absent
 from owl_reasoner import KnowledgeBase, read_ontology, write_ontology
 from owl_reasoner.owl.axiom_text import axiom_text
@@ -118,14 +118,16 @@ def judged(axioms: Iterable[Axiom], judge: Judge, most: int, counts: Counter[str
 
 def main() -> None:
     """Read the arguments and print the table."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = sized_parser(__doc__)
     parser.add_argument('files', nargs='*', type=Path, help='ontologies')
     parser.add_argument('--random', type=int, default=0, help='how many random ontologies')
     parser.add_argument('--first', type=int, default=0, help='the first seed')
     parser.add_argument('--facts', type=int, default=30, help='so many facts of each ontology')
     arguments = parser.parse_args()
     if why := absent():
-        parser.exit(1, f'{why}\n')
+        skip(why)
+    if arguments.size is Size.SMOKE:
+        arguments.random, arguments.facts = 1, 1
     seeds = range(arguments.first, arguments.first + arguments.random)
     with tempfile.TemporaryDirectory() as folder:
         judge = Judge(Path(folder) / 'part.owl')

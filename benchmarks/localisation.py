@@ -12,7 +12,6 @@ measured, and a peer that takes each scan for one of now.
 
 from __future__ import annotations
 
-import argparse
 import math
 import sys
 import time
@@ -26,10 +25,9 @@ import numpy as np
 import numpy.typing as npt
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
-sys.path.insert(0, str(Path(__file__).resolve().parent))
 
-from tables import table
-
+from benchmarks.sizes import Size, sized_parser
+from benchmarks.tables import table
 from surveillance_controllers.geometry import Pose, Scan, angle_between, composed, in_map, relative
 from surveillance_controllers.motion.localisation import Localiser
 from surveillance_controllers.motion.odometry import OdometryBuffer, joined
@@ -330,7 +328,7 @@ def drive(world: World, late: float, sweep: float, seconds: float) -> Iterator[t
         yield now, odometry, found
 
 
-def late_scans(*, quick: bool) -> None:
+def late_scans(size: Size) -> None:
     """Print how late and swept scans change the estimate, with and without joining in time."""
     world = read_world(ROOT / 'config' / 'seven_rooms.yaml')
     grid = plan_grid.draw(world.plan, 0.05)
@@ -341,7 +339,7 @@ def late_scans(*, quick: bool) -> None:
             off, turned = [], []
             localiser: Localiser | None = None
             readings = OdometryBuffer()
-            for now, odometry, found in drive(world, late, sweep, 12.0 if quick else 60.0):
+            for now, odometry, found in drive(world, late, sweep, size.of(60.0, 12.0, 1.5)):
                 localiser = localiser or Localiser(grid, odometry)
                 readings.add(now, odometry)
                 localiser.move(odometry)
@@ -362,9 +360,8 @@ def late_scans(*, quick: bool) -> None:
 
 def main() -> int:
     """Measure and print."""
-    parser = argparse.ArgumentParser(description=__doc__.partition('\n')[0])
+    parser = sized_parser(__doc__, quick='fewer and shorter runs')
     parser.add_argument('--log', type=Path, action='append', default=[], help='in CARMEN format')
-    parser.add_argument('--quick', action='store_true', help='fewer and shorter runs')
     options = parser.parse_args()
     for path in options.log:
         try:
@@ -373,7 +370,7 @@ def main() -> int:
             print(f'localisation.py: {error}', file=sys.stderr)
             return 2
     if not options.log:
-        late_scans(quick=options.quick)
+        late_scans(options.size)
     return 0
 
 

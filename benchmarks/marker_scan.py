@@ -10,7 +10,6 @@ nodes take for messages nothing is counted.
 
 from __future__ import annotations
 
-import argparse
 import math
 import sys
 from collections.abc import Callable
@@ -18,6 +17,9 @@ from pathlib import Path
 
 import numpy as np
 
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from benchmarks.sizes import sized_parser
 from marker_detection import MarkerStream, StreamSettings
 from surveillance_behaviour.map_from_markers.assembly import PlaceNote, SurveyReport
 from surveillance_behaviour.map_from_markers.initial_scan import InitialScan
@@ -107,17 +109,17 @@ LIGHTS: dict[str, tuple[Conditions, float]] = {
 
 def main() -> int:
     """Print the table."""
-    parser = argparse.ArgumentParser(description=__doc__.split('\n')[0])
+    parser = sized_parser(__doc__, quick='one scan under each light')
     parser.add_argument('--seeds', type=int, default=3, help='scans under each light')
-    parser.add_argument('--quick', action='store_true', help='one scan under each light')
     options = parser.parse_args()
+    longest = options.size.of(math.inf, math.inf, 3.0)
     print(
         f'{"light":<25} {"scans":>5} {"whole":>5} {"longest, s":>10}  {"latest place":<12} missed'
     )
-    for name, (conditions, brightness) in LIGHTS.items():
+    for name, (conditions, brightness) in list(LIGHTS.items())[: options.size.of(None, None, 1)]:
         cameras = [
             ArmCamera(conditions, brightness, seed)
-            for seed in range(1 if options.quick else options.seeds)
+            for seed in range(options.size.of(options.seeds, 1, 1))
         ]
         missed: set[str] = set()
         for camera in cameras:
@@ -126,7 +128,7 @@ def main() -> int:
                 camera.report,
                 lambda camera=camera: camera.now,
                 lambda words: None,
-                lambda: False,
+                lambda camera=camera: camera.now > longest,
             )
             missed |= report.missing.keys()
         slowest = max(cameras, key=lambda camera: camera.now)

@@ -11,7 +11,6 @@ The table stands in the library's README.
 
 from __future__ import annotations
 
-import argparse
 import math
 import os
 import sys
@@ -40,6 +39,7 @@ from benchmarks.perception import (
     under_light,
 )
 from benchmarks.photographs import photographs_in
+from benchmarks.sizes import sized_parser
 from benchmarks.tables import table
 from marker_detection.cell_differences import CellReadings
 from marker_detection.decoding import MarkerReader
@@ -167,12 +167,11 @@ def foreign(samples: int) -> Iterator[ImageArray]:
 
 def main() -> int:
     """Measure and print."""
-    parser = argparse.ArgumentParser(description=(__doc__ or '').splitlines()[0])
-    parser.add_argument('--quick', action='store_true', help='fewer images')
+    parser = sized_parser(__doc__, quick='fewer images')
     parser.add_argument('--photos', type=Path, default=os.environ.get('MARKER_PHOTOS'))
     options = parser.parse_args()
     cv2.setNumThreads(1)
-    samples = 2 if options.quick else 12
+    samples = options.size.of(12, 2, 1)
     results = {name: Result() for name in STEPS}
     detectors: dict[tuple[str, str], MarkerDetector] = {}
 

@@ -34,6 +34,7 @@ from armor_service.access import Settings
 from armor_service.client import ArmorClient, InProcessTransport
 from armor_service.service import ArmorService
 from armor_service.store import Store
+from benchmarks.sizes import sized_parser
 from surveillance_behaviour.mission import mission_log
 from surveillance_ontology.map_ontology import MapOntology
 from surveillance_ontology.patrol_vocabulary import DATA
@@ -152,15 +153,17 @@ def look(month: Month, day: float) -> str:
 
 def main(words: Sequence[str] | None = None) -> int:
     """Run it, print the table, return the exit code."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawTextHelpFormatter
+    parser = sized_parser(
+        __doc__,
+        quick='half a day',
+        description=__doc__,
+        formatter_class=argparse.RawTextHelpFormatter,
     )
     parser.add_argument('--days', type=float, default=30.0)
     parser.add_argument('--minutes', type=float, default=1e9, help='of this machine, at most')
     parser.add_argument('--seed', type=int, default=1)
-    parser.add_argument('--quick', action='store_true', help='half a day')
     chosen = parser.parse_args(words)
-    days = 0.5 if chosen.quick else chosen.days
+    days = chosen.size.of(chosen.days, 0.5, 0.005)
     end = time.monotonic() + 60.0 * chosen.minutes
     print('  day record MB  store MB  read, s  build, s  held, MB  ends in', flush=True)
     with tempfile.TemporaryDirectory() as scratch:

@@ -20,7 +20,6 @@ they are left out. `--report FILE` keeps the survivors, `--again FILE` tries tho
 
 from __future__ import annotations
 
-import argparse
 import ast
 import contextlib
 import difflib
@@ -47,11 +46,14 @@ from types import CodeType, FunctionType
 from typing import Any
 
 import pytest
-from tables import table
 
 CHECKOUT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(CHECKOUT))
 
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from benchmarks.sizes import sized_parser, skip
+from benchmarks.tables import table
 from launcher.environment import LIBRARIES
 
 PACKAGES = (
@@ -197,13 +199,12 @@ def root_of(module: str) -> Path:
 def main(words: Sequence[str] | None = None) -> int:
     """Print the survivors as they come, then the table; return the exit code."""
     known = (*LIBRARIES, *PACKAGES)
-    parser = argparse.ArgumentParser(description=(__doc__ or '').split('\n')[0])
+    parser = sized_parser(__doc__, quick=f'one library, {QUICK} mutants')
     parser.add_argument(
         'parts', nargs='*', metavar='PART', help=f'default: all of {", ".join(known)}'
     )
     parser.add_argument('--mutants', type=int, default=300, help='in all, shared by their places')
     parser.add_argument('--seed', type=int, default=1)
-    parser.add_argument('--quick', action='store_true', help=f'one library, {QUICK} mutants')
     parser.add_argument('--report', type=Path, metavar='FILE', help='keep the survivors as JSON')
     parser.add_argument('--again', type=Path, metavar='FILE', help='try those of a report alone')
     given = parser.parse_args(words)
@@ -216,8 +217,9 @@ def main(words: Sequence[str] | None = None) -> int:
         import cosmic_ray  # noqa: F401
         import coverage  # noqa: F401
     except ImportError as error:
-        parser.error(f'{error.name} is missing: pip install cosmic-ray coverage')
-    parts = given.parts or (['state_machines'] if given.quick else list(known))
+        skip(f'{error.name} is missing: pip install cosmic-ray coverage')
+    few = ['state_machines']
+    parts = given.parts or given.size.of(list(known), few, few)
     groups = {name: groups_of(name) for name in parts}
     places = sum(map(len, groups.values()))
     chosen: list[Mutant] = []
@@ -225,7 +227,7 @@ def main(words: Sequence[str] | None = None) -> int:
     known_equal = equivalent()
     for name in parts:
         generator = random.Random(f'{given.seed} {name}')
-        wanted = QUICK if given.quick else round(given.mutants * len(groups[name]) / places)
+        wanted = given.size.of(round(given.mutants * len(groups[name]) / places), QUICK, 1)
         count = min(len(groups[name]), max(1, wanted))
         for mutant in (generator.choice(each) for each in generator.sample(groups[name], count)):
             if not mutant.is_python():

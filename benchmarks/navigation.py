@@ -8,7 +8,6 @@ Every figure of planning stands beside its peers' from the same run.
 
 from __future__ import annotations
 
-import argparse
 import itertools
 import json
 import logging
@@ -27,22 +26,24 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from statistics import median
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 import yaml
-from driven_robot import DrivenRobot
 from geometry_msgs.msg import Twist
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import dijkstra
 from skimage.graph import MCP_Geometric
-from tables import table
-from whole_stack import ROOT, Stack, ros_arguments
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from benchmarks import regular_places
+from benchmarks.driven_robot import DrivenRobot
 from benchmarks.processes import cpu_seconds, end_processes
+from benchmarks.sizes import Size, sized_parser
+from benchmarks.tables import table
+from benchmarks.whole_stack import ROOT, Stack, ros_arguments
 from launcher.run import Run
 from launcher.run_processes import command, node_environ
 from patrol_policy.battery import PERCENTILE_99
@@ -92,10 +93,10 @@ def grid_of(side: int) -> tuple[Grid, npt.NDArray[np.float64], npt.NDArray[np.fl
     return drawn, first, rooms * 2 * half - first
 
 
-def planning(*, quick: bool) -> None:
+def planning(size: Size) -> None:
     """Time and length of paths beside the bare library, networkx and an optimal reference."""
     rows = []
-    for side in (100, 300, 1000) if quick else (100, 200, 500, 1000, 1500, 2000):
+    for side in size.of((100, 200, 500, 1000, 1500, 2000), (100, 300, 1000), (100,)):
         grid, start, goal = grid_of(side)
         planner = GridPlanner(grid)
         cost = planner.cost.copy()
@@ -106,7 +107,7 @@ def planning(*, quick: bool) -> None:
             bare.find_costs([first], [last])
             return bare.traceback(last)
 
-        budget = 1.0 if quick else 4.0
+        budget = size.of(4.0, 1.0, 0.0)
         ours = median_ms(lambda p=planner, s=start, g=goal: p.plan(s, g), budget)
         library = median_ms(search, budget)
         path = planner.plan(start, goal)
@@ -219,7 +220,7 @@ def _pairs(free: Mask, offset: tuple[int, int]) -> tuple[Any, Any]:
     return numbers, numbers + offset[0] * columns + offset[1]
 
 
-def control(*, quick: bool) -> None:
+def control(size: Size) -> None:
     """Time of one step of each part of a drive through the seven rooms, without any ROS."""
     world = read_world(ROOT / 'config' / 'seven_rooms.yaml')
     robot = Robot(world, rng=np.random.default_rng(1))
@@ -237,7 +238,7 @@ def control(*, quick: bool) -> None:
         spent[part].append((time.process_time() - begun) * 1e3)
         return result
 
-    stops = ('R1', 'R4') if quick else ('R1', 'R4', 'E', 'R3', 'R2', 'E')
+    stops = size.of(('R1', 'R4', 'E', 'R3', 'R2', 'E'), ('R1', 'R4'), ('R1',))
     for stop in stops:
         goal = world.plan.place.positions[stop][:2]
         navigator.move(robot.base.odometry)
@@ -305,9 +306,9 @@ def among_people(model: PeopleModel, seconds: float, seed: int, place: str) -> D
     return result
 
 
-def people(*, quick: bool) -> None:
+def people(size: Size) -> None:
     """Drives that arrive, and contacts by the robot's own motion, among people who walk."""
-    seconds = 300.0 if quick else 4 * 3600.0
+    seconds = size.of(4 * 3600.0, 300.0, 10.0)
     rows = []
     for place, manner, count in (
         ('office', 'polite', 0),
@@ -342,7 +343,7 @@ def people(*, quick: bool) -> None:
     )
 
 
-def kidnaps(*, quick: bool) -> None:
+def kidnaps(size: Size) -> None:
     """Robots that are carried off while they drive: when they know where they are."""
     places = {
         'seven_rooms': (read_world(ROOT / 'config' / 'seven_rooms.yaml'), 16),
@@ -352,8 +353,8 @@ def kidnaps(*, quick: bool) -> None:
     }
     rows = []
     for name, (world, count) in places.items():
-        count = 3 if quick else count
-        ends = [kidnapped(world, seed) for seed in range(count)]
+        count = size.of(count, 3, 1)
+        ends = [kidnapped(world, seed, size.of(90.0, 90.0, 2.0)) for seed in range(count)]
         found = [after for after, _ in ends if after is not None]
         wrong = [longest for _, longest in ends]
         rows.append(
@@ -375,8 +376,14 @@ def kidnaps(*, quick: bool) -> None:
     )
 
 
-def kidnapped(world: World, seed: int) -> tuple[float | None, float]:
-    """Carry a driving robot off; return when it knew its pose again, and how long it was wrong."""
+def kidnapped(world: World, seed: int, watched: float) -> tuple[float | None, float]:
+    """Carry a driving robot off; return when it knew its pose again, and how long it was wrong.
+
+    Args:
+        world: Where.
+        seed: Of chance.
+        watched: For how long it is watched, simulated seconds.
+    """
     rng = np.random.default_rng(seed)
     robot = Robot(world, rng=np.random.default_rng(seed))
     begun = found = wrong_since = None
@@ -411,7 +418,7 @@ def kidnapped(world: World, seed: int) -> tuple[float | None, float]:
             robot.base.push(0.0, 0.0, 0.0)
             begun = robot.time
         since = 0.0 if begun is None else robot.time - begun
-        return since >= 90.0 or (found is not None and since >= found + 5.0)
+        return since >= watched or (found is not None and since >= found + 5.0)
 
     robot.base.pose = robot.base.odometry = anywhere()
     driven.navigator.believe(robot.base.pose)
@@ -421,10 +428,10 @@ def kidnapped(world: World, seed: int) -> tuple[float | None, float]:
     return found, longest
 
 
-def silence(*, quick: bool) -> None:
+def silence(size: Size) -> None:
     """Time and way until the robot stands when a sensor falls silent, in real time."""
-    speeds = (0.2, 0.58) if quick else (0.1, 0.2, 0.3, 0.4, 0.5, 0.58)
-    rounds = 1 if quick else 5
+    speeds = size.of((0.1, 0.2, 0.3, 0.4, 0.5, 0.58), (0.2, 0.58), (0.2,))
+    rounds = size.of(5, 1, 1)
     rows = []
     with stack_in_real_time() as patrol:
         for topic in ('scan', 'odom'):
@@ -450,11 +457,11 @@ def silence(*, quick: bool) -> None:
     )
 
 
-def standstill(*, quick: bool) -> None:
+def standstill(size: Size) -> None:
     """Time and way from a person's Stop or Pause until the robot stands, simulated seconds."""
     from std_srvs.srv import SetBool, Trigger
 
-    rounds = 2 if quick else 10
+    rounds = size.of(10, 2, 1)
     stop, release = ((SetBool, 'stop', SetBool.Request(data=on)) for on in (True, False))
     rows = []
     with stack_in_real_time() as patrol:
@@ -539,14 +546,16 @@ def stops_after_silence(
 ) -> list[tuple[str, ...]]:
     """Silence a sensor at each speed; return rows with the longest times and way."""
     base = patrol.robot.base
-    sensors = patrol.nodes['simulator']._sensors
-    name = '_odometry' if who.endswith('odom') else '_scan'
-    publisher = getattr(sensors, name)
-    missed: list[tuple[float, float]] = []
-    mute = SimpleNamespace(
-        publish=lambda _: missed.append((patrol.robot.time, base.travelled)),
-        get_subscription_count=lambda: 1,
+    topic = '/odom' if who.endswith('odom') else '/scan'
+    (publisher,) = (
+        each for each in patrol.nodes['simulator'].publishers if each.topic_name == topic
     )
+    speak = publisher.publish
+    missed: list[tuple[float, float]] = []
+
+    def be_silent(_message: Any) -> None:
+        missed.append((patrol.robot.time, base.travelled))
+
     rows = []
     for wanted in speeds:
         stops = []
@@ -554,7 +563,7 @@ def stops_after_silence(
             _await(lambda: base.speed == 0.0, 60.0)
             _await(lambda wanted=wanted: base.speed >= wanted, 60.0, pause=0.002)
             missed.clear()
-            setattr(sensors, name, mute)
+            publisher.publish = be_silent
             _await(lambda: missed, 5.0, pause=0.001)
             (begun, driven), top, braked = missed[0], base.speed, math.nan
             while base.speed != 0.0:
@@ -565,14 +574,14 @@ def stops_after_silence(
                 if patrol.robot.time - begun > 5.0:
                     raise SystemExit(f'{who}: the robot does not stop')
             stops.append((top, braked, patrol.robot.time - begun, base.travelled - driven))
-            setattr(sensors, name, publisher)
+            publisher.publish = speak
         rows.append((who, *(f'{max(each):.2f}' for each in zip(*stops, strict=True))))
     return rows
 
 
-def stack(*, quick: bool) -> None:
+def stack(size: Size) -> None:
     """Return the simulated seconds per real second of the whole patrol."""
-    seconds = 5.0 if quick else 30.0
+    seconds = size.of(30.0, 5.0, 0.5)
     rows = []
     for name, measure in (
         ('composed', lambda: composed(seconds)),
@@ -724,10 +733,13 @@ def legs_of(record: Path) -> list[Leg]:
     return legs
 
 
-def pace(*, quick: bool) -> None:
+def pace(size: Size) -> None:
     """Measure the simulated seconds of the same legs and stops: at full speed beside real time."""
-    place, seconds = ROOT / 'config' / 'seven_rooms.yaml', 35.0 if quick else 240.0
+    place, seconds = ROOT / 'config' / 'seven_rooms.yaml', size.of(240.0, 35.0, 3.0)
     fast, real = mission(place, seconds), mission(place, seconds, real_time=True)
+    if not _ways(fast) & _ways(real):
+        print(f'\nThe two missions share no leg within {seconds:.0f} s.')
+        return
     rows = []
     for what, measure in (
         ('leg', lambda leg: leg.seconds),
@@ -764,12 +776,12 @@ def _ways(legs: Sequence[Leg]) -> set[tuple[str, str]]:
     return {(leg.start, leg.goal) for leg in legs}
 
 
-def times(*, quick: bool) -> None:
+def times(size: Size) -> None:
     """Time of legs and the longest wait: as the mission predicts them, beside what was driven."""
-    seconds = 120.0 if quick else 700.0
+    seconds = size.of(700.0, 120.0, 60.0)
     rows = []
     with tempfile.TemporaryDirectory() as folder:
-        for name, place in places_to_patrol(Path(folder))[: 1 if quick else None]:
+        for name, place in places_to_patrol(Path(folder))[: size.of(None, 1, 1)]:
             positions = read_world(place).plan.place.positions
             learned = LegTimes()
             wrong, kept = [], 0
@@ -849,13 +861,12 @@ SECTIONS: dict[str, Callable[..., None]] = {
 
 def main() -> int:
     """Run the sections asked for."""
-    parser = argparse.ArgumentParser(description=__doc__.split('\n')[0])
+    parser = sized_parser(__doc__, quick='a run below 50 s')
     parser.add_argument('sections', nargs='*', choices=[*SECTIONS, []], help='default: all')
-    parser.add_argument('--quick', action='store_true', help='a run below 50 s')
     options = parser.parse_args()
     logging.disable()
     for name in options.sections or SECTIONS:
-        SECTIONS[name](quick=options.quick)
+        SECTIONS[name](options.size)
     return 0
 
 

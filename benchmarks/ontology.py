@@ -30,6 +30,7 @@ ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
 from benchmarks.patrol_facts import IRI, Patrol, named, schema
+from benchmarks.sizes import Size, sized_parser
 from benchmarks.tables import table
 from libs.owl_reasoner.tests.java_reasoner import KINDS, JavaReasoner, JavaReasonerError, absent
 from owl_reasoner.documents.reading import read_ontology
@@ -153,13 +154,13 @@ def duration(value: float) -> str:
     raise AssertionError
 
 
-def java_rows(figures: list[Figures], quick: bool) -> list[list[str]]:
+def java_rows(figures: list[Figures], size: Size) -> list[list[str]]:
     """REASON and QUERY of the resident Java reasoners beside ours; absent ones named as absent."""
     rows: list[list[str]] = []
     ours = {entry.places: entry for entry in figures}
     missing = absent()
     for kind in KINDS:
-        for places, visits in list(JAVA_VISITS.items())[: 1 if quick else None]:
+        for places, visits in list(JAVA_VISITS.items())[: size.of(None, 1, 1)]:
             if places not in ours:
                 continue
             title = f'resident {kind}, {places} places'
@@ -167,7 +168,7 @@ def java_rows(figures: list[Figures], quick: bool) -> list[list[str]]:
                 rows.append([title, 'absent', '', missing])
                 break
             try:
-                reason, query = measure_java(kind, places, 40 if quick else visits)
+                reason, query = measure_java(kind, places, size.of(visits, 40, 4))
             except JavaReasonerError as error:
                 rows.append([title, 'refuses', '', str(error).rpartition(': ')[2]])
                 break
@@ -176,27 +177,27 @@ def java_rows(figures: list[Figures], quick: bool) -> list[list[str]]:
     return rows
 
 
-def directive_rows(quick: bool) -> list[list[str]]:
+def directive_rows(size: Size) -> list[list[str]]:
     """Directives inside the server and over ROS, as `benchmarks/armor_calls.py` measures them."""
     try:
         calls = importlib.import_module('benchmarks.armor_calls')
-        return [[what, duration(ms / 1e3), beside] for what, ms, beside in calls.rows(quick)]
+        return [[what, duration(ms / 1e3), beside] for what, ms, beside in calls.rows(size)]
     except (ImportError, OSError, RuntimeError, subprocess.SubprocessError) as error:
         return [['over ROS', 'absent', str(error).partition('\n')[0][-80:]]]
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__.partition('\n')[0])
-    parser.add_argument('--quick', action='store_true', help='fewer visits, sizes and peers')
+    parser = sized_parser(__doc__, quick='fewer visits, sizes and peers')
     parser.add_argument('--places', type=int, nargs='+', default=list(SIZES))
     parser.add_argument('--visits', type=int, default=0, help='visits per size')
     parser.add_argument('--one', type=int, help=argparse.SUPPRESS)
     options = parser.parse_args()
-    visits = options.visits or (100 if options.quick else VISITS)
+    visits = options.visits or options.size.of(VISITS, 100, 10)
     if options.one:
         print(json.dumps(asdict(measure(options.one, visits))))
         return 0
-    figures = [measure_apart(places, visits) for places in options.places]
+    chosen = options.size.of(options.places, options.places, [7])
+    figures = [measure_apart(places, visits) for places in chosen]
     base = figures[0].visit
     rows = [
         [
@@ -231,12 +232,13 @@ def main() -> int:
         table(
             [
                 ['peer, after a visit', 'REASON', 'QUERYs', 'in all'],
-                *java_rows(figures, options.quick),
+                *java_rows(figures, options.size),
             ]
         )
     )
-    print()
-    print(table([['directive, 7 places', 'median', 'beside'], *directive_rows(options.quick)]))
+    if options.size is not Size.SMOKE:  # there armor_calls.py runs by itself
+        print()
+        print(table([['directive, 7 places', 'median', 'beside'], *directive_rows(options.size)]))
     return 0
 
 

@@ -10,7 +10,6 @@ time runs as fast as it can, for `--minutes` of real time.
 
 from __future__ import annotations
 
-import argparse
 import contextlib
 import json
 import os
@@ -35,6 +34,7 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
 from benchmarks.processes import cpu_seconds, end_processes
+from benchmarks.sizes import Size, sized_parser
 from benchmarks.tables import table
 from surveillance_operator.page.broadcaster import Broadcaster
 from surveillance_operator.recording.bag import METADATA, BagWriter, TopicType
@@ -175,7 +175,8 @@ def replay_rows(folder: Path, hours: float) -> list[Row]:
     write_messages(recording, hours)
     write_timeline(run / 'timeline.jsonl', hours)
     size = sum(path.stat().st_size for path in recording.iterdir()) / 1e6
-    rows = replayed(run, f'replay of {hours:g} h, {size:.0f} MB')
+    needed = min(600.0, 1800.0 * hours)
+    rows = replayed(run, f'replay of {hours:g} h, {size:.0f} MB', needed)
     foreign = folder / 'foreign'
     recording.rename(foreign)
     (foreign / METADATA).unlink()
@@ -185,11 +186,17 @@ def replay_rows(folder: Path, hours: float) -> list[Row]:
             file.seek(content_end)
             (summary,) = struct.unpack('<Q', file.read(8))
         os.truncate(path, summary)
-    return rows + replayed(foreign, 'the same without time line, metadata, index')
+    return rows + replayed(foreign, 'the same without time line, metadata, index', needed)
 
 
-def replayed(recording: Path, name: str) -> list[Row]:
-    """Measure from the command to the first picture, and jumps with lidar and camera."""
+def replayed(recording: Path, name: str, needed: float) -> list[Row]:
+    """Measure from the command to the first picture, and jumps with lidar and camera.
+
+    Args:
+        recording: What is played.
+        name: What the row is called.
+        needed: Seconds of it that have to be read before somebody jumps.
+    """
     with contextlib.ExitStack() as stack:
         began = time.perf_counter()
         player = open_player(
@@ -200,7 +207,7 @@ def replayed(recording: Path, name: str) -> list[Row]:
         thread.start()
         stack.callback(thread.join)
         stack.callback(player.stop)
-        while player.length < 600.0:
+        while player.length < needed:
             time.sleep(0.1)
 
         def jump() -> None:
@@ -273,14 +280,14 @@ def slowest(times: int, do: Callable[[], object]) -> float:
     return max(took)
 
 
-def mission_rows(folder: Path, quick: bool) -> list[Row]:
+def mission_rows(folder: Path, size: Size) -> list[Row]:
     """Measure beside a running mission."""
-    seconds = 6.0 if quick else 20.0
+    seconds = size.of(20.0, 6.0, 0.3)
     rows: list[Row] = []
     domain = claim_domain()
     with mission(folder, domain) as (address, processes):
         page, recorder = processes['mission_page'], processes['mission_recorder']
-        time.sleep(3.0)
+        time.sleep(size.of(3.0, 3.0, 0.0))
         nobody, recording = share([page, recorder], seconds)
         rows.append(('server, nobody looks', f'{nobody:.1f} % of a core', ''))
         rows.append(('recording, markers and diagnostics', f'{recording:.1f} % of a core', '4 %'))
@@ -295,8 +302,8 @@ def mission_rows(folder: Path, quick: bool) -> list[Row]:
             return rows
         viewer = Viewer(address)
         try:
-            time.sleep(2.0)
-            found = latencies(viewer, domain, 100 if quick else 500)
+            time.sleep(size.of(2.0, 2.0, 0.0))
+            found = latencies(viewer, domain, size.of(500, 100, 3))
             for name, at in (('p50', 0.5), ('p99', 0.99)):
                 value = found[min(len(found) - 1, int(at * len(found)))]
                 limit = '50 ms' if at > 0.9 else ''
@@ -340,16 +347,15 @@ def memory_rows(folder: Path, minutes: float) -> list[Row]:
 
 def main() -> None:
     """Print the table."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument('--quick', action='store_true')
+    parser = sized_parser(__doc__, quick='an hour is replayed, memory is not watched')
     parser.add_argument('--minutes', type=float, default=10.0, help='to watch memory; 0: not')
     options = parser.parse_args()
     size = sum(path.stat().st_size for path in PAGE_FILES.iterdir())
     rows: list[Row] = [('page, all files', f'{size / 1000:.0f} kB', '150 kB')]
     with tempfile.TemporaryDirectory() as folder:
-        rows += replay_rows(Path(folder), 1.0 if options.quick else 24.0)
-        rows += mission_rows(Path(folder), options.quick)
-        if not options.quick:
+        rows += replay_rows(Path(folder), options.size.of(24.0, 1.0, 0.02))
+        rows += mission_rows(Path(folder), options.size)
+        if options.size is Size.FULL:
             rows += memory_rows(Path(folder), options.minutes)
     print(table([('figure', 'measured', 'limit'), *rows]))
 

@@ -38,6 +38,7 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
 from benchmarks.literature_policies import LITERATURE
+from benchmarks.sizes import Size, sized_parser
 from benchmarks.tables import table
 from patrol_policy.bounds import charge_bound, rule_bound
 from patrol_policy.decision import QUIET, RECHARGE, Rules
@@ -133,13 +134,15 @@ def ring(count: int) -> Map:
     return Map(f'ring {count}', _joined(pairs, draw), 'P0')
 
 
-def maps(quick: bool) -> Iterator[Map]:
+def maps(size: Size) -> Iterator[Map]:
     """Yield the maps of the benchmark."""
     yield place_map('seven rooms', ROOT / 'config' / 'seven_rooms.yaml')
+    if size is Size.SMOKE:
+        return
     yield place_map('patrol world', ROOT / 'config' / 'patrol_world.yaml')
     yield place_map('office, 40 rooms', ROOT / 'config' / 'office.yaml')
     yield grid(5, 5)
-    if not quick:
+    if size is Size.FULL:
         yield grid(10, 10)
         yield tree(100)
         yield ring(100)
@@ -525,12 +528,12 @@ def plot(path: Path, hours: float, results: dict[str, tuple[float, dict[str, Pat
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the benchmark; return the exit code."""
-    parser = argparse.ArgumentParser(
-        description=(__doc__ or '').partition('\n')[0],
+    parser = sized_parser(
+        __doc__,
+        quick='small maps, half an hour',
         epilog=(__doc__ or '').partition('\n')[2],
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument('--quick', action='store_true', help='small maps, half an hour')
     parser.add_argument('--hours', type=float, help='simulated hours (default 24, or 0.5)')
     parser.add_argument(
         '--graph', nargs='+', metavar='FILE', help="maps in patrolling_sim's format, or folders"
@@ -545,7 +548,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument('--table', nargs='+', choices=TABLES, default=TABLES, help='default: all')
     parser.add_argument('--plot', type=Path, metavar='FILE.png', help='draw the ratios')
     options = parser.parse_args(arguments)
-    hours = options.hours or (0.5 if options.quick else 24.0)
+    size = options.size
+    hours = options.hours or size.of(24.0, 0.5, 0.05)
     try:
         if options.graph:
             chosen = []
@@ -556,9 +560,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
                     chosen.append(Map(file.stem, graph, graph.places[0]))
         else:
             words = options.only or ['']
-            chosen = [
-                place for place in maps(options.quick) if any(word in place.name for word in words)
-            ]
+            chosen = [place for place in maps(size) if any(word in place.name for word in words)]
     except (GraphError, OSError, ValueError, yaml.YAMLError) as error:
         print(error, file=sys.stderr)
         return 1
@@ -570,20 +572,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if 'battery' in options.table:
         for place in small:
             strandings(place, hours)
-        with_battery(options.random or (8 if options.quick else 100), 20_000)
+        with_battery(options.random or size.of(100, 8, 1), size.of(20_000, 20_000, 200))
     if 'rules' in options.table:
-        many = options.random if options.random is not None else 3 if options.quick else 8
+        many = options.random if options.random is not None else size.of(8, 3, 0)
         sizes, uneven = options.sizes, 4
         graphs = [random_graph(sizes[n % len(sizes)], n, n % uneven == 3) for n in range(many)]
-        within = [*(chosen if options.graph else small[:2] if options.quick else small), *graphs]
-        if options.quick:
-            within_rules(within, (0.1, 1.0), 8.0, 3_000)
-        else:
-            within_rules(within, (0.1, 0.5, 1.0, 2.0), 15.0, 60_000)
+        within = [*(chosen if options.graph else size.of(small, small[:2], small[:1])), *graphs]
+        factors = size.of((0.1, 0.5, 1.0, 2.0), (0.1, 1.0), (1.0,))
+        within_rules(within, factors, size.of(15.0, 8.0, 2.0), size.of(60_000, 3_000, 100))
     if 'choice' in options.table:
-        first_choice(1000)
+        first_choice(size.of(1000, 1000, 20))
     if 'hours' in options.table:
-        month(3 if options.quick else 31)
+        month(size.of(31, 3, 1))
     if 'configured' in options.table and not options.graph:
         configured(small, min(hours, 6.0))
     if options.plot:

@@ -16,7 +16,6 @@ times its answers.
 
 from __future__ import annotations
 
-import argparse
 import math
 import os
 import resource
@@ -40,6 +39,7 @@ import numpy as np
 import numpy.typing as npt
 
 from benchmarks.photographs import AS_TAKEN, VARIATIONS, Photograph, photographs_in
+from benchmarks.sizes import Size, sized_parser
 from benchmarks.tables import table
 from libs.marker_detection.tests.backdrops import BACKDROPS, backdrop_of
 from marker_detection.camera_model import CameraModel
@@ -219,13 +219,15 @@ def grid(detectors: dict[str, Detect], samples: int) -> dict[tuple[int, int], Ta
     return cells
 
 
-def degraded(detectors: dict[str, Detect], samples: int) -> dict[str, Tallies]:
+def degraded(
+    detectors: dict[str, Detect], samples: int, distances: Sequence[int] = (2, 3, 4, 5)
+) -> dict[str, Tallies]:
     """Recall under each condition, at 2 to 5 m and up to 60 degrees."""
     result = {}
     for index, (condition, degradation) in enumerate(DEGRADED.items()):
         generator = np.random.default_rng([2, index])
         tallies = {name: Tally() for name in detectors}
-        for distance in (2, 3, 4, 5):
+        for distance in distances:
             for degrees in (0, 20, 40, 60):
                 for _ in range(samples):
                     panels = [panel(distance, degrees, generator)]
@@ -574,11 +576,11 @@ def beside_the_edge(gap: float, index: int) -> tuple[ImageArray, Panel]:
     return scene([shown], indoors(generator), SHARP, generator), shown
 
 
-def print_edge(count: int) -> None:
+def print_edge(count: int, gaps: Sequence[float]) -> None:
     """Markers beside the edge of the image, and cut by it: found, and how far a corner is off."""
     detectors = {'OpenCV': opencv_defaults(), 'ladder': opencv_ladder(), 'here': this_project()}
     rows = []
-    for gap in GAPS:
+    for gap in gaps:
         row = [f'{gap:g} pixels']
         views = [beside_the_edge(gap, index) for index in range(count)]
         for detect in detectors.values():
@@ -845,8 +847,7 @@ def print_recall(title: str, groups: dict[str, Tallies]) -> None:
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Measure and print."""
-    parser = argparse.ArgumentParser(description=(__doc__ or '').splitlines()[0])
-    parser.add_argument('--quick', action='store_true', help='fewer images, under 50 s')
+    parser = sized_parser(__doc__, quick='fewer images, under 50 s')
     parser.add_argument('--picture', type=Path, help='draw recall over distance and angle')
     parser.add_argument('--photos', type=Path, default=os.environ.get('MARKER_PHOTOS'))
     parser.add_argument('--fuzz', type=int, metavar='N', help='damaged messages, and nothing else')
@@ -859,19 +860,23 @@ def main(argv: Sequence[str] | None = None) -> int:
     if options.node is not None:
         print_node(options.node)
         return 0
+    size = options.size
+    if size is Size.SMOKE:
+        print_fuzz(3)
+        print_node(2)
     detectors = {'OpenCV': opencv_defaults(), 'here': this_project()}
-    samples, degraded_samples, empty = (1, 1, 45) if options.quick else (12, 5, 10_000)
+    samples, degraded_samples, empty = size.of((12, 5, 10_000), (1, 1, 45), (1, 1, 9))
     print(f'OpenCV {cv2.__version__}, {samples} images a cell\n')
 
-    print_times(12 if options.quick else 60)
-    print_lights(3 if options.quick else 60)
-    print_photos(options.photos, 12 if options.quick else 1)
-    print_poses(300 if options.quick else 6000)
-    print_foreign(40 if options.quick else 1)
-    print_kalibr(1 if options.quick else 5)
+    print_times(size.of(60, 12, 1))
+    print_lights(size.of(60, 3, 1))
+    print_photos(options.photos, size.of(1, 12, 100))
+    print_poses(size.of(6000, 300, 10))
+    print_foreign(size.of(1, 40, 400))
+    print_kalibr(size.of(5, 1, 1))
     print_corners(None if options.photos is None else Path(options.photos))
-    print_edge(4 if options.quick else 60)
-    print_natural(40 if options.quick else 1500)
+    print_edge(size.of(60, 4, 1), size.of(GAPS, GAPS, GAPS[:1]))
+    print_natural(size.of(1500, 40, 1))
     cells = grid(detectors, samples)
     for name in detectors:
         rows = [
@@ -894,7 +899,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             ),
         },
     )
-    conditions = degraded(detectors, degraded_samples)
+    conditions = degraded(detectors, degraded_samples, size.of((2, 3, 4, 5), (2, 3, 4, 5), (2,)))
     whole = {name: summed([each[name] for each in conditions.values()]) for name in detectors}
     print_recall('2-5 m, to 60 deg', {**conditions, 'all degraded': whole})
 

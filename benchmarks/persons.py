@@ -14,13 +14,17 @@ mirrored or not.
 
 from __future__ import annotations
 
-import argparse
+import sys
+import tempfile
 import time
 from pathlib import Path
 
 import cv2
 import numpy as np
 
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from benchmarks.sizes import Size, sized_parser, skip
 from surveillance_perception.observation.persons import PersonFinder, load_finder
 
 ENDINGS = ('.jpg', '.jpeg', '.png')
@@ -69,13 +73,26 @@ def false_in_crops(finder: PersonFinder, paths: list[Path], crops: int) -> tuple
 
 def main() -> None:
     """Print the table."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else '')
+    parser = sized_parser(__doc__)
     parser.add_argument('--with', dest='persons', type=Path, nargs='*', default=[])
     parser.add_argument('--without', type=Path, nargs='*', default=[])
     parser.add_argument('--crops', type=int, default=0, help='of each picture without persons')
     given = parser.parse_args()
-    persons, without = pictures(given.persons), pictures(given.without)
-    finder = load_finder()
+    try:
+        finder = load_finder()
+    except ValueError as error:
+        skip(str(error))
+    if given.size is Size.SMOKE:
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / 'grey.png'
+            cv2.imwrite(str(path), np.full((240, 320, 3), 128, np.uint8))
+            compare(finder, [], [path], 1)
+    else:
+        compare(finder, pictures(given.persons), pictures(given.without), given.crops)
+
+
+def compare(finder: PersonFinder, persons: list[Path], without: list[Path], crops: int) -> None:
+    """Print what is found in pictures with persons and without, and in parts of the latter."""
     print(f'{"":12} {"found":>10} {"false":>10} {"ms CPU":>8}')
     hits, first = measured(finder, persons)
     false, second = measured(finder, without)
@@ -84,8 +101,8 @@ def main() -> None:
     print(f'{"SSDLite":12} {found:>10} {wrong:>10} {spent:8.0f}   {", ".join(false)}')
     missed = [each.name for each in persons if each.name not in hits]
     print(f'missed: {", ".join(missed) or "none"}')
-    if given.crops:
-        looked, wrong_parts = false_in_crops(finder, without, given.crops)
+    if crops:
+        looked, wrong_parts = false_in_crops(finder, without, crops)
         names = ', '.join(f'{each} {wrong_parts.count(each)}' for each in sorted(set(wrong_parts)))
         print(f'parts: {len(wrong_parts)} of {looked} false   {names}')
 

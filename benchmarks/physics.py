@@ -10,7 +10,6 @@ that does not say it is lost or unsure.
 
 from __future__ import annotations
 
-import argparse
 import logging
 import math
 import sys
@@ -21,11 +20,10 @@ from pathlib import Path
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
-sys.path.insert(0, str(Path(__file__).resolve().parent))
 
-from driven_robot import DrivenRobot
-from localisation import Amcl, print_table
-
+from benchmarks.driven_robot import DrivenRobot
+from benchmarks.localisation import Amcl, print_table
+from benchmarks.sizes import sized_parser, skip
 from surveillance_controllers.geometry import Pose, Scan, composed, relative
 from surveillance_controllers.motion.driving import State
 from surveillance_controllers.motion.odometry import OdometryBuffer
@@ -94,16 +92,15 @@ def patrol(robot: Robot, seconds: float, seed: int) -> Outcome:
 
 def main() -> int:
     """Measure and print."""
-    parser = argparse.ArgumentParser(description=__doc__.partition('\n')[0])
+    parser = sized_parser(__doc__, quick='120 simulated seconds')
     parser.add_argument('--place', default='office', help='a place of config/')
     parser.add_argument('--seconds', type=float, default=900.0, help='simulated')
     parser.add_argument('--seed', type=int, default=1)
-    parser.add_argument('--quick', action='store_true', help='120 simulated seconds')
     options = parser.parse_args()
     if mujoco is None:
-        parser.error('mujoco is missing: pip install mujoco')
+        skip('mujoco is missing: pip install mujoco')
     logging.disable()
-    seconds = 120.0 if options.quick else options.seconds
+    seconds = options.size.of(options.seconds, 120.0, 5.0)
     file = ROOT / 'config' / f'{options.place}.yaml'
     bad = PhysicsModel(wheel_errors=(0.05, -0.05), friction=0.3)
     off = replace(bad, lidar_offset=(0.03, 0.02, 0.03))

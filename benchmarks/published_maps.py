@@ -12,24 +12,23 @@ reach.
 
 from __future__ import annotations
 
-import argparse
 import contextlib
 import json
 import sys
 import tempfile
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-sys.path.insert(0, str(Path(__file__).resolve().parent))
 
-from localisation import print_table
-from whole_stack import Stack
-
+from benchmarks.localisation import print_table
+from benchmarks.sizes import Size, sized_parser
+from benchmarks.whole_stack import ROOT, Stack
 from surveillance_operator.place_import import ImportRequest, import_place
-from surveillance_runtime.place import read_place_file
-from surveillance_runtime.place.occupancy_map import read_map
+from surveillance_runtime.place import plan_grid, read_place_file
+from surveillance_runtime.place.occupancy_map import read_map, write_map
 
 PATIENCE = 300.0
 """So long in real time without a simulated second, and the run has failed, seconds."""
@@ -95,16 +94,33 @@ def maps_in(folder: Path) -> list[Path]:
 
 def main() -> int:
     """Import and patrol each map; print the table."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument('folder', type=Path)
+    parser = sized_parser(__doc__, quick='two minutes each')
+    parser.add_argument('folder', type=Path, nargs='?')
     parser.add_argument('only', nargs='*', metavar='MAP', help='names of maps; default: all')
     parser.add_argument('--minutes', type=float, default=10.0, help='simulated, each map')
-    parser.add_argument('--quick', action='store_true', help='two minutes each')
     options = parser.parse_args()
+    seconds = options.size.of(60.0 * options.minutes, 120.0, 5.0)
+    if options.size is Size.SMOKE:
+        with tempfile.TemporaryDirectory() as folder:
+            plan = read_place_file(ROOT / 'config' / 'seven_rooms.yaml').plan
+            grid = plan_grid.draw(plan)
+            write_map(
+                Path(folder) / 'map.yaml', grid.cells[::-1], grid.resolution, (*grid.origin, 0.0)
+            )
+            patrol_each(Path(folder), (), seconds)
+    elif options.folder is None:
+        parser.error('the folder with maps is missing')
+    else:
+        patrol_each(options.folder, options.only, seconds)
+    return 0
+
+
+def patrol_each(maps: Path, only: Sequence[str], simulated: float) -> None:
+    """Import and patrol maps of a folder for simulated seconds each; print the table."""
     rows = []
-    for path in maps_in(options.folder):
-        name = str(path.relative_to(options.folder).with_suffix(''))
-        if options.only and name not in options.only:
+    for path in maps_in(maps):
+        name = str(path.relative_to(maps).with_suffix(''))
+        if only and name not in only:
             continue
         with tempfile.TemporaryDirectory() as folder:
             place = Path(folder) / 'place.yaml'
@@ -118,7 +134,7 @@ def main() -> int:
             rows_, columns = read_map(path).cells.shape
             rooms = read_place_file(place).plan.place.rooms
             with contextlib.chdir(folder):  # a map's file is named as seen from the place's
-                run = patrolled(place, 60.0 * (2.0 if options.quick else options.minutes))
+                run = patrolled(place, simulated)
         rows.append(
             (
                 name,
@@ -140,7 +156,6 @@ def main() -> int:
         ),
         rows,
     )
-    return 0
 
 
 if __name__ == '__main__':

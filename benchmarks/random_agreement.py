@@ -16,7 +16,6 @@ reported; `settled` are differences in which the other Java reasoner answers as 
 
 from __future__ import annotations
 
-import argparse
 import sys
 import tempfile
 import time
@@ -27,6 +26,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
+from benchmarks.sizes import sized_parser, skip
 from libs.owl_reasoner.tests.java_reasoner import KINDS, JavaReasoner, JavaReasonerError, absent
 from libs.owl_reasoner.tests.wide_ontologies import DenseOntology, WideOntology
 from owl_reasoner import KnowledgeBase, write_ontology
@@ -226,7 +226,7 @@ class Comparison:
 
 def main() -> None:
     """Read the arguments and print the table."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = sized_parser(__doc__, quick='40 ontologies')
     parser.add_argument('--number', type=int, default=1000, help='how many ontologies')
     parser.add_argument('--first', type=int, default=0, help='the first seed')
     parser.add_argument('--cases', type=float, default=0.2, help='share of disjunctive classes')
@@ -234,11 +234,10 @@ def main() -> None:
     parser.add_argument('--dense', action='store_true', help='few names and few kinds of axioms')
     parser.add_argument('--kind', choices=KINDS, default='hermit')
     parser.add_argument('--seconds', type=float, default=30.0, help='longest time for an ontology')
-    parser.add_argument('--quick', action='store_true', help='40 ontologies')
     arguments = parser.parse_args()
     if why := absent():
-        parser.exit(1, f'{why}\n')
-    number = 40 if arguments.quick else arguments.number
+        skip(why)
+    number = arguments.size.of(arguments.number, 40, 1)
     comparison = Comparison(arguments.kind, arguments.seconds)
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / 'random.owl'

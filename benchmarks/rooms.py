@@ -19,6 +19,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+import tempfile
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -31,6 +32,7 @@ from skimage.segmentation import watershed
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
+from benchmarks.sizes import Size, sized_parser
 from surveillance_runtime.map_rooms import propose, segment
 from surveillance_runtime.place.occupancy_grid import Grid
 from surveillance_runtime.place.occupancy_map import OccupancyMap
@@ -182,20 +184,42 @@ def variants(
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument('folder', type=Path)
+    parser = sized_parser(__doc__, quick='the first three maps')
+    parser.add_argument('folder', type=Path, nargs='?')
     parser.add_argument('--turned', action='store_true', help='other resolutions and directions')
-    parser.add_argument('--quick', action='store_true', help='the first three maps')
     parser.add_argument('--doors', action='store_true', help='the doors, too')
     parser.add_argument('--clicks', action='store_true', help='corrections in the editor, too')
     parser.add_argument('--each', action='store_true', help='a line for each map')
     options = parser.parse_args()
+    with tempfile.TemporaryDirectory() as example:
+        if options.size is Size.SMOKE:
+            options.folder = Path(example)
+            options.doors = options.clicks = options.turned = True
+            draw_example(options.folder)
+        elif options.folder is None:
+            parser.error('the folder with maps is missing')
+        measure(options)
+    return 0
+
+
+def draw_example(folder: Path) -> None:
+    """Draw two rooms with a door between them, and the truth of that."""
+    truth = np.zeros((120, 220), np.uint8)
+    truth[10:110, 10:106] = truth[10:110, 114:210] = 255
+    image = truth.copy()
+    image[48:72, 106:114] = 255
+    for ending, picture in (('.png', image), ('_furnitures.png', image), (TRUTH, truth)):
+        cv2.imwrite(str(folder / f'example{ending}'), picture)
+
+
+def measure(options: argparse.Namespace) -> None:
+    """Measure the maps of a folder and print the tables."""
     names = sorted(path.name.removesuffix(TRUTH) for path in options.folder.glob('*' + TRUTH))
     methods: dict[str, Callable[[Image, float], Labels]] = {'watershed': peer, 'ours': ours}
     results: dict[tuple[str, str, str], list[tuple[float, ...]]] = {}
     doors: dict[str, list[tuple[int, ...]]] = {}
     clicks: dict[str, list[tuple[int, int]]] = {}
-    for name in names[:3] if options.quick else names:
+    for name in options.size.of(names, names[:3], names):
         drawn: Any = cv2.imread(str(options.folder / (name + TRUTH)), cv2.IMREAD_GRAYSCALE)
         truth = true_rooms(drawn)
         for kind, ending in (('empty', '.png'), ('furnished', '_furnitures.png')):
@@ -240,7 +264,6 @@ def main() -> int:
             f'{kind:10} doors: {found} of {true_} found ({found / true_:.1%}), '
             f'{false} of {proposed} false ({false / proposed:.1%})'
         )
-    return 0
 
 
 if __name__ == '__main__':

@@ -13,7 +13,6 @@ share is counted in part in each, so that the sum counts it once.
 
 from __future__ import annotations
 
-import argparse
 import os
 import re
 import shutil
@@ -30,6 +29,7 @@ CHECKOUT = Path(__file__).resolve().parent.parent
 if str(CHECKOUT) not in sys.path:
     sys.path.insert(0, str(CHECKOUT))
 
+from benchmarks.sizes import Size, sized_parser
 from launcher.process_watch import look_at
 from surveillance_runtime.testing import claim_domain
 
@@ -124,11 +124,10 @@ def cold_start() -> Start:
 
 def main() -> None:
     """Measure and print the tables."""
-    parser = argparse.ArgumentParser(description=(__doc__ or '').partition('\n')[0])
-    parser.add_argument('--quick', action='store_true', help='one start of each kind')
+    parser = sized_parser(__doc__, quick='one start of each kind')
     parser.add_argument('--cold', action='store_true', help='also a start from nothing (minutes)')
     options = parser.parse_args()
-    repeats = 1 if options.quick else 5
+    repeats = options.size.of(5, 1, 1)
     python = str(CHECKOUT / '.venv' / 'bin' / 'python')
     bare = statistics.median(
         time_of([python, '-c', 'import rclpy'], own_environ()) for _ in range(2 + repeats)
@@ -147,8 +146,10 @@ def main() -> None:
         starts = {
             kind: [launch(CHECKOUT, *words) for _ in range(repeats)]
             for kind, words in kinds.items()
+            if options.size is not Size.SMOKE or kind == 'composed, start not explored'
         }
-    starts['resumed'] = [resumed(domain) for _ in range(repeats)]
+    if options.size is not Size.SMOKE:
+        starts['resumed'] = [resumed(domain) for _ in range(repeats)]
     if options.cold:
         starts['cold, from nothing'] = [cold_start()]
     print(f'from the command to the first chosen room, median of {repeats}')
@@ -160,7 +161,7 @@ def main() -> None:
         print(f'{name:<40} {seconds:>8.2f} {seconds / bare:>9.1f} {cpu:>12.2f}')
     print('\nmemory at that moment, PSS')
     print(f'{"process":<40} {"MB":>8}')
-    for kind in ('processes', 'composed'):
+    for kind in starts.keys() & {'processes', 'composed'} or starts:
         memory = starts[kind][-1].memory
         for name, size in memory.items():
             print(f'{kind + ": " + name:<40} {size:>8.1f}')

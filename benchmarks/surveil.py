@@ -11,7 +11,6 @@ Real data beside it: photographs and scanned maps of `--shared`, and the picture
 
 from __future__ import annotations
 
-import argparse
 import json
 import math
 import resource
@@ -27,12 +26,15 @@ from typing import Any
 
 import cv2
 import numpy as np
-from tables import table
 
 ROOT = Path(__file__).resolve().parents[1]
 if str(ROOT) not in sys.path:
     sys.path.insert(0, str(ROOT))
 
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from benchmarks.sizes import Size, sized_parser
+from benchmarks.tables import table
 from launcher.alarm import Alarm
 from marker_detection.camera_model import CameraModel
 from marker_detection.detector import DetectorSettings, MarkerDetector
@@ -1338,8 +1340,7 @@ def measure_cpu() -> list[list[str]]:
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Print the tables."""
-    parser = argparse.ArgumentParser(description=(__doc__ or '').splitlines()[0])
-    parser.add_argument('--quick', action='store_true', help='fewer trials, below 50 s')
+    parser = sized_parser(__doc__, quick='fewer trials, below 50 s')
     parser.add_argument('--days', type=float, default=7.0, help='of the week (default: 7)')
     parser.add_argument('--seed', type=int, default=21, help='of the week (default: 21)')
     parser.add_argument('--trials', type=int, default=100, help='of markers (default: 100)')
@@ -1359,22 +1360,22 @@ def main(argv: Sequence[str] | None = None) -> int:
     )
     parser.add_argument('--only', choices=names, nargs='*', help='these tables alone')
     options = parser.parse_args(argv)
-    quick = options.quick
+    size = options.size
     shared = options.shared if options.shared and options.shared.is_dir() else None
     measures: dict[str, Callable[[], list[list[str]]]] = {
-        'doors': lambda: measure_doors(12 if quick else 420),
-        'things': lambda: measure_things(4 if quick else 70),
-        'markers': lambda: measure_markers(4 if quick else options.trials),
-        'persons': lambda: measure_persons(6 if quick else 60),
-        'views': lambda: measure_views(8 if quick else 60),
-        'real': lambda: measure_real(shared, 40 if quick else 1000),
+        'doors': lambda: measure_doors(size.of(420, 12, 1)),
+        'things': lambda: measure_things(size.of(70, 4, 1)),
+        'markers': lambda: measure_markers(size.of(options.trials, 4, 1)),
+        'persons': lambda: measure_persons(size.of(60, 6, 1)),
+        'views': lambda: measure_views(size.of(60, 8, 1)),
+        'real': lambda: measure_real(shared, size.of(1000, 40, 1)),
         'cpu': measure_cpu,
-        'telling': lambda: measure_telling(3 if quick else 20),
-        'alerts': lambda: telling_by_kind(2 if quick else 20),
-        'month': lambda: measure_month(2 if quick else 30),
-        'week': lambda: measure_week(0.1 if quick else options.days, 3600.0, options.seed),
+        'telling': lambda: measure_telling(size.of(20, 3, 1)),
+        'alerts': lambda: telling_by_kind(size.of(20, 2, 1)),
+        'month': lambda: measure_month(size.of(30, 2, 2)),
+        'week': lambda: measure_week(size.of(options.days, 0.1, 0.01), 3600.0, options.seed),
     }
-    chosen = options.only or [name for name in names if quick or name != 'week']
+    chosen = options.only or [name for name in names if size is not Size.FULL or name != 'week']
     for name in chosen:
         begun = time.process_time()
         print(table(measures[name]()))

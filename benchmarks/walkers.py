@@ -15,6 +15,7 @@ import argparse
 import gzip
 import math
 import sys
+import tempfile
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -25,8 +26,11 @@ from pathlib import Path
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from tables import table
 
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from benchmarks.sizes import Size, sized_parser
+from benchmarks.tables import table
 from surveillance_controllers.exploration.map_building import MapBuilder
 from surveillance_controllers.geometry import Pose, Scan
 from surveillance_controllers.motion.localisation import Localiser
@@ -34,7 +38,10 @@ from surveillance_perception.observation.events import EventBook
 from surveillance_perception.observation.observations import Kind, Observation
 from surveillance_perception.observation.watcher import Watcher
 from surveillance_runtime.place.occupancy_grid import Grid
+from surveillance_simulation.robot.lidar import LidarModel, scan
+from surveillance_simulation.world.world import read_world
 
+ROOT = Path(__file__).resolve().parents[1]
 Points = NDArray[np.float64]
 
 REACH = 25.0
@@ -177,10 +184,34 @@ def watch(log: list[Sweep], pictures: Path | None, name: str) -> tuple[int, list
 
 def main() -> None:
     """Print the table."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else '')
-    parser.add_argument('logs', type=Path, nargs='+')
+    parser = sized_parser(__doc__)
+    parser.add_argument('logs', type=Path, nargs='*')
     parser.add_argument('--pictures', type=Path, help='where each walk is drawn')
     given = parser.parse_args()
+    with tempfile.TemporaryDirectory() as folder:
+        if given.size is Size.SMOKE:
+            given.logs = [Path(folder) / 'simulated.log']
+            write_log(given.logs[0])
+        elif not given.logs:
+            parser.error('no log is named')
+        measure(given)
+
+
+def write_log(file: Path) -> None:
+    """Write what a robot on its way through the seven rooms sees, as CARMEN does."""
+    world, model = read_world(ROOT / 'config' / 'seven_rooms.yaml'), LidarModel(rays=180)
+    rng, lines = np.random.default_rng(1), []
+    x, y, yaw = world.plan.start
+    for number in range(12):
+        pose = x + 0.05 * number, y, yaw
+        ranges = ' '.join(f'{each:.2f}' for each in scan(world, pose, model, rng))
+        at = ' '.join(f'{each:.3f}' for each in pose)
+        lines.append(f'FLASER {model.rays} {ranges} {at} {at} {0.5 * number:.1f}\n')
+    file.write_text(''.join(lines), encoding='utf-8')
+
+
+def measure(given: argparse.Namespace) -> None:
+    """Look at the logs and print the table."""
     rows = [['log', 'scans', 'apart', 'walks told', 'ms CPU a scan']]
     for file in given.logs:
         log = read_log(file)
