@@ -8,10 +8,10 @@
 stand outside: `surveillance_ontology.armor_server_node`, `surveillance_ontology.armor_client`.
 
 Modules, from the bottom: `protocol` (requests, answers), `rendering` and `facts` (texts),
-`changes` (of an ontology), `reference` (a loaded ontology), `store` (what outlives the process),
-`worlds` (the same for owlready2), `names` (mistyped ones), `access` (limits and files),
-`workspace` (all of these: what directives act on), `directives` (what each does), `service`
-(dispatch and locks) and `client`.
+`changes` (of an ontology), `quarantine`, `reference` and `registry` (loaded ontologies), `store`
+(what outlives the process), `worlds` (the same for owlready2), `names` (mistyped ones), `access`
+(limits and files), `workspace` (all of these: what directives act on), `directives` (what each
+does), `service` (dispatch and locks) and `client`.
 """
 
 from __future__ import annotations

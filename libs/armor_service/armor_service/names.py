@@ -70,7 +70,7 @@ def _added(changes: Iterable[Change], *, facts: bool = False) -> Iterator[tuple[
 def _is_known(ref: Reference, kind: str, iri: str) -> bool:
     if ref.kb.is_known(kind, iri):
         return True
-    return any((kind, iri) in set(_added(told.changes)) for told in ref.waiting)
+    return any((kind, iri) in set(_added(told.changes)) for told in ref.buffering.waiting)
 
 
 def _article(words: str) -> str:

@@ -27,7 +27,8 @@ from armor_service.protocol import (
     ListResponse,
     StoreError,
 )
-from armor_service.reference import Reference, Told, TooHardError
+from armor_service.quarantine import Told, TooHardError
+from armor_service.reference import Reference
 from armor_service.rendering import one_line, shown
 from armor_service.store import Store
 from armor_service.workspace import Watcher, Workspace
@@ -182,7 +183,7 @@ class ArmorService:
         """Carry out a manipulation; return what a client should know of it."""
         self.workspace.check_free(ref, request.client_name)
         if directive.kind is Kind.CONTROL:
-            if self._store and ref.waiting:
+            if self._store and ref.buffering.waiting:
                 self._store.flushed(ref.name)
             remark: str = directive.run(ref, *self._values(directive, request, ref))
             return remark
@@ -191,10 +192,14 @@ class ArmorService:
         told = Told(request.client_name, self._clock(), tuple(changes))
         if self._store and changes:
             self._store.changed(ref.name, told)
-        ref.heavy |= directive.schema
+        ref.effort.heavy |= directive.schema
         remark = '; '.join(filter(None, (ref.missing(changes), *doubts)))
         if not changes:
-            waiting = f'; {len(ref.queue)} changes wait for APPLY' if ref.waiting else ''
+            waiting = (
+                f'; {len(ref.buffering.queue)} changes wait for APPLY'
+                if ref.buffering.waiting
+                else ''
+            )
             remark = f'{request.words}: nothing to change{waiting}'
         try:
             problem = ref.submit(told)

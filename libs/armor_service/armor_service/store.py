@@ -32,7 +32,8 @@ from typing import Any, get_args
 
 from armor_service.changes import Change, apply_all
 from armor_service.protocol import StoreError
-from armor_service.reference import WHOLE, Origin, Reference, Told, knowledge_base
+from armor_service.quarantine import WHOLE, Quarantine, Told
+from armor_service.reference import Buffering, Effort, Origin, Reference, knowledge_base
 from owl_reasoner.owl import axioms, expressions
 from owl_reasoner.owl.axioms import Axiom
 from owl_reasoner.owl.expressions import Literal
@@ -457,7 +458,7 @@ class Store:
             )
         for ref in recovery.references.values():
             ref.opened = False
-            ref.deaths, ref.died_at = self._reasoning.left(ref.name)
+            ref.quarantine.deaths, ref.quarantine.died_at = self._reasoning.left(ref.name)
             self.follow(ref)
         return list(recovery.references.values())
 
@@ -538,7 +539,7 @@ class Store:
                         # What waits is in the references already. Or one of them came or went
                         # meanwhile, or is in use. The next change tries again.
                         return
-                    if any(0 < len(ref.untested) <= MOST_UNTESTED for ref in kept):
+                    if any(0 < len(ref.quarantine.untested) <= MOST_UNTESTED for ref in kept):
                         return
                     if journal.is_incomplete:
                         self.warn(
@@ -636,13 +637,13 @@ def _state(ref: Reference) -> _State:
         'path': ref.origin.path,
         'format': ref.origin.format,
         'prefixes': dict(ref.origin.prefixes),
-        'buffered_manipulation': ref.buffered_manipulation,
-        'buffered_reasoner': ref.buffered_reasoner,
+        'buffered_manipulation': ref.buffering.manipulation,
+        'buffered_reasoner': ref.buffering.reasoner,
         'mounted': ref.mounted,
-        'base': ref.base,
-        'quarantine': list(ref.quarantine),
+        'base': ref.effort.base,
+        'quarantine': list(ref.quarantine.lines),
     }
-    return ref.name, settings, list(ref.kb.axioms()), list(ref.waiting)
+    return ref.name, settings, list(ref.kb.axioms()), list(ref.buffering.waiting)
 
 
 def _records(
@@ -682,7 +683,7 @@ class _Recovery:
         if what == 'load':
             settings, axioms, queue = rest
             self._load(name, settings, [decode(axiom) for axiom in axioms])
-            self.references[name].waiting = [_told(*parts) for parts in queue]
+            self.references[name].buffering.waiting = [_told(*parts) for parts in queue]
             return
         if what == 'loaded':
             if name not in self.references:
@@ -706,20 +707,20 @@ class _Recovery:
             ref.mounted = rest[0]
         elif what == 'change':
             told = _told(*rest)
-            if ref.buffered_manipulation:
-                ref.waiting.append(told)
+            if ref.buffering.manipulation:
+                ref.buffering.waiting.append(told)
             else:
                 self._apply(ref, [told])
         elif what == 'taken back':
-            ref.quarantine += rest[0]
+            ref.quarantine.lines += rest[0]
             apply_all(ref.kb, [decode(change) for change in rest[1]])
             # What is left was reasoned over.
-            ref.untested.clear()
-            ref.origin_axioms = tuple(ref.kb.axioms())
+            ref.quarantine.untested.clear()
+            ref.quarantine.origin = tuple(ref.kb.axioms())
         elif what == 'flush':
             self._flush(ref)
         elif what == 'buffer':
-            ref.buffered_manipulation = rest[0]
+            ref.buffering.manipulation = rest[0]
             if not rest[0]:
                 self._flush(ref)
 
@@ -733,23 +734,22 @@ class _Recovery:
                     settings['format'],
                     settings['prefixes'],
                 ),
-                settings['buffered_manipulation'],
-                settings['buffered_reasoner'],
+                Buffering(settings['buffered_manipulation'], settings['buffered_reasoner']),
                 settings['mounted'],
-                base=settings.get('base', 0.0),
-                quarantine=list(settings.get('quarantine', ())),
+                Quarantine(lines=list(settings.get('quarantine', ()))),
+                Effort(base=settings.get('base', 0.0)),
             )
         except KeyError as error:
             raise ValueError(f'no setting {error}') from None
 
     def _flush(self, ref: Reference) -> None:
-        waiting, ref.waiting = ref.waiting, []
+        waiting, ref.buffering.waiting = ref.buffering.waiting, []
         self._apply(ref, waiting)
 
     def _apply(self, ref: Reference, told: list[Told]) -> None:
-        if not ref.untested:
-            ref.origin_axioms = tuple(ref.kb.axioms())
-        ref.untested += told
+        if not ref.quarantine.untested:
+            ref.quarantine.origin = tuple(ref.kb.axioms())
+        ref.quarantine.untested += told
         for one in told:
             apply_all(ref.kb, one.changes)
 

@@ -16,7 +16,8 @@ from armor_service.access import SafePaths, Settings
 from armor_service.changes import Change
 from armor_service.directive_log import DirectiveLog
 from armor_service.protocol import DirectiveError, ExitCode, StoreError
-from armor_service.reference import Limits, Reference, Registry
+from armor_service.reference import Limits, Reference
+from armor_service.registry import Registry
 from armor_service.rendering import one_line
 from armor_service.sparql import SparqlEngine
 from armor_service.store import Store
@@ -125,7 +126,7 @@ class Workspace:
             for line in lines:
                 self.warn(f'{ref.name}: taken back: {line}')
 
-        ref.limits, ref.on_taken_back = self.limits, on_taken_back
+        ref.effort.limits, ref.on_taken_back = self.limits, on_taken_back
         ref.kb.subscribe(on_changes)
         if self.worlds:
             self.worlds.follow(ref)

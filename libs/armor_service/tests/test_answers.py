@@ -14,7 +14,7 @@ from armor_service.access import Settings
 from armor_service.directives import closing
 from armor_service.directives.table import TABLE
 from armor_service.protocol import DirectiveRequest, StoreError
-from armor_service.reference import TooHardError
+from armor_service.quarantine import TooHardError
 from armor_service.service import LARGE, LONG_ARGUMENTS, ArmorService
 from armor_service.store import Store
 from owl_reasoner.documents.reading import read_ontology
@@ -170,7 +170,7 @@ def test_what_is_quick_is_done_at_once_and_all_else_is_left(
     ref.opened = False
     assert at_once(request('QUERY IND', 'R1')) is None
     ref.opened = True
-    ref.heavy = True
+    ref.effort.heavy = True
     assert at_once(request('QUERY IND', 'R1')) is not None, 'a query reasons over nothing'
     assert at_once(request('ADD IND', 'R1')) is None
 

@@ -190,7 +190,7 @@ def unbounded(served: Served) -> Served:
     """Provide the service with the hard ontology and hours for it."""
     ask = served.load('products', 'true')
     ref = served.service.workspace.references.find('hard')
-    ref.limits = type(ref.limits)()
+    ref.effort.limits = type(ref.effort.limits)()
     ask(*HARD['products'][1])
     return served
 

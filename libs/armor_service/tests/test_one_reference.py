@@ -13,20 +13,21 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from armor_service import reference as reference_module
+from armor_service import registry as registry_module
 from armor_service.changes import AddAxiom, Change, RemoveAxiom, RemoveEntity, RenameEntity
 from armor_service.protocol import DirectiveError
+from armor_service.quarantine import Quarantine, Told, TooHardError
 from armor_service.reference import (
     LONG_BACKLOG,
     NOBODY,
     SLOW,
+    Buffering,
+    Effort,
     Limits,
     Origin,
     Reference,
-    Registry,
-    Told,
-    TooHardError,
 )
+from armor_service.registry import Registry
 from owl_reasoner.knowledge_base import KnowledgeBase
 from owl_reasoner.owl.axioms import Axiom, ClassAssertion
 from owl_reasoner.reasoner.budget import ReasoningBudgetError
@@ -68,7 +69,7 @@ def made(*present: Axiom, **settings: Any) -> tuple[Reference, Hard]:
     kb = Hard(present)
     kb.reason()
     kb.asked.clear()
-    return Reference('map', kb, Origin('', ''), **{'base': 2.0, **settings}), kb
+    return Reference('map', kb, Origin('', ''), **{'effort': Effort(base=2.0), **settings}), kb
 
 
 def told(*changes: Change, client: str = 'me', time: float = 0.0) -> Told:
@@ -111,7 +112,7 @@ def test_only_the_directives_that_are_too_hard_are_taken_back(
 ) -> None:
     base: set[Axiom] = {fact('a'), fact('kept')}
     ref, kb = made(*base)
-    ref.buffered_reasoner = True
+    ref.buffering.reasoner = True
     undone: list[tuple[list[str], list[Change]]] = []
     completed: list[bool] = []
     ref.on_taken_back = lambda lines, undo: undone.append((lines, undo))
@@ -144,8 +145,8 @@ def test_only_the_directives_that_are_too_hard_are_taken_back(
     answer = ref.reason()
     assert answer == '; '.join(lines)
     assert set(kb.axioms()) == kept
-    assert (ref.quarantine, ref.quarantined) == (lines, len(gone))
-    assert (ref.untested, ref.backlog, ref.too_hard) == ([], 0, '')
+    assert (ref.quarantine.lines, ref.quarantine.count) == (lines, len(gone))
+    assert (ref.quarantine.untested, ref.effort.backlog, ref.too_hard) == ([], 0, '')
     assert not kb.stale
     if gone:
         # Who keeps a journal of the directives undoes by this what was too hard.
@@ -164,15 +165,15 @@ def test_a_line_for_each_of_the_last_hundred_that_were_taken_back() -> None:
         answer = ref.submit(told(AddAxiom(fact('hard')), client=f'c{number}'))
         assert f"'c{number}'" in answer
         assert ';' not in answer
-    assert len(ref.quarantine) == 100
-    assert ref.quarantined == 102
-    assert "'c2'" in ref.quarantine[0]
-    assert "'c101'" in ref.quarantine[-1]
+    assert len(ref.quarantine.lines) == 100
+    assert ref.quarantine.count == 102
+    assert "'c2'" in ref.quarantine.lines[0]
+    assert "'c101'" in ref.quarantine.lines[-1]
 
 
 def test_reasoning_has_the_time_of_the_changes_or_of_all_where_nothing_is_known() -> None:
     limits = Limits(1.0, 5.0)
-    ref, kb = made(*(fact(f'n{number}') for number in range(10)), limits=limits)
+    ref, kb = made(*(fact(f'n{number}') for number in range(10)), effort=Effort(limits, base=2.0))
     ref.submit(told(AddAxiom(fact('a')), AddAxiom(fact('b'))))
     assert kb.asked == [(pytest.approx(1.0 + 40.0 + 0.0004), 5.0)]
     ref.submit(told(AddAxiom(fact('c'))))
@@ -181,20 +182,22 @@ def test_reasoning_has_the_time_of_the_changes_or_of_all_where_nothing_is_known(
         kb.change([fact(f'more{asked}')])
         ref.reason(asked)
     assert [seconds for seconds, _ in kb.asked[2:]] == [0.25, pytest.approx(41.0)]
-    assert ref.base == 2.0
+    assert ref.effort.base == 2.0
     # The first time, and after a restart, all is new.
-    for new in ({'base': 0.0}, {'base': 2.0, 'origin_axioms': (fact('a'),)}):
-        ref, kb = made(*(fact(f'n{number}') for number in range(10)), limits=limits, **new)
+    for base, before in ((0.0, ()), (2.0, (fact('a'),))):
+        ref, kb = made(
+            *(fact(f'n{number}') for number in range(10)),
+            effort=Effort(limits, base=base),
+            quarantine=Quarantine(origin=before),
+        )
         ref.submit(told(AddAxiom(fact('b'))))
-        base = new['base']
-        assert isinstance(base, float)
         assert kb.asked[0][0] == pytest.approx(1.0 + 20.0 * base + 11 * 0.0002)
-        assert (ref.base == ref.took) == (base == 0.0)
-        assert ref.origin_axioms == ()
+        assert (ref.effort.base == ref.effort.took) == (base == 0.0)
+        assert ref.quarantine.origin == ()
 
 
 def test_over_what_is_reasoned_is_told_before_and_its_end_after() -> None:
-    ref, _ = made(buffered_reasoner=True)
+    ref, _ = made(buffering=Buffering(reasoner=True))
     places: list[int | None] = []
     ref.on_reasoning = places.append
     for name in ('a', 'hard', 'b'):
@@ -207,15 +210,15 @@ def test_over_what_is_reasoned_is_told_before_and_its_end_after() -> None:
 
 @pytest.mark.parametrize('deaths', [1, 2])
 def test_what_ended_the_process_twice_is_not_reasoned_over_again(deaths: int) -> None:
-    ref, kb = made(buffered_reasoner=True)
-    ref.deaths, ref.died_at = deaths, 1
+    ref, kb = made(buffering=Buffering(reasoner=True))
+    ref.quarantine.deaths, ref.quarantine.died_at = deaths, 1
     for name in ('a', 'b', 'c'):
         ref.submit(told(AddAxiom(fact(name)), client=name))
     answer = ref.reason()
     why = 'the process ended 2 times while it reasoned over it'
     assert set(kb.axioms()) == {fact(name) for name in ('abc' if deaths == 1 else 'ac')}
     assert answer == ('' if deaths == 1 else f'{told(AddAxiom(fact("b")), client="b")}: {why}')
-    assert ref.deaths == 0
+    assert ref.quarantine.deaths == 0
 
 
 def error(limit: str) -> ReasoningBudgetError:
@@ -232,7 +235,7 @@ def test_what_takes_too_long_without_the_changes_as_well_leaves_them_as_they_are
     assert ref.too_hard == 'ended by memory'
     assert ref.is_slow
     assert ref.revision > revision
-    assert (ref.quarantine, ref.quarantined) == ([], 0)
+    assert (ref.quarantine.lines, ref.quarantine.count) == ([], 0)
     # Nothing is derived any more until somebody asks for it.
     reasoned = len(kb.asked)
     assert ref.submit(told(AddAxiom(fact('c')))) == ''
@@ -245,7 +248,7 @@ def test_what_takes_too_long_without_the_changes_as_well_leaves_them_as_they_are
 @pytest.mark.parametrize('when', [1, 2, 3])
 def test_a_reasoning_that_is_cancelled_leaves_the_changes_as_they_are(when: int) -> None:
     """The first one, the one without the changes, or one over some of them."""
-    ref, kb = made(buffered_reasoner=True)
+    ref, kb = made(buffering=Buffering(reasoner=True))
     for name in ('a', 'b'):
         ref.submit(told(AddAxiom(fact(name))))
     kb.fails = [*(error('seconds'), None, None)[: when - 1], error('cancelled')]
@@ -253,17 +256,17 @@ def test_a_reasoning_that_is_cancelled_leaves_the_changes_as_they_are(when: int)
         ref.reason()
     assert set(kb.axioms()) == {fact('a'), fact('b')}
     assert ref.too_hard == ''
-    assert ref.quarantine == []
+    assert ref.quarantine.lines == []
     assert ref.reason() == ''
 
 
 def test_a_time_of_ones_own_takes_nothing_back() -> None:
-    ref, kb = made(buffered_reasoner=True)
+    ref, kb = made(buffering=Buffering(reasoner=True))
     ref.submit(told(AddAxiom(fact('hard'))))
     with pytest.raises(TooHardError, match='it takes too long'):
         ref.reason(0.5)
     assert set(kb.axioms()) == {fact('hard')}
-    assert ref.quarantine == []
+    assert ref.quarantine.lines == []
 
 
 def test_who_wishes_an_end_is_heard_once_but_for_what_was_dropped() -> None:
@@ -278,7 +281,7 @@ def test_who_wishes_an_end_is_heard_once_but_for_what_was_dropped() -> None:
 
 
 def test_how_long_is_looked_for_an_explanation(monkeypatch: pytest.MonkeyPatch) -> None:
-    ref, kb = made(fact('a'), limits=Limits(1.0, 5.0))
+    ref, kb = made(fact('a'), effort=Effort(Limits(1.0, 5.0), base=2.0))
     asked: list[tuple[Any, ...]] = []
 
     def explain(*args: Any, memory: float) -> None:
@@ -304,19 +307,20 @@ def test_what_may_take_long_is_known_before() -> None:
         ('opened', True, False),
         ('too_hard', '', 'so long'),
     ):
-        setattr(ref, attribute, plain)
+        owner = ref.effort if hasattr(ref.effort, attribute) else ref
+        setattr(owner, attribute, plain)
         assert not ref.is_slow
-        setattr(ref, attribute, slow)
+        setattr(owner, attribute, slow)
         assert ref.is_slow, attribute
-        setattr(ref, attribute, plain)
+        setattr(owner, attribute, plain)
 
 
 def test_the_backlog_and_the_revision_count() -> None:
-    ref, kb = made(buffered_manipulation=True, buffered_reasoner=True)
+    ref, kb = made(buffering=Buffering(True, True))
     ref.submit(told(AddAxiom(fact('a')), AddAxiom(fact('b'))))
     ref.submit(told(AddAxiom(fact('c'))))
-    assert (ref.backlog, ref.revision, len(ref.queue)) == (3, 0, 3)
-    assert ref.queue[0] == AddAxiom(fact('a'))
+    assert (ref.effort.backlog, ref.revision, len(ref.buffering.queue)) == (3, 0, 3)
+    assert ref.buffering.queue[0] == AddAxiom(fact('a'))
     ref.flush()
     revision = ref.revision
     assert revision > 0
@@ -327,7 +331,7 @@ def test_the_backlog_and_the_revision_count() -> None:
     revision = ref.revision
     ref.reason()
     assert ref.revision == revision, 'nothing was new'
-    assert ref.backlog == 0
+    assert ref.effort.backlog == 0
     ref.submit(told(AddAxiom(fact('d'))))
     ref.buffer(True)
     assert fact('d') not in kb
@@ -351,7 +355,7 @@ def test_what_is_not_there_to_go_is_named_unless_it_may_come_before() -> None:
     assert 'b' in first
     assert second == f'map has no class <{X}#OLD>'
     assert third == f'map has no object property <{X}#p>'
-    ref.buffered_manipulation = True
+    ref.buffering.manipulation = True
     ref.submit(told(AddAxiom(fact('b'))))
     assert ref.missing(lost) == ''
 
@@ -461,8 +465,8 @@ def test_the_locks_of_a_batch_are_held_together_in_order() -> None:
 
 
 def test_all_are_held_or_none_where_one_is_in_use(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(reference_module, 'UNUSED_WITHIN', 0.01)
-    monkeypatch.setattr(reference_module, 'AT_ONCE', 0.01)
+    monkeypatch.setattr(registry_module, 'UNUSED_WITHIN', 0.01)
+    monkeypatch.setattr(registry_module, 'AT_ONCE', 0.01)
     registry, found = registered('a', 'b')
     with registry.held_briefly() as held:
         assert [ref.name for ref in held] == ['a', 'b']
@@ -473,7 +477,7 @@ def test_all_are_held_or_none_where_one_is_in_use(monkeypatch: pytest.MonkeyPatc
             assert held == []
         assert is_free(found['a'])
     # Somebody comes between the two looks.
-    monkeypatch.setattr(reference_module, '_becomes_free', lambda _: True)
+    monkeypatch.setattr(registry_module, '_becomes_free', lambda _: True)
     with in_use(found['b']):
         with registry.held_briefly() as held:
             assert held == []

@@ -155,9 +155,9 @@ def test_a_reference_whose_reasoning_takes_long_is_reasoned_over_by_a_worker(
     monkeypatch.setattr(reference, 'SLOW', 60.0)
     ref = service.workspace.references.find('map')
     ask('ADD IND CLASS', 'R1', 'ROOM')
-    ref.took = 60.0
+    ref.effort.took = 60.0
     assert service.execute_at_once(request('REASON')) is not None
-    ref.took = 60.1
+    ref.effort.took = 60.1
     assert service.execute_at_once(request('ADD IND CLASS', 'R2', 'ROOM')) is None
     ask('ADD IND CLASS', 'R2', 'ROOM')
     assert service.execute_at_once(request('REASON')) is not None, 'it took less this time'

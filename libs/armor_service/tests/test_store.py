@@ -16,12 +16,13 @@ from pathlib import Path
 
 import pytest
 
-from armor_service import reference as reference_module
+from armor_service import registry as registry_module
 from armor_service import store as store_module
 from armor_service.access import Settings
 from armor_service.changes import AddAxiom, RemoveEntity, RenameEntity
 from armor_service.protocol import DirectiveRequest, StoreError
-from armor_service.reference import Origin, Reference, Told
+from armor_service.quarantine import Quarantine, Told
+from armor_service.reference import Buffering, Effort, Origin, Reference
 from armor_service.service import ArmorService
 from armor_service.store import Journal, Store, decode, encode
 from owl_reasoner.documents.reading import read_ontology
@@ -253,7 +254,7 @@ def test_one_snapshot_is_written_at_a_time(tmp_path: Path) -> None:
 def test_a_snapshot_waits_for_an_ontology_in_use_and_holds_no_other_meanwhile(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(reference_module, 'UNUSED_WITHIN', 60.0)
+    monkeypatch.setattr(registry_module, 'UNUSED_WITHIN', 60.0)
     server = Server(tmp_path / 'store', compact_from=1)
     server.ask(*LOAD, 'false', '', 'false')
     server.ask(*LOAD, 'false', '', 'false', reference='used')
@@ -531,7 +532,8 @@ def reference(count: int = 3) -> Reference:
     kb = KnowledgeBase(IRI, axioms)
     kb.reason()
     origin = Origin('/a/map.ttl', 'ntriples', {'x': 'urn:x#'})
-    return Reference('map', kb, origin, True, True, 'me', base=2.5, quarantine=['a line'])
+    buffering, quarantine = Buffering(True, True), Quarantine(lines=['a line'])
+    return Reference('map', kb, origin, buffering, 'me', quarantine, Effort(base=2.5))
 
 
 @pytest.mark.parametrize('count', [0, 3, 100, 101, 250])
@@ -539,7 +541,7 @@ def test_a_reference_is_made_from_its_records_again(tmp_path: Path, count: int) 
     store = Store(tmp_path / 'store')
     ref = reference(count)
     waits = Told('you', 7.0, (AddAxiom(ClassAssertion(f'{IRI}#K', f'{IRI}#later')),))
-    ref.waiting.append(waits)
+    ref.buffering.waiting.append(waits)
     store.loaded(ref)
     store.close()
     store = Store(tmp_path / 'store')
@@ -547,10 +549,10 @@ def test_a_reference_is_made_from_its_records_again(tmp_path: Path, count: int) 
     store.close()
     assert set(again.kb.axioms()) == set(ref.kb.axioms())
     assert again.kb.iri == IRI
-    for name in ('name', 'origin', 'buffered_manipulation', 'buffered_reasoner', 'mounted', 'base'):
+    for name in ('name', 'origin', 'buffering', 'mounted'):
         assert getattr(again, name) == getattr(ref, name), name
-    assert again.quarantine == ['a line']
-    assert again.waiting == [waits]
+    assert again.quarantine.lines == ['a line']
+    assert again.buffering.waiting == [waits]
     assert not again.opened
     assert store.notes == []
     # Damage costs a hundred axioms at most, and never the settings.
@@ -580,7 +582,7 @@ def test_what_was_not_reasoned_over_is_known_after_the_death_with_what_was_befor
 ) -> None:
     store = Store(tmp_path / 'store')
     ref = reference()
-    ref.buffered_manipulation = False
+    ref.buffering.manipulation = False
     store.loaded(ref)
     before = tuple(ref.kb.axioms())
     told = [
@@ -595,9 +597,9 @@ def test_what_was_not_reasoned_over_is_known_after_the_death_with_what_was_befor
     fcntl.flock(store._journal._lock, fcntl.LOCK_UN)
     again = Store(tmp_path / 'store')
     (found,) = again.recover()
-    assert found.untested == told
-    assert set(found.origin_axioms) == set(before)
-    assert (found.deaths, found.died_at) == (1, 1)
+    assert found.quarantine.untested == told
+    assert set(found.quarantine.origin) == set(before)
+    assert (found.quarantine.deaths, found.quarantine.died_at) == (1, 1)
     # A further one counts on, until reasoning is completed.
     found.on_reasoning(-1)
     assert json.loads((tmp_path / 'store' / 'reasoning').read_text()) == {'map': [2, -1]}
@@ -631,11 +633,11 @@ def test_a_snapshot_is_written_from_the_size_on_that_was_set(tmp_path: Path) -> 
     store._compact_from = size + 1
     assert not compacted()
     # Reasoning over it may end the process, and the journal says by which directive.
-    ref.untested = [Told('me', 0.0, ())]
+    ref.quarantine.untested = [Told('me', 0.0, ())]
     store._compact_from = size
     assert compacted()
     assert not list((tmp_path / 'store').glob('snapshot-*'))
-    ref.untested = [Told('me', 0.0, ())] * (store_module.MOST_UNTESTED + 1)
+    ref.quarantine.untested = [Told('me', 0.0, ())] * (store_module.MOST_UNTESTED + 1)
     assert compacted()
     (path,) = (tmp_path / 'store').glob('snapshot-*')
     # The next one comes where the journal is as long as the snapshot.

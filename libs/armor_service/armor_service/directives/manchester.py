@@ -159,7 +159,7 @@ def _individuals(workspace: Workspace, ref: Reference, written: str) -> Directiv
     with ref.held() as kb:
         parser = _read(words, 'class expression', lambda: _parser(ref, written))
         expression = _read(words, 'class expression', lambda: parser.whole(parser.class_expression))
-        axioms, base = list(kb.axioms()), ref.base
+        axioms, base = list(kb.axioms()), ref.effort.base
     asked = knowledge_base(kb.iri, [*axioms, EquivalentClasses((ASKED, expression))])
     asked.reason(workspace.limits.of(base, len(axioms)), memory=workspace.limits.memory)
     if not asked.consistent:

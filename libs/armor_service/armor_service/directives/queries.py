@@ -292,7 +292,9 @@ def _unsupported(ref: Reference) -> DirectiveResponse:
     'the process: what, whose, when and why, one line each.',
 )
 def _taken_back(ref: Reference) -> DirectiveResponse:
-    return DirectiveResponse(queried_objects=list(ref.quarantine), error_description=ref.too_hard)
+    return DirectiveResponse(
+        queried_objects=list(ref.quarantine.lines), error_description=ref.too_hard
+    )
 
 
 @query(

@@ -18,6 +18,7 @@ from armor_service.protocol import (
 from armor_service.reference import (
     NATIVE,
     NOBODY,
+    Effort,
     Origin,
     Reference,
     knowledge_base,
@@ -105,7 +106,7 @@ def _load(
         with gc_control.uncollected():
             ref, found = _read_document(workspace, request, source, iri, reasoner)
             gc_control.settle(len(ref.kb))
-        ref.buffered_manipulation, ref.buffered_reasoner = buffered, lazy
+        ref.buffering.manipulation, ref.buffering.reasoner = buffered, lazy
         with workspace.entering:
             entered = name not in workspace.references
             if entered:
@@ -128,7 +129,7 @@ def _rebuffer(workspace: Workspace, request: DirectiveRequest, buffered: bool) -
     with workspace.references.locked_if_there(request.reference_name) as ref:
         if ref is None:
             return False
-        if ref.buffered_manipulation != buffered:
+        if ref.buffering.manipulation != buffered:
             workspace.check_free(ref, request.client_name)
             if workspace.store:
                 workspace.store.buffered(ref.name, buffered)
@@ -424,7 +425,8 @@ def _read_document(
         notes.append(f'{len(unsupported)} statements not supported by the reasoner: {named}{more}')
     form = WRITTEN.get(document.format, document.format)
     origin = Origin(path, form, document.prefixes)
-    return Reference(request.reference_name, kb, origin, took=took, base=took * FIRST), notes
+    effort = Effort(took=took, base=took * FIRST)
+    return Reference(request.reference_name, kb, origin, effort=effort), notes
 
 
 def _reasoned(
