@@ -7,8 +7,10 @@
     kb.reason()
     kb.instances(iri + '#URGENT')
 
-Nothing here needs Java. Each name is imported when it is first used. The
-axioms themselves are in `owl_reasoner.owl`.
+Begin with `python -m owl_reasoner.demo`, then `knowledge_base`. Public is what this module lists,
+what `owl_reasoner.owl` has (axioms and expressions), and `owl_reasoner.owlready`; the rest may
+change. `documents` reads and writes, `reasoner` derives and explains. Nothing here needs Java. Each
+name is imported when it is first used.
 """
 
 from __future__ import annotations
