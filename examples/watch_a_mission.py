@@ -1,7 +1,7 @@
-"""Watch a mission: build snapshots as a feed does, and show what changed and the last one.
+"""Watch a mission: build states as a feed does, and show what changed and the last one.
 
-No ROS is started. On a robot `MissionSubscriber` makes the snapshots from topics; here a few lines
-of Python play the robot. The terminal view, the page and the recording all show such snapshots.
+No ROS is started. On a robot `MissionSubscriber` makes the states from topics; here a few lines
+of Python play the robot. The terminal view, the page and the recording all show such states.
 """
 
 from __future__ import annotations
@@ -13,7 +13,8 @@ import numpy as np
 from rich.console import Console
 
 from patrol_policy.world import Decision
-from surveillance_operator.mission_state import MissionState, Status, follow
+from surveillance_operator.mission_changes import follow
+from surveillance_operator.mission_state import MissionState, Status
 from surveillance_operator.page_state import PatchMaker
 from surveillance_operator.watch.view import MissionView
 from surveillance_runtime.place.occupancy_grid import Grid
@@ -29,7 +30,7 @@ def two_rooms() -> Grid:
 
 def main() -> None:
     """Play a short mission and show it."""
-    snapshot = MissionState(
+    state = MissionState().having(
         where='an example',
         now=100.0,
         mode='SIMULATED',
@@ -43,7 +44,7 @@ def main() -> None:
         threshold=50.0,
     )
     framer = PatchMaker()
-    framer.patch(snapshot)
+    framer.patch(state)
     reason = 'B has waited 60 s, longer than the threshold of 50 s'
     decision = Decision(100.0, 'A', 'B', 'B', 'URGENT', 'tour', reason, {'B': 60.0, 'A': 2.0})
     moving = Status(100.0, 'surveillance', 'MOVE_TO_NEXT_ROOM', 'A', 'B', False, '', ())
@@ -59,14 +60,14 @@ def main() -> None:
     ]
     start = time.time()
     for second, fields in enumerate(steps):
-        new = replace(snapshot, now=100.0 + second, **fields)  # type: ignore[arg-type]
-        snapshot, told = follow(snapshot, new, at=start + second)
+        new = replace(state, now=100.0 + second, **fields)  # type: ignore[arg-type]
+        state, told = follow(state, new, at=start + second)
         for change in told:
             print(f'{second:3d} s      {change.text} {change.detail}'.rstrip())
-        patch = framer.patch(snapshot)
+        patch = framer.patch(state)
         print(f'          the page gets {", ".join(patch) or "nothing"}')
     console = Console(width=80, height=20, highlight=False)
-    console.print(MissionView(snapshot, whole=False))
+    console.print(MissionView(state, whole=False))
 
 
 if __name__ == '__main__':

@@ -3,7 +3,7 @@
 Free of ROS:
 
 - `MissionState`, `follow`, `changes`: what is known of a mission, and what changed.
-- `PatchMaker`: snapshots as the page's parts, and patches between them.
+- `PatchMaker`: states as the page's parts, and patches between them.
 
 With ROS:
 
@@ -11,8 +11,9 @@ With ROS:
 - `MissionActions` (in `mission_actions`) does what a person wants.
 """
 
-from surveillance_operator.mission_state import Change, MissionState, Status, changes, follow
+from surveillance_operator.mission_changes import changes, follow
+from surveillance_operator.mission_state import MissionState, Notice, Status
 from surveillance_operator.page_state import PatchMaker
 from surveillance_runtime.place.occupancy_grid import Grid
 
-__all__ = ['Change', 'Grid', 'MissionState', 'PatchMaker', 'Status', 'changes', 'follow']
+__all__ = ['Grid', 'MissionState', 'Notice', 'PatchMaker', 'Status', 'changes', 'follow']

@@ -277,11 +277,17 @@ class Reply:
     ends: bool = False
 
 
-class Fleet(Protocol):
-    """The robots that a console speaks to."""
+class ConsoleMission(Protocol):
+    """The mission that a console speaks to: one robot of it, and all of them."""
+
+    def why(self) -> str:
+        """Return why the robot goes where it goes."""
+
+    def figures(self) -> str:
+        """Return the figures of its mission in one line; empty: none is known."""
 
     def lines(self) -> list[str]:
-        """Return what each robot does."""
+        """Return what each robot does; raises `ValueError` where there is one only."""
 
     def choose(self, robot: str) -> str:
         """Speak to a robot from now on; raises `ValueError` where there is none of that name."""
@@ -335,22 +341,20 @@ def completions(text: str) -> list[str]:
 def answer(
     line: str,
     actions: MissionActions,
-    why: Callable[[], str],
+    mission: ConsoleMission,
     columns: int = 1000,
-    fleet: Fleet | None = None,
 ) -> list[Reply]:
     """Do what a line says, and return what came of it.
 
     Args:
         line: As it was typed.
         actions: Does it.
-        why: The present decision in words.
+        mission: The robot that is spoken to, and all of them.
         columns: Of the terminal.
-        fleet: All robots; None: there is one.
     """
     words = line.split()
     if [word.lower() for word in words] == ['why']:
-        return [Reply(why())]
+        return [Reply(mission.why())]
     if len(words) == 2 and words[0].lower() == EXIT.name:
         return [_exit(words[1], actions)]
     try:
@@ -364,20 +368,19 @@ def answer(
     if command.name == EXIT.name:
         return [Reply('', ends=True)]
     if command.name == STATUS.name:
-        return [_told(actions, controller, line) for controller in CONTROLLED]
+        known = [Reply(said)] if (said := mission.figures()) else []
+        return [*known, *(_told(actions, controller, line) for controller in CONTROLLED)]
     if command.name in _CONTROLLER_OF:
         return [_told(actions, _CONTROLLER_OF[command.name], line)]
     try:
         if command.name in (_ROBOTS.name, _ROBOT.name, _ALL.name):
-            return [Reply(_of_fleet(command, fleet))]
+            return [Reply(_of_fleet(command, mission))]
         return [Reply(_DOES[command.name](actions, *command.values))]
     except (ValueError, CallError) as error:
         return [Reply(f'{command.name}: {error}')]
 
 
-def _of_fleet(command: ParsedCommand, fleet: Fleet | None) -> str:
-    if fleet is None:
-        raise ValueError('this robot is alone')
+def _of_fleet(command: ParsedCommand, fleet: ConsoleMission) -> str:
     if command.name == _ROBOTS.name:
         return '\n'.join(fleet.lines())
     word = str(command.values[0])

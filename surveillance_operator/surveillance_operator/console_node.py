@@ -24,11 +24,13 @@ from surveillance_operator.console_commands import (
     is_for_robot,
     wrapped,
 )
+from surveillance_operator.figures import figures_line
 from surveillance_operator.fleet_actions import ALL, WORDS, FleetActions
 from surveillance_operator.fleet_subscriber import FleetSubscriber
 from surveillance_operator.fleet_table import fleet_lines
 from surveillance_operator.mission_actions import MissionActions
-from surveillance_operator.mission_state import MissionState, why
+from surveillance_operator.mission_state import MissionState
+from surveillance_operator.mission_words import why as reason
 from surveillance_runtime.logging import clean, print_lines
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.node_table import name_for
@@ -85,6 +87,11 @@ class ConsoleNode(PatrolNode):
         """
         return self._robot or self._subscriber.robots[0]
 
+    def figures(self) -> str:
+        """Return the figures of the robot's mission that are known."""
+        known = self._subscriber.robots
+        return figures_line(self._subscriber.state(self.robot)) if self.robot in known else ''
+
     def lines(self) -> list[str]:
         """Return what each robot of the fleet does."""
         if self._subscriber.robots == ('',):
@@ -116,7 +123,7 @@ class ConsoleNode(PatrolNode):
         name = self.robot
         if name not in self._subscriber.robots:
             return f' {name} is not heard '
-        return status_line(self._subscriber.snapshot(name), name)
+        return status_line(self._subscriber.state(name), name)
 
     def _on_announcement(self, controller: str, message: String) -> None:
         allowance = self.get_logger().lines
@@ -136,7 +143,7 @@ class ConsoleNode(PatrolNode):
         if self.ended.is_set():
             return  # a pipe has more lines than the `exit`
         # The robots of a fleet are found some time after the console is opened.
-        while time.monotonic() < self._found_by and self._subscriber.snapshot('').status is None:
+        while time.monotonic() < self._found_by and self._subscriber.state('').task.status is None:
             if self.stopping.wait(0.05):
                 return
         try:
@@ -144,7 +151,7 @@ class ConsoleNode(PatrolNode):
         except ValueError as error:
             _tell(str(error))
             return
-        for each in answer(line, actions, self._why, _columns(), fleet=self):
+        for each in answer(line, actions, self, _columns()):
             if each.ends:
                 self.finish()
             elif each.text:
@@ -165,25 +172,24 @@ class ConsoleNode(PatrolNode):
         others = ', '.join(filter(None, known)) or 'a run with several robots'
         raise ValueError(f'robot {robot!r} is not heard: expected {others}')
 
-    def _why(self) -> str:
+    def why(self) -> str:
+        """Return why the robot goes where it goes."""
         deadline = time.monotonic() + self._timeout
-        while (said := why(self._subscriber.snapshot(self.robot))) is None:
+        while (said := reason(self._subscriber.state(self.robot))) is None:
             # The feed of a console that was just opened has not heard of it yet.
             if time.monotonic() > deadline or self.stopping.wait(FEED_PERIOD):
                 return 'no decision yet'
         return '\n'.join(said)
 
 
-def status_line(snapshot: MissionState, robot: str = '') -> str:
-    """Return the mission in one line: what it does, where, how much charge is left."""
-    status = snapshot.status
-    if status is None or not snapshot.nodes:
-        return f' no mission on {snapshot.where} '
-    battery = '–' if snapshot.battery is None else f'{snapshot.battery:.0f} %'
-    paused = 'PAUSED · ' if snapshot.paused else ''
-    paused = 'STOPPED · ' if snapshot.stopped else paused
-    who = f'{robot} · ' if robot else ''
-    return f' {who}{paused}{status.state} · {status.whereabouts} · battery {battery} '
+def status_line(state: MissionState, robot: str = '') -> str:
+    """Return the mission in one line: what it does, where, and the brief figures."""
+    status = state.task.status
+    if status is None or not state.health.nodes:
+        return f' no mission on {state.where} '
+    how = 'STOPPED' if state.task.stopped else 'PAUSED' if state.machine.paused else ''
+    words = (robot, how, status.state, state.whereabouts, figures_line(state, brief=True))
+    return f' {" · ".join(filter(None, words))} '
 
 
 def _tell(text: str, controller: str = '') -> None:

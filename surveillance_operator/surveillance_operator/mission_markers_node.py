@@ -61,33 +61,33 @@ class MissionMarkers(PatrolNode):
         drawn, due = None, 0.0
         made: dict[tuple[str, int], Marker] = {}
         while not self.stopping.wait(PERIOD):
-            snapshot = self._subscriber.see()
-            self._markers.publish(markers_of(snapshot, self.get_clock().now().to_msg(), made))
-            if snapshot.trail is not drawn and time.monotonic() >= due:
-                drawn, due = snapshot.trail, time.monotonic() + PATH_PERIOD
-                self._driven.publish(path_of(snapshot, self.get_clock().now().to_msg()))
-            if silent := silent_of(snapshot):
+            state = self._subscriber.see()
+            self._markers.publish(markers_of(state, self.get_clock().now().to_msg(), made))
+            if state.sensors.trail is not drawn and time.monotonic() >= due:
+                drawn, due = state.sensors.trail, time.monotonic() + PATH_PERIOD
+                self._driven.publish(path_of(state, self.get_clock().now().to_msg()))
+            if silent := silent_of(state):
                 message = DiagnosticArray(status=silent)
                 message.header.stamp = self.get_clock().now().to_msg()
                 self._diagnostics.publish(message)
 
 
-def silent_of(snapshot: MissionState) -> list[DiagnosticStatus]:
+def silent_of(state: MissionState) -> list[DiagnosticStatus]:
     """Return a status for each node that reported and does not any more."""
     return [
         DiagnosticStatus(
             level=DiagnosticStatus.STALE,
             name=name,
-            message='has ended' if name in snapshot.ended else 'does not report',
+            message='has ended' if name in state.health.ended else 'does not report',
             hardware_id=health.hardware,
         )
-        for name, health in sorted(snapshot.health.items())
+        for name, health in sorted(state.health.reports.items())
         if health.level == STALE
     ]
 
 
 def markers_of(
-    snapshot: MissionState, stamp: Any, made: dict[tuple[str, int], Marker] | None = None
+    state: MissionState, stamp: Any, made: dict[tuple[str, int], Marker] | None = None
 ) -> MarkerArray:
     """Return places and doors as markers in the map frame.
 
@@ -95,50 +95,50 @@ def markers_of(
     has a namespace has its name above it.
 
     Args:
-        snapshot: What is known.
+        state: What is known.
         stamp: Of the markers.
         made: Markers of an earlier message, to be used again: making them costs most of it.
     """
     made = {} if made is None else made
     found = [Marker(action=Marker.DELETEALL)]
-    threshold = snapshot.threshold or 120.0
-    for number, (name, (x, y)) in enumerate(sorted(snapshot.positions.items())):
-        visited = snapshot.visited_at.get(name) or None
-        share = 1.0 if visited is None else min(1.0, max(0.0, (snapshot.now - visited) / threshold))
+    threshold = state.task.threshold or 120.0
+    for number, (name, (x, y)) in enumerate(sorted(state.place.positions.items())):
+        visited = state.place.visited_at.get(name) or None
+        share = 1.0 if visited is None else min(1.0, max(0.0, (state.now - visited) / threshold))
         mixed = [a + share * (b - a) for a, b in zip(FRESH, LATE, strict=True)]
         disc = _marker(
             made, 'places', number, Marker.CYLINDER, (x, y, 0.02), (0.8, 0.8, 0.04), mixed
         )
-        urgent = URGENT_MARK if name in snapshot.urgent else ''
+        urgent = URGENT_MARK if name in state.place.urgent else ''
         label = _marker(
             made, 'names', number, Marker.TEXT_VIEW_FACING, (x, y, 0.4), (0, 0, 0.5), (1, 1, 1)
         )
         label.text = name + urgent
         found += [disc, label]
-    for number, (name, line) in enumerate(sorted(snapshot.door_lines.items())):
-        is_open = (snapshot.doors or {}).get(name, True)
+    for number, (name, line) in enumerate(sorted(state.place.door_lines.items())):
+        is_open = (state.place.doors or {}).get(name, True)
         colour = (0.04, 0.5, 0.35) if is_open else (0.7, 0.07, 0.17)
         door = _marker(made, 'doors', number, Marker.LINE_LIST, (0, 0, 0.1), (0.12, 0, 0), colour)
         door.text = name
         door.points = [Point(x=line[0], y=line[1]), Point(x=line[2], y=line[3])]
         found.append(door)
-    if snapshot.namespace and snapshot.pose is not None:
-        x, y, _ = snapshot.pose
+    if state.namespace and state.sensors.pose is not None:
+        x, y, _ = state.sensors.pose
         own = _marker(
             made, 'robots', 0, Marker.TEXT_VIEW_FACING, (x, y, 0.8), (0, 0, 0.5), (1, 0.9, 0.4)
         )
-        own.text = snapshot.namespace.rpartition('/')[2]
+        own.text = state.namespace.rpartition('/')[2]
         found.append(own)
     for each in found:
         each.header.frame_id, each.header.stamp = 'map', stamp
     return MarkerArray(markers=found)
 
 
-def path_of(snapshot: MissionState, stamp: Any) -> Path:
+def path_of(state: MissionState, stamp: Any) -> Path:
     """Return the way driven as a path in the map frame."""
     path = Path()
     path.header.frame_id, path.header.stamp = 'map', stamp
-    for x, y in snapshot.trail.tolist():
+    for x, y in state.sensors.trail.tolist():
         pose = PoseStamped(header=path.header)
         pose.pose.position.x, pose.pose.position.y = x, y
         path.poses.append(pose)

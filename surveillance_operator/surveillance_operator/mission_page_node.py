@@ -26,7 +26,7 @@ from surveillance_operator.fleet_actions import WORDS, FleetActions
 from surveillance_operator.fleet_subscriber import FleetSubscriber
 from surveillance_operator.images import ANNOTATED, PLAIN, jpeg_from
 from surveillance_operator.mission_actions import MissionActions
-from surveillance_operator.mission_state import Change, MissionState
+from surveillance_operator.mission_state import MissionState, Notice
 from surveillance_operator.page.broadcaster import Broadcaster
 from surveillance_operator.page.server import Action, Page
 from surveillance_operator.place_page.edit_session import EditSession
@@ -133,7 +133,7 @@ class MissionPage(PatrolNode):
             )
         except OSError as error:
             raise NotNowError(str(error)) from error
-        self._broadcaster.show(self._subscriber.snapshot(''))
+        self._broadcaster.show(self._subscriber.state(''))
         self.page.start()
         self.get_logger().info(f'the mission is shown at {self.page.address}')
         self.spawn(self._tick, 'page')
@@ -146,7 +146,7 @@ class MissionPage(PatrolNode):
     def _period(self) -> float:
         return POLL_PERIOD if self._broadcaster.viewers else IDLE_PERIOD
 
-    def _on_news(self, robot: str, new: MissionState, _told: Sequence[Change]) -> None:
+    def _on_news(self, robot: str, new: MissionState, _told: Sequence[Notice]) -> None:
         self._broadcaster.show(new, robot)
 
     def _picture(self, robot: str) -> bytes | None:
@@ -156,8 +156,8 @@ class MissionPage(PatrolNode):
 
     def _tick(self) -> None:
         while not self.stopping.wait(1.0):
-            for robot, snapshot in self._subscriber.see().items():
-                self._broadcaster.show(snapshot, robot)
+            for robot, state in self._subscriber.see().items():
+                self._broadcaster.show(state, robot)
                 self._meet(robot)
             for camera in self._cameras.values():
                 camera.rest()

@@ -16,7 +16,7 @@ from rich.console import Console
 from state_machines.exceptions import CallError
 from surveillance_operator.fleet_actions import ALL
 from surveillance_operator.fleet_subscriber import FleetSubscriber
-from surveillance_operator.mission_state import Change, MissionState
+from surveillance_operator.mission_state import MissionState, Notice
 from surveillance_operator.stop_button import StopButton
 from surveillance_operator.watch.view import show_moving, show_once
 from surveillance_runtime.logging import clean, print_lines
@@ -51,12 +51,12 @@ class MissionViewNode(PatrolNode):
                 self._stops[''] = StopButton(self)
             self.spawn(self._draw, 'display')
         else:
-            self._print(f'watching {self.snapshot.where}')
+            self._print(f'watching {self.state.where}')
 
     @property
-    def snapshot(self) -> MissionState:
+    def state(self) -> MissionState:
         """All that is known of the robot that is alone, or of what the robots of a fleet share."""
-        return self._subscriber.snapshot('')
+        return self._subscriber.state('')
 
     def see(self) -> dict[str, MissionState]:
         """Return all that is known, at the mission's present time, or the time of its end."""
@@ -66,7 +66,7 @@ class MissionViewNode(PatrolNode):
                 self._stops[robot] = StopButton(self, robot)  # found before it is needed
         return seen
 
-    def _tell(self, robot: str, _new: MissionState, told: Sequence[Change]) -> None:
+    def _tell(self, robot: str, _new: MissionState, told: Sequence[Notice]) -> None:
         if not self._draws:
             at = time.strftime('%H:%M:%S')
             for each in told:
@@ -87,7 +87,7 @@ class MissionViewNode(PatrolNode):
                     self._robot,
                 )
             elif not show_once(self.see, self.stopping, self._console, self._timeout, self._robot):
-                where = f'{self.snapshot.where} within {self._timeout:g} s'
+                where = f'{self.state.where} within {self._timeout:g} s'
                 what = f'robot {self._robot}' if self._robot else 'mission'
                 print(f'watch: no {what} on {where}', file=sys.stderr)
                 self.fail('no mission')

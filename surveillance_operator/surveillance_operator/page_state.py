@@ -1,4 +1,4 @@
-"""A snapshot as the page shows it: named parts of plain values, and patches of what changed.
+"""A state as the page shows it: named parts of plain values, and patches of what changed.
 
 The page over the network and the time line in a recording carry the same parts. A part is computed
 only when a field that it comes from has changed.
@@ -10,8 +10,8 @@ import base64
 import io
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, fields
-from typing import Any
+from dataclasses import asdict
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,22 +19,22 @@ from PIL import Image
 
 from patrol_policy.policies import POLICIES
 from patrol_policy.promises import lines as promise_lines
+from surveillance_operator.figures import figures_line, shown_figures
 from surveillance_operator.mission_state import (
     NO_POINTS,
+    RECORDS,
     TRAIL_STEP,
     MissionState,
     NodeReport,
-    doing,
-    is_out,
-    shares,
-    troubles,
+    Pose,
 )
+from surveillance_operator.mission_words import doing, shares, troubles
 from surveillance_operator.room_outlines import room_outlines
 from surveillance_runtime.place.occupancy_grid import Grid
 
 Parts = dict[str, Any]
 
-FIGURES = frozenset({'memory_mb', 'restarts'})
+USAGE = frozenset({'memory_mb', 'restarts'})
 
 MOST_TRAIL = 600
 """Points of the trail that viewers are shown, the newest."""
@@ -68,25 +68,25 @@ def _grid(grid: Grid | None) -> Any:
     }
 
 
-def _decision(snapshot: MissionState) -> Any:
-    decision = snapshot.decision
+def _decision(state: MissionState) -> Any:
+    decision = state.task.decision
     if decision is None:
         return None
     scores = [[name, round(value, 3)] for name, value in decision.scores.items()]
-    more = {'number': snapshot.number, 'from': decision.from_place, 'scores': scores}
+    more = {'number': state.task.decision_number, 'from': decision.from_place, 'scores': scores}
     return {**vars(decision), **more}
 
 
-def _promises(snapshot: MissionState) -> Any:
+def _promises(state: MissionState) -> Any:
     return {
         each.place: {
             'verdict': each.verdict,
             'threshold': _seconds(each.threshold),
             'wait': _seconds(each.wait),
             'words': each.words,
-            'hours': snapshot.hours.get(each.place, ''),
+            'hours': state.task.hours.get(each.place, ''),
         }
-        for each in snapshot.promises
+        for each in state.task.promises
     }
 
 
@@ -95,30 +95,36 @@ def _seconds(value: float) -> float | None:
     return None if math.isinf(value) else round(value, 1)
 
 
-def _status(snapshot: MissionState) -> Any:
-    status = snapshot.status
-    return status and {**vars(status), 'whereabouts': status.whereabouts}
+def _rounded(pose: Pose) -> list[float]:
+    return [round(value, 3) for value in pose]
 
 
-def _plan(snapshot: MissionState) -> Any:
+def _status(state: MissionState) -> Any:
+    status = state.task.status
+    if status is None:
+        return None
+    return {**vars(status), 'place': state.robot_place, 'whereabouts': state.whereabouts}
+
+
+def _plan(state: MissionState) -> Any:
     """Return the way that the robot means to drive; none while it waits for help."""
-    waits = snapshot.status is not None and snapshot.status.waiting_for_help
-    return [] if waits else _points(snapshot.plan)
+    waits = state.task.status is not None and state.task.status.waiting_for_help
+    return [] if waits else _points(state.sensors.plan)
 
 
-def _places(snapshot: MissionState) -> Any:
-    names = sorted({*snapshot.positions, *snapshot.visited_at})
+def _places(state: MissionState) -> Any:
+    names = sorted({*state.place.positions, *state.place.visited_at})
     return {
         name: {
-            'at': snapshot.positions.get(name),
-            'visited': snapshot.visited_at.get(name) or None,
-            'urgent': name in snapshot.urgent,
+            'at': state.place.positions.get(name),
+            'visited': state.place.visited_at.get(name) or None,
+            'urgent': name in state.place.urgent,
         }
         for name in names
     }
 
 
-def _transitions(snapshot: MissionState) -> Any:
+def _transitions(state: MissionState) -> Any:
     return [
         [
             each.sequence,
@@ -129,14 +135,14 @@ def _transitions(snapshot: MissionState) -> Any:
             each.to_state,
             round(each.duration, 2),
         ]
-        for each in snapshot.transitions[-20:]
+        for each in state.machine.transitions[-20:]
     ]
 
 
-def _regions(snapshot: MissionState) -> Any:
-    if snapshot.grid is None:
+def _regions(state: MissionState) -> Any:
+    if state.place.grid is None:
         return {}
-    found = room_outlines(snapshot.grid, snapshot.positions, snapshot.door_lines)
+    found = room_outlines(state.place.grid, state.place.positions, state.place.door_lines)
     return {
         name: {
             'boxes': [[round(edge, 2) for edge in box] for box in each.boxes],
@@ -147,46 +153,46 @@ def _regions(snapshot: MissionState) -> Any:
     }
 
 
-def health(snapshot: MissionState) -> Any:
+def health(state: MissionState) -> Any:
     """Return what is known of each node, with its own reports, and what else is reported.
 
     A program that robots share, as the simulator, may have a node in the namespace of each: its
     report is that node's, too.
     """
-    reports = {_in_namespace(name, snapshot): each for name, each in snapshot.health.items()}
+    reports = {_in_namespace(name, state): each for name, each in state.health.reports.items()}
     reports = dict(sorted(reports.items()))
     nodes = {}
-    for name in sorted({*snapshot.nodes, *snapshot.ended}):
+    for name in sorted({*state.health.nodes, *state.health.ended}):
         own = [each for each in reports if each == name or each.startswith(f'{name}:')]
         nodes[name] = {
-            'up': name in snapshot.nodes,
-            'restarts': snapshot.restarts.get(name, 0),
+            'up': name in state.health.nodes,
+            'restarts': state.health.restarts.get(name, 0),
             'reports': [_report(reports.pop(each)) for each in own],
         }
     others = {name: _report(each) for name, each in reports.items()}
-    return {'nodes': nodes, 'others': others, 'silent': dict(snapshot.silent)}
+    return {'nodes': nodes, 'others': others, 'silent': dict(state.health.silent)}
 
 
-def _in_namespace(name: str, snapshot: MissionState) -> str:
+def _in_namespace(name: str, state: MissionState) -> str:
     """Return the name of who reports, without the namespace of the robot that is shown."""
-    return name.removeprefix(f'{snapshot.namespace}/') if snapshot.namespace else name
+    return name.removeprefix(f'{state.namespace}/') if state.namespace else name
 
 
 def _report(health: NodeReport) -> Any:
     return {'level': health.level, 'message': health.message}
 
 
-def _figures(snapshot: MissionState) -> Any:
-    """Return what viewers are shown of the figures that nodes report of themselves."""
+def _usage(state: MissionState) -> Any:
+    """Return what viewers are shown of what each node reports that it takes."""
     return {
-        _in_namespace(name, snapshot): {key: value for key, value in each.values if key in FIGURES}
-        for name, each in sorted(snapshot.health.items())
+        _in_namespace(name, state): {key: value for key, value in each.values if key in USAGE}
+        for name, each in sorted(state.health.reports.items())
         if ':' not in name
     }
 
 
-def _history(snapshot: MissionState) -> Any:
-    history = snapshot.history
+def _history(state: MissionState) -> Any:
+    history = state.history
     return {
         'visits': [[round(at, 1), place] for at, place in history.visits],
         'battery': [[round(at, 1), level] for at, level in history.battery],
@@ -194,93 +200,77 @@ def _history(snapshot: MissionState) -> Any:
     }
 
 
-def events_of(snapshot: MissionState) -> Any:
-    """Return the latest events, as `merged_events` takes them."""
+def events_of(state: MissionState) -> Any:
+    """Return the latest notices, the events of the page, as `merged_events` takes them."""
     # A third value says that the event is of the place.
-    return [[round(at, 1), text, *([1] if shared else [])] for at, text, shared in snapshot.events]
+    return [[round(each.at, 1), each.text, *([1] if each.shared else [])] for each in state.notices]
 
 
-PARTS: Mapping[str, tuple[tuple[str, ...], Callable[[MissionState], Any]]] = {
-    'mission': (
-        ('where', 'mode', 'threshold', 'policy', 'nodes'),
-        lambda s: {
-            'where': s.where,
-            'mode': s.mode,
-            'threshold': s.threshold,
-            'policy': s.policy,
-            'policies': list(POLICIES),
-            'running': bool(s.nodes),
-        },
-    ),
-    'status': (('status',), _status),
-    'decision': (('decision', 'number'), _decision),
-    'promises': (('promises', 'hours'), _promises),
+PARTS: Mapping[str, Callable[[MissionState], Any]] = {
+    'mission': lambda s: {
+        'where': s.where,
+        'mode': s.task.mode,
+        'threshold': s.task.threshold,
+        'policy': s.task.policy,
+        'policies': list(POLICIES),
+        'running': bool(s.health.nodes),
+    },
+    'status': _status,
+    'figures': lambda s: [
+        [each.figure.name, each.figure.label, each.words, each.is_bad, each.share]
+        for each in shown_figures(s)
+    ],
+    'brief': lambda s: figures_line(s, brief=True),
+    'decision': _decision,
+    'promises': _promises,
     # As the log says it: a place that is late by little is no trouble.
-    'kept': (('promises',), lambda s: promise_lines(s.promises)[0] if s.promises else None),
-    'battery': (
-        ('battery', 'battery_low'),
-        lambda s: None if s.battery is None else {'level': s.battery, 'low': s.battery_low},
-    ),
-    'grid': (('grid',), lambda s: _grid(s.grid)),
-    'places': (('positions', 'visited_at', 'urgent'), _places),
-    'regions': (('grid', 'positions', 'door_lines'), _regions),
-    'links': (('links',), lambda s: sorted(map(list, s.links))),
-    'doors': (
-        ('doors', 'door_lines'),
-        lambda s: {
-            name: {'open': (s.doors or {}).get(name), 'line': s.door_lines.get(name)}
-            for name in sorted({*(s.doors or {}), *s.door_lines})
-        },
-    ),
-    'zones': (
-        ('zones',),
-        lambda s: {
-            name: {'corners': [list(corner) for corner in zone.corners], 'speed': zone.speed}
-            for name, zone in s.zones.items()
-        },
-    ),
-    'stations': (
-        ('stations',),
-        lambda s: {room: [round(v, 3) for v in pose] for room, pose in s.stations.items()},
-    ),
-    'pose': (('pose',), lambda s: None if s.pose is None else [round(v, 3) for v in s.pose]),
-    'others': (
-        ('others',),
-        lambda s: {name: [round(v, 3) for v in pose] for name, pose in s.others.items()},
-    ),
-    'plan': (('plan', 'status'), _plan),
-    'scan': (('scan',), lambda s: _points(s.scan)),
-    'obstacles': (('obstacles',), lambda s: _points(s.obstacles)),
-    'machine': (('containers',), lambda s: [asdict(each) for each in s.containers]),
-    'stopped': (('stopped',), lambda s: s.stopped),
-    'active': (
-        ('active', 'paused', 'waiting'),
-        lambda s: {'paths': list(s.active), 'paused': s.paused, 'waiting': list(s.waiting)},
-    ),
-    'transitions': (('transitions',), _transitions),
-    'markers': (
-        ('detections', 'scan_progress', 'markers'),
-        lambda s: {
-            'seen': [list(each) for each in s.detections],
-            'progress': s.scan_progress,
-            'at': {str(number): list(point) for number, point in sorted(s.markers.items())},
-        },
-    ),
-    'requests': (('requests',), lambda s: dict(s.requests)),
-    'health': (('namespace', 'nodes', 'ended', 'restarts', 'health', 'silent'), health),
-    'figures': (('namespace', 'health'), _figures),
-    'doing': (('status', 'share', 'paused', 'stopped', 'nodes'), doing),
-    'shares': (('share',), shares),
-    'out': (('share',), is_out),
-    'troubles': (('status', 'stopped', 'nodes', 'ended', 'health', 'namespace'), troubles),
-    'events': (('events',), events_of),
-    'history': (('history',), _history),
+    'kept': lambda s: promise_lines(s.task.promises)[0] if s.task.promises else None,
+    'grid': lambda s: _grid(s.place.grid),
+    'places': _places,
+    'regions': _regions,
+    'links': lambda s: sorted(map(list, s.place.links)),
+    'doors': lambda s: {
+        name: {'open': (s.place.doors or {}).get(name), 'line': s.place.door_lines.get(name)}
+        for name in sorted({*(s.place.doors or {}), *s.place.door_lines})
+    },
+    'zones': lambda s: {
+        name: {'corners': [list(corner) for corner in zone.corners], 'speed': zone.speed}
+        for name, zone in s.place.zones.items()
+    },
+    'stations': lambda s: {room: _rounded(pose) for room, pose in s.place.stations.items()},
+    'pose': lambda s: None if s.sensors.pose is None else _rounded(s.sensors.pose),
+    'others': lambda s: {name: _rounded(pose) for name, pose in s.place.others.items()},
+    'plan': _plan,
+    'scan': lambda s: _points(s.sensors.scan),
+    'obstacles': lambda s: _points(s.sensors.obstacles),
+    'machine': lambda s: [asdict(each) for each in s.machine.containers],
+    'stopped': lambda s: s.task.stopped,
+    'active': lambda s: {
+        'paths': list(s.machine.active),
+        'paused': s.machine.paused,
+        'waiting': list(s.machine.waiting),
+    },
+    'transitions': _transitions,
+    'markers': lambda s: {
+        'seen': [list(each) for each in s.sensors.detections],
+        'progress': s.sensors.scan_progress,
+        'at': {str(number): list(point) for number, point in sorted(s.sensors.markers.items())},
+    },
+    'requests': lambda s: dict(s.task.requests),
+    'health': health,
+    'usage': _usage,
+    'doing': doing,
+    'shares': shares,
+    'out': lambda s: s.task.is_out,
+    'troubles': troubles,
+    'events': events_of,
+    'history': _history,
 }
-"""Each part with the snapshot's fields that it comes from."""
+"""The parts of the page, each with what computes it; which fields it reads is found by itself."""
 
 GLANCE = frozenset(
     (
-        *('mission', 'status', 'decision', 'battery', 'pose', 'plan', 'stopped', 'active'),
+        *('mission', 'status', 'brief', 'decision', 'pose', 'plan', 'stopped', 'active'),
         *('doing', 'shares', 'out', 'troubles', 'events'),
     )
 )
@@ -320,13 +310,43 @@ def merged_events(events: Mapping[str, Any]) -> list[list[Any]]:
     return found[-KEPT_EVENTS:]
 
 
-assert {name for sources, _ in PARTS.values() for name in sources} <= {
-    field.name for field in fields(MissionState)
-}
+class _Traced:
+    """Passes on what a state's records hold, and notes each field that is read.
+
+    Args:
+        record: The state, or one of its records.
+        name: Of the record in the state; empty for the state itself.
+        read: Where the fields are noted, with the values that they have.
+    """
+
+    def __init__(self, record: Any, name: str, read: dict[str, Any]) -> None:
+        self._record, self._name, self._read = record, name, read
+
+    def __getattr__(self, field: str) -> Any:
+        attribute = getattr(type(self._record), field, None)
+        if isinstance(attribute, property) and attribute.fget is not None:
+            return attribute.fget(self)  # it reads fields itself
+        value = getattr(self._record, field)
+        if not self._name and field in RECORDS:
+            return _Traced(value, field, self._read)
+        self._read[field] = value
+        return value
+
+
+def traced(
+    compute: Callable[[MissionState], Any], state: MissionState
+) -> tuple[Any, dict[str, Any]]:
+    """Return what a function of a state returns, and the fields that it has read.
+
+    Returns:
+        The value; and by the names of the fields, what they hold.
+    """
+    read: dict[str, Any] = {}
+    return compute(cast(MissionState, _Traced(state, '', read))), read
 
 
 class PatchMaker:
-    """Turns a series of snapshots into patches.
+    """Turns a series of states into patches: the parts of which a field has changed.
 
     Args:
         without: Parts to leave out.
@@ -335,34 +355,32 @@ class PatchMaker:
     def __init__(self, without: frozenset[str] = frozenset()) -> None:
         self._parts = {name: part for name, part in PARTS.items() if name not in without}
         self._last: MissionState | None = None
-        self._seen: dict[str, tuple[Any, ...]] = {}
+        self._read: dict[str, dict[str, Any]] = {}
         self.parts: Parts = {}
 
-    def patch(self, snapshot: MissionState, only: frozenset[str] | None = None) -> Parts:
-        """Return the parts that differ from the last snapshot's, and a trail that begins anew.
+    def patch(self, state: MissionState, only: frozenset[str] | None = None) -> Parts:
+        """Return the parts that differ from the last state's, and a trail that begins anew.
 
         Args:
-            snapshot: What is known.
+            state: What is known.
             only: The parts that are asked for; None: all.
         """
         last, changed = self._last, {}
-        self._last = snapshot
-        if last is not None and len(snapshot.trail) < len(last.trail):
-            changed['trail'] = _points(snapshot.trail)
-        for name, (sources, compute) in self._parts.items():
+        self._last = state
+        if last is not None and len(state.sensors.trail) < len(last.sensors.trail):
+            changed['trail'] = _points(state.sensors.trail)
+        for name, compute in self._parts.items():
             if only is not None and name not in only:
                 continue
-            values = tuple(getattr(snapshot, source) for source in sources)
-            seen = self._seen.get(name)
-            if seen is not None and all(a is b for a, b in zip(seen, values, strict=True)):
+            read = self._read.get(name)
+            if read is not None and all(state.field(field) is held for field, held in read.items()):
                 continue
-            self._seen[name] = values
-            value = compute(snapshot)
+            value, self._read[name] = traced(compute, state)
             if name not in self.parts or self.parts[name] != value:
                 self.parts[name] = changed[name] = value
         return changed
 
     def whole(self) -> Parts:
         """Return all parts, and the trail, which patches leave to whoever follows the pose."""
-        trail = NO_POINTS if self._last is None else self._last.trail
+        trail = NO_POINTS if self._last is None else self._last.sensors.trail
         return {**self.parts, 'trail': _points(trail[-MOST_TRAIL:])}

@@ -1,4 +1,4 @@
-"""What each topic tells of a mission: from its messages to the fields of a snapshot.
+"""What each topic tells of a mission: from its messages to the fields of a state.
 
 A running mission (`mission_subscriber`) and a recording (`recording.stored`) are read by the same
 table. A message from the network may hold anything. What cannot be used raises `ValueError` with
@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import replace
+from importlib import import_module
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -37,9 +37,11 @@ from surveillance_interfaces.msg import (
     FsmTransition,
     MarkerDetectionArray,
     MissionStatus,
+    RobotPlace,
 )
 from surveillance_ontology.armor_client import value_in
 from surveillance_ontology.patrol_vocabulary import CONNECTIONS, URGENT_PLACES, VISITS
+from surveillance_operator.figures import FIGURES, Figure
 from surveillance_operator.mission_state import (
     NO_POINTS,
     TRAIL_STEP,
@@ -93,12 +95,12 @@ Fields = dict[str, Any]
 
 
 class Topic(NamedTuple):
-    """One topic that a snapshot takes from.
+    """One topic that a state takes from.
 
     Attributes:
         name: Relative to the namespace, or absolute.
         kind: The type of its messages.
-        read: The snapshot's fields that a message changes; raises `ValueError` for one that cannot
+        read: The state's fields that a message changes; raises `ValueError` for one that cannot
             be used.
         qos: How it is heard.
         stream: Whether a view may do without it.
@@ -118,18 +120,18 @@ class Topic(NamedTuple):
     whose: Callable[[Any], frozenset[str] | None] | None = None
 
 
-def read_message(snapshot: MissionState, topic: Topic, message: Any) -> MissionState:
-    """Return the snapshot with what a message says, or why it cannot be used."""
+def read_message(state: MissionState, topic: Topic, message: Any) -> MissionState:
+    """Return the state with what a message says, or why it cannot be used."""
     try:
-        fields = topic.read(message, snapshot)
+        fields = topic.read(message, state)
     except (ValueError, TypeError, OverflowError) as error:
-        return replace(snapshot, silent={**snapshot.silent, topic.name: str(error)})
-    return replace(snapshot, **fields) if fields else snapshot
+        return state.having(silent={**state.health.silent, topic.name: str(error)})
+    return state.having(**fields) if fields else state
 
 
 def moved(pose: Pose, old: MissionState) -> Fields:
     """Return the fields that a new pose changes: the pose, and the trail."""
-    trail = old.trail
+    trail = old.sensors.trail
     if not len(trail) or math.dist(trail[-1], pose[:2]) >= TRAIL_STEP:
         trail = np.vstack([trail[1 - TRAIL_POINTS :], pose[:2]])
     return {'pose': pose, 'trail': trail}
@@ -137,13 +139,13 @@ def moved(pose: Pose, old: MissionState) -> Fields:
 
 def _fed_back(point: Any, old: MissionState) -> Fields:
     # Where somebody estimates the pose, it is known better than from the drive's feedback.
-    if old.localised and old.mode not in ('RANDOM', 'MANUAL'):
+    if old.sensors.localised and old.task.mode not in ('RANDOM', 'MANUAL'):
         return {}
     x, y = point_from(point)
     yaw = 0.0
-    if old.pose is not None:
-        dx, dy = x - old.pose[0], y - old.pose[1]
-        yaw = math.atan2(dy, dx) if dx or dy else old.pose[2]
+    if old.sensors.pose is not None:
+        dx, dy = x - old.sensors.pose[0], y - old.sensors.pose[1]
+        yaw = math.atan2(dy, dx) if dx or dy else old.sensors.pose[2]
     return moved((x, y, yaw), old)
 
 
@@ -153,7 +155,7 @@ def _on_map(message: OccupancyGrid, _old: MissionState) -> Fields:
 
 def _on_transition(message: FsmTransition, old: MissionState) -> Fields:
     transition = transition_from(message)
-    return {'transitions': (*old.transitions, transition)[-KEPT_TRANSITIONS:]}
+    return {'transitions': (*old.machine.transitions, transition)[-KEPT_TRANSITIONS:]}
 
 
 def _on_pose(message: PoseWithCovarianceStamped, old: MissionState) -> Fields:
@@ -161,16 +163,16 @@ def _on_pose(message: PoseWithCovarianceStamped, old: MissionState) -> Fields:
     pose = pose_from(message.pose.pose)
     return {
         **moved(pose, old),
-        **_seen(pose, at, old.lidar),
+        **_seen(pose, at, old.sensors.lidar),
         'localised': True,
         'pose_time': at,
-        'stands': old.pose is not None and np.allclose(pose, old.pose, atol=STILL),
+        'stands': old.sensors.pose is not None and np.allclose(pose, old.sensors.pose, atol=STILL),
     }
 
 
 def _on_scan(message: LaserScan, old: MissionState) -> Fields:
     lidar = seconds_of(message.header.stamp), scan_from(message)
-    return {'lidar': lidar, **_seen(old.pose, old.pose_time, lidar)}
+    return {'lidar': lidar, **_seen(old.sensors.pose, old.sensors.pose_time, lidar)}
 
 
 def _seen(pose: Pose | None, at: float, lidar: tuple[float, Any] | None) -> Fields:
@@ -207,13 +209,13 @@ def _on_detections(message: MarkerDetectionArray, old: MissionState) -> Fields:
             for each in found
         )
     }
-    if old.pose is None or old.camera is None or not old.stands:
+    if old.sensors.pose is None or old.sensors.camera is None or not old.sensors.stands:
         return fields
-    at, frame = old.camera
+    at, frame = old.sensors.camera
     if abs(at - seconds_of(message.header.stamp)) > SAME_VIEW:
         return fields
-    x, y, yaw = old.pose
-    placed = dict(old.markers)
+    x, y, yaw = old.sensors.pose
+    placed = dict(old.sensors.markers)
     for each in found:
         point = each.pose.position
         seen = np.array([point.x, point.y, point.z])
@@ -226,18 +228,18 @@ def _on_detections(message: MarkerDetectionArray, old: MissionState) -> Fields:
         )
     if len(placed) > MOST_NAMES:
         raise ValueError(f'{len(placed)} markers: expected at most {MOST_NAMES}')
-    return {**fields, 'markers': placed} if placed != old.markers else fields
+    return {**fields, 'markers': placed} if placed != old.sensors.markers else fields
 
 
 def _on_diagnostics(message: DiagnosticArray, old: MissionState) -> Fields:
     came = health_from(message)
     health = {
-        **old.health,
+        **old.health.reports,
         **{name: came[name] for name in came if not _is_of_another(name, old.namespace)},
     }
     if len(health) > MOST_NAMES:
         raise ValueError(f'{len(health)} parts report: expected at most {MOST_NAMES}')
-    return {'health': health}
+    return {'reports': health}
 
 
 def _who_reports(message: DiagnosticArray) -> frozenset[str] | None:
@@ -268,7 +270,7 @@ def _on_fleet_robot(message: FleetRobot, old: MissionState) -> Fields:
         message.runs_until if math.isfinite(message.runs_until) else None,
         message.taken_out,
     )
-    return {} if share == old.share else {'share': share}
+    return {} if share == old.task.share else {'share': share}
 
 
 def _in_fleet(message: FleetRobot) -> frozenset[str]:
@@ -298,24 +300,23 @@ def behaviour_fields(values: dict[str, Any]) -> Fields:
     return fields
 
 
-def with_fact(snapshot: MissionState, fact: ShortFact, came: bool) -> MissionState:
-    """Return the snapshot after a fact of the ontology came or went; most facts change nothing."""
+def with_fact(state: MissionState, fact: ShortFact, came: bool) -> MissionState:
+    """Return the state after a fact of the ontology came or went; most facts change nothing."""
     if _URGENT.matches(fact):
         place = frozenset(fact.arguments)
-        return replace(
-            snapshot, urgent=snapshot.urgent | place if came else snapshot.urgent - place
-        )
+        urgent = state.place.urgent
+        return state.having(urgent=urgent | place if came else urgent - place)
     if _CONNECTED.matches(fact):
         pair = frozenset({(fact.arguments[0], fact.arguments[1])})
-        return replace(snapshot, links=snapshot.links | pair if came else snapshot.links - pair)
+        return state.having(links=state.place.links | pair if came else state.place.links - pair)
     if _VISITED.matches(fact):
         # A time of 0 or before stands for never.
         name, seconds = fact.arguments[0], max(0.0, float(value_in(fact.arguments[1])))
         if came:
-            return replace(snapshot, visited_at={**snapshot.visited_at, name: seconds})
-        if snapshot.visited_at.get(name) == seconds:
-            return replace(snapshot, visited_at=without(snapshot.visited_at, name))
-    return snapshot
+            return state.having(visited_at={**state.place.visited_at, name: seconds})
+        if state.place.visited_at.get(name) == seconds:
+            return state.having(visited_at=without(state.place.visited_at, name))
+    return state
 
 
 _URGENT, _CONNECTED, _VISITED = map(parse_fact, (URGENT_PLACES, CONNECTIONS, VISITS))
@@ -469,12 +470,27 @@ def _names(names: Iterable[str], what: str) -> tuple[str, ...]:
 
 
 def _on_request(controller: str) -> Callable[[String, MissionState], Fields]:
-    return lambda message, old: {'requests': {**old.requests, controller: message.data}}
+    return lambda message, old: {'requests': {**old.task.requests, controller: message.data}}
 
 
 def _sets(name: str, value: Callable[[Any], Any]) -> Callable[[Any, MissionState], Fields]:
     """Return how a message sets one field."""
     return lambda message, _: {name: value(message)}
+
+
+def topic_of(figure: Figure) -> Topic:
+    """Return the topic that brings a figure; it has one of its own."""
+    heard = figure.heard
+    assert heard is not None
+    package, _, kind = heard.kind.split('/')
+
+    def read(message: Any, old: MissionState) -> Fields:
+        value = heard.value(message)
+        known = without(old.measured, figure.name)
+        return {'measured': known if value is None else {**known, figure.name: value}}
+
+    # Whoever publishes it, a driver mostly, is heard with this quality.
+    return Topic(heard.topic, getattr(import_module(f'{package}.msg'), kind), read, _STREAM)
 
 
 def _on_scan_goals(message: GoalStatusArray, _: MissionState) -> Fields:
@@ -486,6 +502,10 @@ def _feedback(action: str, kind: Any, read: Callable[[Any, MissionState], Fields
     """Return the topic of an action's feedback, read without its envelope."""
     name, message = f'{action}/_action/feedback', kind.Impl.FeedbackMessage
     return Topic(name, message, lambda m, old: read(m.feedback, old), _NEWEST)
+
+
+def _on_decision(message: Decision, _: MissionState) -> Fields:
+    return {'decision': decision_from(message), 'decision_number': message.sequence}
 
 
 def _on_promises(message: DiagnosticArray, _: MissionState) -> Fields:
@@ -500,7 +520,8 @@ def _on_machine(message: FsmStatus, _: MissionState) -> dict[str, Any]:
 
 TOPICS: tuple[Topic, ...] = (
     Topic('mission_status', MissionStatus, _sets('status', status_from)),
-    Topic('decision', Decision, lambda m, _: {'decision': decision_from(m), 'number': m.sequence}),
+    Topic('decision', Decision, _on_decision),
+    Topic('robot_place', RobotPlace, lambda m, _: {'robot_place': m.place}),
     Topic('promises', DiagnosticArray, _on_promises),
     Topic('battery_level', UInt8, _sets('battery', percent_from)),
     Topic('battery_low', Bool, lambda m, _: {'battery_low': m.data}),
@@ -524,7 +545,8 @@ TOPICS: tuple[Topic, ...] = (
     Topic(f'{FSM}/transition', FsmTransition, _on_transition, _QUEUE),
     *(Topic(f'{name}/announcement', String, _on_request(name)) for name in CONTROLLERS),
     Topic(FLEET_TOPIC, FleetRobot, _on_fleet_robot, _MANY, whose=_in_fleet),
+    *(topic_of(each) for each in FIGURES if each.heard is not None),
     Topic('/diagnostics', DiagnosticArray, _on_diagnostics, _MANY, period=1.0, whose=_who_reports),
     Topic('/parameter_events', ParameterEvent, _on_parameters, _MANY, whose=_whose_parameters),
 )
-"""All that a snapshot takes from, with how."""
+"""All that a state takes from, with how."""

@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 
 from surveillance_operator.console_commands import Reply, answer, completions, help_text
+from tests.operator.prompt import Prompt
 
 ANSWERS: dict[str, Any] = {
     'why_not': ('R3 can wait', ['URGENT(R3)']),
@@ -33,7 +34,7 @@ class Scripted:
 
 def said(line: str, actions: Any = None) -> list[Reply]:
     taken: Any = actions or Scripted()
-    return answer(line, taken, lambda: 'because')
+    return answer(line, taken, Prompt())
 
 
 @pytest.mark.parametrize(
@@ -82,8 +83,10 @@ def test_why_tells_the_decision_and_known_the_proofs() -> None:
     ]
 
 
-def test_status_asks_every_controller() -> None:
-    assert [each.who for each in said('status')] == [
+def test_status_shows_the_figures_and_asks_every_controller() -> None:
+    figures, *controllers = said('status')
+    assert figures.text == 'battery 80 %'
+    assert [each.who for each in controllers] == [
         'battery_controller',
         'planner_controller',
         'motion_controller',

@@ -33,23 +33,22 @@ from state_machines import Interrupt
 from state_machines.exceptions import CallError
 from surveillance_behaviour.mission.mission_log import MissionRecord
 from surveillance_interfaces.msg import DoorStates, FleetRobot, MissionStatus
-from surveillance_operator import fleet_command, fleet_subscriber, mission_subscriber
+from surveillance_operator import fleet_command, fleet_subscriber, node_graph_watch
 from surveillance_operator.console_commands import answer, completions
 from surveillance_operator.console_node import ConsoleNode
 from surveillance_operator.fleet_actions import WORDS, FleetActions
 from surveillance_operator.fleet_subscriber import FleetSubscriber
 from surveillance_operator.fleet_table import fleet_lines
+from surveillance_operator.mission_changes import follow
 from surveillance_operator.mission_markers_node import markers_of
 from surveillance_operator.mission_state import (
-    Event,
     MissionState,
     NodeReport,
+    Notice,
     PatrolShare,
     Status,
-    doing,
-    follow,
-    troubles,
 )
+from surveillance_operator.mission_words import doing, troubles
 from surveillance_operator.page.broadcaster import Broadcaster
 from surveillance_operator.page.server import Page
 from surveillance_operator.page_state import health, merged_events
@@ -65,13 +64,14 @@ from surveillance_runtime.qos import STATE_QOS
 from surveillance_runtime.rviz_layout import fleet_layout
 from tests.launcher.conftest import ROOT
 from tests.operator.browser import CHROMIUM, DESK, DRIVER, MISSING, PHONE, Viewer
+from tests.operator.prompt import Prompt
 
 
 def robot(name: str, place: str = 'A', x: float = 1.0) -> MissionState:
     """Return a robot of a fleet on its way from a place."""
     cells = np.zeros((20, 60), np.int8)
     cells[0] = cells[-1] = cells[:, 0] = cells[:, -1] = 100
-    return MissionState(
+    return MissionState().having(
         where='ROS domain 5',
         namespace=name,
         now=100.0,
@@ -79,19 +79,22 @@ def robot(name: str, place: str = 'A', x: float = 1.0) -> MissionState:
         nodes={'robot_behavior': frozenset('1')},
         status=Status(90.0, 'surveillance', 'MOVE', place, 'B', False, '', ()),
         decision=Decision(95.0, place, 'B', 'B', 'URGENT', 'tour', f'B is for {name}', {}),
-        number=1,
+        decision_number=1,
         battery=80.0,
         grid=Grid(cells, 0.1),
         positions={'A': (1.0, 1.0), 'B': (5.0, 1.0)},
         pose=(x, 1.0, 0.0),
         plan=np.array([(x, 1.0), (5.0, 1.0)]),
         share=PatrolShare(('A', 'B'), 'B', heading_to='B', is_moving=True),
-        events=(Event(1e9, f'{name} begins'), Event(1e9 + 1.0, 'door D closed', shared=True)),
+        notices=(
+            Notice(f'{name} begins', at=1e9),
+            Notice('door D closed', at=1e9 + 1.0, shared=True),
+        ),
     )  # fmt: skip
 
 
 FLEET = {
-    '': replace(MissionState(where='ROS domain 5'), nodes={'armor_server': frozenset('1')}),
+    '': MissionState(where='ROS domain 5').having(nodes={'armor_server': frozenset('1')}),
     'anna': robot('anna'),
     'bert': robot('bert', x=2.0),
     'carl': robot('carl', x=3.0),
@@ -119,10 +122,10 @@ def test_one_time_line_names_each_robot_and_tells_of_the_place_once() -> None:
 def test_a_program_that_robots_share_stands_once_in_the_health_of_each() -> None:
     good = NodeReport(0, 'up', ())
     names = ('anna/planner_controller', 'anna/mission_markers', 'simulator', 'armor_server')
-    anna = replace(
-        FLEET['anna'], nodes=dict.fromkeys(('simulator', 'planner_controller'), frozenset('1'))
+    anna = FLEET['anna'].having(
+        nodes=dict.fromkeys(('simulator', 'planner_controller'), frozenset('1'))
     )
-    found = health(replace(anna, namespace='anna', health=dict.fromkeys(names, good)))
+    found = health(anna.having(namespace='anna', reports=dict.fromkeys(names, good)))
     assert {name: len(node['reports']) for name, node in found['nodes'].items()} == {
         'planner_controller': 1,
         'simulator': 1,
@@ -133,10 +136,10 @@ def test_a_program_that_robots_share_stands_once_in_the_health_of_each() -> None
 def test_what_a_robot_does_and_what_is_wrong_with_it_is_said_in_words() -> None:
     anna = FLEET['anna']
     assert doing(anna) == 'on its way to B'
-    share = anna.share
+    share = anna.task.share
     assert share is not None
-    assert doing(replace(anna, share=replace(share, is_moving=False))) == 'waits to go to B'
-    out = replace(anna, share=PatrolShare(taken_out=True))
+    assert doing(anna.having(share=replace(share, is_moving=False))) == 'waits to go to B'
+    out = anna.having(share=PatrolShare(taken_out=True))
     assert doing(out) == 'taken out of the patrol'
     assert [each.text for each in follow(anna, out, 1.0)[1]] == ['taken out of the patrol']
     reports = {
@@ -145,18 +148,19 @@ def test_what_a_robot_does_and_what_is_wrong_with_it_is_said_in_words() -> None:
         'bert/motion_controller': NodeReport(2, 'not mine', ()),
         'armor_server': NodeReport(2, 'of all', ()),
     }
-    bad = replace(anna, stopped=True, health=reports, ended=frozenset({'robot_behavior'}))
+    bad = anna.having(stopped=True, reports=reports, ended=frozenset({'robot_behavior'}))
     assert troubles(bad) == [
         'stopped until a person releases it',
         'ended: robot_behavior',
         'motion_controller: no odometry',
         'silent: battery_controller',
     ]
-    assert troubles(replace(anna, nodes={})) == ['none of its programs is heard']
-    lines = fleet_lines({'anna': bad, '': replace(FLEET[''], ended=frozenset({'simulator'}))})
+    assert troubles(anna.having(nodes={})) == ['none of its programs is heard']
+    lines = fleet_lines({'anna': bad, '': FLEET[''].having(ended=frozenset({'simulator'}))})
     assert lines[0].split() == [
         'anna',
         'A',
+        'battery',
         '80',
         '%',
         'stopped;',
@@ -171,8 +175,8 @@ def test_what_a_robot_does_and_what_is_wrong_with_it_is_said_in_words() -> None:
 
 def test_a_viewer_gets_all_of_one_robot_and_a_glance_of_the_others() -> None:
     broadcaster = Broadcaster()
-    for name, snapshot in FLEET.items():
-        broadcaster.show(snapshot, name)
+    for name, state in FLEET.items():
+        broadcaster.show(state, name)
 
     async def look() -> tuple[Any, Any, Any]:
         first = broadcaster.stream('bert')
@@ -181,7 +185,7 @@ def test_a_viewer_gets_all_of_one_robot_and_a_glance_of_the_others() -> None:
         for stream in (first, usual):
             await anext(stream)
             read.append(json.loads((await anext(stream)).removeprefix('data: ')))
-        broadcaster.show(replace(FLEET['anna'], battery=79.0), 'anna')
+        broadcaster.show(FLEET['anna'].having(battery=79.0), 'anna')
         read.append(json.loads((await anext(first)).removeprefix('data: ')))
         return read[0], read[1], read[2]
 
@@ -193,13 +197,13 @@ def test_a_viewer_gets_all_of_one_robot_and_a_glance_of_the_others() -> None:
     assert 'grid' not in bert['r']['anna']
     assert ['anna begins' in each for each in bert['p']['events']].count(True) == 1
     assert [each[1:] for each in bert['p']['events']].count(['', 'door D closed']) == 1
-    assert (later['p'], later['r']) == ({}, {'anna': {'battery': {'level': 79.0, 'low': False}}})
+    assert (later['p'], later['r']) == ({}, {'anna': {'brief': 'battery 79 %'}})
 
 
 def test_a_viewer_of_a_robot_that_is_shown_no_longer_sees_another_one_whole() -> None:
     broadcaster = Broadcaster()
-    for name, snapshot in FLEET.items():
-        broadcaster.show(snapshot, name)
+    for name, state in FLEET.items():
+        broadcaster.show(state, name)
 
     async def look() -> list[Any]:
         stream = broadcaster.stream('bert')
@@ -209,7 +213,7 @@ def test_a_viewer_of_a_robot_that_is_shown_no_longer_sees_another_one_whole() ->
             read.append(json.loads((await anext(stream)).removeprefix('data: ')))
             broadcaster.forget(leaves)
             if leaves == 'nobody':
-                broadcaster.show(replace(FLEET['anna'], battery=70.0), 'anna')
+                broadcaster.show(FLEET['anna'].having(battery=70.0), 'anna')
         return [*read, json.loads((await anext(stream)).removeprefix('data: '))]
 
     whole, same, other, last = asyncio.run(look())
@@ -274,7 +278,7 @@ class Robot:
 
 @pytest.fixture(autouse=True)
 def _look_often(monkeypatch: pytest.MonkeyPatch) -> None:
-    for module in (mission_subscriber, fleet_subscriber):
+    for module in (node_graph_watch, fleet_subscriber):
         monkeypatch.setattr(module, 'LOOK_PERIOD', 0.05)
 
 
@@ -294,30 +298,38 @@ def test_robots_are_found_and_told_apart_and_share_the_place(graph: Any) -> None
     def known() -> bool:
         names = ('anna/motion_controller', 'bertha/motion_controller', 'armor_server')
         reports.publish(DiagnosticArray(status=[DiagnosticStatus(name=name) for name in names]))
-        seen = [feed.snapshot(name) for name in robots]
+        seen = [feed.state(name) for name in robots]
         return all(
-            each.status and each.pose and each.battery and each.share and each.doors and each.health
+            each.task.status
+            and each.sensors.pose
+            and each.task.battery
+            and each.task.share
+            and each.place.doors
+            and each.health.reports
             for each in seen
         )
 
     graph.until(known)
-    anna, bertha = (feed.snapshot(name) for name in robots)
-    assert anna.status is not None
-    assert bertha.status is not None
-    assert (anna.status.place, bertha.status.place) == ('place_of_anna', 'place_of_bertha')
-    assert (anna.battery, bertha.battery) == (40.0, 60.0)
-    assert anna.share == PatrolShare(('A', 'anna'), 'anna', runs_until=9.0)
-    assert anna.doors == bertha.doors == {'D': False}
-    assert anna.health.keys() == {'anna/motion_controller', 'armor_server'}
+    anna, bertha = (feed.state(name) for name in robots)
+    assert anna.task.status is not None
+    assert bertha.task.status is not None
+    assert (anna.task.status.place, bertha.task.status.place) == (
+        'place_of_anna',
+        'place_of_bertha',
+    )
+    assert (anna.task.battery, bertha.task.battery) == (40.0, 60.0)
+    assert anna.task.share == PatrolShare(('A', 'anna'), 'anna', runs_until=9.0)
+    assert anna.place.doors == bertha.place.doors == {'D': False}
+    assert anna.health.reports.keys() == {'anna/motion_controller', 'armor_server'}
     assert list(feed.see()) == ['anna', 'bertha', ''], 'what they share is last'
     topics = ('/diagnostics', watcher.resolve_topic_name('fleet_robots'), '/clock')
     heard_by = [len(watcher.get_subscriptions_info_by_topic(topic)) for topic in topics]
     assert heard_by == [1, 1, 1], 'who watches many robots hears each of them once'
-    graph.until(lambda: 'robot_behavior' in feed.snapshot('anna').nodes)
+    graph.until(lambda: 'robot_behavior' in feed.state('anna').health.nodes)
     # A program of one that ends is not one of the other.
     graph.remove(robots['anna'].node)
-    graph.until(lambda: 'robot_behavior' in feed.snapshot('anna').ended)
-    assert 'robot_behavior' in feed.snapshot('bertha').nodes
+    graph.until(lambda: 'robot_behavior' in feed.state('anna').health.ended)
+    assert 'robot_behavior' in feed.state('bertha').health.nodes
     assert ('anna', 'every node has ended: waiting for the next mission') in heard
     assert 'anna' in feed.robots, 'a robot that is gone is missed'
 
@@ -411,8 +423,10 @@ def fleet_run(tmp_path: Path) -> Path:
         writer = TimelineWriter(own / 'timeline.jsonl')
         for second in range(30):
             at = 1000.0 + begin + second
-            snapshot = replace(FLEET[name], now=at, pose=(float(second), 1.0, 0.0), number=second)
-            writer.add(snapshot, at)
+            state = FLEET[name].having(
+                now=at, pose=(float(second), 1.0, 0.0), decision_number=second
+            )
+            writer.add(state, at)
         writer.close()
         with MissionRecord(own / 'events.jsonl') as record:
             places = ['C1', 'R1', 'R2']
@@ -508,19 +522,6 @@ def test_rviz_shows_each_robot_in_a_group_of_its_own() -> None:
     assert name.text == 'anna'
 
 
-class Prompt:
-    """The robots behind a console."""
-
-    def lines(self) -> list[str]:
-        return ['anna', 'bert']
-
-    def choose(self, robot: str) -> str:
-        return f'you speak to {robot}'
-
-    def tell_all(self, word: str) -> str:
-        return f'all {word}'
-
-
 def test_the_console_commands_no_other_robot_than_the_one_that_was_named(
     graph: Any, capfd: Any
 ) -> None:
@@ -572,16 +573,13 @@ def test_the_command_fleet_says_in_one_line_that_a_name_is_none(
 def test_the_console_speaks_to_one_robot_or_to_all() -> None:
     def told(line: str) -> str:
         actions: Any = None
-        (said,) = answer(line, actions, lambda: '', fleet=Prompt())
+        (said,) = answer(line, actions, Prompt())
         return said.text
 
     assert told('robots') == 'anna\nbert'
     assert told('robot bert') == 'you speak to bert'
     assert told('all stop') == 'all stop'
     assert told('all sto') == "all: 'sto': expected 'stop'"
-    nobody: Any = None
-    (alone,) = answer('all stop', nobody, lambda: '')
-    assert alone.text == 'all: this robot is alone'
     assert completions('all p') == ['pause']
 
 
@@ -612,8 +610,8 @@ def viewer(broadcaster: Broadcaster, told: list[tuple[str, str]]) -> Iterator[Vi
 
     page = Page(broadcaster, questions={}, actions={'fleet': fleet, 'stop': stop}, port=0)
     page.start()
-    for name, snapshot in FLEET.items():
-        broadcaster.show(snapshot, name)
+    for name, state in FLEET.items():
+        broadcaster.show(state, name)
     viewer = Viewer(page.address)
     yield viewer
     viewer.close()
@@ -640,18 +638,18 @@ def test_the_page_shows_all_robots_and_one_of_them_whole(
     assert viewer.text('#reason') == 'B is for bert'
     assert viewer.attribute('[data-choose=bert]', 'aria-pressed') == 'true'
     assert 'robot=bert' in viewer.driver.current_url
-    broadcaster.show(replace(FLEET['carl'], pose=(4.0, 1.0, 0.0)), 'carl')
+    broadcaster.show(FLEET['carl'].having(pose=(4.0, 1.0, 0.0)), 'carl')
     viewer.until(lambda: '4px' in viewer.attribute('#map [data-robot=carl]', 'style'))
 
 
 def test_alarms_name_the_robot_and_one_time_line_has_the_events_of_all(
     broadcaster: Broadcaster, viewer: Viewer
 ) -> None:
-    status = FLEET['carl'].status
+    status = FLEET['carl'].task.status
     assert status is not None
     help_needed = replace(status, waiting_for_help=True, text='shut in')
-    events = (*FLEET['carl'].events, Event(1e9 + 9.0, 'battery low'))
-    broadcaster.show(replace(FLEET['carl'], status=help_needed, events=events), 'carl')
+    events = (*FLEET['carl'].notices, Notice('battery low', at=1e9 + 9.0))
+    broadcaster.show(FLEET['carl'].having(status=help_needed, notices=events), 'carl')
     viewer.until(lambda: viewer.text('#alarms') == 'carl: waits for help: shut in')
     viewer.until(lambda: 'battery low' in viewer.text('#events li'))
     assert viewer.text('#events li b') == 'carl'
@@ -683,9 +681,7 @@ def test_one_robot_or_all_are_told(
         ('stop', 'anna'),
     ]
     viewer.until(lambda: viewer.text('#fleet-answer') == '✓ stop anna')
-    broadcaster.show(
-        replace(FLEET['anna'], stopped=True, share=PatrolShare(taken_out=True)), 'anna'
-    )
+    broadcaster.show(FLEET['anna'].having(stopped=True, share=PatrolShare(taken_out=True)), 'anna')
     words = 'return [...document.querySelectorAll("[data-row=anna] [data-word]")]'
     words += '.filter((each) => !each.hidden).map((each) => each.dataset.word)'
     viewer.until(lambda: viewer.js(words) == ['pause', 'release', 'in'])

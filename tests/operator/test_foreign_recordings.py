@@ -71,7 +71,7 @@ def visit(place: str, at: float) -> FactChanges:
 
 def said() -> Iterator[tuple[float, str, Any]]:
     """Yield what a mission in the namespace `two` said: seconds, topic, message."""
-    places = MissionState(
+    places = MissionState().having(
         positions={'A': (0.0, 0.0), 'B': (9.0, 0.0)}, door_lines={'D': (5.0, -1.0, 5.0, 1.0)}
     )
     yield 0.0, '/two/place_markers', markers_of(places, Time())
@@ -126,7 +126,7 @@ def test_it_is_replayed_as_a_mission_was(bag: Path, tmp_path: Path) -> None:
     _, now, parts = line.at(START + 12.9)
     assert now == pytest.approx(START + 12.5, abs=1.0)
     assert parts['status']['state'] == 'S12'
-    assert parts['battery']['level'] == 78
+    assert parts['brief'] == 'battery 78 %'
     assert parts['pose'][0] == pytest.approx(6.0)
     assert len(parts['trail']) == 13
     assert parts['decision']['number'] == 7

@@ -31,6 +31,7 @@ from surveillance_operator.mission_actions import MissionActions
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.place import make_place
 from surveillance_runtime.waiting import AwaitedEvent
+from tests.operator.prompt import Prompt
 
 PLACE = {
     'map.A': ['D'],
@@ -162,7 +163,7 @@ def test_any_parameter_of_a_running_node_is_looked_at_and_set(
     reasoner = graph.add(Reasoner, parameters={'urgency_threshold': 240})
 
     def said(line: str) -> str:
-        (told,) = answer(line, actions, lambda: '')
+        (told,) = answer(line, actions, Prompt())
         return told.text
 
     assert '* urgency_threshold' in said('param list reasoner')

@@ -14,7 +14,7 @@ from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from std_msgs.msg import String
 
-from surveillance_operator import mission_markers_node, mission_subscriber
+from surveillance_operator import mission_markers_node, node_graph_watch
 from surveillance_operator.mission_markers_node import (
     FRESH,
     LATE,
@@ -31,7 +31,7 @@ CONFIG = Path(__file__).parents[2] / 'config'
 
 
 def test_a_place_is_coloured_by_its_wait_and_a_door_by_its_state() -> None:
-    snapshot = MissionState(
+    state = MissionState().having(
         now=220.0,
         threshold=120.0,
         positions={'A': (1.0, 2.0), 'B': (3.0, 4.0)},
@@ -40,7 +40,7 @@ def test_a_place_is_coloured_by_its_wait_and_a_door_by_its_state() -> None:
         door_lines={'D': (0.0, 0.0, 1.0, 0.0)},
         doors={'D': False},
     )
-    found = {(each.ns, each.id): each for each in markers_of(snapshot, Time()).markers}
+    found = {(each.ns, each.id): each for each in markers_of(state, Time()).markers}
     first, second = found['places', 0].color, found['places', 1].color
     assert (first.r, first.g, first.b) == pytest.approx(FRESH, abs=1e-6)
     assert (second.r, second.g, second.b) == pytest.approx(LATE, abs=1e-6)
@@ -51,7 +51,7 @@ def test_a_place_is_coloured_by_its_wait_and_a_door_by_its_state() -> None:
 
 
 def test_the_driven_way_is_a_path() -> None:
-    path = path_of(MissionState(trail=np.array([(0.0, 1.0), (2.0, 3.0)])), Time())
+    path = path_of(MissionState().having(trail=np.array([(0.0, 1.0), (2.0, 3.0)])), Time())
     assert [(each.pose.position.x, each.pose.position.y) for each in path.poses] == [
         (0.0, 1.0),
         (2.0, 3.0),
@@ -70,7 +70,7 @@ def test_the_description_has_the_joints_of_joint_states() -> None:
 
 def test_a_node_that_reports_no_more_is_stale(graph: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(mission_markers_node, 'PERIOD', 0.05)
-    monkeypatch.setattr(mission_subscriber, 'STALE_AFTER', 0.5)
+    monkeypatch.setattr(node_graph_watch, 'STALE_AFTER', 0.5)
     node_speaks = graph.node.create_publisher(DiagnosticArray, '/diagnostics', 10)
     status = DiagnosticStatus(name='planner', hardware_id='robot7', message='up')
     heard = graph.listen(DiagnosticArray, '/diagnostics')
@@ -91,7 +91,7 @@ def test_a_node_that_reports_no_more_is_stale(graph: Any, monkeypatch: pytest.Mo
     assert (stale[0].name, stale[0].hardware_id) == ('planner', 'robot7')
     assert stale[0].message == 'does not report'
     assert {each.name for each in stale} == {'planner'}
-    monkeypatch.setattr(mission_subscriber, 'STALE_AFTER', 1000.0)
+    monkeypatch.setattr(node_graph_watch, 'STALE_AFTER', 1000.0)
     node_speaks.publish(DiagnosticArray(status=[status]))
     seen = len(heard)
     graph.until(lambda: DiagnosticStatus.OK in [each.status[0].level for each in heard[seen:]])

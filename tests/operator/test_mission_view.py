@@ -15,13 +15,12 @@ from rich.console import Console
 
 from patrol_policy.world import Decision
 from state_machines import Interrupt
+from surveillance_operator.mission_changes import changes, follow
 from surveillance_operator.mission_state import (
-    Event,
     MissionState,
     NodeReport,
+    Notice,
     Status,
-    changes,
-    follow,
 )
 from surveillance_operator.watch import raster, view
 from surveillance_operator.watch.raster import Viewport, rasterise
@@ -43,14 +42,14 @@ def two_rooms() -> Grid:
 
 
 def whole() -> MissionState:
-    return MissionState(
+    return MissionState().having(
         where='ROS domain 7',
         now=100.0,
         mode='SIMULATED',
         nodes={'robot_behavior': frozenset({'1'})},
         status=STATUS,
         decision=DECISION,
-        number=3,
+        decision_number=3,
         battery=80.0,
         grid=two_rooms(),
         positions={'A': (1.0, 3.0), 'B': (4.0, 3.0)},
@@ -61,11 +60,11 @@ def whole() -> MissionState:
         pose=(1.0, 3.0, math.pi / 2),
         trail=np.array([(0.0, 3.0), (1.0, 3.0)]),
         obstacles=np.array([(2.0, 3.5)]),
-        events=(Event(time.mktime((2026, 1, 1, 12, 0, 0, 0, 0, -1)), 'arrived in A'),),
+        notices=(Notice('arrived in A', at=time.mktime((2026, 1, 1, 12, 0, 0, 0, 0, -1))),),
     )
 
 
-def shown(snapshot: MissionState, width: int = 100, height: int = 30, colours: bool = False) -> str:
+def shown(state: MissionState, width: int = 100, height: int = 30, colours: bool = False) -> str:
     console = Console(
         width=width,
         height=height,
@@ -73,7 +72,7 @@ def shown(snapshot: MissionState, width: int = 100, height: int = 30, colours: b
         force_terminal=colours,
     )
     with console.capture() as capture:
-        console.print(MissionView(snapshot), end='')
+        console.print(MissionView(state), end='')
     return capture.get()
 
 
@@ -82,7 +81,7 @@ def test_a_robot_that_waits_for_help_says_for_what_in_the_place_of_its_decision(
     status = replace(STATUS, waiting_for_help=True, text='D is shut; open it')
     console = Console(width=100, height=30, color_system=None)
     with console.capture() as capture:
-        console.print(MissionView(replace(whole(), status=status), page=page), end='')
+        console.print(MissionView(whole().having(status=status), page=page), end='')
     text = capture.get()
     assert 'the robot waits for help' in text
     assert text.count('D is shut; open it') == 1
@@ -119,8 +118,8 @@ def test_a_picture_keeps_the_aspect_and_leaves_out_what_is_not_known():
 
 @pytest.mark.parametrize(('width', 'height'), [(100, 30), (80, 24), (40, 30), (40, 12), (7, 3)])
 def test_the_picture_fills_any_terminal_exactly(width, height):
-    for snapshot in (whole(), MissionState(), replace(whole(), grid=None)):
-        lines = shown(snapshot, width, height).split('\n')
+    for state in (whole(), MissionState(), whole().having(grid=None)):
+        lines = shown(state, width, height).split('\n')
         assert [len(line) for line in lines] == [width] * height
 
 
@@ -152,14 +151,14 @@ def test_the_map_shows_robot_door_obstacle_trail_and_names_without_colours_too()
 
 def test_a_name_never_covers_another():
     close = {f'ROOM{number}': (1.0 + 0.1 * number, 3.0) for number in range(9)}
-    picture = shown(replace(whole(), grid=None, positions=close, visited_at={}), 60, 20)
+    picture = shown(whole().having(grid=None, positions=close, visited_at={}), 60, 20)
     written = [name for name in close if name in picture.split('sketched')[0]]
     assert 0 < len(written) < 9
     assert picture.split('sketched')[0].count('ROOM') == len(written)
 
 
 def test_colours_tell_an_open_door_from_a_closed_one():
-    opened = replace(whole(), doors={'D': True})
+    opened = whole().having(doors={'D': True})
     assert shown(opened, colours=True) != shown(whole(), colours=True)
     assert 'all 1 open' in shown(opened)
 
@@ -170,33 +169,33 @@ def test_what_does_not_come_is_said_in_its_place():
     for topic in ('map', 'mission_status', 'decision', 'battery_level', 'door_states'):
         assert f'nothing on {topic} yet' in text
     assert 'nothing from the ontology yet' in text
-    why = replace(MissionState(), silent={'map': 'its publisher offers another durability'})
+    why = MissionState().having(silent={'map': 'its publisher offers another durability'})
     assert 'nothing on map yet: its publisher offers another durability' in shown(why)
 
 
 def test_without_a_map_the_places_are_sketched():
-    text = shown(replace(whole(), grid=None, pose=None, links=frozenset({('A', 'B')})))
+    text = shown(whole().having(grid=None, pose=None, links=frozenset({('A', 'B')})))
     assert 'sketched: nothing on map yet' in text
     row = next(line for line in text.split('\n') if '○' in line)
     assert row.index('●') < row.index('.') < row.index('○')
 
 
 def test_the_end_of_a_node_and_of_the_mission_is_announced():
-    crippled = replace(whole(), ended=frozenset({'battery_controller'}))
+    crippled = whole().having(ended=frozenset({'battery_controller'}))
     assert 'ended: battery_controller' in shown(crippled)
-    assert 'the mission has ended: waiting' in shown(replace(whole(), nodes={}))
+    assert 'the mission has ended: waiting' in shown(whole().having(nodes={}))
 
 
 def test_what_does_not_fit_is_said_to_be_left_out():
     many = {f'R{number}': float(number) for number in range(60)}
-    assert '… and more places' in shown(replace(whole(), visited_at=many))
+    assert '… and more places' in shown(whole().having(visited_at=many))
     wordy = replace(DECISION, reason='a reason ' * 200)
-    assert '…' in shown(replace(whole(), decision=wordy))
+    assert '…' in shown(whole().having(decision=wordy))
 
 
 def test_a_whole_reason_is_read_at_80_columns():
     reason = ' '.join(f'clause {number} of the reason' for number in range(20))
-    text = shown(replace(whole(), decision=replace(DECISION, reason=reason)), 80, 50)
+    text = shown(whole().having(decision=replace(DECISION, reason=reason)), 80, 50)
     assert '…' not in text
     assert 'clause 19' in text
 
@@ -207,18 +206,18 @@ def test_a_whole_reason_is_read_at_80_columns():
 )
 def test_a_key_shows_a_page(page, words):
     console = Console(width=80, height=24, color_system=None)
-    snapshot = replace(whole(), decision=replace(DECISION, scores={'B': 1.5, 'C': 0.5}))
+    state = whole().having(decision=replace(DECISION, scores={'B': 1.5, 'C': 0.5}))
     with console.capture() as capture:
-        console.print(MissionView(snapshot, page=page), end='')
+        console.print(MissionView(state, page=page), end='')
     assert words in capture.get()
 
 
 def test_a_node_that_is_started_again_is_told_though_the_killed_one_still_seems_there():
     before = whole()
-    again = replace(before, nodes={'robot_behavior': frozenset({'1', '2'})})
+    again = before.having(nodes={'robot_behavior': frozenset({'1', '2'})})
     told = [change.text for change in changes(before, again)]
     assert told == ['robot_behavior was started again']
-    assert list(changes(again, replace(again, nodes={'robot_behavior': frozenset({'2'})}))) == []
+    assert list(changes(again, again.having(nodes={'robot_behavior': frozenset({'2'})}))) == []
 
 
 def test_each_change_is_told_once_in_one_line():
@@ -228,8 +227,7 @@ def test_each_change_is_told_once_in_one_line():
     assert {'door D closed', 'B is URGENT', 'arrived in A', 'battery at 80 %'} <= first.keys()
     assert 'something stands at (2.0, 3.5)' in first
     assert list(changes(after, after)) == []
-    later = replace(
-        after,
+    later = after.having(
         doors={'D': True},
         obstacles=np.empty((0, 2)),
         battery=70.0,
@@ -246,13 +244,13 @@ def test_each_change_is_told_once_in_one_line():
 
 def test_each_node_has_one_line_with_the_worst_that_it_reports() -> None:
     good, late = NodeReport(0, 'up', ()), NodeReport(1, 'late', ())
-    snapshot = MissionState(
+    state = MissionState().having(
         nodes={'robot_behavior': frozenset()},
         ended=frozenset({'simulator'}),
         restarts={'robot_behavior': 1},
-        health={'robot_behavior': good, 'robot_behavior: clock': late, 'mission_recorder': good},
+        reports={'robot_behavior': good, 'robot_behavior: clock': late, 'mission_recorder': good},
     )
-    assert [line.plain for line in node_page(snapshot)] == [
+    assert [line.plain for line in node_page(state)] == [
         '▲ WARN  robot_behavior: late, started again 1 time',
         '✗ ended simulator',
         '● up    mission_recorder: up',
@@ -280,7 +278,7 @@ def test_a_single_picture_waits_until_all_has_come_and_no_longer_than_it_may(mon
 
     def shown(come_at: float, *, timeout: float = 1.0) -> str:
         now[0] = 0.0
-        late = replace(whole(), battery=None)
+        late = whole().having(battery=None)
         file = io.StringIO()
         console = Console(file=file)
         told = show_once(
@@ -302,11 +300,11 @@ def test_a_single_picture_waits_until_all_has_come_and_no_longer_than_it_may(mon
 
 def test_a_node_that_reports_nothing_is_up_and_each_start_again_is_counted() -> None:
     def running(process: str, before: MissionState) -> MissionState:
-        new = replace(before, nodes={'robot_behavior': frozenset({process})})
+        new = before.having(nodes={'robot_behavior': frozenset({process})})
         return follow(before, new, 0.0)[0]
 
-    snapshot = running('1', MissionState())
-    assert [line.plain for line in node_page(snapshot)] == ['● up    robot_behavior']
-    snapshot = running('3', running('2', snapshot))
-    (line,) = node_page(snapshot)
+    state = running('1', MissionState())
+    assert [line.plain for line in node_page(state)] == ['● up    robot_behavior']
+    state = running('3', running('2', state))
+    (line,) = node_page(state)
     assert line.plain == '● up    robot_behavior, started again 2 times'

@@ -24,7 +24,7 @@ from surveillance_interfaces.msg import Decision, DoorStates, MissionStatus
 from surveillance_interfaces.srv import ConsoleCommand
 from surveillance_ontology.armor_server_node import ArmorServer
 from surveillance_ontology.ontology_map_builder_node import OntologyMapBuilder
-from surveillance_operator import mission_subscriber, mission_view_node
+from surveillance_operator import mission_view_node, node_graph_watch
 from surveillance_operator.mission_view_node import MissionViewNode
 from surveillance_runtime.conversions import cloud_from_points
 from surveillance_runtime.node import PatrolNode
@@ -52,7 +52,7 @@ class Planner(PatrolNode):
 
 @pytest.fixture(autouse=True)
 def _look_often(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(mission_subscriber, 'LOOK_PERIOD', 0.05)
+    monkeypatch.setattr(node_graph_watch, 'LOOK_PERIOD', 0.05)
     return
 
 
@@ -68,7 +68,7 @@ def test_what_a_peer_says_commands_no_terminal(graph: Any, monkeypatch: pytest.M
     said = MissionStatus(state='MOVE', place='\x1b[2J', heading_to='E\nlaunch | forged')
     publisher = say(graph, 'mission_status', said)
     view = graph.add(MissionViewNode)
-    graph.until(lambda: view.snapshot.status)
+    graph.until(lambda: view.state.task.status)
     told = r'in \x1b[2J, heading for E\nlaunch | forged'
     graph.until(lambda: any(told in line for line in printed))
     assert publisher is not None
@@ -97,12 +97,12 @@ def test_zones_and_stations_follow_a_changed_place(graph: Any) -> None:
     zone = [0.0, 0.0, 1.0, 0.0, 1.0, 1.0]
     graph.add(Planner, parameters={'keep_out_zones.K': zone, 'slow_zones.S': [0.3, *zone]})
     view = graph.add(MissionViewNode)
-    graph.until(lambda: view.snapshot.stations == {'A': (1.0, 2.0, 0.5)})
-    graph.until(lambda: {'K', 'S'} == set(view.snapshot.zones))
-    assert view.snapshot.zones['S'].speed == 0.3
+    graph.until(lambda: view.state.place.stations == {'A': (1.0, 2.0, 0.5)})
+    graph.until(lambda: {'K', 'S'} == set(view.state.place.zones))
+    assert view.state.place.zones['S'].speed == 0.3
     change_place(graph, slow_zones={'S': [0.2, *zone]})
-    graph.until(lambda: view.snapshot.stations == {'B': (5.0, 2.0, 0.0)})
-    assert {name: zone.speed for name, zone in view.snapshot.zones.items()} == {'S': 0.2}
+    graph.until(lambda: view.state.place.stations == {'B': (5.0, 2.0, 0.0)})
+    assert {name: zone.speed for name, zone in view.state.place.zones.items()} == {'S': 0.2}
 
 
 def test_a_point_that_is_moved_while_it_is_asked_for_is_asked_for_again(
@@ -123,27 +123,27 @@ def test_a_point_that_is_moved_while_it_is_asked_for_is_asked_for_again(
     graph.add(OntologyMapBuilder, parameters={**PLACE, 'station': [1.0, 2.0, 0.5]})
     graph.add(Planner)
     view = graph.add(MissionViewNode)
-    graph.until(lambda: held and view.snapshot.stations)
+    graph.until(lambda: held and view.state.place.stations)
     change_place(graph, room_positions={'A': [1.0, 1.0], 'B': [6.0, 1.0]})
-    graph.until(lambda: view.snapshot.stations == {'B': (5.0, 2.0, 0.0)})
+    graph.until(lambda: view.state.place.stations == {'B': (5.0, 2.0, 0.0)})
     graph.node.executor.create_task(held[0].set_result, None)
-    graph.until(lambda: view.snapshot.positions == {'A': (1.0, 1.0), 'B': (6.0, 1.0)})
+    graph.until(lambda: view.state.place.positions == {'A': (1.0, 1.0), 'B': (6.0, 1.0)})
 
 
 def test_another_mission_may_have_another_ontology(
     graph: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(mission_subscriber, 'WHOLE_LOOK_PERIOD', 0.05)
+    monkeypatch.setattr(node_graph_watch, 'WHOLE_LOOK_PERIOD', 0.05)
     graph.add(ArmorServer)
     view = graph.add(MissionViewNode)
     for reference, room in (('first', 'B'), ('second', 'C')):
         place = {key.replace('B', room): value for key, value in PLACE.items()}
         parameters = {**place, 'ontology_reference': reference}
         nodes = graph.add(OntologyMapBuilder, parameters=parameters), graph.add(Planner)
-        graph.until(lambda room=room: set(view.snapshot.positions) == {'A', room})
+        graph.until(lambda room=room: set(view.state.place.positions) == {'A', room})
         for node in nodes:
             graph.remove(node)
-        graph.until(lambda: not view.snapshot.nodes)
+        graph.until(lambda: not view.state.health.nodes)
 
 
 def test_it_gathers_what_topics_ontology_and_parameters_tell(graph: Any) -> None:
@@ -167,38 +167,38 @@ def test_it_gathers_what_topics_ontology_and_parameters_tell(graph: Any) -> None
 
     graph.until(
         lambda: (
-            view.snapshot.mode == 'SIMULATED'
-            and view.snapshot.positions == {'A': (1.0, 1.0), 'B': (5.0, 1.0)}
-            and view.snapshot.visited_at.keys() == {'A', 'B'}
-            and view.snapshot.links
-            and view.snapshot.pose
-            and view.snapshot.doors
-            and view.snapshot.obstacles is not None
-            and view.snapshot.grid is not None
-            and view.snapshot.battery_low
-            and 'planner_controller' in view.snapshot.nodes
+            view.state.task.mode == 'SIMULATED'
+            and view.state.place.positions == {'A': (1.0, 1.0), 'B': (5.0, 1.0)}
+            and view.state.place.visited_at.keys() == {'A', 'B'}
+            and view.state.place.links
+            and view.state.sensors.pose
+            and view.state.place.doors
+            and view.state.sensors.obstacles is not None
+            and view.state.place.grid is not None
+            and view.state.task.battery_low
+            and 'planner_controller' in view.state.health.nodes
         )
     )
     seen = view.see()['']
-    assert seen.battery == 15.0
-    assert seen.status is not None
-    assert seen.status.state == 'MOVE'
-    assert seen.decision is not None
-    assert (seen.number, seen.decision.place) == (4, 'B')
-    assert seen.grid is not None
-    assert seen.grid.cells.tolist() == [[0, 100, -1], [0, 0, 0]]
-    assert seen.doors == {'D': False}
-    assert seen.door_lines['D'] == pytest.approx((2.5, 1.0, 3.5, 1.0))
-    assert seen.obstacles is not None
-    assert seen.obstacles.tolist() == [[2.0, 1.0]]
-    assert seen.pose == (1.5, 0.0, 0.0)
-    assert seen.trail.tolist() == [[1.5, 0.0]]
-    assert seen.visited_at == {'A': 0.0, 'B': 0.0}  # never yet
-    assert 'door D closed' in [each.text for each in seen.events]
+    assert seen.task.battery == 15.0
+    assert seen.task.status is not None
+    assert seen.task.status.state == 'MOVE'
+    assert seen.task.decision is not None
+    assert (seen.task.decision_number, seen.task.decision.place) == (4, 'B')
+    assert seen.place.grid is not None
+    assert seen.place.grid.cells.tolist() == [[0, 100, -1], [0, 0, 0]]
+    assert seen.place.doors == {'D': False}
+    assert seen.place.door_lines['D'] == pytest.approx((2.5, 1.0, 3.5, 1.0))
+    assert seen.sensors.obstacles is not None
+    assert seen.sensors.obstacles.tolist() == [[2.0, 1.0]]
+    assert seen.sensors.pose == (1.5, 0.0, 0.0)
+    assert seen.sensors.trail.tolist() == [[1.5, 0.0]]
+    assert seen.place.visited_at == {'A': 0.0, 'B': 0.0}  # never yet
+    assert 'door D closed' in [each.text for each in seen.notices]
 
     graph.remove(planner)
-    graph.until(lambda: view.snapshot.ended == {'planner_controller'})
-    assert ('planner_controller ended') in view.snapshot.events[-1][1]
+    graph.until(lambda: view.state.health.ended == {'planner_controller'})
+    assert ('planner_controller ended') in view.state.notices[-1].text
 
 
 def test_where_nobody_estimates_the_pose_the_feedback_of_the_drive_tells_it(graph: Any) -> None:
@@ -210,17 +210,17 @@ def test_where_nobody_estimates_the_pose_the_feedback_of_the_drive_tells_it(grap
         message = kind()
         message.feedback.position.x = message.feedback.position.y = x
         drive.publish(message)
-        graph.until(lambda x=x: view.snapshot.pose and view.snapshot.pose[0] == x)
-    assert view.snapshot.pose == pytest.approx((2.0, 2.0, np.pi / 4))
+        graph.until(lambda x=x: view.state.sensors.pose and view.state.sensors.pose[0] == x)
+    assert view.state.sensors.pose == pytest.approx((2.0, 2.0, np.pi / 4))
 
 
 def test_why_a_topic_cannot_be_used_is_known(graph: Any) -> None:
     view = graph.add(MissionViewNode)
     say(graph, 'battery_level', UInt8(data=50), QoSProfile(depth=1))
     say(graph, 'map', OccupancyGrid(data=[0, 0]))
-    graph.until(lambda: {'battery_level', 'map'} <= view.snapshot.silent.keys())
-    assert 'another DURABILITY' in view.snapshot.silent['battery_level']
-    assert 'a map of 2 cells' in view.snapshot.silent['map']
+    graph.until(lambda: {'battery_level', 'map'} <= view.state.health.silent.keys())
+    assert 'another DURABILITY' in view.state.health.silent['battery_level']
+    assert 'a map of 2 cells' in view.state.health.silent['map']
 
 
 def test_the_next_mission_begins_with_an_empty_picture(graph: Any) -> None:
@@ -228,31 +228,31 @@ def test_the_next_mission_begins_with_an_empty_picture(graph: Any) -> None:
     status = say(graph, '/alone/mission_status', MissionStatus(state='FIRST'))
     battery = say(graph, '/alone/battery_level', UInt8(data=50))
     clock = say(graph, '/clock', Clock(clock=Time(sec=100)))
-    graph.until(lambda: view.snapshot.battery == 50 and view.snapshot.nodes)
+    graph.until(lambda: view.state.task.battery == 50 and view.state.health.nodes)
     graph.until(lambda: view.see()[''].now == 100.0)
     for publisher in (status, battery, clock):
         graph.node.destroy_publisher(publisher)
-    graph.until(lambda: not view.snapshot.nodes)
+    graph.until(lambda: not view.state.health.nodes)
     frozen = view.see()['']
-    assert frozen.status is not None
-    assert frozen.status.state == 'FIRST'
+    assert frozen.task.status is not None
+    assert frozen.task.status.state == 'FIRST'
     assert view.see()[''].now == frozen.now
     reports = say(graph, '/diagnostics', DiagnosticArray(status=[DiagnosticStatus(name='x')]), 10)
 
     def reported() -> bool:  # an observer of the mission, which goes on
         reports.publish(DiagnosticArray(status=[DiagnosticStatus(name='x')]))
-        return 'x' in view.snapshot.health
+        return 'x' in view.state.health.reports
 
     graph.until(reported)
-    assert view.see()[''].status == frozen.status
+    assert view.see()[''].task.status == frozen.task.status
     assert view.see()[''].now == 100.0  # no wait grows by the time of day
 
     say(graph, '/alone/mission_status', MissionStatus(state='SECOND'))
-    graph.until(lambda: view.snapshot.status and view.snapshot.status.state == 'SECOND')
-    assert view.snapshot.battery is None
-    assert view.snapshot.history.battery == ()
+    graph.until(lambda: view.state.task.status and view.state.task.status.state == 'SECOND')
+    assert view.state.task.battery is None
+    assert view.state.history.battery == ()
     assert view.see()[''].now > 1e9
-    assert any('waiting for the next mission' in each.text for each in view.snapshot.events)
+    assert any('waiting for the next mission' in each.text for each in view.state.notices)
 
 
 def test_that_the_observers_of_an_ended_mission_are_gone_is_no_fault(
@@ -260,15 +260,15 @@ def test_that_the_observers_of_an_ended_mission_are_gone_is_no_fault(
 ) -> None:
     view = graph.add(MissionViewNode)
     status = say(graph, 'mission_status', MissionStatus(state='MOVE'))
-    graph.until(lambda: view.snapshot.nodes)
+    graph.until(lambda: view.state.health.nodes)
     names = ('mission_recorder', 'arm_controller')
     reports = DiagnosticArray(status=[DiagnosticStatus(name=name) for name in names])
     say(graph, '/diagnostics', reports, 10)
-    graph.until(lambda: view.snapshot.health.keys() == set(names))
-    monkeypatch.setattr(mission_subscriber, 'STALE_AFTER', 0.0)
-    graph.until(lambda: [each.level for each in view.snapshot.health.values()] == [3, 3])
+    graph.until(lambda: view.state.health.reports.keys() == set(names))
+    monkeypatch.setattr(node_graph_watch, 'STALE_AFTER', 0.0)
+    graph.until(lambda: [each.level for each in view.state.health.reports.values()] == [3, 3])
     graph.node.destroy_publisher(status)
-    graph.until(lambda: view.snapshot.health.keys() == {'arm_controller'})
+    graph.until(lambda: view.state.health.reports.keys() == {'arm_controller'})
 
 
 def test_a_terminal_that_cannot_draw_gets_lines(

@@ -185,7 +185,7 @@ def test_no_other_site_may_be_loaded_or_embed_the_page(page: Page) -> None:
 
 
 def test_a_viewer_gets_everything_and_then_what_changed(page: Page) -> None:
-    page._broadcaster.show(MissionState(battery=50.0, now=1.0))
+    page._broadcaster.show(MissionState().having(battery=50.0, now=1.0))
     connection = http.client.HTTPConnection('127.0.0.1', page.port, timeout=60.0)
     connection.request('GET', '/events')
     answer = connection.getresponse()
@@ -198,11 +198,12 @@ def test_a_viewer_gets_everything_and_then_what_changed(page: Page) -> None:
 
     first = event()
     assert first['whole'] == 1
-    assert first['p']['battery'] == {'level': 50.0, 'low': False}  # type: ignore[index]
-    page._broadcaster.show(MissionState(battery=49.0, now=2.0))
+    assert first['p']['brief'] == 'battery 50 %'  # type: ignore[index]
+    page._broadcaster.show(MissionState().having(battery=49.0, now=2.0))
     second = event()
-    battery = {'battery': {'level': 49.0, 'low': False}}
-    assert second == {'now': 2.0, 'whole': 0, 'robot': '', 'p': battery, 'r': {}}
+    figures = [['battery', 'battery', '49 %', False, 0.49]]
+    changed = {'figures': figures, 'brief': 'battery 49 %'}
+    assert second == {'now': 2.0, 'whole': 0, 'robot': '', 'p': changed, 'r': {}}
     connection.close()
 
 

@@ -11,12 +11,12 @@ import pytest
 
 from patrol_policy.world import Decision
 from surveillance_operator.mission_state import (
-    Event,
     MachineContainer,
     MachineTransition,
     MissionHistory,
     MissionState,
     NodeReport,
+    Notice,
     Status,
 )
 from surveillance_operator.page.broadcaster import Broadcaster
@@ -45,7 +45,7 @@ def mission(names: tuple[str, ...]) -> MissionState:
         name: (2.0 * (n % side) + 1.0, 2.0 * (n // side) + 1.0) for n, name in enumerate(names)
     }
     first, last = names[0], names[-1]
-    return MissionState(
+    return MissionState().having(
         where=first,
         now=5000.0,
         mode='SIMULATED',
@@ -56,7 +56,7 @@ def mission(names: tuple[str, ...]) -> MissionState:
         decision=Decision(
             4990.0, first, last, last, 'URGENT', 'tour', first, dict.fromkeys(names, 1.0)
         ),
-        number=3,
+        decision_number=3,
         battery=50.0,
         grid=Grid(cells, 0.1),
         positions=positions,
@@ -71,9 +71,9 @@ def mission(names: tuple[str, ...]) -> MissionState:
         active=(f'm/{first}',),
         transitions=(MachineTransition(1, 4999.0, 'm', first, last, last, 1.0),),
         markers={11: (0.5, 0.5)},
-        health={name: NodeReport(2, first, (('memory_mb', '5'),)) for name in names},
+        reports={name: NodeReport(2, first, (('memory_mb', '5'),)) for name in names},
         silent={first: last},
-        events=(Event(1e9, first),),
+        notices=(Notice(first, at=1e9),),
         history=MissionHistory(((4900.0, last),), ((4000.0, 60.0),), ((4950.0, 'failure', first),)),
     )  # fmt: skip
 
@@ -81,14 +81,13 @@ def mission(names: tuple[str, ...]) -> MissionState:
 ROOMS = tuple(f'R{n}' for n in range(1, 501))
 STATES = {
     'nothing': MissionState(where='ROS domain 5'),
-    'begins': replace(MissionState(), nodes={'armor_server': frozenset('1')}),
+    'begins': MissionState().having(nodes={'armor_server': frozenset('1')}),
     'hostile': mission(HOSTILE),
     'large': mission(ROOMS),
-    'help': replace(
-        mission(('A', 'B')),
+    'help': mission(('A', 'B')).having(
         status=Status(5000.0, 'm', 'WAIT_FOR_HELP', 'A', 'B', True, 'shut in', ()),
     ),
-    'ended': replace(mission(('A', 'B')), nodes={}, ended=frozenset({'A', 'B'})),
+    'ended': mission(('A', 'B')).having(nodes={}, ended=frozenset({'A', 'B'})),
 }
 
 
@@ -111,7 +110,7 @@ def viewer(broadcaster: Broadcaster) -> Iterator[Viewer]:
 
 def show(broadcaster: Broadcaster, viewer: Viewer, name: str) -> None:
     """Show a state of a mission, and wait until the page has it."""
-    broadcaster.show(replace(STATES[name], policy=name))
+    broadcaster.show(STATES[name].having(policy=name))
     viewer.until(lambda: viewer.js('return mission.state.mission?.policy') == name)
 
 
@@ -169,14 +168,14 @@ def test_zones_and_stations_are_drawn_and_drawn_anew(
         'K1': Zone('K1', ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0))),
         'S1': Zone('S1', ((2.0, 0.0), (3.0, 0.0), (3.0, 1.0)), 0.3),
     }
-    shown = replace(STATES['large'], zones=zones, stations={'R1': (1.0, 1.5, 0.0)})
+    shown = STATES['large'].having(zones=zones, stations={'R1': (1.0, 1.5, 0.0)})
     broadcaster.show(shown)
     viewer.until(lambda: viewer.count('#map [data-zone]') == 2)
     assert viewer.text('#map [data-zone=S1] title') == 'S1: at most 0.3 m/s'
     assert viewer.js(
         'return document.querySelector("#map [data-zone=K1]").getAttribute("d")'
     ).startswith('M0 0L1 0L1 -1')
-    broadcaster.show(replace(shown, zones={}, stations={'R2': (3.0, 1.5, 0.0)}))
+    broadcaster.show(shown.having(zones={}, stations={'R2': (3.0, 1.5, 0.0)}))
     viewer.until(lambda: not viewer.count('#map [data-zone]'))
     viewer.until(lambda: viewer.count('#map [data-station=R2]') == 1)
 
@@ -294,8 +293,8 @@ def test_enter_does_what_a_forms_first_button_does(
 
 def test_no_link_leads_below_the_header(broadcaster: Broadcaster, viewer: Viewer) -> None:
     show(broadcaster, viewer, 'large')
-    long = replace(STATES['large'].status, text='charging, for which there are reasons ' * 20)  # type: ignore[type-var]
-    broadcaster.show(replace(STATES['large'], status=long))
+    long = replace(STATES['large'].task.status, text='charging, for which there are reasons ' * 20)  # type: ignore[type-var]
+    broadcaster.show(STATES['large'].having(status=long))
     viewer.until(lambda: 'reasons' in viewer.text('#state'))
     viewer.size(*PHONE)
     for section in ('why', 'camera-section', 'control', 'machine-section'):
@@ -312,7 +311,7 @@ def test_a_long_report_leaves_the_names_of_nodes_their_room(
     names = ('aruco_detector', 'ontology_map_builder')
     long = NodeReport(0, 'waiting for the arm to rest', ())
     broadcaster.show(
-        replace(STATES['begins'], nodes=dict.fromkeys(names, frozenset()), health={names[0]: long})
+        STATES['begins'].having(nodes=dict.fromkeys(names, frozenset()), reports={names[0]: long})
     )
     viewer.size(*PHONE)
     viewer.until(lambda: 'waiting' in viewer.text('#nodes'))

@@ -11,14 +11,13 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from surveillance_operator.mission_state import Event, MissionState
+from surveillance_operator.mission_state import MissionState, Notice
 from surveillance_operator.watch import raster
 from surveillance_operator.watch.raster import CharacterCanvas, Viewport
 from surveillance_operator.watch.view import (
     MissionView,
-    battery_line,
-    doors_line,
     draw_map,
+    figure_lines,
     place_lines,
     robot_colour,
 )
@@ -30,15 +29,15 @@ OTHER = replace(STATUS, place='B', state='CHARGE', heading_to='', text='')
 
 
 def fleet() -> dict[str, MissionState]:
-    second = replace(whole(), pose=(4.0, 3.0, 0.0), status=OTHER, battery=15.0, battery_low=True)
+    second = whole().having(pose=(4.0, 3.0, 0.0), status=OTHER, battery=15.0, battery_low=True)
     return {'': whole(), 'r1': whole(), 'r2': second}
 
 
-def drawn(snapshot: MissionState, width: int, height: int, **more: Any) -> list[str]:
+def drawn(state: MissionState, width: int, height: int, **more: Any) -> list[str]:
     """Return the lines of a screen, without the spaces at their ends and the hour of events."""
     console = Console(width=width, height=height, color_system=None)
     with console.capture() as capture:
-        console.print(MissionView(snapshot, **more), end='')
+        console.print(MissionView(state, **more), end='')
     lines = capture.get().split('\n')
     assert [len(line) for line in lines] == [width] * height
     return [line.rstrip().replace('12:00:00', 'hh:mm:ss') for line in lines]
@@ -119,8 +118,8 @@ policy tour, target B
 """
 ROBOTS = """
  r2 · surveillance in mode SIMULATED · ROS domain 7
-r1      A          80 %  on its way to B
-r2      B          15 %  charge
+r1      A         battery 80 %        on its way to B
+r2      B         battery 15 % (low)  charge
 """
 EVENTS = """
  surveillance in mode SIMULATED · ROS domain 7
@@ -130,20 +129,20 @@ hh:mm:ss arrived in A
 
 
 @pytest.mark.parametrize(
-    ('screen', 'width', 'snapshot', 'more'),
+    ('screen', 'width', 'state', 'more'),
     [
         (BESIDE, 100, whole(), {}),
         (
             SKETCHED,
             50,
-            replace(whole(), grid=None, pose=None, links=frozenset({('A', 'B'), ('A', 'gone')})),
+            whole().having(grid=None, pose=None, links=frozenset({('A', 'B'), ('A', 'gone')})),
             {},
         ),
         (FLEET, 96, fleet()['r1'], {'fleet': fleet(), 'robot': 'r1', 'note': 'the last line'}),
         (
             SCORES,
             60,
-            replace(whole(), decision=replace(DECISION, scores={'C': 0.5, 'B': 1.5})),
+            whole().having(decision=replace(DECISION, scores={'C': 0.5, 'B': 1.5})),
             {'page': 'decision'},
         ),
         (ROBOTS, 60, whole(), {'page': 'robots', 'fleet': fleet(), 'robot': 'r2'}),
@@ -151,69 +150,69 @@ hh:mm:ss arrived in A
     ],
 )
 def test_a_screen_looks_as_it_should(
-    screen: str, width: int, snapshot: MissionState, more: Mapping[str, Any]
+    screen: str, width: int, state: MissionState, more: Mapping[str, Any]
 ) -> None:
     expected = screen.strip('\n').split('\n')
     height = len(screen.split('\n')) - 2
     expected += [''] * (height - len(expected))
-    assert drawn(snapshot, width, height, **more) == expected
+    assert drawn(state, width, height, **more) == expected
 
 
 @pytest.mark.parametrize(
     ('page', 'words'), [('events', 'no events yet'), ('robots', 'this robot is alone')]
 )
 def test_a_page_without_anything_says_so(page: str, words: str) -> None:
-    assert drawn(replace(whole(), events=()), 50, 4, page=page)[1:] == [words, '', '']
+    assert drawn(whole().having(notices=()), 50, 4, page=page)[1:] == [words, '', '']
 
 
 def test_a_screen_that_is_too_small_keeps_the_state_and_the_last_event() -> None:
     many = {f'R{number:02}': 10.0 + number for number in range(30)}
-    events = tuple(Event(1e9 + each, f'event {each:02}') for each in range(20))
+    events = tuple(Notice(f'event {each:02}', at=1e9 + each) for each in range(20))
     reason = 'word ' * 60
-    snapshot = replace(
-        whole(), visited_at=many, events=events, decision=replace(DECISION, reason=reason)
+    state = whole().having(
+        visited_at=many, notices=events, decision=replace(DECISION, reason=reason)
     )
-    lines = drawn(snapshot, 80, 24)
+    lines = drawn(state, 80, 24)
     assert lines[1].endswith('█ MOVE_TO_NEXT_ROOM for 0:05')
     text = '\n'.join(lines)
     assert text.count('event ') == 3
     assert 'event 19' in lines[-1]
     assert '… and more places' in text
     assert text.index('A   never') < text.index('B   never') < text.index('R00')
-    tall = '\n'.join(drawn(snapshot, 80, 60))
+    tall = '\n'.join(drawn(state, 80, 60))
     assert [f'event {each:02}' in tall for each in range(20)] == [False] * 10 + [True] * 10
     assert '…' not in tall
     assert all(name in tall for name in many)
 
 
 @pytest.mark.parametrize(
-    ('snapshot', 'words'),
+    ('state', 'words'),
     [
         (MissionState(where='here'), ' no mission yet: waiting on here '),
-        (replace(whole(), nodes={}), ' the mission has ended: waiting on ROS domain 7 '),
+        (whole().having(nodes={}), ' the mission has ended: waiting on ROS domain 7 '),
         (
-            replace(whole(), ended=frozenset({'b', 'a'}), stopped=True),
+            whole().having(ended=frozenset({'b', 'a'}), stopped=True),
             ' ended: a, b · ROS domain 7 ',
         ),
         (
-            replace(whole(), stopped=True),
+            whole().having(stopped=True),
             ' STOPPED until a person releases it (r) · ROS domain 7 ',
         ),
-        (replace(whole(), paused=True), ' surveillance in mode SIMULATED · PAUSED · ROS domain 7 '),
-        (replace(whole(), mode='', status=None), ' mission · ROS domain 7 '),
+        (whole().having(paused=True), ' surveillance in mode SIMULATED · PAUSED · ROS domain 7 '),
+        (whole().having(mode='', status=None), ' mission · ROS domain 7 '),
     ],
 )
-def test_the_head_says_which_mission_this_is(snapshot: MissionState, words: str) -> None:
-    assert drawn(snapshot, 70, 12)[0] == words.rstrip()
+def test_the_head_says_which_mission_this_is(state: MissionState, words: str) -> None:
+    assert drawn(state, 70, 12)[0] == words.rstrip()
     alarmed = 'ended' in words or 'STOPPED' in words or 'no mission' in words
     console = Console(width=70, height=12, color_system='truecolor', force_terminal=True)
-    first = console.render_lines(MissionView(snapshot), console.options.update(height=12))[0]
+    first = console.render_lines(MissionView(state), console.options.update(height=12))[0]
     ground = {str(each.style.bgcolor.name) for each in first if each.style and each.style.bgcolor}
     assert ground == {'red3' if alarmed else 'deep_sky_blue1'}
 
 
 def test_who_is_stopped_in_a_fleet_is_named() -> None:
-    stopped = {**fleet(), 'r2': replace(fleet()['r2'], stopped=True)}
+    stopped = {**fleet(), 'r2': fleet()['r2'].having(stopped=True)}
     line = drawn(stopped['r2'], 96, 20, fleet=stopped, robot='r2')[0]
     assert line == ' r2 is STOPPED until a person releases it (r) · ROS domain 7'
 
@@ -222,44 +221,44 @@ def test_who_is_stopped_in_a_fleet_is_named() -> None:
     ('level', 'width', 'low', 'expected'),
     [
         (80.0, 60, False, 'battery ████████████████░░░░ 80 %'),
-        (0.0, 60, True, 'battery ░░░░░░░░░░░░░░░░░░░░ 0 %  low'),
+        (0.0, 60, True, 'battery ░░░░░░░░░░░░░░░░░░░░ 0 % (low)'),
         (100.0, 28, False, 'battery ██████████ 100 %'),
         (47.5, 38, False, 'battery ██████████░░░░░░░░░░ 48 %'),
     ],
 )
 def test_the_battery_is_a_bar(level: float, width: int, low: bool, expected: str) -> None:
-    line = battery_line(replace(whole(), battery=level, battery_low=low), width)
+    line = figure_lines(whole().having(battery=level, battery_low=low), width, brief=True)[0]
     assert line.plain == expected
     assert {str(each.style) for each in line.spans} >= {'bold red1' if low else 'green3'}
 
 
 def test_doors_are_counted_and_the_closed_ones_named() -> None:
     doors = {'D1': True, 'D2': False, 'D3': True, 'D4': False}
-    line = doors_line(replace(whole(), doors=doors))
+    (line,) = figure_lines(whole().having(doors=doors), 40, brief=False)
     assert line.plain == 'doors D2 D4 closed, 2 open'
-    assert [str(each.style) for each in line.spans] == ['bold red1', 'green3']
-    assert doors_line(replace(whole(), doors={'D1': True})).plain == 'doors all 1 open'
+    assert [str(each.style) for each in line.spans] == ['bold red1']
+    (line,) = figure_lines(whole().having(doors={'D1': True}), 40, brief=False)
+    assert line.plain == 'doors all 1 open'
 
 
 def test_places_stand_in_columns_with_the_time_since_their_visit() -> None:
     status = replace(STATUS, avoided=('D',))
-    snapshot = replace(
-        whole(),
+    state = whole().having(
         now=10_000.0,
         status=status,
         visited_at={'A': 9_998.2, 'B': 0.0, 'C': 2_800.0, 'D': 6_401.0, 'E': 10_500.0},
         positions={'X': (0.0, 0.0)},
         urgent=frozenset({'C'}),
     )
-    assert [line.plain.rstrip() for line in place_lines(snapshot, 56)] == [
+    assert [line.plain.rstrip() for line in place_lines(state, 56)] == [
         'B   never  ←       X   never',
         'C 2:00:00 URGENT   D   59:59 avoided',
         'A    0:01  ●       E    0:00',
     ]
-    assert [len(line) for line in place_lines(snapshot, 20)] == [19] * 6
-    assert len(place_lines(snapshot, 38)) == 3
-    assert len(place_lines(snapshot, 37)) == 6
-    nothing = replace(snapshot, visited_at={}, positions={})
+    assert [len(line) for line in place_lines(state, 20)] == [19] * 6
+    assert len(place_lines(state, 38)) == 3
+    assert len(place_lines(state, 37)) == 6
+    nothing = state.having(visited_at={}, positions={})
     assert 'nothing from the ontology yet' in place_lines(nothing, 60)[0].plain
 
 
@@ -270,10 +269,10 @@ def test_colours_of_a_fleet_repeat_after_five() -> None:
     assert found[5:] == found[:2]
 
 
-def styles(snapshot: MissionState) -> dict[str, set[str]]:
+def styles(state: MissionState) -> dict[str, set[str]]:
     """Return the styles in which each kind of character of a map is drawn."""
     found: dict[str, set[str]] = {}
-    for line in draw_map(snapshot, 60, 11, colours=True):
+    for line in draw_map(state, 60, 11, colours=True):
         for segment in line:
             for character in segment.text:
                 found.setdefault(character, set()).add(str(segment.style))
@@ -290,11 +289,11 @@ def test_the_colours_of_a_map_tell_what_is_what() -> None:
     assert seen[' '] == {'on grey19'}
     halves = seen['▀'] | seen['▄']
     assert {'orange1 on grey19', 'deep_sky_blue1 on grey19'} <= halves
-    opened = styles(replace(whole(), doors={'D': True}))
+    opened = styles(whole().having(doors={'D': True}))
     assert 'green3' in opened['█']
     assert 'red1' not in opened['█']
     long = np.column_stack([np.linspace(0.0, 2.9, 301), np.full(301, 2.4)])
-    trail = styles(replace(whole(), trail=np.concatenate([long * 0 + (0.0, 3.6), long])))
+    trail = styles(whole().having(trail=np.concatenate([long * 0 + (0.0, 3.6), long])))
     assert {'dodger_blue3', 'deep_sky_blue1'} <= {
         each.split(' ')[0] for each in trail['▀'] | trail['▄']
     }
@@ -362,7 +361,7 @@ def test_without_anything_there_is_no_map_and_a_note_of_what_is_missing() -> Non
     text = '\n'.join(''.join(each.text for each in line) for line in lines)
     assert text.startswith('nothing on map yet: the simulator or a')
     assert draw_map(MissionState(), 40, 1, colours=False)[0][0].text.startswith('nothing on map')
-    unplaced = draw_map(replace(whole(), pose=None), 60, 8, colours=False)
+    unplaced = draw_map(whole().having(pose=None), 60, 8, colours=False)
     assert ''.join(each.text for each in unplaced[-1]) != ''
     rows = [''.join(each.text for each in line) for line in unplaced]
     assert any('nothing on amcl_pose yet' in row for row in rows)

@@ -23,13 +23,13 @@ def record(path: Path, seconds: int = 200) -> None:
     for second in range(seconds):
         pose = (second / 10, 0.0, 0.0)
         writer.add(
-            MissionState(
+            MissionState().having(
                 now=float(second),
                 battery=100.0 - second // 10,
                 pose=pose,
                 trail=np.array([(x / 10, 0.0) for x in range(second + 1)]),
                 decision=DECISION,
-                number=1 + second // 50,
+                decision_number=1 + second // 50,
             ),
             1000.0 + second,
         )
@@ -44,7 +44,7 @@ def test_any_time_shows_what_was_known_then(tmp_path: Path) -> None:
         second = int(min(max(time, 1000.0), 1199.0) - 1000)
         assert now == second
         assert parts['pose'] == [second / 10, 0.0, 0.0]
-        assert parts['battery']['level'] == 100 - second // 10
+        assert parts['brief'] == f'battery {100 - second // 10} %'
         assert parts['trail'][-1] == [second / 10, 0.0]
         assert len(parts['trail']) == second + 1
 
@@ -79,8 +79,8 @@ def test_a_full_disk_tears_no_line_that_others_follow(
     with monkeypatch.context() as full:
         full.setattr(os, 'write', lambda file, data: write(file, data[:20]))
         with pytest.raises(OSError, match=r'No space left.*timeline\.jsonl'):
-            writer.add(MissionState(now=1.0, pose=(1.0, 0.0, 0.0)), 1001.0)
-    writer.add(MissionState(now=2.0, pose=(1.0, 0.0, 0.0)), 1002.0)
+            writer.add(MissionState().having(now=1.0, pose=(1.0, 0.0, 0.0)), 1001.0)
+    writer.add(MissionState().having(now=2.0, pose=(1.0, 0.0, 0.0)), 1002.0)
     writer.close()
     line = Timeline(path)
     assert line.times == [1000.0, 1002.0]
@@ -118,17 +118,21 @@ def test_what_is_no_time_line_is_said_in_one_line(content: str | None, tmp_path:
 
 def test_a_patch_holds_what_changed_alone() -> None:
     framer = PatchMaker()
-    first = framer.patch(MissionState(battery=50.0, decision=DECISION, number=1))
-    assert first['battery'] == {'level': 50.0, 'low': False}
-    assert framer.patch(replace(MissionState(), battery=50.0, decision=DECISION, number=1)) == {}
-    after = framer.patch(replace(MissionState(), battery=49.0, decision=DECISION, number=1))
-    assert after == {'battery': {'level': 49.0, 'low': False}}
+    first = framer.patch(MissionState().having(battery=50.0, decision=DECISION, decision_number=1))
+    assert first['brief'] == 'battery 50 %'
+    assert (
+        framer.patch(MissionState().having(battery=50.0, decision=DECISION, decision_number=1))
+        == {}
+    )
+    after = framer.patch(MissionState().having(battery=49.0, decision=DECISION, decision_number=1))
+    assert after.keys() == {'brief', 'figures'}
+    assert after['brief'] == 'battery 49 %'
 
 
 def test_a_robot_that_waits_for_help_has_no_plan() -> None:
     framer = PatchMaker()
     moving = Status(0.0, 'm', 'MOVE', 'A', 'B', False, '', ())
-    snapshot = MissionState(status=moving, plan=np.array([(0.0, 0.0), (1.0, 0.0)]))
-    assert framer.patch(snapshot)['plan'] == [[0.0, 0.0], [1.0, 0.0]]
-    stuck = replace(snapshot, status=replace(moving, waiting_for_help=True))
+    state = MissionState().having(status=moving, plan=np.array([(0.0, 0.0), (1.0, 0.0)]))
+    assert framer.patch(state)['plan'] == [[0.0, 0.0], [1.0, 0.0]]
+    stuck = state.having(status=replace(moving, waiting_for_help=True))
     assert framer.patch(stuck)['plan'] == []

@@ -16,7 +16,7 @@ from std_msgs.msg import String
 from armor_service.facts import parse_fact
 from surveillance_interfaces.action import ScanSurroundings
 from surveillance_interfaces.msg import MarkerDetection, MarkerDetectionArray
-from surveillance_operator import mission_subscriber
+from surveillance_operator import node_graph_watch
 from surveillance_operator.mission_state import MissionState
 from surveillance_operator.mission_subscriber import MissionSubscriber
 from surveillance_operator.topics import DETECTIONS_TOPIC, TOPICS, read_message, with_fact
@@ -52,11 +52,11 @@ def seen(second: int = 5, *, confirmed: bool = True) -> MarkerDetectionArray:
 
 
 def told(*messages: tuple[str, Any]) -> MissionState:
-    snapshot = MissionState()
+    state = MissionState()
     for name, message in messages:
-        snapshot = read_message(snapshot, TOPIC[name], message)
-    assert not snapshot.silent
-    return snapshot
+        state = read_message(state, TOPIC[name], message)
+    assert not state.health.silent
+    return state
 
 
 def test_a_confirmed_marker_is_put_on_the_map() -> None:
@@ -64,7 +64,7 @@ def test_a_confirmed_marker_is_put_on_the_map() -> None:
     known = told(*standing, ('joint_states', joints()), (DETECTIONS_TOPIC, seen()))
     camera = ARM.camera_frame([0.0] * 5)
     ahead, left = (camera[:3, :3] @ np.array([0.0, 0.0, 3.0]) + camera[:3, 3])[:2]
-    assert known.markers[12] == pytest.approx((1.0 - left, 2.0 + ahead), abs=0.01)
+    assert known.sensors.markers[12] == pytest.approx((1.0 - left, 2.0 + ahead), abs=0.01)
 
 
 @pytest.mark.parametrize(
@@ -84,25 +84,29 @@ def test_where_a_marker_is_cannot_be_told_from_a_moving_camera(messages: list[An
         MarkerDetectionArray: DETECTIONS_TOPIC,
     }
     known = told(*((names[type(message)], message) for message in messages))
-    assert known.markers == {}
-    assert len(known.detections) == 1
+    assert known.sensors.markers == {}
+    assert len(known.sensors.detections) == 1
 
 
 def test_a_pose_in_utm_is_known() -> None:
-    assert told(('amcl_pose', pose(499_000.5, 9_999_000.25))).pose == (499_000.5, 9_999_000.25, 0.0)
+    assert told(('amcl_pose', pose(499_000.5, 9_999_000.25))).sensors.pose == (
+        499_000.5,
+        9_999_000.25,
+        0.0,
+    )
 
 
 def test_facts_come_and_go() -> None:
-    snapshot = MissionState()
+    state = MissionState()
     for text in ('URGENT(R1)', 'connectedTo(R1, C1)', 'visitedAt(R1, "7"^^xsd:long)', 'ROBOT(x)'):
-        snapshot = with_fact(snapshot, parse_fact(text), came=True)
-    assert snapshot.urgent == {'R1'}
-    assert snapshot.links == {('R1', 'C1')}
-    assert snapshot.visited_at == {'R1': 7.0}
-    snapshot = with_fact(snapshot, parse_fact('visitedAt(R1, "9"^^xsd:long)'), came=True)
-    snapshot = with_fact(snapshot, parse_fact('visitedAt(R1, "7"^^xsd:long)'), came=False)
-    assert snapshot.visited_at == {'R1': 9.0}
-    assert with_fact(snapshot, parse_fact('URGENT(R1)'), came=False).urgent == set()
+        state = with_fact(state, parse_fact(text), came=True)
+    assert state.place.urgent == {'R1'}
+    assert state.place.links == {('R1', 'C1')}
+    assert state.place.visited_at == {'R1': 7.0}
+    state = with_fact(state, parse_fact('visitedAt(R1, "9"^^xsd:long)'), came=True)
+    state = with_fact(state, parse_fact('visitedAt(R1, "7"^^xsd:long)'), came=False)
+    assert state.place.visited_at == {'R1': 9.0}
+    assert with_fact(state, parse_fact('URGENT(R1)'), came=False).place.urgent == set()
 
 
 class Watcher(PatrolNode):
@@ -110,13 +114,13 @@ class Watcher(PatrolNode):
 
     def __init__(self, **options: Any) -> None:
         super().__init__('mission_watcher', **options)
-        self.feed = MissionSubscriber(self, 0.05, streams=True)
+        self.subscriber = MissionSubscriber(self, 0.05, streams=True)
 
 
 def test_robots_of_other_namespaces_appear_and_go(
     graph: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(mission_subscriber, 'LOOK_PERIOD', 0.05)
+    monkeypatch.setattr(node_graph_watch, 'LOOK_PERIOD', 0.05)
     watcher = graph.add(Watcher)
     publishers = {
         name: graph.node.create_publisher(PoseWithCovarianceStamped, topic, STATE_QOS)
@@ -124,27 +128,27 @@ def test_robots_of_other_namespaces_appear_and_go(
     }
     for number, publisher in enumerate(publishers.values()):
         publisher.publish(pose(float(number), 0.0))
-    graph.until(lambda: watcher.feed.snapshot.others.keys() == {'two', 'a/b'})
-    assert watcher.feed.snapshot.others['two'] == (1.0, 0.0, 0.0)
-    graph.until(lambda: watcher.feed.snapshot.pose == (0.0, 0.0, 0.0))
+    graph.until(lambda: watcher.subscriber.state.place.others.keys() == {'two', 'a/b'})
+    assert watcher.subscriber.state.place.others['two'] == (1.0, 0.0, 0.0)
+    graph.until(lambda: watcher.subscriber.state.sensors.pose == (0.0, 0.0, 0.0))
     graph.node.destroy_publisher(publishers['two'])
-    graph.until(lambda: watcher.feed.snapshot.others.keys() == {'a/b'})
+    graph.until(lambda: watcher.subscriber.state.place.others.keys() == {'a/b'})
 
 
 def test_who_leaves_a_mission_hears_nothing_more(
     graph: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A fleet's page leaves robots that go: their topics would come in for ever."""
-    monkeypatch.setattr(mission_subscriber, 'LOOK_PERIOD', 0.05)
+    monkeypatch.setattr(node_graph_watch, 'LOOK_PERIOD', 0.05)
     watcher = graph.add(Watcher)
     publisher = graph.node.create_publisher(PoseWithCovarianceStamped, 'amcl_pose', STATE_QOS)
     publisher.publish(pose(1.0, 0.0))
-    graph.until(lambda: watcher.feed.snapshot.pose == (1.0, 0.0, 0.0))
-    watcher.feed.leave()
+    graph.until(lambda: watcher.subscriber.state.sensors.pose == (1.0, 0.0, 0.0))
+    watcher.subscriber.leave()
     graph.until(lambda: publisher.get_subscription_count() == 0)
     assert graph.node.count_subscribers('battery_level') == 0
     publisher.publish(pose(2.0, 0.0))
-    assert watcher.feed.snapshot.pose == (1.0, 0.0, 0.0)
+    assert watcher.subscriber.state.sensors.pose == (1.0, 0.0, 0.0)
 
 
 def test_a_place_that_is_changed_brings_no_robot_back_that_was_left(graph: Any) -> None:
@@ -157,14 +161,14 @@ def test_a_place_that_is_changed_brings_no_robot_back_that_was_left(graph: Any) 
         sender.publish(String(data=description_text({'doors': {'D1': [x, 0.0, x, 1.0]}})))
 
     changed(1.0)
-    graph.until(lambda: 'D1' in feed.snapshot.door_lines)
+    graph.until(lambda: 'D1' in feed.state.place.door_lines)
     read: list[object] = []
     follow_place(graph.node, read.append)  # made later, and so told later
     feed.leave()
-    before, told = feed.snapshot.door_lines, len(heard)
+    before, told = feed.state.place.door_lines, len(heard)
     changed(2.0)
     graph.until(lambda: any('2.0' in str(each) for each in read))
-    assert feed.snapshot.door_lines == before
+    assert feed.state.place.door_lines == before
     assert len(heard) == told
 
 
@@ -175,6 +179,6 @@ def test_the_progress_of_a_scan_ends_with_its_goal() -> None:
     goals = TOPIC['scan_surroundings/_action/status']
     running = GoalStatusArray(status_list=[GoalStatus(status=GoalStatus.STATUS_EXECUTING)])
     ended = GoalStatusArray(status_list=[GoalStatus(status=GoalStatus.STATUS_CANCELED)])
-    snapshot = read_message(MissionState(), TOPIC['scan_surroundings/_action/feedback'], feedback)
-    assert read_message(snapshot, goals, running).scan_progress == (4, 7)
-    assert read_message(snapshot, goals, ended).scan_progress is None
+    state = read_message(MissionState(), TOPIC['scan_surroundings/_action/feedback'], feedback)
+    assert read_message(state, goals, running).sensors.scan_progress == (4, 7)
+    assert read_message(state, goals, ended).sensors.scan_progress is None

@@ -45,11 +45,11 @@ def grid(**info: Any) -> OccupancyGrid:
 def test_a_message_that_cannot_be_used_is_said_and_changes_nothing(
     topic: str, message: Any, words: str
 ) -> None:
-    before = MissionState(pose=(0.0, 0.0, 0.0), battery=50.0)
+    before = MissionState().having(pose=(0.0, 0.0, 0.0), battery=50.0)
     after = read_message(before, TOPIC[topic], message)
-    assert words in after.silent[topic]
-    assert after.battery == 50.0
-    assert after.grid is None
+    assert words in after.health.silent[topic]
+    assert after.task.battery == 50.0
+    assert after.place.grid is None
 
 
 def test_a_pose_that_is_not_finite_is_refused() -> None:

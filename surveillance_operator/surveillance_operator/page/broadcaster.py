@@ -1,4 +1,4 @@
-"""Passes snapshots on to any number of viewers, each as fast as it reads and no faster.
+"""Passes states on to any number of viewers, each as fast as it reads and no faster.
 
 Of each part only the newest value is kept, as text that is made once for all viewers. A viewer that
 comes gets everything; later what changed since it was served last. Nothing is queued.
@@ -41,7 +41,7 @@ class _Robot:
 
     def __init__(self) -> None:
         self.framer = PatchMaker()
-        self.snapshot: MissionState | None = None
+        self.state: MissionState | None = None
         self.now = 0.0
         self.texts: Texts = {}
         self.trail: list[list[float]] = []
@@ -65,11 +65,11 @@ class Broadcaster:
         """How many there are."""
         return len(self._waiting)
 
-    def show(self, snapshot: MissionState, robot: str = '') -> None:
-        """Take a new snapshot of a robot; from any thread."""
+    def show(self, state: MissionState, robot: str = '') -> None:
+        """Take a new state of a robot; from any thread."""
         with self._lock:
             shown = self._robots.setdefault(robot, _Robot())
-            shown.snapshot, shown.now = snapshot, snapshot.now
+            shown.state, shown.now = state, state.now
             if not self._waiting:
                 return  # Nobody looks: what is new is computed when somebody does.
             self._bring(robot)
@@ -174,12 +174,12 @@ class Broadcaster:
         )
 
     def _bring(self, name: str, *, anew: bool = False) -> None:
-        """Compute what viewers see of a robot's snapshot; its whole trail, too, if anew."""
+        """Compute what viewers see of a robot's state; its whole trail, too, if anew."""
         robot = self._robots.get(name)
-        if robot is None or robot.snapshot is None:
+        if robot is None or robot.state is None:
             return
         watched = name in self._waiting.values()
-        patch = robot.framer.patch(robot.snapshot, None if watched else GLANCE)
+        patch = robot.framer.patch(robot.state, None if watched else GLANCE)
         self._accept(name, patch)
         if anew:
             robot.trail = robot.framer.whole()['trail']

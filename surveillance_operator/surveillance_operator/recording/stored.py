@@ -26,7 +26,8 @@ from visualization_msgs.msg import MarkerArray
 from surveillance_interfaces.msg import FactChanges
 from surveillance_ontology.conversions import changes_from_ros
 from surveillance_operator.images import ANNOTATED, KINDS, PLAIN, SUFFIX, jpeg_from
-from surveillance_operator.mission_state import STALE, MissionState, follow
+from surveillance_operator.mission_changes import follow
+from surveillance_operator.mission_state import STALE, MissionState
 from surveillance_operator.recording.reading import Messages
 from surveillance_operator.recording.timeline import TimelineWriter
 from surveillance_operator.topics import (
@@ -46,7 +47,7 @@ from surveillance_runtime.node_table import name_for
 
 CLOCK = '/clock'
 WINDOW = 0.4
-"""Seconds of the recording that make one snapshot."""
+"""Seconds of the recording that make one state."""
 RECENT = 2.5
 """What was seen longer ago is not shown, seconds."""
 SCAN_TOPIC = 'scan'
@@ -56,7 +57,7 @@ def _on_fact_changes(message: FactChanges, old: MissionState) -> Fields:
     new = old
     for fact, came, _ in changes_from_ros(message):
         new = with_fact(new, fact, came)
-    return {name: getattr(new, name) for name in ('urgent', 'links', 'visited_at')}
+    return {name: new.field(name) for name in ('urgent', 'links', 'visited_at')}
 
 
 def _on_place_markers(message: MarkerArray, _old: MissionState) -> Fields:
@@ -75,7 +76,7 @@ STORED_TOPICS = (
     Topic('fact_changes', FactChanges, _on_fact_changes, QoSProfile(depth=100)),
     Topic('place_markers', MarkerArray, _on_place_markers),
 )
-"""All that a snapshot takes from in a recording."""
+"""All that a state takes from in a recording."""
 
 
 def prefix_of(topics: Iterable[str]) -> str:
@@ -115,7 +116,7 @@ class Conversion:
         self._thread = threading.Thread(target=self._run, name='conversion', daemon=True)
         self._clock: float | None = None
         prefix = prefix_of(self._messages.types)
-        self._snapshot = MissionState(where='a recording', namespace=prefix.strip('/'))
+        self._state = MissionState(where='a recording', namespace=prefix.strip('/'))
         self._topics = {
             _recorded_name(each.name, prefix, self._messages.types): each for each in STORED_TOPICS
         }
@@ -173,34 +174,37 @@ class Conversion:
                 part.replace(self._keep)
 
     def _take(self, window: dict[str, deque[bytes]], at: float, writer: TimelineWriter) -> None:
-        """Take one window's messages into the snapshot."""
+        """Take one window's messages into the state."""
         for data in window.pop(CLOCK, ()):
             stamp = deserialize_message(data, Clock).clock
             self._clock = stamp.sec + stamp.nanosec / 1e9
-        new = self._snapshot
+        new = self._state
         # What stands beside another topic is read before it.
         for name in sorted(window, key=lambda name: not self._topics[name].beside):
             topic = self._topics[name]
             for data in window[name]:
                 new = read_stored(new, topic, data)
-        nodes = {name for name in new.health if ':' not in name and new.health[name].level != STALE}
-        if not nodes and new.status is not None:
+        health = new.health
+        nodes = {
+            name for name, each in health.reports.items() if ':' not in name and each.level != STALE
+        }
+        if not nodes and new.task.status is not None:
             nodes = {BEHAVIOUR}
-        if nodes != new.nodes.keys():
-            ended = new.ended.union(new.nodes).difference(nodes)
-            new = replace(new, nodes=dict.fromkeys(sorted(nodes), frozenset()), ended=ended)
+        if nodes != health.nodes.keys():
+            ended = health.ended.union(health.nodes).difference(nodes)
+            new = new.having(nodes=dict.fromkeys(sorted(nodes), frozenset()), ended=ended)
         new = replace(new, now=at if self._clock is None else self._clock)
-        self._snapshot, _ = follow(self._snapshot, new, at)
-        writer.add(self._snapshot, at)
+        self._state, _ = follow(self._state, new, at)
+        writer.add(self._state, at)
 
 
-def read_stored(snapshot: MissionState, topic: Topic, data: bytes) -> MissionState:
-    """Return the snapshot with what a serialised message says, or why it cannot be used."""
+def read_stored(state: MissionState, topic: Topic, data: bytes) -> MissionState:
+    """Return the state with what a serialised message says, or why it cannot be used."""
     try:
         message = deserialize_message(data, topic.kind)
     except Exception as error:  # whatever rmw finds: the bytes may be anything
-        return replace(snapshot, silent={**snapshot.silent, topic.name: str(error)})
-    return read_message(snapshot, topic, message)
+        return state.having(silent={**state.health.silent, topic.name: str(error)})
+    return read_message(state, topic, message)
 
 
 class RecordedSights:
@@ -231,7 +235,7 @@ class RecordedSights:
         for _, _, data in self._messages.before([self._prefix + SCAN_TOPIC], at, RECENT):
             # A scan is shown from the pose of its moment.
             for known in poses:
-                seen = read_stored(known, self._scan, data).scan
+                seen = read_stored(known, self._scan, data).sensors.scan
                 if len(seen):
                     points: list[list[float]] = np.round(seen, 2).tolist()
                     return points

@@ -19,7 +19,7 @@ from surveillance_operator.mission_state import MissionState
 from surveillance_operator.page_state import Parts, PatchMaker, lengthen
 from surveillance_runtime.files import FileError, LineFile
 
-LEFT_OUT = frozenset({'scan', 'figures'})
+LEFT_OUT = frozenset({'scan', 'usage'})
 """Parts that change all the time: they are in the recording itself."""
 WHOLE_PERIOD = 60.0
 """Seconds between two lines that hold everything."""
@@ -42,24 +42,24 @@ class TimelineWriter:
         self._whole = 0.0
         self._before: MissionState | None = None
 
-    def add(self, snapshot: MissionState, at: float) -> None:
+    def add(self, state: MissionState, at: float) -> None:
         """Write what changed, if anything did.
 
         Args:
-            snapshot: What is known.
+            state: What is known.
             at: Seconds since 1970.
 
         Raises:
             OSError: The file takes no more; the next line will hold everything.
         """
-        changed = self._framer.patch(snapshot)
+        changed = self._framer.patch(state)
         whole = at - self._whole >= WHOLE_PERIOD
         if not changed and not whole:
             return
         if whole:
             self._whole, changed = at, self._framer.whole()
-        line = json.dumps({'now': round(snapshot.now, 2), 'p': changed}, separators=(',', ':'))
-        head = f'{{"t":{at:.3f},"k":{int(whole)},"e":"{self._event(snapshot)}",'
+        line = json.dumps({'now': round(state.now, 2), 'p': changed}, separators=(',', ':'))
+        head = f'{{"t":{at:.3f},"k":{int(whole)},"e":"{self._event(state)}",'
         try:
             if self._file is None:
                 self._file = LineFile(self._path)
@@ -68,7 +68,7 @@ class TimelineWriter:
             self._whole = 0.0
             self.close()
             raise
-        self._before = snapshot
+        self._before = state
 
     def close(self) -> None:
         """Close the file; nothing is lost without it."""
@@ -76,15 +76,15 @@ class TimelineWriter:
             self._file.close()
             self._file = None
 
-    def _event(self, snapshot: MissionState) -> str:
+    def _event(self, state: MissionState) -> str:
         """Return the most important thing that happened since the last line."""
         before = self._before
-        marks = snapshot.history.marks
+        marks = state.history.marks
         if before is not None and marks and marks != before.history.marks:
             kind = marks[-1][1]
             return kind if kind in MARKS else 'failure' if kind == 'help' else ''
-        if before is None or snapshot.number != before.number:
-            return 'decision' if snapshot.decision is not None else ''
+        if before is None or state.task.decision_number != before.task.decision_number:
+            return 'decision' if state.task.decision is not None else ''
         return ''
 
 

@@ -28,9 +28,11 @@ from rich.style import Style
 from rich.text import Text
 
 from state_machines import Interrupt
+from surveillance_operator.figures import FIGURES, ShownFigure, shown_figures
 from surveillance_operator.fleet_actions import ALL
 from surveillance_operator.fleet_table import fleet_lines
-from surveillance_operator.mission_state import MissionState, Pose, doing, troubles, why
+from surveillance_operator.mission_state import MissionState, Pose
+from surveillance_operator.mission_words import doing, troubles, why
 from surveillance_operator.page_state import events_of, health, merged_events
 from surveillance_operator.watch import raster
 from surveillance_operator.watch.raster import CharacterCanvas, Viewport, rasterise
@@ -93,10 +95,10 @@ Lines = list[list[Segment]]
 
 
 class MissionView:
-    """Draws one snapshot.
+    """Draws one state.
 
     Args:
-        snapshot: What is known.
+        state: What is known.
         whole: Fill the terminal, down to its last line.
         page: What to show, one of the values of `KEYS`.
         note: Stands in the last line.
@@ -106,7 +108,7 @@ class MissionView:
 
     def __init__(
         self,
-        snapshot: MissionState,
+        state: MissionState,
         *,
         whole: bool = True,
         page: str = 'map',
@@ -114,11 +116,11 @@ class MissionView:
         fleet: Mapping[str, MissionState] | None = None,
         robot: str = '',
     ) -> None:
-        self._snapshot = snapshot
+        self._state = state
         self._robot = robot
         self._fleet = dict(fleet or {}) if robot else {}
         self._events = merged_events(
-            {name: events_of(each) for name, each in (self._fleet or {'': snapshot}).items()}
+            {name: events_of(each) for name, each in (self._fleet or {'': state}).items()}
         )
         self._whole = whole
         self._page = page
@@ -143,7 +145,7 @@ class MissionView:
         else:
             picture = self._map(width, max(3, body // 2), colours=colours)
             rows = [*picture, *self._panel(console, options, width, max(0, body - len(picture)))]
-        title = header_line(self._snapshot, self._robot)
+        title = header_line(self._state, self._robot)
         title.pad_right(max(0, width - len(title)))
         rows = [*_rendered(console, options, [title], width), *rows][: body + 1]
         if self._whole:
@@ -157,11 +159,11 @@ class MissionView:
 
     def _map(self, columns: int, rows: int, *, colours: bool) -> Lines:
         others = {
-            name: each.pose
+            name: each.sensors.pose
             for name, each in self._fleet.items()
-            if name and name != self._robot and each.pose is not None
+            if name and name != self._robot and each.sensors.pose is not None
         }
-        return draw_map(self._snapshot, columns, rows, colours=colours, others=others)
+        return draw_map(self._state, columns, rows, colours=colours, others=others)
 
     def _page_lines(self) -> list[Text]:
         if self._page == 'events':
@@ -170,7 +172,7 @@ class MissionView:
             if not self._fleet:
                 return [_dim('this robot is alone')]
             return [Text(line) for line in fleet_lines(self._fleet)]
-        return PAGES[self._page](self._snapshot)
+        return PAGES[self._page](self._state)
 
     def _robot_lines(self) -> list[Text]:
         """Return what the robots of a fleet do, with the keys that choose them."""
@@ -180,11 +182,10 @@ class MissionView:
             each = self._fleet[name]
             wrong = troubles(each)
             style = 'bold' if name == self._robot else ''
-            place = each.status.place if each.status else ''
             lines.append(
                 Text.assemble(
                     (f'{number} {name} ', style or robot_colour(names, name)),
-                    f'{place} {"; ".join(wrong) or doing(each)}',
+                    f'{each.robot_place} {"; ".join(wrong) or doing(each)}',
                     style=URGENT if wrong else style,
                 )
             )
@@ -193,16 +194,17 @@ class MissionView:
     def _panel(
         self, console: Console, options: ConsoleOptions, width: int, height: int
     ) -> list[list[Segment]]:
-        snapshot = self._snapshot
-        fixed = [*_wrapped(console, state_lines(snapshot), width), battery_line(snapshot, width)]
-        doors = _wrapped(console, [doors_line(snapshot)], width)
-        decision = _wrapped(console, decision_lines(snapshot), width)
+        state = self._state
+        fixed = _wrapped(console, state_lines(state), width)
+        fixed += figure_lines(state, width, brief=True)
+        figures = _wrapped(console, figure_lines(state, width, brief=False), width)
+        decision = _wrapped(console, decision_lines(state), width)
         # The whole reason, as long as the longest waiting places and the last event stay.
-        most = max(2, height - len(fixed) - len(doors) - 5)
+        most = max(2, height - len(fixed) - len(figures) - 5)
         if len(decision) > most:
             decision[most - 1].append('…')
-        fixed += [*decision[:most], *doors]
-        places = place_lines(snapshot, width)
+        fixed += [*decision[:most], *figures]
+        places = place_lines(state, width)
         robots = self._robot_lines()
         if robots:
             fixed = [_title('robots', width), *robots, _title(self._robot, width), *fixed]
@@ -230,78 +232,84 @@ def robot_colour(names: Sequence[str], name: str) -> str:
     return FLEET_COLOURS[list(names).index(name) % len(FLEET_COLOURS)]
 
 
-def header_line(snapshot: MissionState, robot: str = '') -> Text:
+def header_line(state: MissionState, robot: str = '') -> Text:
     """Return which mission this is, or that there is none."""
-    if not snapshot.nodes:
-        text = 'the mission has ended' if snapshot.status else 'no mission yet'
-        return Text(f' {text}: waiting on {snapshot.where} ', style=ALARM)
-    if snapshot.ended:
-        ended = ', '.join(sorted(snapshot.ended))
-        return Text(f' ended: {ended} · {snapshot.where} ', style=ALARM)
-    if snapshot.stopped:
+    if not state.health.nodes:
+        text = 'the mission has ended' if state.task.status else 'no mission yet'
+        return Text(f' {text}: waiting on {state.where} ', style=ALARM)
+    if state.health.ended:
+        ended = ', '.join(sorted(state.health.ended))
+        return Text(f' ended: {ended} · {state.where} ', style=ALARM)
+    if state.task.stopped:
         who = f'{robot} is ' if robot else ''
-        text = f' {who}STOPPED until a person releases it (r) · {snapshot.where} '
+        text = f' {who}STOPPED until a person releases it (r) · {state.where} '
         return Text(text, style=ALARM)
-    name = snapshot.status.machine if snapshot.status else 'mission'
+    name = state.task.status.machine if state.task.status else 'mission'
     name = f'{robot} · {name}' if robot else name
-    mode = f' in mode {snapshot.mode}' if snapshot.mode else ''
-    mode += ' · PAUSED' if snapshot.paused else ''
-    return Text(f' {name}{mode} · {snapshot.where} ', style=HEADER)
+    mode = f' in mode {state.task.mode}' if state.task.mode else ''
+    mode += ' · PAUSED' if state.machine.paused else ''
+    return Text(f' {name}{mode} · {state.where} ', style=HEADER)
 
 
-def state_lines(snapshot: MissionState) -> list[Text]:
+def state_lines(state: MissionState) -> list[Text]:
     """Return what the state machine does."""
-    status = snapshot.status
+    status = state.task.status
     if status is None:
-        return [_nothing(snapshot, 'mission_status')]
-    age = f' for {_age(snapshot.now - status.since)}'
+        return [_nothing(state, 'mission_status')]
+    age = f' for {_age(state.now - status.since)}'
     lines = [
         Text.assemble((status.state or 'not started', 'bold cyan'), (age, DIM)),
-        Text(status.whereabouts),
+        Text(state.whereabouts),
     ]
     if status.text and not status.waiting_for_help:
         lines.append(Text(status.text))
     return lines
 
 
-def battery_line(snapshot: MissionState, width: int) -> Text:
-    """Return the battery as a bar."""
-    if snapshot.battery is None:
-        return _nothing(snapshot, 'battery_level')
-    full = round(snapshot.battery / 100 * min(BAR, width - 18))
-    rest = min(BAR, width - 18) - full
-    colour = 'red1' if snapshot.battery_low else 'green3'
-    low = ('  low', URGENT) if snapshot.battery_low else ''
-    bar = (('█' * full, colour), ('░' * rest, DIM))
-    return Text.assemble('battery ', *bar, f' {snapshot.battery:.0f} %', low)
+def figure_lines(state: MissionState, width: int, *, brief: bool) -> list[Text]:
+    """Return the figures of the mission (`figures.FIGURES`), a line each.
+
+    Args:
+        state: What is known.
+        width: Columns that there are.
+        brief: Those that are brief, or else the others.
+    """
+    shown = {each.figure.name: each for each in shown_figures(state)}
+    lines = []
+    for figure in (each for each in FIGURES if each.is_brief == brief):
+        if (each := shown.get(figure.name)) is not None:
+            lines.append(_figure(each, width))
+        elif figure.awaited:
+            lines.append(_nothing(state, figure.awaited))
+    return lines
 
 
-def decision_lines(snapshot: MissionState) -> list[Text]:
+def _figure(shown: ShownFigure, width: int) -> Text:
+    """Return a figure, with a bar where it is a share of something."""
+    line = Text(f'{shown.figure.label} ')
+    if shown.share is not None:
+        cells = min(BAR, width - 18)
+        full = round(shown.share * cells)
+        line.append('█' * full, 'red1' if shown.is_bad else 'green3')
+        line.append(f'{"░" * (cells - full)} ', DIM)
+    return line.append(shown.words, URGENT if shown.is_bad else '')
+
+
+def decision_lines(state: MissionState) -> list[Text]:
     """Return the present decision and its reason, or what the robot waits for."""
-    said = why(snapshot)
+    said = why(state)
     if said is None:
-        return [_nothing(snapshot, 'decision')]
-    waits = snapshot.stopped or (snapshot.status is not None and snapshot.status.waiting_for_help)
+        return [_nothing(state, 'decision')]
+    waits = state.task.stopped or (
+        state.task.status is not None and state.task.status.waiting_for_help
+    )
     return [Text(said[0], URGENT if waits else 'bold'), Text(said[1])]
 
 
-def doors_line(snapshot: MissionState) -> Text:
-    """Return which doors are open, and which closed."""
-    if snapshot.doors is None:
-        return _nothing(snapshot, 'door_states')
-    closed = [door for door, is_open in snapshot.doors.items() if not is_open]
-    if not closed:
-        return Text.assemble('doors ', (f'all {len(snapshot.doors)} open', 'green3'))
-    opened = len(snapshot.doors) - len(closed)
-    return Text.assemble(
-        'doors ', (f'{" ".join(closed)} closed', 'bold red1'), (f', {opened} open', 'green3')
-    )
-
-
-def decision_page(snapshot: MissionState) -> list[Text]:
+def decision_page(state: MissionState) -> list[Text]:
     """Return the decision in full, with the score of each candidate."""
-    lines = decision_lines(snapshot)
-    status, decision = snapshot.status, snapshot.decision
+    lines = decision_lines(state)
+    status, decision = state.task.status, state.task.decision
     if decision is None or (status is not None and status.waiting_for_help):
         return lines
     lines.append(Text(f'policy {decision.policy}, target {decision.target}'))
@@ -311,9 +319,9 @@ def decision_page(snapshot: MissionState) -> list[Text]:
     return lines
 
 
-def node_page(snapshot: MissionState) -> list[Text]:
+def node_page(state: MissionState) -> list[Text]:
     """Return the nodes: up or ended, how often started again, the worst that they report."""
-    known = health(snapshot)
+    known = health(state)
     others = {name: {'up': True, 'reports': [each]} for name, each in known['others'].items()}
     lines = []
     for name, node in {**known['nodes'], **others}.items():
@@ -341,23 +349,23 @@ PAGES: dict[str, Callable[[MissionState], list[Text]]] = {
 }
 
 
-def place_lines(snapshot: MissionState, width: int) -> list[Text]:
+def place_lines(state: MissionState, width: int) -> list[Text]:
     """Return places by the time since their last visit, in as many columns as fit."""
-    known = snapshot.visited_at
-    names = sorted({*known, *snapshot.positions}, key=lambda name: (known.get(name, 0.0), name))
+    known = state.place.visited_at
+    names = sorted({*known, *state.place.positions}, key=lambda name: (known.get(name, 0.0), name))
     if not names:
         return [_dim('nothing from the ontology yet: its map is not built')]
-    ages = [_age(snapshot.now - known[name]) if known.get(name) else 'never' for name in names]
-    status, longest, widest = snapshot.status, max(map(len, names)), max(map(len, ages))
+    ages = [_age(state.now - known[name]) if known.get(name) else 'never' for name in names]
+    status, longest, widest = state.task.status, max(map(len, names)), max(map(len, ages))
     column = longest + widest + len('  avoided ←')
     lines = [Text()]
     for place, age in zip(names, ages, strict=True):
         entry = Text(f'{place:<{longest}} {age:>{widest}} ')
-        if place in snapshot.urgent:
+        if place in state.place.urgent:
             entry.append('URGENT', URGENT)
         elif status and place in status.avoided:
             entry.append('avoided', 'orange1')
-        if status and place == status.place:
+        if place == state.robot_place:
             entry.append(' ●', HERE)
         elif status and place == status.heading_to:
             entry.append(' ←', HERE)
@@ -369,7 +377,7 @@ def place_lines(snapshot: MissionState, width: int) -> list[Text]:
 
 
 def draw_map(
-    snapshot: MissionState,
+    state: MissionState,
     columns: int,
     rows: int,
     *,
@@ -380,66 +388,66 @@ def draw_map(
     missing.
 
     Args:
-        snapshot: What is known.
+        state: What is known.
         columns, rows: Of the picture.
         colours: Whether there are any.
         others: Where the other robots of a fleet are.
     """
     notes = []
-    if snapshot.grid is None:
-        notes.append(_nothing(snapshot, 'map', sketched=bool(snapshot.positions)))
-    elif snapshot.pose is None:
-        notes.append(_nothing(snapshot, 'amcl_pose'))
+    if state.place.grid is None:
+        notes.append(_nothing(state, 'map', sketched=bool(state.place.positions)))
+    elif state.sensors.pose is None:
+        notes.append(_nothing(state, 'amcl_pose'))
     captions = [[Segment(line, DIM)] for note in notes for line in wrap(note.plain, columns)]
-    box = snapshot.grid.known if snapshot.grid else _box_around(snapshot)
+    box = state.place.grid.known if state.place.grid else _box_around(state)
     if box is None or rows - len(captions) < 1:
         return captions[:rows] or [[]]
     viewport = Viewport.around(box, columns, rows - len(captions))
     canvas = CharacterCanvas(
-        viewport, rasterise(snapshot.grid, viewport) if snapshot.grid else None
+        viewport, rasterise(state.place.grid, viewport) if state.place.grid else None
     )
-    if snapshot.grid is None:
-        for first, second in snapshot.links:
-            if {first, second} <= snapshot.positions.keys():
-                ends = snapshot.positions[first], snapshot.positions[second]
+    if state.place.grid is None:
+        for first, second in state.place.links:
+            if {first, second} <= state.place.positions.keys():
+                ends = state.place.positions[first], state.place.positions[second]
                 canvas.line(*ends, raster.LINK)
-    canvas.dots(snapshot.trail[:-RECENT], raster.OLD_TRAIL)
-    canvas.dots(snapshot.trail[-RECENT:], raster.TRAIL)
-    for door, is_open in (snapshot.doors or {}).items():
-        if door in snapshot.door_lines:
-            x1, y1, x2, y2 = snapshot.door_lines[door]
+    canvas.dots(state.sensors.trail[:-RECENT], raster.OLD_TRAIL)
+    canvas.dots(state.sensors.trail[-RECENT:], raster.TRAIL)
+    for door, is_open in (state.place.doors or {}).items():
+        if door in state.place.door_lines:
+            x1, y1, x2, y2 = state.place.door_lines[door]
             kind = raster.OPEN_DOOR if is_open else raster.CLOSED_DOOR
             # Two lines, so that it is as thick as its wall where that takes two pixels.
             for aside in (-HALF_WALL, HALF_WALL):
                 canvas.line((x1 + aside, y1 + aside), (x2 + aside, y2 + aside), kind)
-    if snapshot.obstacles is not None:
-        canvas.dots(snapshot.obstacles, raster.OBSTACLE)
-    if snapshot.grid is None:
-        for x, y in snapshot.positions.values():
+    if state.sensors.obstacles is not None:
+        canvas.dots(state.sensors.obstacles, raster.OBSTACLE)
+    if state.place.grid is None:
+        for x, y in state.place.positions.values():
             canvas.mark(x, y, '○', LABEL)
-    for place, (x, y) in snapshot.positions.items():
-        canvas.label(x, y, place, URGENT if place in snapshot.urgent else LABEL)
+    for place, (x, y) in state.place.positions.items():
+        canvas.label(x, y, place, URGENT if place in state.place.urgent else LABEL)
     for name, pose in (others or {}).items():
         canvas.arrow(pose, OTHER)
         canvas.label(pose[0], pose[1], name, OTHER)
-    place = snapshot.status.place if snapshot.status else ''
-    if snapshot.pose is not None:
-        canvas.arrow(snapshot.pose, ROBOT)
-    elif place in snapshot.positions:
-        canvas.mark(*snapshot.positions[place], '●', ROBOT)
+    place = state.robot_place
+    if state.sensors.pose is not None:
+        canvas.arrow(state.sensors.pose, ROBOT)
+    elif place in state.place.positions:
+        canvas.mark(*state.place.positions[place], '●', ROBOT)
     return [*canvas.lines(colours=colours), *captions]
 
 
-def _box_around(snapshot: MissionState) -> Box | None:
-    if not snapshot.positions:
+def _box_around(state: MissionState) -> Box | None:
+    if not state.place.positions:
         return None
-    points = np.array([*snapshot.positions.values(), *snapshot.trail])
+    points = np.array([*state.place.positions.values(), *state.sensors.trail])
     (left, bottom), (right, top) = points.min(axis=0) - MARGIN, points.max(axis=0) + MARGIN
     return float(left), float(bottom), float(right), float(top)
 
 
-def _nothing(snapshot: MissionState, topic: str, *, sketched: bool = False) -> Text:
-    why = snapshot.silent.get(topic) or PUBLISHERS[topic]
+def _nothing(state: MissionState, topic: str, *, sketched: bool = False) -> Text:
+    why = state.health.silent.get(topic) or PUBLISHERS[topic]
     return _dim(f'{"sketched: " if sketched else ""}nothing on {topic} yet: {why}')
 
 
@@ -582,7 +590,7 @@ def show_once(
     deadline = time.monotonic() + timeout
     while True:
         seen = see()
-        if robot in ('', *seen) and any(each.status is not None for each in seen.values()):
+        if robot in ('', *seen) and any(each.task.status is not None for each in seen.values()):
             break
         if time.monotonic() > deadline or stopping.wait(PERIOD / 4):
             return False
@@ -602,8 +610,14 @@ def _are_complete(seen: Mapping[str, MissionState]) -> bool:
     return all(_is_complete(each) for name, each in seen.items() if name or len(seen) == 1)
 
 
-def _is_complete(snapshot: MissionState) -> bool:
+def _is_complete(state: MissionState) -> bool:
     """Tell whether all that a simulated mission tells has come."""
-    parts = (snapshot.battery, snapshot.decision, snapshot.grid, snapshot.pose, snapshot.doors)
-    placed = snapshot.positions and snapshot.visited_at.keys() <= snapshot.positions.keys()
-    return None not in parts and bool(placed and snapshot.mode)
+    parts = (
+        state.task.battery,
+        state.task.decision,
+        state.place.grid,
+        state.sensors.pose,
+        state.place.doors,
+    )
+    placed = state.place.positions and state.place.visited_at.keys() <= state.place.positions.keys()
+    return None not in parts and bool(placed and state.task.mode)

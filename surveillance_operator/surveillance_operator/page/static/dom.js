@@ -46,6 +46,9 @@ export function wait({places, history, mission, promises}, name, now) {
   return {seconds, late, share: late ? 1 : threshold ? seconds / threshold : 0, text: (visited === null ? 'never' : age(seconds)) + (late ? ' !' : '')};
 }
 
+// The mission's figures: name, label, words, whether it is bad, its share of a whole or null. Recordings of before have the battery alone.
+export const figuresOf = ({figures, battery}) => figures ?? (battery ? [['battery', 'battery', `${Math.round(battery.level)} %${battery.low ? ' (low)' : ''}`, battery.low, battery.level / 100]] : []);
+
 // The robot that is looked at; one that is alone has no name.
 export const shown = {robot: ''};
 const OF_ROBOT = new Set(['go', 'arm', 'machine', 'stop', 'threshold', 'policy', 'command', 'event', 'why_not', 'sightings']);

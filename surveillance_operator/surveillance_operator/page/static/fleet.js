@@ -1,5 +1,5 @@
 // The robots of a fleet: what each does and why, what is wrong with it, and what it can be told to do.
-import {$, h, act, colour, names, shown} from './dom.js';
+import {$, h, act, colour, figuresOf, names, shown} from './dom.js';
 
 const SHARED = 'shared programs';
 // Of two words that undo each other the one that changes something is offered.
@@ -57,13 +57,13 @@ export class Fleet {
   }
 
   fill(name) {
-    const {doing, shares, out, battery, decision, status, troubles, stopped, active, mission} = this.robots[name];
+    const {doing, shares, out, decision, status, troubles, stopped, active, mission} = this.robots[name];
     const {item, select, cells, words} = this.rows.get(name);
     item.classList.toggle('chosen', name === shown.robot);
     select.setAttribute('aria-pressed', String(name === shown.robot));
     const set = (cell, text) => { if (cell.textContent !== text) cell.textContent = text; cell.hidden = !text; };
-    const level = battery ? `battery ${Math.round(battery.level)} %${battery.low ? ' (low)' : ''}` : '';
-    const words_of = [status?.place, doing, level, shares].filter(Boolean).join(' · ');
+    const brief = this.robots[name].brief ?? figuresOf(this.robots[name]).map(([, label, words]) => `${label} ${words}`).join(' · ');
+    const words_of = [status?.place, doing, brief, shares].filter(Boolean).join(' · ');
     set(cells.doing, name ? words_of : mission?.running ? 'running' : 'not heard');
     set(cells.trouble, (troubles ?? []).join('; '));
     set(cells.reason, name && decision ? `${decision.from} → ${decision.place} [${decision.rule}]: ${decision.reason}` : '');

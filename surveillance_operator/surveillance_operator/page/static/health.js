@@ -25,9 +25,9 @@ function row(name, node, own) {
     h('td', {class: again ? 'n warn' : 'n'}, String(again)));
 }
 
-export function showHealth({health, figures}) {
+export function showHealth({health, usage}) {
   const others = Object.entries(health?.others ?? {}).map(([name, report]) => [name, {up: true, reports: [report]}]);
-  const rows = [...Object.entries(health?.nodes ?? {}), ...others].map(([name, node]) => row(name, node, figures?.[name] ?? {}));
+  const rows = [...Object.entries(health?.nodes ?? {}), ...others].map(([name, node]) => row(name, node, usage?.[name] ?? {}));
   $('nodes').tBodies[0].replaceChildren(...rows);
   const silent = Object.entries(health?.silent ?? {}).map(([topic, reason]) => h('li', {}, `${topic}: ${reason}`));
   $('reports').replaceChildren(...silent);

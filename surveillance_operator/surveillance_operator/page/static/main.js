@@ -1,5 +1,5 @@
 // Follows the mission's events and hands each part to those who show it.
-import {$, h, colour, shown, timeOfDay} from './dom.js';
+import {$, h, colour, figuresOf, shown, timeOfDay} from './dom.js';
 import {MapView} from './map.js';
 import {drawMachine, lightMachine} from './machine.js';
 import {drawStrips, showPromises} from './time.js';
@@ -44,7 +44,7 @@ function set(id, text) {
 }
 
 function header() {
-  const {status, mission, battery} = state;
+  const {status, mission} = state;
   const ended = mission && !mission.running && status;
   const name = shown.robot ? `${shown.robot} · ` : '';
   const begins = fleet.isOne || shown.robot ? `${name}a mission begins` : 'what all robots share';
@@ -56,8 +56,13 @@ function header() {
   const words = status ? [ended && 'the mission has ended', status.state, status.whereabouts, status.waiting_for_help ? 'waiting for help' : status.text] : [`waiting on ${mission?.where ?? ''}`];
   set('state', words.filter(Boolean).join(' · '));
   $('state').classList.toggle('warn', Boolean(status?.waiting_for_help || ended));
-  set('battery', battery ? `battery ${Math.round(battery.level)} %${battery.low ? ' (low)' : ''}` : 'battery –');
-  $('battery').classList.toggle('warn', Boolean(battery?.low));
+}
+
+// Every entry of figures.py, in its order.
+function figures() {
+  $('figures').replaceChildren(...figuresOf(state).map(([name, label, words, bad, share]) =>
+    h('li', {'data-figure': name, class: bad ? 'warn' : null}, `${label} ${words}`,
+      share === null ? null : h('meter', {value: share, low: bad ? 1 : 0, 'aria-label': label}))));
 }
 
 function list(id, lines) {
@@ -89,11 +94,12 @@ const MOST_TRAIL = 600;
 const MAP_PARTS = ['status', 'grid', 'places', 'regions', 'links', 'doors', 'plan', 'scan', 'obstacles', 'pose', 'trail', 'mission', 'markers', 'others', 'promises', 'robots', 'zones', 'stations'];
 const SHOW = {
   present: [['grid', 'places', 'machine', 'mission', 'health'], present],
-  fleet: [['robots', 'doing', 'shares', 'out', 'troubles', 'battery', 'decision', 'stopped', 'active', 'mission'], () => fleet.show()],
-  header: [['status', 'mission', 'battery', 'robots'], header],
+  fleet: [['robots', 'doing', 'shares', 'out', 'troubles', 'brief', 'battery', 'decision', 'stopped', 'active', 'mission'], () => fleet.show()],
+  header: [['status', 'mission', 'robots'], header],
+  figures: [['figures', 'battery'], figures],
   why: [['decision', 'places', 'status'], () => why.show()],
   lists: [['events', 'markers', 'transitions'], lists],
-  health: [['health', 'figures'], () => showHealth(state)],
+  health: [['health', 'usage'], () => showHealth(state)],
   machine: [['machine'], () => drawMachine($('machine'), state.machine ?? [])],
   lit: [['machine', 'active', 'transitions'], () => {
     lightMachine($('machine'), state.active?.paths ?? [], state.transitions ?? []);

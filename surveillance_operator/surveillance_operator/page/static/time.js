@@ -33,7 +33,7 @@ function sawtooth(visits, since, now, x, y) {
 }
 
 export function drawStrips(root, state, now) {
-  const {history, mission, battery} = state;
+  const {history, mission} = state;
   if (!history) return;
   const places = names(state.places);
   const key = JSON.stringify(places);
@@ -62,7 +62,7 @@ export function drawStrips(root, state, now) {
   const level = (percent) => H - 2 - (H - 4) * percent / 100;
   const charge = history.battery.map(([at, percent], i) => `${i ? 'L' : 'M'}${x(at)} ${level(percent)}`).join('') + (history.battery.length ? `H${W}` : '');
   drawn.get('battery').strip.replaceChildren(s('path', {class: 'charge', d: charge}));
-  drawn.get('battery').value.textContent = battery ? `${Math.round(battery.level)} %` : '–';
+  drawn.get('battery').value.textContent = history.battery.length ? `${Math.round(history.battery.at(-1)[1])} %` : '–';
   drawMarks(drawn.get('events').strip, history.marks.filter(([at]) => at > since), (at) => x(at) / W);
   drawn.get('events').value.textContent = String(history.marks.filter(([at]) => at > since).length);
   root.querySelector('#axis-start').textContent = `${age(now - since)} ago`;

@@ -1,0 +1,127 @@
+"""The figures of a mission: one table, from which every view shows them.
+
+A figure is a short value with a label, such as the battery's charge. An entry of `FIGURES` is all
+that a new one takes. The terminal view, the page's head, the console's `status`, a fleet's lines
+and the recording's time line, and so a replay, show each entry; a topic that brings it is
+subscribed to by each of them, and read from recordings of other programs.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from typing import Any, NamedTuple
+
+from surveillance_operator.mission_state import MissionState
+
+
+class Heard(NamedTuple):
+    """A topic that nothing but one figure is read from.
+
+    Attributes:
+        topic: Its name, relative to the robot's namespace; in no line of `topics.TOPICS`.
+        kind: The type of its messages, as `sensor_msgs/msg/BatteryState`.
+        value: Returns what a message says, None for nothing; raises `ValueError` for one that
+            cannot be used. It becomes `MissionState.measured` by the figure's name.
+    """
+
+    topic: str
+    kind: str
+    value: Callable[[Any], Any]
+
+
+class Figure(NamedTuple):
+    """One figure.
+
+    Attributes:
+        name: Of its element on the page, and in time lines; each once.
+        label: What stands before it.
+        words: Returns what is shown; empty while it is not known.
+        is_bad: Tells whether a person should look at it.
+        share: Returns how full it is, 0 to 1, where it is to be drawn as a bar; None: no bar.
+        awaited: The topic that is named while the figure is not known; empty: nothing is shown.
+        is_brief: Whether it is shown where there is one line for a robot.
+        heard: Where it comes from, unless it follows from fields that the state has already.
+    """
+
+    name: str
+    label: str
+    words: Callable[[MissionState], str]
+    is_bad: Callable[[MissionState], bool] = lambda _state: False
+    share: Callable[[MissionState], float | None] = lambda _state: None
+    awaited: str = ''
+    is_brief: bool = False
+    heard: Heard | None = None
+
+
+class ShownFigure(NamedTuple):
+    """A figure as it is at one moment."""
+
+    figure: Figure
+    words: str
+    is_bad: bool
+    share: float | None
+
+
+def shown_figures(state: MissionState, *, brief: bool = False) -> Iterator[ShownFigure]:
+    """Yield the figures that are known, in the order of the table.
+
+    Args:
+        state: What is known of the mission.
+        brief: Only those that are shown in one line with others.
+    """
+    for each in FIGURES:
+        if (each.is_brief or not brief) and (words := each.words(state)):
+            yield ShownFigure(each, words, each.is_bad(state), each.share(state))
+
+
+def figures_line(state: MissionState, *, brief: bool = False) -> str:
+    """Return the figures that are known in one line."""
+    shown = shown_figures(state, brief=brief)
+    return ' · '.join(f'{each.figure.label} {each.words}' for each in shown)
+
+
+def _battery(state: MissionState) -> str:
+    level, low = state.task.battery, state.task.battery_low
+    return '' if level is None else f'{level:.0f} %{" (low)" if low else ""}'
+
+
+def _doors(state: MissionState) -> str:
+    doors = state.place.doors or {}
+    closed = [door for door, is_open in doors.items() if not is_open]
+    if not doors:
+        return ''
+    if not closed:
+        return f'all {len(doors)} open'
+    return f'{" ".join(closed)} closed, {len(doors) - len(closed)} open'
+
+
+def _volts(message: Any) -> float | None:
+    return float(message.voltage) if math.isfinite(message.voltage) else None
+
+
+FIGURES: tuple[Figure, ...] = (
+    Figure(
+        'battery',
+        'battery',
+        _battery,
+        lambda state: state.task.battery_low,
+        lambda state: None if state.task.battery is None else state.task.battery / 100,
+        awaited='battery_level',
+        is_brief=True,
+    ),
+    Figure(
+        'voltage',
+        'voltage',
+        lambda state: f'{state.measured["voltage"]:.1f} V' if 'voltage' in state.measured else '',
+        heard=Heard('battery_state', 'sensor_msgs/msg/BatteryState', _volts),
+    ),
+    Figure(
+        'doors',
+        'doors',
+        _doors,
+        lambda state: not all((state.place.doors or {}).values()),
+        awaited='door_states',
+    ),
+)
+"""Every figure, in the order in which they are shown."""
