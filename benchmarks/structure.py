@@ -18,7 +18,7 @@ import subprocess
 import sys
 import tokenize
 from collections import Counter, defaultdict
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 VOCABULARY = ('isIn', 'visitedAt', 'Robot1')
@@ -42,6 +42,15 @@ DENSE = (
 """Beginnings of the names of modules whose algorithms need reasons beside them."""
 SMALL = 60
 """Lines of code below which a module is asked for a reason to be alone."""
+MOST_ATTRIBUTES, MOST_LINES = 20, 400
+"""A class with more of either is asked for a reason."""
+ROS = (
+    *('action_msgs', 'builtin_interfaces', 'control_msgs', 'diagnostic_msgs', 'geometry_msgs'),
+    *('nav2_msgs', 'nav_msgs', 'rcl_interfaces', 'rclpy', 'rosgraph_msgs', 'sensor_msgs'),
+    *('std_msgs', 'std_srvs', 'surveillance_interfaces', 'tf2_msgs', 'trajectory_msgs'),
+    *('unique_identifier_msgs', 'visualization_msgs'),
+)
+"""Packages that come with ROS 2, and the project's messages."""
 
 
 def main(words: Sequence[str] | None = None) -> int:
@@ -69,6 +78,7 @@ def main(words: Sequence[str] | None = None) -> int:
     robot = set(modules) - libraries
     arrows = arrows_between(trees)
     circles = circles_of(trees)
+    testable, lacking = named_tests(modules)
     rows = [
         ('modules of the robot; of libraries', f'{len(robot)}; {len(libraries)}'),
         (
@@ -83,6 +93,20 @@ def main(words: Sequence[str] | None = None) -> int:
         (f'modules that spell {", ".join(VOCABULARY)}', listed(spelling(trees))),
         ('modules that write isIn', listed(writers(modules))),
         (f'modules below {SMALL} lines with at most one importer', listed(small)),
+        ('class names with several meanings', listed(double_names(trees))),
+        (
+            f'classes over {MOST_ATTRIBUTES} attributes or {MOST_LINES} lines',
+            listed(f'{name} {size}' for name, size in owning_much(trees).items()),
+        ),
+        ('modules of the robot that load no ROS', str(len(robot - loading_ros(trees)))),
+        ("imports past a library's face", listed(past_the_face(trees, modules))),
+        (
+            "modules whose tests are found by name: the robot's; the libraries'",
+            '; '.join(
+                f'{len(part) - len(part & lacking)} of {len(part)}'
+                for part in (robot & testable, libraries & testable)
+            ),
+        ),
         ('longest chain of own classes', f'{len(chain)}: {" <- ".join(chain)}'),
         ('classes of errors', str(len(errors))),
         ('of them not named ...Error', listed(e for e in errors if not e.endswith('Error'))),
@@ -274,6 +298,125 @@ def large_classes(trees: dict[str, ast.Module], most: int) -> list[str]:
         if isinstance(node, ast.ClassDef)
         and (count := sum(isinstance(each, ast.FunctionDef) for each in node.body)) > most
     ]
+
+
+def double_names(trees: Mapping[str, ast.Module]) -> dict[str, list[str]]:
+    """Return the names that several modules give a class of theirs, with those modules."""
+    found: dict[str, list[str]] = defaultdict(list)
+    for module, tree in trees.items():
+        for node in tree.body:
+            if isinstance(node, ast.ClassDef):
+                found[node.name].append(module)
+    return {name: modules for name, modules in sorted(found.items()) if len(modules) > 1}
+
+
+def owning_much(trees: Mapping[str, ast.Module]) -> dict[str, str]:
+    """Return the classes above the limits, `module.Class`, with 'attributes/lines'.
+
+    Attributes are the fields that the class declares and those that its methods assign on self.
+    """
+    found = {}
+    for module, tree in trees.items():
+        for node in ast.walk(tree):
+            if not isinstance(node, ast.ClassDef):
+                continue
+            held = {
+                each.target.id
+                for each in node.body
+                if isinstance(each, ast.AnnAssign) and isinstance(each.target, ast.Name)
+            }
+            held |= {
+                each.attr
+                for each in ast.walk(node)
+                if isinstance(each, ast.Attribute)
+                and isinstance(each.ctx, ast.Store)
+                and ast.unparse(each.value) == 'self'
+            }
+            count = (node.end_lineno or node.lineno) - node.lineno + 1
+            if len(held) > MOST_ATTRIBUTES or count > MOST_LINES:
+                found[f'{module}.{node.name}'] = f'{len(held)}/{count}'
+    return found
+
+
+def loading_ros(trees: Mapping[str, ast.Module]) -> set[str]:
+    """Return the modules whose import loads ROS, themselves or by what they import.
+
+    What is imported for types only, or within a function, does not count.
+    """
+    packages = {name.removesuffix('.__init__'): name for name in trees}
+    loaded = {name: set(at_import(tree.body)) for name, tree in trees.items()}
+    found = {name for name, many in loaded.items() if any(m.split('.')[0] in ROS for m in many)}
+    inner = {name: {packages[m] for m in many if m in packages} for name, many in loaded.items()}
+    while more := {name for name, many in inner.items() if many & found} - found:
+        found |= more
+    return found
+
+
+def at_import(body: Sequence[ast.stmt]) -> Iterator[str]:
+    """Yield the dotted names that a module's import loads, or that name something in them."""
+    for node in body:
+        if isinstance(node, ast.If):
+            for_types = 'TYPE_CHECKING' in ast.unparse(node.test)
+            yield from at_import(node.orelse if for_types else [*node.body, *node.orelse])
+        elif isinstance(node, ast.Try | ast.With):
+            yield from at_import(node.body)
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            yield node.module
+            yield from (f'{node.module}.{alias.name}' for alias in node.names)
+        elif isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+
+
+def public_modules(face: ast.Module) -> set[str]:
+    """Return the modules that a package's docstring calls public.
+
+    That is a paragraph `Public modules: `a`, `b.c`.`; the names of `__all__` are public anyhow.
+    """
+    told = re.search(r'^Public modules: (.+?)(\n\n|\Z)', ast.get_docstring(face) or '', re.M | re.S)
+    return set(re.findall(r'`([\w.]+)`', told[1])) if told else set()
+
+
+def past_the_face(trees: Mapping[str, ast.Module], modules: Mapping[str, Path]) -> set[str]:
+    """Return the modules of libraries that others import though they are not public."""
+    faces = {
+        name.split('.')[0]: public_modules(trees[name])
+        for name, path in modules.items()
+        if 'libs' in path.parts and name.count('.') == 1 and name.endswith('.__init__')
+    }
+    found = set()
+    for module, tree in trees.items():
+        for node in ast.walk(tree):
+            if isinstance(node, ast.ImportFrom) and node.module and '.' in node.module:
+                library, _, inner = node.module.partition('.')
+                if library in faces and library != module.split('.')[0]:
+                    named = {f'{inner}.{alias.name}' for alias in node.names}
+                    if inner not in faces[library] and not named <= faces[library]:
+                        found.add(node.module)
+    return found
+
+
+def named_tests(modules: Mapping[str, Path]) -> tuple[set[str], set[str]]:
+    """Return the modules that can have a test file, and those without one of their name.
+
+    A module's tests are `test_<module>.py`, or without its `_node`, in the tests of its library,
+    or anywhere below `tests/`.
+    """
+    some = next(iter(modules.values()))
+    checkout = next(
+        folder
+        for folder in some.parents
+        if (folder / 'pyproject.toml').is_file() and (folder / 'launch.py').is_file()
+    )
+    testable = {name for name in modules if not name.endswith('__init__')}
+    lacking = set()
+    for name in testable:
+        path = modules[name].relative_to(checkout)
+        below = Path(*path.parts[:2], 'tests') if path.parts[0] == 'libs' else Path('tests')
+        stem = path.stem
+        names = {f'test_{stem}.py', f'test_{stem.removesuffix("_node")}.py'}
+        if not any(each.name in names for each in (checkout / below).rglob('test_*.py')):
+            lacking.add(name)
+    return testable, lacking
 
 
 def longest_chain(trees: dict[str, ast.Module]) -> list[str]:
