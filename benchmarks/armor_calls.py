@@ -158,10 +158,10 @@ def _service_rows(label: str, store: Any, rounds: int, *, worlds: bool = False) 
     from armor_service.access import Settings
     from armor_service.client import ArmorClient, InProcessTransport
     from armor_service.service import ArmorService
+    from floor_plans import read_place_file
     from surveillance_ontology.map_ontology import MapOntology
     from surveillance_ontology.patrol_vocabulary import DATA
     from surveillance_ontology.robot_ontology import RobotOntology
-    from surveillance_runtime.place import read_place_file
 
     service = ArmorService(Settings(worlds=worlds), store=store)
     client = ArmorClient('benchmark', 'map', InProcessTransport(service))

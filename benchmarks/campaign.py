@@ -64,11 +64,11 @@ from benchmarks.hosts import Host, Network, may_be_made
 from benchmarks.machine_faults import SmallDisk, SteppedClock
 from benchmarks.processes import end_processes, memory_mb
 from benchmarks.sizes import Size, sized_parser
+from floor_plans import read_place_file
+from floor_plans.regions import Regions
 from state_machines.ros import ServiceCaller
 from surveillance_interfaces.srv import ArmorDirective
 from surveillance_runtime.discovery import prefer_quick_discovery
-from surveillance_runtime.place import read_place_file
-from surveillance_runtime.place.regions import Regions
 from surveillance_runtime.process import ExecutorThread
 from surveillance_runtime.qos import STATE_QOS
 from surveillance_runtime.run_parameters import PLACES

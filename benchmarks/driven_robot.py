@@ -11,16 +11,12 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from surveillance_controllers.geometry import Points, Scan
-from surveillance_controllers.motion.driving import Drive, State
-from surveillance_controllers.motion.navigator import Navigator
-from surveillance_controllers.motion.path_following import DriveParameters, Velocity
-from surveillance_controllers.planning.grid_planning import (
-    GridPlanner,
-    NoPathError,
-    PlanningParameters,
-)
-from surveillance_runtime.place import plan_grid
+from floor_plans import plan_grid
+from lidar_navigation.driving.driving import Drive, State
+from lidar_navigation.driving.navigator import Navigator
+from lidar_navigation.driving.path_following import DriveParameters, Velocity
+from lidar_navigation.geometry import Points, Scan
+from lidar_navigation.planning.grid_planning import GridPlanner, NoPathError, PlanningParameters
 from surveillance_simulation.robot.robot import Robot
 
 PERIOD = 0.1

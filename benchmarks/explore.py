@@ -24,13 +24,13 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from benchmarks.sizes import sized_parser
 from benchmarks.tables import table
 from benchmarks.whole_stack import ROOT
-from surveillance_controllers.exploration.exploration import Exploration, Phase
-from surveillance_controllers.exploration.frontiers import FrontierParameters
-from surveillance_controllers.exploration.map_building import MapBuilder
-from surveillance_controllers.geometry import Pose, Scan, composed, relative
+from floor_plans import plan_grid
+from floor_plans.occupancy_grid import Grid, distance_to
+from lidar_navigation.exploration.exploration import Exploration, Phase
+from lidar_navigation.exploration.frontiers import FrontierParameters
+from lidar_navigation.exploration.map_building import MapBuilder
+from lidar_navigation.geometry import Pose, Scan, composed, relative
 from surveillance_operator.map_command import graph_over_doors
-from surveillance_runtime.place import plan_grid
-from surveillance_runtime.place.occupancy_grid import Grid, distance_to
 from surveillance_simulation.robot.base import BaseModel
 from surveillance_simulation.robot.lidar import LidarModel
 from surveillance_simulation.robot.robot import Robot

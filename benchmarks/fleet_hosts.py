@@ -42,13 +42,13 @@ os.environ |= launched_nodes(os.environ, network=True)
 import rclpy
 from geometry_msgs.msg import PoseStamped
 
+from floor_plans import read_place_file
+from floor_plans.regions import Regions
 from state_machines.exceptions import CallError
 from state_machines.ros import ServiceCaller
 from surveillance_interfaces.msg import Decision
 from surveillance_interfaces.srv import ArmorDirective, ReferenceName
 from surveillance_runtime.node import PatrolNode
-from surveillance_runtime.place import read_place_file
-from surveillance_runtime.place.regions import Regions
 from surveillance_runtime.process import ExecutorThread
 from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
 from surveillance_runtime.testing import claim_domain

@@ -30,6 +30,7 @@ from rosgraph_msgs.msg import Clock
 from std_srvs.srv import Trigger
 
 from benchmarks.tables import table
+from floor_plans import read_place_file
 from launcher.run import Run
 from launcher.run_processes import node_environ
 from state_machines.ros import ServiceCaller
@@ -37,7 +38,6 @@ from surveillance_interfaces.srv import ReferenceName
 from surveillance_ontology.armor_client import ArmorClient
 from surveillance_ontology.robot_ontology import RobotOntology
 from surveillance_runtime.node import PatrolNode
-from surveillance_runtime.place import read_place_file
 from surveillance_runtime.process import ExecutorThread
 from surveillance_runtime.qos import SENSOR_QOS
 from surveillance_runtime.testing import claim_domain

@@ -28,11 +28,11 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 from benchmarks.sizes import Size, sized_parser
 from benchmarks.tables import table
-from surveillance_controllers.geometry import Pose, Scan, angle_between, composed, in_map, relative
-from surveillance_controllers.motion.localisation import Localiser
-from surveillance_controllers.motion.odometry import OdometryBuffer, joined
-from surveillance_runtime.place import plan_grid
-from surveillance_runtime.place.occupancy_grid import Grid, distance_to
+from floor_plans import plan_grid
+from floor_plans.occupancy_grid import Grid, distance_to
+from lidar_navigation.geometry import Pose, Scan, angle_between, composed, in_map, relative
+from lidar_navigation.localisation.localisation import Localiser
+from lidar_navigation.localisation.odometry import OdometryBuffer, joined
 from surveillance_simulation.robot.lidar import LidarModel, scan
 from surveillance_simulation.world.world import World, read_world
 

@@ -35,12 +35,12 @@ from armor_service.client import ArmorClient, InProcessTransport
 from armor_service.service import ArmorService
 from armor_service.store import Store
 from benchmarks.sizes import sized_parser
+from floor_plans import read_place_file
 from surveillance_behaviour.mission import mission_log
 from surveillance_ontology.map_ontology import MapOntology
 from surveillance_ontology.patrol_vocabulary import DATA
 from surveillance_ontology.robot_ontology import RobotOntology
 from surveillance_runtime import event_log
-from surveillance_runtime.place import read_place_file
 
 DAY = 86400.0
 LEG = 13.3

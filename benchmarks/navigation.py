@@ -44,21 +44,18 @@ from benchmarks.processes import cpu_seconds, end_processes
 from benchmarks.sizes import Size, sized_parser
 from benchmarks.tables import table
 from benchmarks.whole_stack import ROOT, Stack, ros_arguments
+from floor_plans import plan_grid
+from floor_plans.occupancy_grid import Grid
 from launcher.run import Run
 from launcher.run_processes import command, node_environ
+from lidar_navigation import geometry
+from lidar_navigation.driving.driving import Drive, State
+from lidar_navigation.driving.navigator import Navigator
+from lidar_navigation.geometry import Scan
+from lidar_navigation.planning.grid_planning import GridPlanner, PlanningParameters
 from patrol_policy.battery import PERCENTILE_99
 from surveillance_behaviour.experience import LegTimes
-from surveillance_controllers import geometry
-from surveillance_controllers.geometry import Scan
-from surveillance_controllers.motion.driving import Drive, State
-from surveillance_controllers.motion.navigator import Navigator
-from surveillance_controllers.planning.grid_planning import (
-    GridPlanner,
-    PlanningParameters,
-)
 from surveillance_runtime import node_table
-from surveillance_runtime.place import plan_grid
-from surveillance_runtime.place.occupancy_grid import Grid
 from surveillance_simulation.robot.robot import Robot
 from surveillance_simulation.world.people import People, PeopleModel
 from surveillance_simulation.world.world import World, read_world

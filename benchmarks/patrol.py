@@ -40,6 +40,7 @@ sys.path.insert(0, str(ROOT))
 from benchmarks.literature_policies import LITERATURE
 from benchmarks.sizes import Size, sized_parser
 from benchmarks.tables import table
+from floor_plans import read_place_file
 from patrol_policy.bounds import charge_bound, rule_bound
 from patrol_policy.decision import QUIET, RECHARGE, Rules
 from patrol_policy.graph import (
@@ -56,7 +57,6 @@ from patrol_policy.simulation import (
     PatrolRun,
     SimulatedBattery,
 )
-from surveillance_runtime.place import read_place_file
 
 DAY = 86400.0
 SPEED, EXPLORATION_SECONDS = 0.6, 2.0

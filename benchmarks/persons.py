@@ -25,7 +25,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from benchmarks.sizes import Size, sized_parser, skip
-from surveillance_perception.observation.persons import PersonFinder, load_finder
+from indoor_watch.persons import PersonFinder, load_finder
 
 ENDINGS = ('.jpg', '.jpeg', '.png')
 

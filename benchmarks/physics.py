@@ -24,9 +24,9 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 from benchmarks.driven_robot import DrivenRobot
 from benchmarks.localisation import Amcl, print_table
 from benchmarks.sizes import sized_parser, skip
-from surveillance_controllers.geometry import Pose, Scan, composed, relative
-from surveillance_controllers.motion.driving import State
-from surveillance_controllers.motion.odometry import OdometryBuffer
+from lidar_navigation.driving.driving import State
+from lidar_navigation.geometry import Pose, Scan, composed, relative
+from lidar_navigation.localisation.odometry import OdometryBuffer
 from surveillance_simulation.optional_mujoco import mujoco
 from surveillance_simulation.physics.model import PhysicsModel
 from surveillance_simulation.robot.base import BaseModel

@@ -26,9 +26,9 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from benchmarks.localisation import print_table
 from benchmarks.sizes import Size, sized_parser
 from benchmarks.whole_stack import ROOT, Stack
+from floor_plans import plan_grid, read_place_file
+from floor_plans.occupancy_map import read_map, write_map
 from surveillance_operator.place_import import ImportRequest, import_place
-from surveillance_runtime.place import plan_grid, read_place_file
-from surveillance_runtime.place.occupancy_map import read_map, write_map
 
 PATIENCE = 300.0
 """So long in real time without a simulated second, and the run has failed, seconds."""

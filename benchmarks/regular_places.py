@@ -16,8 +16,8 @@ from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
+from floor_plans.writing import format_place
 from surveillance_runtime.command_line import CommandParser
-from surveillance_runtime.place.writing import format_place
 
 Rectangle = tuple[float, float, float, float]
 """West, south, east and north edge, metres."""

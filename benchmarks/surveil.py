@@ -35,26 +35,26 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from benchmarks.sizes import Size, sized_parser
 from benchmarks.tables import table
+from floor_plans.floor_plan import Marker
+from floor_plans.occupancy_grid import Grid
+from floor_plans.plan_grid import draw
+from indoor_watch.day_book import DayBook
+from indoor_watch.events import Event, EventBook
+from indoor_watch.evidence import EvidenceStore
+from indoor_watch.hung_markers import CameraView, SeenMarker
+from indoor_watch.observations import Kind, Observation
+from indoor_watch.persons import load_finder
+from indoor_watch.viewpoints import Viewpoints
+from indoor_watch.views import view_changes
+from indoor_watch.watch_rules import rule_from
+from indoor_watch.watcher import Watcher
+from indoor_watch.ways import Ways
 from launcher.alarm import Alarm
 from marker_detection.camera_model import CameraModel
 from marker_detection.detector import DetectorSettings, MarkerDetector
 from marker_detection.pose import pose_of
 from surveillance_operator.notify.pipeline import notifier
-from surveillance_perception.observation.day_book import DayBook
-from surveillance_perception.observation.events import Event, EventBook
-from surveillance_perception.observation.evidence import EvidenceStore
-from surveillance_perception.observation.hung_markers import CameraView, SeenMarker
-from surveillance_perception.observation.observations import Kind, Observation
-from surveillance_perception.observation.persons import load_finder
-from surveillance_perception.observation.viewpoints import Viewpoints
-from surveillance_perception.observation.views import view_changes
-from surveillance_perception.observation.watch_rules import rule_from
-from surveillance_perception.observation.watcher import Watcher
-from surveillance_perception.observation.ways import Ways
 from surveillance_runtime.incidents import Cause, Severity, Told
-from surveillance_runtime.place.floor_plan import Marker
-from surveillance_runtime.place.occupancy_grid import Grid
-from surveillance_runtime.place.plan_grid import draw
 from surveillance_simulation.camera.model import Camera, Conditions, covered, expose
 from surveillance_simulation.camera.rendering import Renderer
 from surveillance_simulation.robot.lidar import LidarModel, scan

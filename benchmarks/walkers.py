@@ -31,13 +31,13 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from benchmarks.sizes import Size, sized_parser
 from benchmarks.tables import table
-from surveillance_controllers.exploration.map_building import MapBuilder
-from surveillance_controllers.geometry import Pose, Scan
-from surveillance_controllers.motion.localisation import Localiser
-from surveillance_perception.observation.events import EventBook
-from surveillance_perception.observation.observations import Kind, Observation
-from surveillance_perception.observation.watcher import Watcher
-from surveillance_runtime.place.occupancy_grid import Grid
+from floor_plans.occupancy_grid import Grid
+from indoor_watch.events import EventBook
+from indoor_watch.observations import Kind, Observation
+from indoor_watch.watcher import Watcher
+from lidar_navigation.exploration.map_building import MapBuilder
+from lidar_navigation.geometry import Pose, Scan
+from lidar_navigation.localisation.localisation import Localiser
 from surveillance_simulation.robot.lidar import LidarModel, scan
 from surveillance_simulation.world.world import read_world
 

@@ -20,11 +20,11 @@ from PIL import Image
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
+from floor_plans import read_place_file
+from floor_plans.occupancy_map import write_map
+from floor_plans.plan_grid import draw
 from surveillance_operator.place_import import ImportRequest, import_place
 from surveillance_operator.place_page.edit_command import editor_page
-from surveillance_runtime.place import read_place_file
-from surveillance_runtime.place.occupancy_map import write_map
-from surveillance_runtime.place.plan_grid import draw
 from tests.operator.browser import DESK, Viewer
 from tests.operator.test_place_page import drop_of
 

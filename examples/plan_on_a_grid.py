@@ -9,9 +9,9 @@ import itertools
 
 import numpy as np
 
-from surveillance_controllers.geometry import Points, length
-from surveillance_controllers.planning.grid_planning import GridPlanner, NoPathError
-from surveillance_runtime.place.occupancy_grid import OCCUPIED, Grid
+from floor_plans.occupancy_grid import OCCUPIED, Grid
+from lidar_navigation.geometry import Points, length
+from lidar_navigation.planning.grid_planning import GridPlanner, NoPathError
 
 PLAN = """
 ############################################################

@@ -12,12 +12,12 @@ from dataclasses import replace
 import numpy as np
 from rich.console import Console
 
+from floor_plans.occupancy_grid import Grid
 from patrol_policy.world import Decision
 from surveillance_operator.mission_changes import follow
 from surveillance_operator.mission_state import MissionState, Status
 from surveillance_operator.page_state import PatchMaker
 from surveillance_operator.watch.view import MissionView
-from surveillance_runtime.place.occupancy_grid import Grid
 
 
 def two_rooms() -> Grid:

@@ -7,4 +7,4 @@ from pathlib import Path
 # before anything is set up, and so is the library on whose files the runtime's stand.
 _CHECKOUT = Path(__file__).resolve().parent.parent
 if (_CHECKOUT / 'surveillance_runtime' / 'surveillance_runtime').exists():  # else from wheels
-    sys.path += [str(_CHECKOUT / name) for name in ('surveillance_runtime', 'libs/state_machines')]
+    sys.path += [str(_CHECKOUT / name) for name in ('surveillance_runtime', 'libs/strict_files')]

@@ -17,7 +17,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from launcher.log_merge import MergedLog
-from surveillance_runtime.files import INCIDENTS, LineFile
+from strict_files.files import LineFile
 from surveillance_runtime.incidents import (
     Call,
     Cause,
@@ -27,6 +27,7 @@ from surveillance_runtime.incidents import (
     Told,
     read_line,
 )
+from surveillance_runtime.run_files import INCIDENTS
 
 LAUNCHER = 'launch'
 QUIET_AGAIN = 600.0

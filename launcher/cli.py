@@ -24,11 +24,11 @@ from launcher.environment import (
 )
 from launcher.instance_lock import claim
 from launcher.run import Run, make_parser, shared_options, wanted_run
+from strict_files.files import in_one_line, replace_text
+from strict_files.suggestions import nearest
 from surveillance_runtime import node_table
 from surveillance_runtime.command_line import EXIT_BAD_INPUT, CommandParser
-from surveillance_runtime.files import in_one_line, replace_text
 from surveillance_runtime.launch_protocol import NotNowError
-from surveillance_runtime.suggestions import nearest
 
 
 def runs_folder(checkout: Path = CHECKOUT) -> Path:

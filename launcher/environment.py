@@ -31,8 +31,8 @@ from typing import Any
 
 from launcher import system
 from launcher.progress import Output, SetUpStep
-from state_machines.files import parse_json
-from surveillance_runtime.files import replace_text
+from strict_files.files import replace_text
+from strict_files.regular_files import parse_json
 from surveillance_runtime.launch_protocol import NotNowError
 
 _HERE = Path(__file__).resolve().parent.parent
@@ -44,6 +44,10 @@ COMMAND = [PROGRAM] if INSTALLED else ['python3', PROGRAM]
 CHECKOUT = Path(sys.prefix) / 'share' / 'surveillance' if INSTALLED else _HERE
 """What holds `config` and the sources of the messages."""
 LIBRARIES = (
+    'strict_files',
+    'floor_plans',
+    'lidar_navigation',
+    'indoor_watch',
     'owl_reasoner',
     'armor_service',
     'state_machines',

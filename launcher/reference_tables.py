@@ -19,6 +19,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from floor_plans.rooms import GEOMETRY_KEYS, PATROL_KEYS, PLACE_KEYS
 from launcher import package_commands
 from launcher.environment import CHECKOUT
 from surveillance_runtime import node_table
@@ -31,7 +32,6 @@ from surveillance_runtime.configuration import (
 )
 from surveillance_runtime.launch_protocol import NotNowError
 from surveillance_runtime.parameters import ParameterError, ParameterSpec
-from surveillance_runtime.place.rooms import GEOMETRY_KEYS, PATROL_KEYS, PLACE_KEYS
 from surveillance_runtime.testing import claim_domain
 
 _NAMESPACE = '/robot'

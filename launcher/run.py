@@ -18,10 +18,11 @@ from typing import Any
 
 from launcher import package_commands
 from launcher.environment import PROGRAM
+from strict_files.files import FileError
 from surveillance_runtime import node_table, parameter_checks
 from surveillance_runtime.command_line import CommandParser, page_address
 from surveillance_runtime.discovery import LAST_DOMAIN
-from surveillance_runtime.files import FileError
+from surveillance_runtime.node_table import BY_NAME
 from surveillance_runtime.run_options import (
     BUILT_IN_ROBOT,
     KINEMATIC,
@@ -292,10 +293,10 @@ class Run:
         if self.domain is not None and not 0 <= self.domain <= LAST_DOMAIN:
             raise ValueError(f'--domain {self.domain}: expected a number from 0 to {LAST_DOMAIN}')
         if self.place is not None:
-            from surveillance_runtime.place import read_place_file  # needs a set-up
+            from floor_plans import read_place_file  # needs a set-up
 
             try:
-                read_place_file(self.place)
+                read_place_file(self.place, reserved=BY_NAME)
             except FileError as error:
                 raise ValueError(f'--map {error}') from None
         if self.stage is not None:

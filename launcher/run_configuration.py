@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from launcher.run import OBSERVER, RECORDER, Run
+from strict_files.files import FileError
 from surveillance_runtime import node_table
 from surveillance_runtime.configuration import (
     Configuration,
@@ -18,7 +19,6 @@ from surveillance_runtime.configuration import (
     resolved_text,
 )
 from surveillance_runtime.event_log import record_in
-from surveillance_runtime.files import RECORDING, TRUTH, FileError
 from surveillance_runtime.profile import (
     ProfileFile,
     RobotProfile,
@@ -27,6 +27,7 @@ from surveillance_runtime.profile import (
     read_profile,
     unmonitored_entries,
 )
+from surveillance_runtime.run_files import RECORDING, TRUTH
 from surveillance_runtime.run_parameters import (
     BEHAVIOUR_NODE,
     for_node,
@@ -221,7 +222,7 @@ def check_watch(merged: Configuration, run: Run, nodes: Sequence[node_table.Node
     """
     if run.watch is None or all(node.name != OBSERVER for node in nodes):
         return
-    from surveillance_perception.observation.watch_rules import read_watch_file
+    from indoor_watch.watch_rules import read_watch_file
 
     settings = merged.resolve(OBSERVER, full_name(run.namespace, OBSERVER))
     places, doors = (

@@ -19,9 +19,9 @@ from pathlib import Path
 from typing import Any, get_type_hints
 
 from launcher.run import NOT_RECORDED, Run
-from state_machines.files import parse_json
+from strict_files.regular_files import parse_json
+from strict_files.suggestions import like
 from surveillance_runtime.launch_protocol import NotNowError
-from surveillance_runtime.suggestions import like
 
 STATE = 'run.json'
 

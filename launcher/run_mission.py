@@ -9,6 +9,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from floor_plans.writing import copy_place
 from launcher import run_folder
 from launcher.alarm import Alarm, caller
 from launcher.environment import COMMAND, interpreter
@@ -29,14 +30,14 @@ from launcher.run_configuration import (
 from launcher.run_processes import COMPOSED, node_environ, programs_of, ros_domain
 from launcher.service import is_service
 from launcher.supervisor import EXIT_CUT, Supervisor
+from strict_files.files import FileError
 from surveillance_behaviour.mission import mission_log
 from surveillance_runtime import event_log, node_table
 from surveillance_runtime.configuration import Entry
 from surveillance_runtime.event_log import record_in
-from surveillance_runtime.files import LAUNCH_LOG, PLACE, TIMELINE, FileError
 from surveillance_runtime.launch_protocol import EXIT_THERE, NotNowError
-from surveillance_runtime.place.writing import copy_place
 from surveillance_runtime.profile import remappings
+from surveillance_runtime.run_files import LAUNCH_LOG, PLACE, TIMELINE
 from surveillance_runtime.run_parameters import (
     BEHAVIOUR_NODE,
     full_name,

@@ -21,7 +21,6 @@ setup(
             'battery_controller = surveillance_controllers.battery_controller_node:main',
             'planner_controller = surveillance_controllers.planner_controller_node:main',
             'explorer = surveillance_controllers.explorer_node:main',
-            'observer = surveillance_controllers.observer_node:main',
             'motion_controller = surveillance_controllers.motion_controller_node:main',
             'collision_monitor = surveillance_controllers.collision_monitor_node:main',
         ],

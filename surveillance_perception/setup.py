@@ -22,6 +22,7 @@ setup(
             'aruco_detector = surveillance_perception.aruco_detector_node:main',
             'arm_controller = surveillance_perception.arm_controller_node:main',
             'marker_server = surveillance_perception.marker_server_node:main',
+            'observer = surveillance_perception.observer_node:main',
             'video_source = surveillance_perception.video_source_node:main',
         ],
     },

@@ -21,16 +21,15 @@ from launch.events.process import ProcessExited
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 
+from floor_plans.fleet import MOST_ROBOTS
+from floor_plans.writing import copy_place
 from launch import LaunchContext, LaunchDescription
 from surveillance_runtime.configuration import Configuration, Entry, Layer
 from surveillance_runtime.event_log import record_in
-from surveillance_runtime.files import PLACE, RECORDING
 from surveillance_runtime.launch_protocol import EXIT_CANNOT_START, EXIT_NOT_NOW
 from surveillance_runtime.node_table import MARKERS, RECORDER, find, select
 from surveillance_runtime.node_table import Node as NodeOfTable
 from surveillance_runtime.parameters import ParameterError
-from surveillance_runtime.place.fleet import MOST_ROBOTS
-from surveillance_runtime.place.writing import copy_place
 from surveillance_runtime.profile import (
     check_behaviour,
     find_profile,
@@ -38,6 +37,7 @@ from surveillance_runtime.profile import (
     remappings,
     unmonitored_entries,
 )
+from surveillance_runtime.run_files import PLACE, RECORDING
 from surveillance_runtime.run_options import OPTIONS, left_out
 from surveillance_runtime.run_parameters import (
     OBSERVER,

@@ -14,12 +14,12 @@ from state_machines import Container
 from state_machines.clock import WALL_CLOCK
 from state_machines.export import to_ascii, to_graphviz, to_mermaid
 from state_machines.verify import Finding, verify
+from strict_files.suggestions import nearest
 from surveillance_behaviour.charging import BatteryMonitor
 from surveillance_behaviour.machines import MACHINES
 from surveillance_behaviour.mission.mission import Mission, MissionSettings
 from surveillance_behaviour.ports import Ports
 from surveillance_runtime.command_line import CommandParser
-from surveillance_runtime.suggestions import nearest
 
 DRAWINGS: dict[str, Callable[[Container], str]] = {
     'mermaid': to_mermaid,

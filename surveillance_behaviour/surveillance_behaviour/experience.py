@@ -28,6 +28,7 @@ from statistics import fmean, median
 from typing import Any
 
 from patrol_policy.battery import LEARNED_FALL, Draw
+from strict_files.files import FileError, KeptFile
 from surveillance_behaviour.charge_estimate import ChargeEstimate
 from surveillance_behaviour.mission.mission_log import (
     account_of,
@@ -35,7 +36,6 @@ from surveillance_behaviour.mission.mission_log import (
     on_present_clock,
 )
 from surveillance_runtime.event_log import read
-from surveillance_runtime.files import FileError, KeptFile
 
 SIMULTANEOUS = 1.0
 """Seconds by which what several threads take for the present may differ."""

@@ -16,6 +16,7 @@ from rclpy.callback_groups import ReentrantCallbackGroup
 from std_srvs.srv import Empty
 
 from state_machines.ros import CallError, ServiceCaller
+from strict_files.files import KeptFile
 from surveillance_behaviour.conversions import map_message
 from surveillance_behaviour.map_from_markers.assembly import (
     PlaceNote,
@@ -27,9 +28,8 @@ from surveillance_behaviour.map_from_markers.initial_scan import InitialScan, Pr
 from surveillance_behaviour.map_from_markers.scan_peers import CameraScanner, MarkerInquiry
 from surveillance_interfaces.msg import OntologyMap
 from surveillance_interfaces.srv import ReferenceName
-from surveillance_runtime.files import KeptFile
 from surveillance_runtime.node import PatrolNode
-from surveillance_runtime.place import described_place
+from surveillance_runtime.place_parameters import described_place
 from surveillance_runtime.process import run_node
 from surveillance_runtime.qos import SENSOR_QOS
 from surveillance_runtime.state_topics import OwnedTopic

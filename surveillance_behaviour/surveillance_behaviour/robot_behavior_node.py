@@ -17,6 +17,7 @@ from std_msgs.msg import Bool
 
 import state_machines as fsm
 from patrol_policy.decision import DecisionSettings
+from strict_files.files import FileError
 from surveillance_behaviour.charging import BatteryMonitor
 from surveillance_behaviour.machines import MACHINES
 from surveillance_behaviour.mission.mission import Mission, MissionSettings
@@ -41,7 +42,6 @@ from surveillance_behaviour.ros_adapters.peers import (
 from surveillance_behaviour.ros_adapters.purpose_feed import PurposeFeed
 from surveillance_behaviour.ros_adapters.reason_client import ReasonClient
 from surveillance_runtime.conversions import charging_from, seconds_of
-from surveillance_runtime.files import FileError
 from surveillance_runtime.introspection import IntrospectionServer
 from surveillance_runtime.launch_protocol import NotNowError
 from surveillance_runtime.namesakes import NamesakeWatch

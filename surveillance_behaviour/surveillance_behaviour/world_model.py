@@ -17,6 +17,8 @@ import threading
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 
+from floor_plans.patrol_rules import PatrolRules
+from floor_plans.stations import Station
 from patrol_policy.battery import Battery, ChargeCurve, Energy
 from patrol_policy.decision import (
     ALERT,
@@ -41,14 +43,12 @@ from patrol_policy.promises import Promise, promises, summary, verdicts
 from patrol_policy.world import Decision, PolicyMemory, World
 from state_machines import Interrupt
 from state_machines.exceptions import CallError, CallInterruptedError
+from strict_files.suggestions import nearest
 from surveillance_behaviour.charging import BatteryMonitor
 from surveillance_behaviour.experience import Experience
 from surveillance_behaviour.fleet import FleetKnowledge, share_of
 from surveillance_behaviour.ports import Ontology, Places, Point, UnknownPlaceError
 from surveillance_ontology.robot_ontology import Snapshot
-from surveillance_runtime.place.patrol_rules import PatrolRules
-from surveillance_runtime.place.stations import Station
-from surveillance_runtime.suggestions import nearest
 
 LOOK_AGAIN = 1.0
 """How long a robot waits for another one until it looks again, seconds."""

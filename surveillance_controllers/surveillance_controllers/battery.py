@@ -20,9 +20,9 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from surveillance_controllers.geometry import Pose, angle_between
-from surveillance_runtime.parameters import parameter
-from surveillance_runtime.place.stations import Station, station_at
+from floor_plans.stations import Station, station_at
+from lidar_navigation.geometry import Pose, angle_between
+from strict_files.settings import parameter
 from surveillance_runtime.robot_arm import ARM, TrajectoryPoint
 
 SECONDS_PER_HOUR = 3600.0

@@ -23,6 +23,7 @@ from std_msgs.msg import Bool, Float32, UInt8
 from std_srvs.srv import Empty
 from trajectory_msgs.msg import JointTrajectory
 
+from floor_plans.stations import stations_in
 from state_machines.ros import ClockWait
 from surveillance_controllers import conversions, stimuli
 from surveillance_controllers.battery import Battery, BatteryInUse
@@ -42,10 +43,10 @@ from surveillance_runtime.conversions import (
 )
 from surveillance_runtime.incidents import Severity
 from surveillance_runtime.node import PatrolNode
-from surveillance_runtime.place.stations import stations_in
 from surveillance_runtime.place_changes import follow_place
 from surveillance_runtime.process import run_node
 from surveillance_runtime.qos import SENSOR_QOS
+from surveillance_runtime.sensing.conversions import refusing
 from surveillance_runtime.state_file import StateFile
 from surveillance_runtime.state_topics import OwnedTopic, StateSubscription
 from surveillance_runtime.waiting import AwaitedEvent
@@ -267,7 +268,7 @@ class RobotBattery:
     def _on_driver(self, message: BatteryState) -> None:
         driver, now = self._driver, self._wait.elapsed()
         assert driver is not None
-        with conversions.refusing(self._node, self._topic):
+        with refusing(self._node, self._topic):
             charging = charging_from(message)
             driver.hear(message.percentage, message.voltage, charging, now, present=message.present)
             if hint := doubt(message.percentage, self._settings):
@@ -293,7 +294,7 @@ class RobotBattery:
         return speaks
 
     def _on_pose(self, serialized: bytes) -> None:
-        with conversions.refusing(self._node, 'amcl_pose'):
+        with refusing(self._node, 'amcl_pose'):
             self._use.see_pose(pose_of_serialized(serialized), self._wait.elapsed())
 
     def _on_trajectory(self, message: JointTrajectory) -> None:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from surveillance_runtime.parameters import parameter
+from strict_files.settings import parameter
 from surveillance_runtime.profile.record import BATTERY_SOURCES, BatterySource, voltage_curve
 
 _SLACK = 1.2

@@ -26,30 +26,30 @@ from sensor_msgs.msg import LaserScan
 from std_msgs.msg import Bool
 from std_srvs.srv import SetBool
 
-from surveillance_controllers import conversions
-from surveillance_controllers.controller_parameters import place_zones
-from surveillance_controllers.footprint import Footprint
-from surveillance_controllers.geometry import Points, Pose, Scan, composed
-from surveillance_controllers.motion.command_publisher import STANDSTILL, CommandPublisher
-from surveillance_controllers.motion.holding import STOPPED
-from surveillance_controllers.motion.path_following import (
+from floor_plans.zones import Zones, zones_from
+from lidar_navigation.driving.path_following import (
     Velocity,
     as_forwards,
     room_ahead,
     safe_turn,
     speed_to_stop,
 )
-from surveillance_controllers.motion.transforms import ScanReader
+from lidar_navigation.footprint import Footprint
+from lidar_navigation.geometry import Points, Pose, Scan, composed
+from lidar_navigation.robot_base import robot_deceleration, robot_footprint, robot_radius
+from strict_files.settings import parameter
+from surveillance_controllers.motion.command_publisher import STANDSTILL, CommandPublisher
+from surveillance_controllers.motion.holding import STOPPED
 from surveillance_runtime.conversions import pose_of_serialized, stamp_of_serialized
 from surveillance_runtime.graph_check import endpoints_of
 from surveillance_runtime.node import PatrolNode
-from surveillance_runtime.parameters import parameter
-from surveillance_runtime.place.zones import Zones, zones_from
 from surveillance_runtime.place_changes import follow_place
+from surveillance_runtime.place_parameters import place_zones
 from surveillance_runtime.process import run_node
 from surveillance_runtime.profile.check_up import Awaited, findings
-from surveillance_runtime.profile.parameters import declared_frames, robot_footprint
-from surveillance_runtime.robot_base import robot_deceleration, robot_radius
+from surveillance_runtime.profile.parameters import declared_frames
+from surveillance_runtime.sensing.conversions import refusing
+from surveillance_runtime.sensing.transforms import ScanReader
 from surveillance_runtime.state_file import StateFile
 from surveillance_runtime.state_topics import OwnedTopic, StateSubscription
 
@@ -195,7 +195,7 @@ class CollisionMonitor(PatrolNode):
         self._zones = zones_from(described)
 
     def _on_pose(self, serialized: bytes) -> None:
-        with conversions.refusing(self, 'amcl_pose'):
+        with refusing(self, 'amcl_pose'):
             self._pose = pose_of_serialized(serialized), self._ros_time()
 
     def _ros_time(self) -> float:

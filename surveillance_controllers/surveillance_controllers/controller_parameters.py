@@ -2,23 +2,17 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
 
-import numpy as np
-
+from floor_plans.stations import Station
+from lidar_navigation.geometry import Points
+from strict_files.settings import converted, parameter
 from surveillance_controllers.battery import BatteryParameters
 from surveillance_controllers.battery_driver import DriverSettings
-from surveillance_controllers.geometry import Points
 from surveillance_runtime import parameter_checks
 from surveillance_runtime.node import PatrolNode
-from surveillance_runtime.parameters import ParameterError, converted, parameter
-from surveillance_runtime.place.floor_plan import Door, Segment
-from surveillance_runtime.place.rooms import ZONE_TABLES, PlaceError
-from surveillance_runtime.place.stations import Station, described_stations
-from surveillance_runtime.place.zones import Zones, zones_from
+from surveillance_runtime.place_parameters import described_stations
 
 EXECUTION_MODES = ('MANUAL', 'RANDOM', 'SIMULATED', 'ROBOT')
 DRIVING_MODES = ('SIMULATED', 'ROBOT')
@@ -242,74 +236,4 @@ class NavigationSettings:
     )
     spin: bool = parameter(
         True, 'motion/controller ends with one turn on the spot.', name='spin_on_arrival'
-    )
-
-
-def door_segments_of(described: Mapping[str, Any]) -> dict[str, Segment]:
-    """Return where the doors are that a place's parameters describe.
-
-    Raises:
-        ValueError: A door is not four numbers.
-    """
-    doors = described.get('doors') or {}
-    for name, values in doors.items():
-        if not _are_numbers(values, 4):
-            raise ValueError(f'doors.{name}: got {values}, expected [x, y, yaw, width]')
-    return {name: Door(name, *values).segment for name, values in doors.items()}
-
-
-def positions_of(described: Mapping[str, Any]) -> dict[str, Points]:
-    """Return the places' points that a place's parameters describe.
-
-    Raises:
-        ValueError: A position is not two or three numbers.
-    """
-    points = described.get('room_positions') or {}
-    for name, values in points.items():
-        if not (_are_numbers(values, 2) or _are_numbers(values, 3)):
-            raise ValueError(f'room_positions.{name}: got {values}, expected [x, y]')
-    return {name: np.array([*at, 0.0][:3], dtype=float) for name, at in points.items()}
-
-
-def door_segments(node: PatrolNode) -> dict[str, Segment]:
-    """Declare and read the doors of the place, `doors.NAME: [x, y, yaw, width]`.
-
-    Raises:
-        ParameterError: A door is not four numbers.
-    """
-    try:
-        return door_segments_of({'doors': node.parameters_under('doors')})
-    except ValueError as error:
-        raise ParameterError(f'parameter {error}') from None
-
-
-def place_zones(node: PatrolNode) -> Zones:
-    """Declare and read the zones of the place.
-
-    Raises:
-        ParameterError: A zone is none.
-    """
-    try:
-        return zones_from({table: node.parameters_under(table) for table in ZONE_TABLES})
-    except PlaceError as error:
-        raise ParameterError(f'parameter {error}') from None
-
-
-def place_positions(node: PatrolNode) -> dict[str, Points]:
-    """Declare and read the places' points, `room_positions.NAME: [x, y]`.
-
-    Raises:
-        ParameterError: A position is not two or three numbers.
-    """
-    try:
-        return positions_of({'room_positions': node.parameters_under('room_positions')})
-    except ValueError as error:
-        raise ParameterError(f'parameter {error}') from None
-
-
-def _are_numbers(values: object, count: int) -> bool:
-    return (
-        isinstance(values, list)
-        and len(values) == count
-        and all(isinstance(v, int | float) and math.isfinite(v) for v in values)
     )

@@ -22,34 +22,35 @@ from geometry_msgs.msg import PoseWithCovarianceStamped
 from nav_msgs.msg import OccupancyGrid
 from sensor_msgs.msg import LaserScan
 
+from floor_plans.occupancy_grid import Grid
+from floor_plans.occupancy_map import write_map
+from lidar_navigation.driving.path_following import DriveParameters, Velocity
+from lidar_navigation.exploration.exploration import Exploration, Phase
+from lidar_navigation.exploration.foreign_map import ForeignMap
+from lidar_navigation.exploration.frontiers import FrontierParameters
+from lidar_navigation.exploration.map_building import MapBuilder, MappingParameters
+from lidar_navigation.geometry import Pose, Scan, composed, relative
+from lidar_navigation.localisation.odometry import ContinuousOdometry, OdometryBuffer, joined
+from lidar_navigation.planning.grid_planning import PlanningParameters
 from state_machines.ros import ClockWait
+from strict_files.files import FileError, in_one_line, replace_text
+from strict_files.settings import parameter
 from surveillance_controllers import conversions
-from surveillance_controllers.exploration.exploration import Exploration, Phase
-from surveillance_controllers.exploration.foreign_map import ForeignMap
-from surveillance_controllers.exploration.frontiers import FrontierParameters
-from surveillance_controllers.exploration.map_building import MapBuilder, MappingParameters
-from surveillance_controllers.geometry import Pose, Scan, composed, relative
 from surveillance_controllers.motion.command_publisher import CommandPublisher
 from surveillance_controllers.motion.holding import Hold
-from surveillance_controllers.motion.odometry import ContinuousOdometry, OdometryBuffer, joined
-from surveillance_controllers.motion.path_following import DriveParameters, Velocity
-from surveillance_controllers.motion.sensors import OdometryReader
-from surveillance_controllers.motion.silence import SensorWatch
-from surveillance_controllers.motion.transforms import MapFrame, MapFrameReader, ScanReader
-from surveillance_controllers.planning.grid_planning import PlanningParameters
 from surveillance_runtime.conversions import (
     map_message,
     pose_estimate,
     pose_from,
     seconds_of,
 )
-from surveillance_runtime.files import FileError, in_one_line, replace_text
 from surveillance_runtime.node import PatrolNode
-from surveillance_runtime.parameters import parameter
-from surveillance_runtime.place.occupancy_grid import Grid
-from surveillance_runtime.place.occupancy_map import write_map
 from surveillance_runtime.process import run_node
 from surveillance_runtime.profile.parameters import declared_frames
+from surveillance_runtime.sensing.conversions import refusing
+from surveillance_runtime.sensing.sensors import OdometryReader
+from surveillance_runtime.sensing.silence import SensorWatch
+from surveillance_runtime.sensing.transforms import MapFrame, MapFrameReader, ScanReader
 from surveillance_runtime.state_topics import OwnedTopic, StateSubscription
 
 MAP_FILE = 'map.yaml'
@@ -156,12 +157,12 @@ class Explorer(PatrolNode):
 
     def _on_map(self, message: OccupancyGrid) -> None:
         assert self._foreign is not None
-        with conversions.refusing(self, 'map'):
+        with refusing(self, 'map'):
             self._foreign.take_map(conversions.grid_from(message))
 
     def _on_pose(self, message: PoseWithCovarianceStamped) -> None:
         assert self._foreign is not None
-        with conversions.refusing(self, 'pose'):
+        with refusing(self, 'pose'):
             pose, stamp = pose_from(message.pose.pose), seconds_of(message.header.stamp)
             with self._lock:
                 odometry = self._odometry_at(stamp)

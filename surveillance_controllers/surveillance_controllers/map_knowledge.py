@@ -10,10 +10,10 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 
+from lidar_navigation.geometry import Points
 from state_machines import Interrupt
 from state_machines.ros import CallError, ServiceCaller
 from surveillance_controllers import conversions
-from surveillance_controllers.geometry import Points
 from surveillance_interfaces.msg import RobotPlace
 from surveillance_interfaces.srv import ReferenceName, RoomPosition
 from surveillance_ontology.armor_client import (

@@ -12,10 +12,11 @@ import math
 from collections.abc import Callable, Sequence
 from typing import Any, TextIO
 
+from lidar_navigation import geometry
+from lidar_navigation.geometry import Points
 from state_machines.ros import GoalAbortedError, GoalRun, GoalServer
-from surveillance_controllers import conversions, geometry, stimuli
+from surveillance_controllers import conversions, stimuli
 from surveillance_controllers.controller_parameters import motion_settings
-from surveillance_controllers.geometry import Points
 from surveillance_controllers.manual import commands
 from surveillance_controllers.manual.commands import MOTION, ParsedCommand
 from surveillance_controllers.manual.requests import CommandConsole

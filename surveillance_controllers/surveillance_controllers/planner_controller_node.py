@@ -14,10 +14,12 @@ from typing import TYPE_CHECKING, Any, TextIO
 import numpy as np
 from nav_msgs.msg import Path
 
+from floor_plans.stations import AT_STATION
+from lidar_navigation import geometry
+from lidar_navigation.geometry import Points
 from state_machines.ros import GoalAbortedError, GoalRun, GoalServer
-from surveillance_controllers import conversions, geometry, stimuli
+from surveillance_controllers import conversions, stimuli
 from surveillance_controllers.controller_parameters import PlannerSettings
-from surveillance_controllers.geometry import Points
 from surveillance_controllers.manual import commands
 from surveillance_controllers.manual.commands import PLANNER, ParsedCommand, Point3
 from surveillance_controllers.manual.requests import CommandConsole
@@ -26,7 +28,6 @@ from surveillance_interfaces.action import ComputePath, Plan
 from surveillance_ontology.patrol_vocabulary import OntologyNotReadyError
 from surveillance_runtime.conversions import point_messages
 from surveillance_runtime.node import PatrolNode
-from surveillance_runtime.place.stations import AT_STATION
 from surveillance_runtime.process import run_node
 from surveillance_runtime.profile.parameters import declared_frames
 from surveillance_runtime.state_topics import OwnedTopic

@@ -10,9 +10,9 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from lidar_navigation import geometry
+from lidar_navigation.geometry import Points
 from state_machines.ros import GoalRun
-from surveillance_controllers import geometry
-from surveillance_controllers.geometry import Points
 from surveillance_controllers.manual.commands import Point3
 
 VIA_POINTS = (0, 4)

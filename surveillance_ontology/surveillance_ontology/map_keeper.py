@@ -16,19 +16,12 @@ from armor_service.client import (
     ArmorServiceCallError,
     ArmorServiceInternalError,
 )
+from floor_plans import Place, PlaceError, Position, description_of, edited_place, problem_in_name
+from strict_files.files import KeptFile
+from strict_files.settings import parameter
 from surveillance_ontology.map_ontology import MapOntology
 from surveillance_ontology.patrol_directives import is_gone
 from surveillance_ontology.patrol_vocabulary import ONTOLOGY, checked_names, never_visited
-from surveillance_runtime.files import KeptFile
-from surveillance_runtime.parameters import parameter
-from surveillance_runtime.place import (
-    Place,
-    PlaceError,
-    Position,
-    description_of,
-    edited_place,
-    problem_in_name,
-)
 
 MOST_REPLACED = 10
 """Servers in a row that may lose the ontology while the map is entered, before that is an error."""

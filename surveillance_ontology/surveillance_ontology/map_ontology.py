@@ -14,6 +14,7 @@ from dataclasses import replace
 
 from armor_service.client import ArmorClient
 from armor_service.protocol import DirectiveRequest
+from floor_plans import Place
 from surveillance_ontology.patrol_directives import PatrolDirectives, names_in
 from surveillance_ontology.patrol_vocabulary import (
     DOOR,
@@ -24,7 +25,6 @@ from surveillance_ontology.patrol_vocabulary import (
     ROOM,
     VISITED_AT,
 )
-from surveillance_runtime.place import Place
 
 
 def shown_doors(place: Place) -> dict[str, tuple[str, ...]]:

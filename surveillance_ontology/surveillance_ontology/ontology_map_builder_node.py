@@ -20,6 +20,12 @@ from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.clock import Clock, ClockType
 from std_msgs.msg import String
 
+from floor_plans import Place, PlaceError, description_of
+from floor_plans.patrol_rules import patrol_rules
+from floor_plans.rooms import place_from
+from floor_plans.stations import AT_STATION, stations_in
+from floor_plans.zones import zones_from
+from strict_files.files import in_one_line, replace_text
 from surveillance_interfaces.msg import FactChanges, OntologyMap
 from surveillance_interfaces.srv import (
     AddRoom,
@@ -41,16 +47,11 @@ from surveillance_ontology.map_ontology import MapOntology
 from surveillance_ontology.patrol_vocabulary import ROBOT, checked_names
 from surveillance_ontology.robot_ontology import RobotOntology
 from surveillance_runtime.conversions import point_from, point_message
-from surveillance_runtime.files import in_one_line, replace_text
 from surveillance_runtime.namesakes import NamesakeWatch
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.parameters import ParameterError
-from surveillance_runtime.place import Place, PlaceError, described_place, description_of
-from surveillance_runtime.place.patrol_rules import patrol_rules
-from surveillance_runtime.place.rooms import place_from
-from surveillance_runtime.place.stations import AT_STATION, described_stations, stations_in
-from surveillance_runtime.place.zones import zones_from
 from surveillance_runtime.place_changes import TOPIC, described_in_text
+from surveillance_runtime.place_parameters import described_place, described_stations
 from surveillance_runtime.process import run_node
 from surveillance_runtime.state_topics import OwnedTopic, StateSubscription
 from surveillance_runtime.waiting import AwaitedEvent, AwaitedWork

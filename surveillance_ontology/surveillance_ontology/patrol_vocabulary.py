@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from surveillance_runtime.place import Place, PlaceError
+from floor_plans import Place, PlaceError
 
 LOCATION, ROOM, DOOR = 'LOCATION', 'ROOM', 'DOOR'
 """Classes: of all places, of rooms (corridors are rooms, too), of doors."""

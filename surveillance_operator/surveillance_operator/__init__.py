@@ -14,6 +14,5 @@ With ROS:
 from surveillance_operator.mission_changes import changes, follow
 from surveillance_operator.mission_state import MissionState, Notice, Status
 from surveillance_operator.page_state import PatchMaker
-from surveillance_runtime.place.occupancy_grid import Grid
 
 __all__ = ['Grid', 'MissionState', 'Notice', 'PatchMaker', 'Status', 'changes', 'follow']

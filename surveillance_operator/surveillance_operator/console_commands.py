@@ -11,6 +11,7 @@ from textwrap import wrap
 from typing import TYPE_CHECKING, Protocol
 
 from state_machines.exceptions import CallError, UnavailableError
+from strict_files.suggestions import nearest
 from surveillance_controllers.manual.commands import (
     BATTERY,
     EXIT,
@@ -27,7 +28,6 @@ from surveillance_controllers.manual.commands import (
 )
 from surveillance_runtime.configuration import declared, read_schema
 from surveillance_runtime.parameters import ParameterSpec, shown
-from surveillance_runtime.suggestions import nearest
 
 if TYPE_CHECKING:  # the launcher's prompt needs the words alone, without ROS
     from surveillance_operator.mission_actions import MissionActions

@@ -15,6 +15,7 @@ from typing import Any, TextIO
 
 from std_msgs.msg import String
 
+from strict_files.suggestions import nearest
 from surveillance_controllers.manual.prompt import Console
 from surveillance_operator.console_commands import (
     CONTROLLED,
@@ -36,7 +37,6 @@ from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.node_table import name_for
 from surveillance_runtime.process import run_node
 from surveillance_runtime.qos import STATE_QOS
-from surveillance_runtime.suggestions import nearest
 
 FEED_PERIOD = 0.5
 """Seconds between two looks at what the status line shows."""

@@ -15,11 +15,12 @@ from itertools import groupby
 from pathlib import Path
 from typing import Any
 
+from indoor_watch.day_book import DayBook, Seen
+from indoor_watch.events import Event, EventState
+from indoor_watch.privacy import PictureError, shareable
+from strict_files.files import FileError, read_file, replace_text
 from surveillance_operator.map_command import counted
-from surveillance_perception.observation.day_book import DayBook, Seen
-from surveillance_perception.observation.events import Event, EventState
-from surveillance_perception.observation.privacy import PictureError, shareable
-from surveillance_runtime.files import INCIDENTS, FileError, read_file, replace_text
+from surveillance_runtime.run_files import INCIDENTS
 
 OBSERVER, EVIDENCE = 'observer.json', 'evidence'
 MOST_BYTES = 200_000_000

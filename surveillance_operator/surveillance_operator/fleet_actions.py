@@ -10,9 +10,9 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 
 from state_machines.exceptions import CallError
+from strict_files.suggestions import nearest
 from surveillance_operator.mission_actions import MissionActions
 from surveillance_runtime.node import PatrolNode
-from surveillance_runtime.suggestions import nearest
 
 ALL = 'all'
 """Stands for every robot."""

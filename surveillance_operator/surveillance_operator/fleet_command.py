@@ -13,14 +13,15 @@ from collections.abc import Sequence
 
 import rclpy
 
+from floor_plans.fleet import problem_in_robot_name
+from strict_files.suggestions import nearest
 from surveillance_operator.fleet_actions import ALL, WORDS, FleetActions
 from surveillance_operator.fleet_subscriber import FleetSubscriber
 from surveillance_operator.fleet_table import fleet_lines
 from surveillance_operator.watch_command import mission_parser, ros_arguments
 from surveillance_runtime.node import PatrolNode
-from surveillance_runtime.place.fleet import problem_in_robot_name
+from surveillance_runtime.node_table import BY_NAME
 from surveillance_runtime.process import ExecutorThread
-from surveillance_runtime.suggestions import nearest
 
 LISTEN = 3.0
 """How long robots are listened for, seconds."""
@@ -43,7 +44,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     options = parser.parse_args(argv)
     if options.word is not None and options.word not in WORDS:
         parser.error(f'{options.word!r}: expected {nearest(options.word, WORDS)}')
-    if options.robot != ALL and (problem := problem_in_robot_name(options.robot)):
+    if options.robot != ALL and (problem := problem_in_robot_name(options.robot, BY_NAME)):
         parser.error(f'robot {options.robot[:80]!r}: {problem}')
     rclpy.init(args=ros_arguments(parser, options))
     node, spinner = PatrolNode('fleet_view'), ExecutorThread()

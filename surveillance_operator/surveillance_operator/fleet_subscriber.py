@@ -12,12 +12,13 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable, Sequence
 
+from floor_plans.fleet import problem_in_robot_name
 from surveillance_operator.mission_state import MissionState, Notice
 from surveillance_operator.mission_subscriber import MissionSubscriber
 from surveillance_operator.node_graph_watch import LOOK_PERIOD
 from surveillance_runtime.fleet_messages import FLEET_TOPIC
 from surveillance_runtime.node import PatrolNode
-from surveillance_runtime.place.fleet import problem_in_robot_name
+from surveillance_runtime.node_table import BY_NAME
 from surveillance_runtime.place_changes import TOPIC as PLACE_TOPIC
 
 OnChange = Callable[[str, MissionState, Sequence[Notice]], None]
@@ -114,7 +115,7 @@ class FleetSubscriber:
             for each in ends
             if each.node_namespace.startswith(own) and each.node_namespace != own
         }
-        return {name for name in below if not problem_in_robot_name(name)}
+        return {name for name in below if not problem_in_robot_name(name, BY_NAME)}
 
     def _follow(self, name: str) -> None:
         def on_change(new: MissionState, told: Sequence[Notice]) -> None:

@@ -12,11 +12,11 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
+from floor_plans.rooms import problem_in_name
 from patrol_policy.graph import GraphError
 from patrol_policy.patrolling_sim import read_patrolling_sim
+from strict_files.files import FileError, read_file
 from surveillance_operator.rmf_building import level_of
-from surveillance_runtime.files import FileError, read_file
-from surveillance_runtime.place.rooms import problem_in_name
 
 MOST_BYTES = 20_000_000
 SUFFIXES = ('.graph', '.geojson', '.json')

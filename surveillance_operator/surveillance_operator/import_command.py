@@ -7,9 +7,9 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from floor_plans.regions import ROBOT_RADIUS
 from surveillance_operator.place_import import ImportRequest, import_place
 from surveillance_runtime.command_line import EXIT_BAD_INPUT, CommandParser
-from surveillance_runtime.robot_base import ROBOT_RADIUS
 
 
 def _parse(argv: Sequence[str] | None) -> argparse.Namespace:

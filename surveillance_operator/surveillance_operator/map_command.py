@@ -10,22 +10,23 @@ from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 
+from floor_plans import Place, PlaceError, PlaceFile, read_place_file
+from floor_plans.drawing import Run, draw_place
+from floor_plans.filter_masks import write_filter_masks
+from floor_plans.floor_plan import FloorPlan
 from patrol_policy.battery import Battery, ChargeCurve, Draw
 from patrol_policy.decision import LONGEST_THRESHOLD, DecisionSettings
 from patrol_policy.graph import PatrolGraph
 from patrol_policy.promises import Promise, promises
 from patrol_policy.promises import lines as promise_lines
 from patrol_policy.world import World
+from strict_files.files import FileError
 from surveillance_behaviour.mission import mission_log
 from surveillance_ontology.patrol_vocabulary import checked_names
 from surveillance_runtime import event_log
 from surveillance_runtime.command_line import EXIT_BAD_INPUT, CommandParser
 from surveillance_runtime.event_log import record_in
-from surveillance_runtime.files import FileError
-from surveillance_runtime.place import Place, PlaceError, PlaceFile, read_place_file
-from surveillance_runtime.place.drawing import Run, draw_place
-from surveillance_runtime.place.filter_masks import write_filter_masks
-from surveillance_runtime.place.floor_plan import FloorPlan
+from surveillance_runtime.node_table import BY_NAME
 from surveillance_simulation.world.textures import marker_panel
 
 Spot = tuple[float, float]
@@ -249,7 +250,7 @@ def _positive(text: str) -> float:
 
 
 def _draw(options: argparse.Namespace) -> list[str]:
-    file = read_place_file(options.place)
+    file = read_place_file(options.place, reserved=BY_NAME)
     plan = file.plan
     try:
         checked_names(plan.place)

@@ -17,8 +17,10 @@ from rclpy.parameter import Parameter, parameter_value_to_python
 from std_srvs.srv import SetBool, Trigger
 
 from armor_service.facts import parse_fact
+from floor_plans import problem_in_name
 from state_machines.exceptions import CallError, CallInterruptedError
 from state_machines.ros import ServiceCaller, UnavailableError
+from strict_files.suggestions import nearest
 from surveillance_interfaces.srv import (
     AddRoom,
     ConsoleCommand,
@@ -47,9 +49,7 @@ from surveillance_runtime.configuration import argument_value, declared
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.node_table import SHARED, name_for
 from surveillance_runtime.parameters import shown
-from surveillance_runtime.place import problem_in_name
 from surveillance_runtime.place_changes import description_text
-from surveillance_runtime.suggestions import nearest
 
 _DISCOVERY = 2.0
 """Seconds in which a node that has just started finds the services that there are."""

@@ -19,8 +19,14 @@ from typing import Any
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import Image as ImageMessage
 
+from floor_plans.editor import PlaceEditor
+from floor_plans.writing import copy_place
+from lidar_navigation.robot_base import robot_radius
 from state_machines.exceptions import CallError
-from state_machines.files import read_file
+from strict_files.files import FileError
+from strict_files.regular_files import read_file
+from strict_files.settings import parameter
+from strict_files.suggestions import nearest
 from surveillance_ontology.patrol_vocabulary import checked_names
 from surveillance_operator.fleet_actions import WORDS, FleetActions
 from surveillance_operator.fleet_subscriber import FleetSubscriber
@@ -33,16 +39,10 @@ from surveillance_operator.place_page.edit_session import EditSession
 from surveillance_operator.polled_subscription import PolledSubscription
 from surveillance_operator.sightings import Sightings
 from surveillance_runtime import parameter_checks
-from surveillance_runtime.files import FileError
 from surveillance_runtime.launch_protocol import NotNowError
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.node_table import name_for
-from surveillance_runtime.parameters import parameter
-from surveillance_runtime.place.writing import copy_place
-from surveillance_runtime.place_editor import PlaceEditor
 from surveillance_runtime.process import run_node
-from surveillance_runtime.robot_base import robot_radius
-from surveillance_runtime.suggestions import nearest
 
 POLL_PERIOD = 0.015
 """Least seconds between two looks at the topics while somebody looks at the page."""

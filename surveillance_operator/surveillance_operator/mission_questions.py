@@ -13,6 +13,10 @@ from rcl_interfaces.srv import GetParameters, ListParameters
 from rclpy.parameter import parameter_value_to_python
 
 from armor_service.facts import ShortFact
+from floor_plans.floor_plan import Door
+from floor_plans.rooms import ZONE_TABLES, PlaceError, nested
+from floor_plans.stations import stations_in
+from floor_plans.zones import Zone, zones_from
 from state_machines.ros import CallError, ServiceCaller
 from surveillance_interfaces.srv import ReferenceName, RoomPosition
 from surveillance_ontology.armor_client import ArmorClient, FactSubscription
@@ -27,10 +31,6 @@ from surveillance_operator.topics import (
 )
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.node_table import name_for
-from surveillance_runtime.place.floor_plan import Door
-from surveillance_runtime.place.rooms import ZONE_TABLES, PlaceError, nested
-from surveillance_runtime.place.stations import stations_in
-from surveillance_runtime.place.zones import Zone, zones_from
 from surveillance_runtime.place_changes import follow_place
 
 TIMEOUT = 2.0

@@ -22,6 +22,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.serialization import serialize_message
 from sensor_msgs.msg import CompressedImage, Image
 
+from strict_files.files import in_one_line
 from surveillance_operator.images import COMPRESSED, KINDS, SUFFIX, jpeg_from
 from surveillance_operator.mission_subscriber import MissionSubscriber
 from surveillance_operator.polled_subscription import PolledSubscription
@@ -33,10 +34,10 @@ from surveillance_operator.recording.bag import (
 )
 from surveillance_operator.recording.schemas import definition, message_class
 from surveillance_operator.recording.timeline import TimelineWriter
-from surveillance_runtime.files import RECORDING, TIMELINE, in_one_line
 from surveillance_runtime.launch_protocol import NotNowError
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.process import run_node
+from surveillance_runtime.run_files import RECORDING, TIMELINE
 
 DRAIN_PERIOD, SEAL_PERIOD, FEED_PERIOD = 0.15, 0.6, 0.4
 """Seconds between two looks at all queues, two chunks, and two lines of the time line."""

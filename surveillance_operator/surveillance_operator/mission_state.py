@@ -14,11 +14,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from floor_plans.floor_plan import Segment
+from floor_plans.occupancy_grid import Grid
+from floor_plans.zones import Zone
 from patrol_policy.promises import Promise
 from patrol_policy.world import Decision
-from surveillance_runtime.place.floor_plan import Segment
-from surveillance_runtime.place.occupancy_grid import Grid
-from surveillance_runtime.place.zones import Zone
 
 NO_POINTS: NDArray[np.float64] = np.empty((0, 2))
 TRAIL_STEP = 0.1

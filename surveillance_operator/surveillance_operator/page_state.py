@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
+from floor_plans.occupancy_grid import Grid
 from patrol_policy.policies import POLICIES
 from patrol_policy.promises import lines as promise_lines
 from surveillance_operator.figures import figures_line, shown_figures
@@ -30,7 +31,6 @@ from surveillance_operator.mission_state import (
 )
 from surveillance_operator.mission_words import doing, shares, troubles
 from surveillance_operator.room_outlines import room_outlines
-from surveillance_runtime.place.occupancy_grid import Grid
 
 Parts = dict[str, Any]
 

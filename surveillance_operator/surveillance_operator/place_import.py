@@ -14,23 +14,18 @@ import numpy as np
 import yaml
 from PIL import Image
 
+from floor_plans import problem_in_name, read_place_file
+from floor_plans.drawing import draw_place
+from floor_plans.map_rooms import Proposal, propose
+from floor_plans.occupancy_grid import distance_to
+from floor_plans.occupancy_map import OccupancyMap, is_picture, read_map, write_map
+from floor_plans.regions import ROBOT_RADIUS
+from floor_plans.writing import format_place
+from strict_files.files import FileError, in_one_line, read_file, replace_text
+from strict_files.yaml_file import read_yaml_file
 from surveillance_operator.graph_import import SUFFIXES, read_graph
 from surveillance_operator.map_command import counted, facts
 from surveillance_operator.rmf_building import RmfLevel, is_rmf_building, read_rmf_building
-from surveillance_runtime.files import FileError, in_one_line, read_file, replace_text
-from surveillance_runtime.map_rooms import Proposal, propose
-from surveillance_runtime.place import problem_in_name, read_place_file
-from surveillance_runtime.place.drawing import draw_place
-from surveillance_runtime.place.occupancy_grid import distance_to
-from surveillance_runtime.place.occupancy_map import (
-    OccupancyMap,
-    is_picture,
-    read_map,
-    write_map,
-)
-from surveillance_runtime.place.writing import format_place
-from surveillance_runtime.robot_base import ROBOT_RADIUS
-from surveillance_runtime.yaml_file import read_yaml_file
 
 MOST_BYTES = 20_000_000
 """Of a YAML file; a picture may be larger."""

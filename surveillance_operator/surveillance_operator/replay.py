@@ -17,13 +17,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from strict_files.files import FileError
+from strict_files.suggestions import nearest
 from surveillance_operator.page.broadcaster import Broadcaster
 from surveillance_operator.page.server import Action, Page
 from surveillance_operator.recording.runs import Recording, find_recordings, run_parser
 from surveillance_operator.recording.timeline import MARKS, Timeline
 from surveillance_runtime.command_line import EXIT_BAD_INPUT, page_address
-from surveillance_runtime.files import TIMELINE, FileError
-from surveillance_runtime.suggestions import nearest
+from surveillance_runtime.run_files import TIMELINE
 
 if TYPE_CHECKING:
     from surveillance_operator.recording.stored import RecordedSights

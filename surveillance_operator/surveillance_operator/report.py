@@ -15,7 +15,11 @@ from html import escape
 from itertools import groupby, pairwise
 from pathlib import Path
 
+from floor_plans import read_place_file
+from floor_plans.drawing import Run, draw_place
+from floor_plans.floor_plan import FloorPlan
 from patrol_policy.promises import lines as promise_lines
+from strict_files.files import FileError, replace_text
 from surveillance_behaviour.mission import mission_log
 from surveillance_operator.map_command import counted, facts, graph_over_doors, in_words, run_of
 from surveillance_operator.recording import bag
@@ -23,10 +27,7 @@ from surveillance_operator.recording.runs import find_run, robots_of, run_parser
 from surveillance_operator.run_entries import RunEntries, entries_of_run, incidents_of
 from surveillance_runtime.command_line import EXIT_BAD_INPUT
 from surveillance_runtime.event_log import KINDS, RECORD, RecordEntry, Section, record_in
-from surveillance_runtime.files import PLACE, RECORDING, FileError, replace_text
-from surveillance_runtime.place import read_place_file
-from surveillance_runtime.place.drawing import Run, draw_place
-from surveillance_runtime.place.floor_plan import FloorPlan
+from surveillance_runtime.run_files import PLACE, RECORDING
 
 NAME, PICTURE = 'report.html', 'report.png'
 MOST_LINES = 2000

@@ -19,10 +19,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from surveillance_runtime.files import FileError
-from surveillance_runtime.place.occupancy_grid import FREE, OCCUPIED, UNKNOWN
-from surveillance_runtime.place.occupancy_map import MOST_CELLS, OccupancyMap
-from surveillance_runtime.suggestions import nearest
+from floor_plans.occupancy_grid import FREE, OCCUPIED, UNKNOWN
+from floor_plans.occupancy_map import MOST_CELLS, OccupancyMap
+from strict_files.files import FileError
+from strict_files.suggestions import nearest
 
 RESOLUTION = 0.05
 WALL_THICKNESS = 0.1

@@ -13,15 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from surveillance_runtime.place.floor_plan import Segment
-from surveillance_runtime.place.occupancy_grid import (
-    FREE,
-    OCCUPIED,
-    Box,
-    Grid,
-    distance_to,
-    drawn_lines,
-)
+from floor_plans.floor_plan import Segment
+from floor_plans.occupancy_grid import FREE, OCCUPIED, Box, Grid, distance_to, drawn_lines
 
 MOST_CELLS = 200_000
 """Of a larger map several cells are taken together."""

@@ -10,7 +10,7 @@ from typing import Any
 
 from std_msgs.msg import String
 
-from state_machines.files import parse_json
+from strict_files.regular_files import parse_json
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.node_table import name_for
 from surveillance_runtime.state_topics import StateSubscription
@@ -104,7 +104,7 @@ def _shown(path: Path, *, blur: bool) -> bytes:
     if not blur:
         return path.read_bytes()
     # It takes its time, and a page on this machine needs none of it.
-    from surveillance_perception.observation.privacy import PictureError, shareable
+    from indoor_watch.privacy import PictureError, shareable
 
     try:
         return shareable(path)

@@ -13,8 +13,9 @@ from typing import Any
 from rclpy.action import ActionClient
 from trajectory_msgs.msg import JointTrajectory
 
+from strict_files.settings import parameter
 from surveillance_runtime.node import PatrolNode
-from surveillance_runtime.parameters import ParameterError, parameter
+from surveillance_runtime.parameters import ParameterError
 from surveillance_runtime.profile.record import ARM_TYPES
 
 

@@ -16,6 +16,7 @@ from std_msgs.msg import Bool, Header
 
 from marker_detection.fusion import MOST_MARKERS, FusedPositions
 from state_machines.ros import GoalAbortedError, GoalRun, GoalServer, work_aside
+from strict_files.settings import converted, parameter
 from surveillance_interfaces.action import ScanSurroundings
 from surveillance_interfaces.msg import MarkerDetectionArray
 from surveillance_interfaces.srv import MarkerRoutine, PointCamera
@@ -35,7 +36,6 @@ from surveillance_perception.conversions import (
 )
 from surveillance_runtime.conversions import seconds_of
 from surveillance_runtime.node import PatrolNode
-from surveillance_runtime.parameters import converted, parameter
 from surveillance_runtime.process import run_node
 from surveillance_runtime.qos import SENSOR_QOS
 from surveillance_runtime.robot_arm import ARM, REST_PATIENCE, Arm, Array

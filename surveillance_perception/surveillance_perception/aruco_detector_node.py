@@ -16,6 +16,7 @@ from std_msgs.msg import Bool, Int32
 from marker_detection.annotation import annotated
 from marker_detection.camera_model import CameraModel
 from marker_detection.marker_stream import MarkerStream, StreamSettings
+from strict_files.settings import parameter
 from surveillance_interfaces.msg import MarkerDetectionArray
 from surveillance_perception.conversions import (
     camera_from_ros,
@@ -28,7 +29,6 @@ from surveillance_perception.conversions import (
 from surveillance_perception.stream.image_subscription import IMAGES_QOS, ImageSubscription, Latest
 from surveillance_runtime.conversions import seconds_of
 from surveillance_runtime.node import PatrolNode
-from surveillance_runtime.parameters import parameter
 from surveillance_runtime.process import run_node
 from surveillance_runtime.qos import SENSOR_QOS
 from surveillance_runtime.stamp_offset import StampOffset

@@ -22,6 +22,7 @@ from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 from std_msgs.msg import Header
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
+from indoor_watch.hung_markers import SeenMarker
 from marker_detection.camera_model import DISTORTION_MODELS, Array, CameraModel
 from marker_detection.fusion import FusedPosition, FusedPositions, is_measured
 from marker_detection.pose import MarkerPose
@@ -32,7 +33,6 @@ from surveillance_interfaces.srv import RoomInformation
 from surveillance_perception.arm.scan import ScanOutcome, ScanPlan, View
 from surveillance_perception.arm.trajectory import ArmTrajectory
 from surveillance_perception.marker_registry import MarkedPlace
-from surveillance_perception.observation.hung_markers import SeenMarker
 from surveillance_perception.stream.encodings import image_of_pixels, printable
 from surveillance_perception.stream.image_files import ImageArray, decode_image
 from surveillance_runtime.conversions import PlanarPose, pose_from

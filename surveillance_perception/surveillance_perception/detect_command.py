@@ -10,10 +10,10 @@ import cv2
 
 from marker_detection.annotation import annotated
 from marker_detection.detector import DetectorSettings, MarkerDetector
-from state_machines.files import replace_file
+from strict_files.files import in_one_line
+from strict_files.regular_files import replace_file
 from surveillance_perception.stream.image_files import read_image
 from surveillance_runtime.command_line import CommandParser
-from surveillance_runtime.files import in_one_line
 
 
 def main(argv: Sequence[str] | None = None) -> int:

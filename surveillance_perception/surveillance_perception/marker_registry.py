@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from surveillance_runtime.place import problem_in_name
-from surveillance_runtime.yaml_file import KeyPath, YamlFile, read_yaml_file
+from floor_plans import problem_in_name
+from strict_files.yaml_file import KeyPath, YamlFile, read_yaml_file
 
 _KEYS = ('room', 'x', 'y', 'connections', 'hangs_at')
 _EXPECTED = "expected 'room', 'x', 'y' and 'connections' (and 'hangs_at', where that is known)"

@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
+from strict_files.files import FileError
 from surveillance_interfaces.msg import MarkerDetectionArray
 from surveillance_interfaces.srv import RoomInformation
 from surveillance_perception.conversions import fused_from_ros, marked_place_to_ros
 from surveillance_perception.marker_registry import MarkedPlace, read_registry
-from surveillance_runtime.files import FileError
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.parameters import ParameterError
 from surveillance_runtime.process import run_node

@@ -12,12 +12,13 @@ from std_msgs.msg import Header
 
 from marker_detection.camera_model import CameraModel
 from state_machines.ros import ClockWait
+from strict_files.settings import parameter
 from surveillance_perception.conversions import camera_to_ros, image_to_ros
 from surveillance_perception.stream.image_files import ImageArray, ImageError
 from surveillance_perception.stream.image_subscription import IMAGES_QOS
 from surveillance_perception.stream.video import FrameSource, open_source
 from surveillance_runtime.node import PatrolNode
-from surveillance_runtime.parameters import ParameterError, parameter
+from surveillance_runtime.parameters import ParameterError
 from surveillance_runtime.process import run_node
 
 

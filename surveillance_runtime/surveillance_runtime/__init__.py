@@ -1,19 +1,17 @@
-"""What all packages share: the base of nodes, parameters, the description of a place.
+"""What all packages share: the base of nodes, parameters, the sensors.
 
 What others may use, by module:
 
 - `node`: `PatrolNode`, the base class with checked parameters and threads that end with it.
   `process`: `run_node`, `run_nodes`, `ExecutorThread`.
 - `health`: `Health`, what a node says of itself on `/diagnostics`.
-- `parameters`: `parameter`, `parameters` and `converted`, the fields of a record that a node
-  declares; `ParameterError`. `configuration`: files, place and arguments merged and checked,
-  without ROS.
-- `files`: `FileError`, the error of all files; `LineFile`, `KeptFile` and `replace_text`, which
-  leave no half; `in_one_line`, what users read of an `OSError`.
+- `parameters`: what a parameter takes, `ParameterError`; the fields of a record that a node
+  declares are those of `strict_files.settings`. `place_parameters`: the place, as a node is told
+  of it. `configuration`: files, place and arguments merged and checked, without ROS.
+- `sensing`: streams of sensors, their ages, transforms.
 - `waiting`: `AwaitedWork` and `AwaitedEvent` for callbacks. `state_file`: `StateFile`, what
   outlives a killed process.
-- `place`: `Place`, `FloorPlan`, `read_place_file`, without ROS.
-- `qos`, `conversions`, `logging`, `yaml_file`, `robot_arm`, `settled_frames`, `image_effects`,
+- `qos`, `conversions`, `logging`, `robot_arm`, `settled_frames`, `image_effects`,
   `testing`.
 
 The modules are imported by themselves, so that a program without ROS can use those that need none.

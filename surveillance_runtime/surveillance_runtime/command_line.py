@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from typing import NoReturn
 from urllib.parse import urlsplit
 
-from surveillance_runtime.suggestions import nearest
+from strict_files.suggestions import nearest
 
 EXIT_BAD_INPUT = 2
 

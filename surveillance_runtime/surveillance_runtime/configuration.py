@@ -24,21 +24,15 @@ from typing import Any
 
 import yaml
 
-from surveillance_runtime.files import FileError
+from floor_plans import Place, PlaceError, checked_plan
+from floor_plans.description import map_file_beside
+from floor_plans.regions import ROBOT_RADIUS
+from floor_plans.rooms import GEOMETRY_KEYS, PATROL_KEYS, PLACE_KEYS, tables_of
+from strict_files.files import FileError
+from strict_files.suggestions import nearest
+from strict_files.yaml_file import UNREADABLE, RosLoader, YamlFile, parameters_of, read_yaml_file
 from surveillance_runtime.node_table import LOG_LEVELS
 from surveillance_runtime.parameters import Check, ParameterError, ParameterSpec
-from surveillance_runtime.place import Place, PlaceError, checked_plan
-from surveillance_runtime.place.description import map_file_beside
-from surveillance_runtime.place.rooms import GEOMETRY_KEYS, PATROL_KEYS, PLACE_KEYS, tables_of
-from surveillance_runtime.robot_base import ROBOT_RADIUS
-from surveillance_runtime.suggestions import nearest
-from surveillance_runtime.yaml_file import (
-    UNREADABLE,
-    RosLoader,
-    YamlFile,
-    parameters_of,
-    read_yaml_file,
-)
 
 SCHEMA = Path(__file__).with_name('parameter_schema.json')
 _PLACE = frozenset((*PLACE_KEYS, *GEOMETRY_KEYS, *PATROL_KEYS))

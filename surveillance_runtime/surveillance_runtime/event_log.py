@@ -47,9 +47,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import NamedTuple
 
-from state_machines import files
-from state_machines.files import parse_json
-from surveillance_runtime.files import FileError, read_file
+from strict_files import regular_files as files
+from strict_files.files import FileError, read_file
+from strict_files.regular_files import parse_json
 
 
 @dataclass(frozen=True)

@@ -11,10 +11,10 @@ from std_msgs.msg import Header
 from state_machines.container import Container
 from state_machines.exceptions import InvalidStateError
 from state_machines.export import to_mermaid
-from state_machines.files import parse_json
 from state_machines.structure import Structure
 from state_machines.transitions import Transition, presentable
 from state_machines.userdata import UserData, raw
+from strict_files.regular_files import parse_json
 from surveillance_interfaces.msg import (
     FsmContainer,
     FsmEdge,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from surveillance_runtime.suggestions import nearest
+from strict_files.suggestions import nearest
 
 MODES = ('SIMULATED', 'ROBOT', 'RANDOM', 'MANUAL')
 DEFAULT_MODE = 'SIMULATED'
@@ -63,7 +63,6 @@ _PURPOSES = {
         'motion_controller': 'follows a path with the base',
         'collision_monitor': 'lets no command through to the base that the lidar does not allow',
         'explorer': 'drives through an unknown building and maps it',
-        'observer': 'notices doors, things, markers and views that are not as they are to be',
     },
     'surveillance_operator': {
         CONSOLE: 'one prompt for a mission: answers, doors, rooms, why, go',
@@ -79,6 +78,7 @@ _PURPOSES = {
         'aruco_detector': 'finds ArUco markers in the camera picture',
         'marker_server': 'tells what place a marker stands for',
         'arm_controller': 'moves the arm that carries the camera',
+        'observer': 'notices doors, things, markers and views that are not as they are to be',
         'video_source': 'a webcam, a video or pictures as the camera topic',
     },
 }

@@ -22,7 +22,7 @@ from __future__ import annotations
 import math
 from array import array
 from collections.abc import Callable, Container, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 if TYPE_CHECKING:
@@ -178,43 +178,6 @@ def shown(value: Any) -> str:
     if isinstance(value, Sequence | array) and not isinstance(value, bytes):
         return '[' + ', '.join(shown(element) for element in value) + ']'
     return str(value)
-
-
-def parameter(
-    default: T,
-    description: str,
-    minimum: float | None = None,
-    maximum: float | None = None,
-    **more: Any,
-) -> T:
-    """Return the field of a record that is a parameter, too; a tuple is declared as a list.
-
-    Args:
-        default: The default.
-        description: One sentence with the unit.
-        minimum: Least value.
-        maximum: Greatest value.
-        **more: Other attributes of `ParameterSpec`; `name` where the parameter's is not the
-            field's behind the prefix.
-    """
-    spec = {'description': description, 'minimum': minimum, 'maximum': maximum, **more}
-    declared: T = field(default=default, metadata={'parameter': {'default': default, **spec}})
-    return declared
-
-
-def converted(make: Callable[[Any], T], default: Any, description: str, **more: Any) -> T:
-    """Return as `parameter` a field whose value is made from the parameter's."""
-    spec = {'default': default, 'description': description, **more}
-    declared: T = field(
-        default_factory=lambda: make(default), metadata={'parameter': spec, 'make': make}
-    )
-    return declared
-
-
-def parameters(record: Callable[[], T], prefix: str = '') -> T:
-    """Return the field of a record that is a record itself, with fields that are parameters."""
-    declared: T = field(default_factory=record, metadata={'parameters': prefix})
-    return declared
 
 
 def specs_of(

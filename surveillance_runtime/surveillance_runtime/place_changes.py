@@ -13,7 +13,7 @@ from typing import Any
 
 from std_msgs.msg import String
 
-from state_machines.files import parse_json
+from strict_files.regular_files import parse_json
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.state_topics import StateSubscription
 

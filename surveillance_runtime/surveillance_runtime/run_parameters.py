@@ -13,6 +13,7 @@ import re
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
+from floor_plans import Place
 from surveillance_runtime.command_line import page_address
 from surveillance_runtime.configuration import (
     Configuration,
@@ -21,10 +22,9 @@ from surveillance_runtime.configuration import (
     file_layer,
     resolved_text,
 )
-from surveillance_runtime.files import PLACE
 from surveillance_runtime.node_table import NODES, Node
-from surveillance_runtime.place import Place
 from surveillance_runtime.profile import ProfileFile, profile_layer
+from surveillance_runtime.run_files import PLACE
 from surveillance_runtime.run_options import MUJOCO
 
 BEHAVIOUR_NODE = 'robot_behavior'

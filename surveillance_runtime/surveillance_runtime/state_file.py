@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 
 from state_machines import Interrupt
-from surveillance_runtime.files import KeptFile
+from strict_files.files import KeptFile
 from surveillance_runtime.node import PatrolNode
 
 WRITE_PERIOD = 0.2

@@ -11,11 +11,8 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from surveillance_runtime import node_table
-from surveillance_runtime.configuration import Entry
-from surveillance_runtime.node_table import MARKERS, RECORDER, Node
-from surveillance_runtime.place import read_place_file
-from surveillance_runtime.place.fleet import (
+from floor_plans import read_place_file
+from floor_plans.fleet import (
     FleetMember,
     points_to_pass,
     robots_in_a_row,
@@ -23,8 +20,11 @@ from surveillance_runtime.place.fleet import (
     wide_ways,
     with_points,
 )
+from strict_files.suggestions import nearest
+from surveillance_runtime import node_table
+from surveillance_runtime.configuration import Entry
+from surveillance_runtime.node_table import MARKERS, RECORDER, Node
 from surveillance_runtime.run_parameters import OBSERVER, full_name
-from surveillance_runtime.suggestions import nearest
 
 POINTS = 'room_positions'
 """The table of a place's file with the points of its places."""
@@ -104,7 +104,7 @@ def members(path: Path, robots: int | None, reach: float) -> tuple[FleetMember, 
     Raises:
         ValueError: The place has another number of robots, or no room for so many.
     """
-    place = read_place_file(path, radius=reach)
+    place = read_place_file(path, radius=reach, reserved=node_table.BY_NAME)
     if robots is None or len(place.robots) == robots:
         return place.robots
     if place.robots:
@@ -133,7 +133,7 @@ def team_parts(
     names = [SHARED, *(member.name for member in fleet)]
     for word in (*choice.only, *choice.without):
         _check_word(word, names)
-    place = read_place_file(path, radius=reach)
+    place = read_place_file(path, radius=reach, reserved=node_table.BY_NAME)
     moved = points_to_pass(place.plan, reach)
     plan = with_points(place.plan, moved)
     shared_by_all: list[tuple[str, object]] = [

@@ -22,7 +22,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from surveillance_runtime.parameters import parameter
+from strict_files.settings import parameter
 
 PLANNING = ('compute_path', 'motion/planner')
 """Actions that take no simulated time: it stands still while one of their goals is executed."""

@@ -14,6 +14,8 @@ from nav_msgs.msg import Odometry
 from sensor_msgs.msg import CameraInfo, Image, JointState, LaserScan
 from std_msgs.msg import Header
 
+from floor_plans.floor_plan import Marker
+from floor_plans.rooms import Pose as PlanePose
 from marker_detection.rotations import quaternion_of
 from surveillance_interfaces.msg import DoorStates
 from surveillance_interfaces.srv import SetMarker
@@ -22,8 +24,6 @@ from surveillance_runtime.conversions import (
     pose_estimate,
     pose_message,
 )
-from surveillance_runtime.place.floor_plan import Marker
-from surveillance_runtime.place.rooms import Pose as PlanePose
 from surveillance_runtime.profile.description import FixedFrame
 from surveillance_simulation.camera.model import Camera, Picture
 from surveillance_simulation.robot.lidar import LidarModel

@@ -24,18 +24,18 @@ from rclpy.clock import ClockType
 from std_msgs.msg import Bool
 from trajectory_msgs.msg import JointTrajectory
 
+from floor_plans import PlaceError
+from floor_plans.fleet import members_of
+from floor_plans.rooms import PLACE_TABLES, Pose, nested
+from strict_files.files import FileError, LineFile
 from surveillance_interfaces.msg import MarkerDetectionArray, RobotPlace
 from surveillance_runtime.conversions import (
     seconds_of,
     stamp_of_serialized,
     trajectory_from,
 )
-from surveillance_runtime.files import FileError, LineFile
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.parameters import ParameterError
-from surveillance_runtime.place import PlaceError
-from surveillance_runtime.place.fleet import members_of
-from surveillance_runtime.place.rooms import PLACE_TABLES, Pose, nested
 from surveillance_runtime.process import run_node
 from surveillance_runtime.profile.parameters import CommandSettings
 from surveillance_runtime.qos import STATE_QOS

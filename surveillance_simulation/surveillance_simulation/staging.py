@@ -30,10 +30,10 @@ from datetime import datetime, timedelta
 from pathlib import Path
 from typing import Any
 
-from surveillance_runtime.place import PlaceError
-from surveillance_runtime.place.floor_plan import Marker
-from surveillance_runtime.suggestions import nearest
-from surveillance_runtime.yaml_file import EntryError, read_table
+from floor_plans import PlaceError
+from floor_plans.floor_plan import Marker
+from strict_files.suggestions import nearest
+from strict_files.yaml_file import EntryError, read_table
 from surveillance_simulation.robot.robot import Robot
 from surveillance_simulation.world.figures import person
 from surveillance_simulation.world.textures import marker_panel

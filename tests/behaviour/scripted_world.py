@@ -11,6 +11,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
+from floor_plans.stations import AT_STATION
 from patrol_policy.decision import NowhereToGoError
 from patrol_policy.world import Decision
 from state_machines import Interrupt
@@ -22,7 +23,6 @@ from surveillance_behaviour.mission.mission_log import MissionRecord
 from surveillance_behaviour.ports import Point, Ports, UnknownPlaceError
 from surveillance_behaviour.world_model import WorldModel
 from surveillance_ontology.robot_ontology import Snapshot
-from surveillance_runtime.place.stations import AT_STATION
 from tests.seven_rooms import SEVEN_ROOMS
 
 POSITIONS = {

@@ -10,6 +10,7 @@ from types import MappingProxyType
 
 import pytest
 
+from floor_plans.stations import Station
 from patrol_policy.decision import SHARE, URGENT, WAIT, DecisionSettings, Rules
 from patrol_policy.fleet import FleetRobot, FleetSettings, Intention, Layout, Share
 from patrol_policy.world import Decision
@@ -18,7 +19,6 @@ from state_machines.exceptions import CallError, UnavailableError
 from surveillance_behaviour.fleet import FleetFacts, FleetKnowledge
 from surveillance_behaviour.ros_adapters.fleet_topic import facts_of, message_of, without_future
 from surveillance_behaviour.world_model import WorldModel
-from surveillance_runtime.place.stations import Station
 
 from .scripted_world import POSITIONS, World
 

@@ -16,6 +16,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from strict_files.files import FileError
 from surveillance_behaviour.mission.mission_log import (
     CutOff,
     MissionRecord,
@@ -25,7 +26,6 @@ from surveillance_behaviour.mission.mission_log import (
 )
 from surveillance_runtime import event_log
 from surveillance_runtime.event_log import Clocks, on_one_clock, read, read_all
-from surveillance_runtime.files import FileError
 
 
 @pytest.fixture

@@ -13,13 +13,13 @@ from typing import Any
 
 import pytest
 
+from floor_plans.patrol_rules import PatrolRules
 from patrol_policy.decision import REQUEST, DecisionSettings, NowhereToGoError
 from state_machines import Interrupt
 from surveillance_behaviour.experience import Experience
 from surveillance_behaviour.mission.mission_log import MissionRecord
 from surveillance_behaviour.world_model import WorldModel
 from surveillance_ontology.robot_ontology import Snapshot
-from surveillance_runtime.place.patrol_rules import PatrolRules
 
 from .scripted_world import World
 

@@ -6,8 +6,8 @@ import math
 
 import pytest
 
+from floor_plans.stations import Station
 from surveillance_controllers.battery import Battery, BatteryInUse, BatteryParameters
-from surveillance_runtime.place.stations import Station
 from surveillance_runtime.robot_arm import TrajectoryPoint
 
 PARAMETERS = BatteryParameters(

@@ -11,13 +11,13 @@ from geometry_msgs.msg import PoseWithCovarianceStamped, Twist
 from sensor_msgs.msg import LaserScan
 from std_msgs.msg import String
 
+from lidar_navigation.driving.path_following import Velocity
 from surveillance_controllers import collision_monitor_node
 from surveillance_controllers.collision_monitor_node import (
     CollisionMonitor,
     MonitorSettings,
     allowed,
 )
-from surveillance_controllers.motion.path_following import Velocity
 from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
 
 ROBOT = MonitorSettings(radius=0.25, margin=0.05, deceleration=0.8)

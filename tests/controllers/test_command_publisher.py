@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 
+from lidar_navigation.driving.path_following import Velocity
 from surveillance_controllers.motion.command_publisher import (
     LEAD,
     REACTION,
@@ -16,7 +17,6 @@ from surveillance_controllers.motion.command_publisher import (
     CommandPublisher,
     SensorAge,
 )
-from surveillance_controllers.motion.path_following import Velocity
 
 DECELERATION = 2.5
 LOOK_PERIOD = 0.01

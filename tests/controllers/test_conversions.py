@@ -14,10 +14,10 @@ from nav_msgs.msg import OccupancyGrid
 from sensor_msgs.msg import BatteryState, LaserScan, PointCloud2, PointField
 from std_msgs.msg import Header
 
+from lidar_navigation.driving.path_following import Velocity
+from lidar_navigation.geometry import Mount
 from surveillance_controllers import conversions
 from surveillance_controllers.battery import Battery, BatteryParameters
-from surveillance_controllers.geometry import Mount
-from surveillance_controllers.motion.path_following import Velocity
 from surveillance_runtime.conversions import (
     cloud_from_points,
     point_message,
@@ -28,6 +28,7 @@ from surveillance_runtime.conversions import (
     pose_message,
     values_from_cloud,
 )
+from surveillance_runtime.sensing.conversions import LONGEST_RANGE, matrix_from, scan_from
 
 NUMBER = st.floats(-1e4, 1e4)
 YAW = st.floats(-3.1, 3.1)
@@ -116,7 +117,7 @@ def test_unsound_maps_are_refused() -> None:
 def test_a_scan_tells_what_was_met_what_was_not_and_what_is_not_known() -> None:
     message = LaserScan(angle_min=-1.0, angle_increment=0.5, range_min=0.125, range_max=8.0)
     message.ranges = [0.5, math.inf, 8.5, math.nan, 0.0, -math.inf]
-    scan = conversions.scan_from(message)
+    scan = scan_from(message)
     assert scan.angles == pytest.approx([-1, -0.5, 0, 0.5, 1, 1.5])
     np.testing.assert_array_equal(scan.ranges, [0.5, math.inf, math.inf, math.nan, math.nan, 0.001])
     near, nearer = (0.5 * math.cos(-1), 0.5 * math.sin(-1)), (0.0, 0.001)
@@ -127,7 +128,7 @@ def test_a_scan_tells_what_was_met_what_was_not_and_what_is_not_known() -> None:
 def test_a_lidar_that_sees_its_own_robot_tells_nothing_of_it(near: float) -> None:
     message = LaserScan(angle_increment=math.pi / 2, range_min=0.125, range_max=8.0)
     message.ranges = [near] * 4
-    scan = conversions.scan_from(message, Mount((0.15, 0.0, 0.0)), radius=0.2)
+    scan = scan_from(message, Mount((0.15, 0.0, 0.0)), radius=0.2)
     assert scan.points == pytest.approx(np.array([[0.2 if near < 0 else 0.21, 0.0]]))
     assert np.isnan(scan.ranges[1:]).all(), 'beside and behind it there is the robot'
 
@@ -137,22 +138,22 @@ def test_a_lidar_that_is_covered_or_broken_is_refused(told: int) -> None:
     message = LaserScan(angle_increment=0.01, range_max=8.0)
     message.ranges = [math.inf] * told + [0.0, math.nan] * ((360 - told) // 2) + [0.0] * (told % 2)
     if told >= 18:
-        assert np.isinf(conversions.scan_from(message).ranges).sum() == told
+        assert np.isinf(scan_from(message).ranges).sum() == told
     else:
         with pytest.raises(ValueError, match='may be covered or broken'):
-            conversions.scan_from(message)
+            scan_from(message)
 
 
 def test_a_lidar_that_turns_clockwise_is_read_the_other_way_round() -> None:
     message = LaserScan(angle_min=1.0, angle_increment=-0.5, range_max=8.0, ranges=[1.0, 2.0, 3.0])
-    scan = conversions.scan_from(message)
+    scan = scan_from(message)
     assert scan.angles == pytest.approx([0.0, 0.5, 1.0])
     assert scan.ranges.tolist() == [3.0, 2.0, 1.0]
 
 
 def test_a_lidar_that_hangs_upside_down_is_read_the_other_way_round() -> None:
     message = LaserScan(angle_min=0.0, angle_increment=0.5, range_max=8.0, ranges=[1.0, 2.0, 3.0])
-    scan = conversions.scan_from(message, Mount((0.2, 0.0, 0.5), upside_down=True))
+    scan = scan_from(message, Mount((0.2, 0.0, 0.5), upside_down=True))
     assert scan.angles == pytest.approx([-1.0, -0.5, 0.0])
     assert scan.ranges.tolist() == [3.0, 2.0, 1.0]
     assert scan.points[1] == pytest.approx((2.2, 0.0))
@@ -205,12 +206,12 @@ def scan_message(**fields: object) -> LaserScan:
 )
 def test_a_scan_that_is_no_lidar_s_is_refused(fields: dict[str, object], text: str) -> None:
     with pytest.raises(ValueError, match=text):
-        conversions.scan_from(scan_message(**fields))
+        scan_from(scan_message(**fields))
 
 
 def test_a_reach_without_end_is_cut() -> None:
-    scan = conversions.scan_from(scan_message(range_max=math.inf))
-    assert scan.range_max == conversions.LONGEST_RANGE
+    scan = scan_from(scan_message(range_max=math.inf))
+    assert scan.range_max == LONGEST_RANGE
     assert len(scan.points) == 20
 
 
@@ -235,11 +236,11 @@ def test_a_map_too_large_or_without_size_is_refused() -> None:
 
 def test_a_transform_is_a_matrix_and_an_unsound_one_is_refused() -> None:
     turned = Transform(translation=Vector3(x=0.2, y=-0.1), rotation=Quaternion(z=2.0, w=2.0))
-    matrix = conversions.matrix_from(turned)
+    matrix = matrix_from(turned)
     assert matrix @ (1.0, 0.0, 0.0, 1.0) == pytest.approx((0.2, 0.9, 0.0, 1.0))
     for unsound in (Quaternion(w=0.0), Quaternion(w=math.inf)):
         with pytest.raises(ValueError, match='a transform that is none'):
-            conversions.matrix_from(Transform(rotation=unsound))
+            matrix_from(Transform(rotation=unsound))
 
 
 @pytest.mark.parametrize('size', [0.0, 0.5, 3.0, 1e200])

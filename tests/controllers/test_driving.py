@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from surveillance_controllers.geometry import composed
-from surveillance_controllers.motion.driving import Drive, RecoveryParameters, Spin, State
-from surveillance_controllers.motion.path_following import DriveParameters, Velocity
-from surveillance_controllers.motion.tracking import Mover
+from lidar_navigation.driving.driving import Drive, RecoveryParameters, Spin, State
+from lidar_navigation.driving.path_following import DriveParameters, Velocity
+from lidar_navigation.geometry import composed
+from lidar_navigation.localisation.tracking import Mover
 
 NOTHING = np.zeros((0, 2))
 PERIOD = 0.1

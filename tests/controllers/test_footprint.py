@@ -10,26 +10,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from floor_plans import plan_grid
+from floor_plans.occupancy_grid import Grid
+from lidar_navigation.driving.driving import Drive, State
+from lidar_navigation.driving.navigator import Navigator
+from lidar_navigation.driving.path_following import DriveParameters, Velocity, room_ahead, safe_turn
+from lidar_navigation.driving.sampled_planning import SampledPlanner, is_safe
+from lidar_navigation.footprint import Footprint
+from lidar_navigation.geometry import Scan
+from lidar_navigation.localisation.tracking import Mover
+from lidar_navigation.planning.grid_planning import GridPlanner, NoPathError, PlanningParameters
 from surveillance_controllers.collision_monitor_node import MonitorSettings, allowed
-from surveillance_controllers.footprint import Footprint
-from surveillance_controllers.geometry import Scan
-from surveillance_controllers.motion.driving import Drive, State
-from surveillance_controllers.motion.navigator import Navigator
-from surveillance_controllers.motion.path_following import (
-    DriveParameters,
-    Velocity,
-    room_ahead,
-    safe_turn,
-)
-from surveillance_controllers.motion.sampled_planning import SampledPlanner, is_safe
-from surveillance_controllers.motion.tracking import Mover
-from surveillance_controllers.planning.grid_planning import (
-    GridPlanner,
-    NoPathError,
-    PlanningParameters,
-)
-from surveillance_runtime.place import plan_grid
-from surveillance_runtime.place.occupancy_grid import Grid
 
 LONG = (0.5, 0.2, -0.3, 0.2, -0.3, -0.2, 0.5, -0.2)
 """0.8 m long, 0.4 m wide; its wheels are 0.3 m before its rear."""

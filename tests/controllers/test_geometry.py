@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from surveillance_controllers import geometry
+from lidar_navigation import geometry
 
 PATHS = st.lists(st.tuples(*[st.floats(-50, 50)] * 3), min_size=1, max_size=12)
 

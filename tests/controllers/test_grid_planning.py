@@ -12,16 +12,16 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from skimage.graph import MCP_Geometric
 
-from surveillance_controllers import geometry
-from surveillance_controllers.planning.grid_planning import (
+from floor_plans.occupancy_grid import Grid, distance_to, drawn_lines, with_walls
+from floor_plans.zones import zones_from
+from lidar_navigation import geometry
+from lidar_navigation.planning.grid_planning import (
     GridPlanner,
     NoPathError,
     PlanningParameters,
     _corners,
     _poses_along,
 )
-from surveillance_runtime.place.occupancy_grid import Grid, distance_to, drawn_lines, with_walls
-from surveillance_runtime.place.zones import zones_from
 
 RESOLUTION = 0.05
 ROBOT = PlanningParameters(radius=0.2)

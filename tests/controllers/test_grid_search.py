@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from skimage.graph import MCP_Geometric
 
-from surveillance_controllers.planning import grid_search
-from surveillance_controllers.planning.grid_search import GridSearch
+from lidar_navigation.planning import grid_search
+from lidar_navigation.planning.grid_search import GridSearch
 
 
 @pytest.fixture(autouse=True)

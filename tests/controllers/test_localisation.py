@@ -11,16 +11,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from scipy import ndimage
 
-from surveillance_controllers.geometry import (
-    Pose,
-    Scan,
-    angle_between,
-    composed,
-    in_map,
-    relative,
-)
-from surveillance_controllers.motion.localisation import Localiser
-from surveillance_runtime.place.occupancy_grid import Grid
+from floor_plans.occupancy_grid import Grid
+from lidar_navigation.geometry import Pose, Scan, angle_between, composed, in_map, relative
+from lidar_navigation.localisation.localisation import Localiser
 
 POSES = st.tuples(st.floats(-5, 5), st.floats(-5, 5), st.floats(-3, 3))
 

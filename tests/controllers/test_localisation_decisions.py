@@ -8,9 +8,9 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from surveillance_controllers.geometry import Points, Pose, Scan
-from surveillance_controllers.motion.localisation import Localiser, _apart, _overlap, _Rival
-from surveillance_runtime.place.occupancy_grid import Grid
+from floor_plans.occupancy_grid import Grid
+from lidar_navigation.geometry import Points, Pose, Scan
+from lidar_navigation.localisation.localisation import Localiser, _apart, _overlap, _Rival
 
 HERE = (5.0, 5.0, 0.0)
 CLOSE = (5.6, 5.0, 0.0)

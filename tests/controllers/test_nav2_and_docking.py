@@ -16,6 +16,7 @@ from builtin_interfaces.msg import Time
 from geometry_msgs.msg import PoseWithCovarianceStamped
 from nav_msgs.msg import OccupancyGrid
 
+from floor_plans.stations import Station
 from state_machines import Interrupt
 from state_machines.ros import CallInterruptedError, GoalCaller, GoalEnd, UnavailableError
 from surveillance_controllers.controller_parameters import MotionSettings
@@ -26,7 +27,6 @@ from surveillance_interfaces.action import FollowPath
 from surveillance_runtime.conversions import map_message, point_messages, pose_estimate
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.parameters import ParameterError
-from surveillance_runtime.place.stations import Station
 from surveillance_runtime.qos import STATE_QOS
 from surveillance_runtime.turning_path import turning_path
 from tests.nav2_definitions import ACTIONS, stand_in

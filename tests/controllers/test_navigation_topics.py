@@ -16,20 +16,20 @@ from geometry_msgs.msg import PoseWithCovarianceStamped, Quaternion, TransformSt
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import LaserScan
 
+from lidar_navigation.driving import driving
+from lidar_navigation.driving.driving import Drive, Spin
+from lidar_navigation.driving.navigator import Navigator
+from lidar_navigation.driving.path_following import Velocity
+from lidar_navigation.geometry import Mount, Scan, composed
+from lidar_navigation.localisation.localisation import Localiser
 from state_machines import Interrupt
 from surveillance_controllers.controller_parameters import MotionSettings
-from surveillance_controllers.geometry import Mount, Scan, composed
-from surveillance_controllers.motion import driving
 from surveillance_controllers.motion.arrival import MotionFailedError
-from surveillance_controllers.motion.driving import Drive, Spin
-from surveillance_controllers.motion.localisation import Localiser
 from surveillance_controllers.motion.navigation_motion import POSE, UNSURE_FOR, NavigationMotion
-from surveillance_controllers.motion.navigator import Navigator
-from surveillance_controllers.motion.path_following import Velocity
-from surveillance_controllers.motion.transforms import ScanReader
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.parameters import ParameterError
 from surveillance_runtime.qos import SENSOR_QOS
+from surveillance_runtime.sensing.transforms import ScanReader
 from surveillance_runtime.turning_path import turning_path
 
 

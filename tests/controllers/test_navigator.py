@@ -9,18 +9,18 @@ from typing import Any
 import numpy as np
 import pytest
 
-from surveillance_controllers.geometry import Scan, composed
-from surveillance_controllers.motion.driving import Drive, State
-from surveillance_controllers.motion.localisation import _Rival
-from surveillance_controllers.motion.navigator import Navigator
-from surveillance_controllers.motion.obstacle_memory import ObstacleMemory
-from surveillance_controllers.motion.path_following import Velocity
-from surveillance_controllers.motion.place_locator import PlaceRegions
+from floor_plans.floor_plan import Door
+from floor_plans.zones import zones_from
+from lidar_navigation.driving.driving import Drive, State
+from lidar_navigation.driving.navigator import Navigator
+from lidar_navigation.driving.obstacle_memory import ObstacleMemory
+from lidar_navigation.driving.path_following import Velocity
+from lidar_navigation.geometry import Scan, composed
+from lidar_navigation.localisation.localisation import _Rival
+from lidar_navigation.localisation.place_locator import PlaceRegions
+from lidar_navigation.planning.grid_planning import NoPathError
 from surveillance_controllers.planning.door_watch import DoorWatch
-from surveillance_controllers.planning.grid_planning import NoPathError
 from surveillance_controllers.planning.map_planner import route
-from surveillance_runtime.place.floor_plan import Door
-from surveillance_runtime.place.zones import zones_from
 
 PERIOD = 0.6
 """Of a slow lidar, seconds: who is out of sight for longer is not followed."""

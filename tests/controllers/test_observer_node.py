@@ -18,10 +18,10 @@ from rclpy.serialization import serialize_message
 from sensor_msgs.msg import CameraInfo, Image, JointState, LaserScan
 from std_msgs.msg import Bool, String
 
+from indoor_watch.hung_markers import HungSpot
+from indoor_watch.lost_sight import LostSight
 from state_machines import Interrupt
 from state_machines.ros import ServiceCaller
-from surveillance_controllers import observer_node
-from surveillance_controllers.observer_node import Observer
 from surveillance_interfaces.msg import (
     FleetRobot,
     MarkerDetection,
@@ -29,8 +29,8 @@ from surveillance_interfaces.msg import (
     RobotPlace,
 )
 from surveillance_interfaces.srv import ConsoleCommand
-from surveillance_perception.observation.hung_markers import HungSpot
-from surveillance_perception.observation.lost_sight import LostSight
+from surveillance_perception import observer_node
+from surveillance_perception.observer_node import Observer
 from surveillance_runtime.conversions import map_from
 from surveillance_runtime.incidents import Cause
 from surveillance_runtime.node import PatrolNode

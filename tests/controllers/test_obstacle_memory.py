@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from surveillance_controllers.geometry import Scan
-from surveillance_controllers.motion.obstacle_memory import ObstacleMemory
-from surveillance_runtime.place.occupancy_grid import Grid
+from floor_plans.occupancy_grid import Grid
+from lidar_navigation.driving.obstacle_memory import ObstacleMemory
+from lidar_navigation.geometry import Scan
 
 ANGLES = np.arange(-40.0, 41.0, dtype=np.float64) * 0.02
 """Rays ahead, 2 cm apart at 1 m."""

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from surveillance_controllers.geometry import Pose, Scan, composed, relative
-from surveillance_controllers.motion.localisation import Localiser
-from surveillance_controllers.motion.odometry import (
+from lidar_navigation.geometry import Pose, Scan, composed, relative
+from lidar_navigation.localisation.localisation import Localiser
+from lidar_navigation.localisation.odometry import (
     ContinuousOdometry,
     OdometryBuffer,
     is_jump,

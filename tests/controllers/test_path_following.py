@@ -10,10 +10,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from surveillance_controllers import geometry
-from surveillance_controllers.footprint import Footprint
-from surveillance_controllers.geometry import composed
-from surveillance_controllers.motion.path_following import (
+from lidar_navigation import geometry
+from lidar_navigation.driving.path_following import (
     DriveParameters,
     PathFollower,
     Velocity,
@@ -22,6 +20,8 @@ from surveillance_controllers.motion.path_following import (
     safe_turn,
     speed_to_stop,
 )
+from lidar_navigation.footprint import Footprint
+from lidar_navigation.geometry import composed
 
 NOTHING = np.zeros((0, 2))
 PERIOD = 0.1

@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from surveillance_controllers.motion.place_locator import PlaceLocator, PlaceRegions, _stretched
-from surveillance_runtime.place.occupancy_grid import Grid
+from floor_plans.occupancy_grid import Grid
+from lidar_navigation.localisation.place_locator import PlaceLocator, PlaceRegions, _stretched
 
 SIDE = 0.05
 DOORS = {'D1': (2.0, 0.5, 2.0, 1.5), 'D2': (4.0, 1.5, 4.0, 0.5)}

@@ -7,9 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from surveillance_controllers.geometry import composed, relative
-from surveillance_controllers.motion.path_following import DriveParameters, Velocity
-from surveillance_controllers.motion.sampled_planning import (
+from lidar_navigation.driving.path_following import DriveParameters, Velocity
+from lidar_navigation.driving.sampled_planning import (
     SampledPlanner,
     _standing,
     is_safe,
@@ -17,7 +16,8 @@ from surveillance_controllers.motion.sampled_planning import (
     price_of_way,
     rolled_out,
 )
-from surveillance_controllers.motion.tracking import Mover
+from lidar_navigation.geometry import composed, relative
+from lidar_navigation.localisation.tracking import Mover
 
 ROBOT = DriveParameters()
 NOTHING = np.zeros((0, 2))

@@ -9,13 +9,13 @@ from builtin_interfaces.msg import Time
 from geometry_msgs.msg import PoseWithCovarianceStamped, TransformStamped
 from sensor_msgs.msg import LaserScan
 
-from surveillance_controllers.geometry import Pose
-from surveillance_controllers.motion.navigator import Navigator
-from surveillance_controllers.motion.sensors import SensorStream
-from surveillance_controllers.motion.transforms import TELL_WITHIN, ScanReader
+from lidar_navigation.driving.navigator import Navigator
+from lidar_navigation.geometry import Pose
 from surveillance_runtime.conversions import seconds_of, stamp_from
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.qos import SENSOR_QOS
+from surveillance_runtime.sensing.sensors import SensorStream
+from surveillance_runtime.sensing.transforms import TELL_WITHIN, ScanReader
 from tests.controllers.test_navigation_topics import motion_of
 
 tf2 = pytest.importorskip('tf2_msgs.msg')

@@ -10,13 +10,13 @@ from builtin_interfaces.msg import Time
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import LaserScan
 
-from surveillance_controllers.motion.sensors import REPEATED, OdometryReader
-from surveillance_controllers.motion.silence import SILENT_AFTER, SensorWatch, SilenceWatch
-from surveillance_controllers.motion.transforms import ScanReader
 from surveillance_runtime.incidents import Incidents
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.profile.record import Frames
 from surveillance_runtime.qos import SENSOR_QOS
+from surveillance_runtime.sensing.sensors import REPEATED, OdometryReader
+from surveillance_runtime.sensing.silence import SILENT_AFTER, SensorWatch, SilenceWatch
+from surveillance_runtime.sensing.transforms import ScanReader
 
 
 def stream(topic: str) -> Any:

@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from surveillance_controllers.geometry import Points
-from surveillance_controllers.motion.tracking import Tracker
+from lidar_navigation.geometry import Points
+from lidar_navigation.localisation.tracking import Tracker
 
 ROBOT = (0.0, 0.0, 0.0)
 NOISE = np.random.default_rng(3)

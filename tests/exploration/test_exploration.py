@@ -9,17 +9,17 @@ import numpy as np
 import pytest
 
 from benchmarks import regular_places
-from surveillance_controllers.exploration.exploration import Exploration, Phase
-from surveillance_controllers.exploration.foreign_map import ForeignMap
-from surveillance_controllers.exploration.frontiers import (
+from floor_plans.occupancy_grid import Grid
+from lidar_navigation.exploration.exploration import Exploration, Phase
+from lidar_navigation.exploration.foreign_map import ForeignMap
+from lidar_navigation.exploration.frontiers import (
     FrontierParameters,
     find_frontiers,
     frontier_cells,
 )
-from surveillance_controllers.exploration.map_building import MapBuilder
-from surveillance_controllers.geometry import Scan
-from surveillance_controllers.planning.grid_planning import GridPlanner
-from surveillance_runtime.place.occupancy_grid import Grid
+from lidar_navigation.exploration.map_building import MapBuilder
+from lidar_navigation.geometry import Scan
+from lidar_navigation.planning.grid_planning import GridPlanner
 from surveillance_simulation.robot.robot import Robot
 from surveillance_simulation.world.world import World
 

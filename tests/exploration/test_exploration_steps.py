@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from surveillance_controllers.exploration.exploration import Exploration, Phase
-from surveillance_controllers.geometry import Pose, Scan, composed
-from surveillance_controllers.motion.driving import Drive, Spin, State
-from surveillance_controllers.motion.path_following import Velocity
-from surveillance_runtime.place.occupancy_grid import Grid
+from floor_plans.occupancy_grid import Grid
+from lidar_navigation.driving.driving import Drive, Spin, State
+from lidar_navigation.driving.path_following import Velocity
+from lidar_navigation.exploration.exploration import Exploration, Phase
+from lidar_navigation.geometry import Pose, Scan, composed
 
 AROUND = np.linspace(-math.pi, math.pi, 180)
 HOME = (1.0, 2.0, 0.0)

@@ -13,11 +13,11 @@ from nav_msgs.msg import OccupancyGrid, Odometry
 from sensor_msgs.msg import LaserScan
 
 from benchmarks import regular_places
-from surveillance_controllers.exploration.exploration import Phase
+from floor_plans.occupancy_grid import Grid
+from floor_plans.occupancy_map import read_map
+from lidar_navigation.exploration.exploration import Phase
 from surveillance_controllers.explorer_node import DONE_FILE, MAP_FILE, Explorer
 from surveillance_runtime.conversions import map_message, pose_estimate, pose_message
-from surveillance_runtime.place.occupancy_grid import Grid
-from surveillance_runtime.place.occupancy_map import read_map
 from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
 from surveillance_simulation.conversions import scan_to_ros
 from surveillance_simulation.robot.lidar import LidarModel, scan

@@ -10,17 +10,17 @@ import pytest
 from scipy.optimize import least_squares
 from skimage.graph import MCP_Geometric
 
-from surveillance_controllers.exploration.evidence_grid import HIT, PASSED, EvidenceGrid
-from surveillance_controllers.exploration.foreign_map import ForeignMap
-from surveillance_controllers.exploration.frontiers import (
+from floor_plans.occupancy_grid import Grid
+from lidar_navigation.exploration.evidence_grid import HIT, PASSED, EvidenceGrid
+from lidar_navigation.exploration.foreign_map import ForeignMap
+from lidar_navigation.exploration.frontiers import (
     FrontierParameters,
     find_frontiers,
     frontier_cells,
     travel_costs,
 )
-from surveillance_controllers.exploration.pose_graph import Edge, PoseGraph
-from surveillance_controllers.geometry import Pose, Scan, angle_between, composed, relative
-from surveillance_runtime.place.occupancy_grid import Grid
+from lidar_navigation.exploration.pose_graph import Edge, PoseGraph
+from lidar_navigation.geometry import Pose, Scan, angle_between, composed, relative
 
 SIDE = 0.1
 

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from surveillance_controllers.exploration.map_building import MapBuilder, MappingParameters
-from surveillance_controllers.geometry import Pose, Scan
-from surveillance_runtime.place.occupancy_grid import Grid
+from floor_plans.occupancy_grid import Grid
+from lidar_navigation.exploration.map_building import MapBuilder, MappingParameters
+from lidar_navigation.geometry import Pose, Scan
 
 ANGLES = (np.arange(180) + 0.5) * math.tau / 180 - math.pi
 HOME = (2.0, 1.5, 0.0)

@@ -9,11 +9,11 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from surveillance_controllers.exploration.evidence_grid import EvidenceGrid
-from surveillance_controllers.exploration.map_building import MapBuilder
-from surveillance_controllers.exploration.pose_graph import Edge, PoseGraph
-from surveillance_controllers.exploration.scan_matching import Matcher, surface_of
-from surveillance_controllers.geometry import Pose, Scan, composed, relative
+from lidar_navigation.exploration.evidence_grid import EvidenceGrid
+from lidar_navigation.exploration.map_building import MapBuilder
+from lidar_navigation.exploration.pose_graph import Edge, PoseGraph
+from lidar_navigation.exploration.scan_matching import Matcher, surface_of
+from lidar_navigation.geometry import Pose, Scan, composed, relative
 from surveillance_simulation.robot.lidar import LidarModel, scan
 from surveillance_simulation.world.world import World, read_world
 

@@ -7,14 +7,14 @@ import math
 import numpy as np
 import pytest
 
-from surveillance_controllers.exploration.scan_matching import (
+from lidar_navigation.exploration.scan_matching import (
     Matcher,
     MatchingParameters,
     Surface,
     joined,
     surface_of,
 )
-from surveillance_controllers.geometry import Pose, Scan, angle_between, composed, in_map
+from lidar_navigation.geometry import Pose, Scan, angle_between, composed, in_map
 
 ANGLES = (np.arange(240) + 0.5) * math.tau / 240 - math.pi
 

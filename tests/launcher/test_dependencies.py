@@ -113,7 +113,7 @@ def test_one_range_of_versions_serves_the_robot_and_all_libraries():
 
 def test_the_set_up_itself_needs_the_standard_library_alone(tmp_path):
     # A Python without any package, in a copy without those that need one.
-    for part in ('launcher', 'surveillance_runtime', 'libs/state_machines'):
+    for part in ('launcher', 'surveillance_runtime', 'libs/strict_files'):
         shutil.copytree(ROOT / part, tmp_path / part)
     modules = ('cli', 'run', 'environment', 'instance_lock', 'progress', 'system')
     program = ';'.join(f'import launcher.{module}' for module in modules)

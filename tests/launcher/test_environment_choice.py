@@ -166,7 +166,7 @@ def test_what_was_half_installed_is_taken_away(checkout: Path) -> None:
     environment._write_path_file()
     lines = (site / 'surveillance_checkout.pth').read_text().splitlines()
     assert lines == [str(checkout / folder) for folder in FOLDERS]
-    assert lines[0].endswith('libs/owl_reasoner')
+    assert lines[0].endswith('libs/strict_files')
     assert lines[-1].endswith('surveillance_operator')
 
 

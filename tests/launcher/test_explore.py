@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from floor_plans import read_place_file
+from floor_plans.occupancy_map import write_map
 from launcher.explore import EXIT_NOTHING_SEEN, close, options_of
 from surveillance_controllers.explorer_node import DONE_FILE, MAP_FILE
-from surveillance_runtime.place import read_place_file
-from surveillance_runtime.place.occupancy_map import write_map
 
 CONFIG = Path(__file__).parents[2] / 'config'
 

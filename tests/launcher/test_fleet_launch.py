@@ -9,12 +9,13 @@ from pathlib import Path
 
 import pytest
 
+from floor_plans import read_place_file
 from launcher.fleet_launch import parts
 from launcher.run import Run, make_parser, wanted_run
 from launcher.run_configuration import configuration, profile_of
 from launcher.run_mission import checked
-from surveillance_runtime.files import FileError
-from surveillance_runtime.place import read_place_file
+from strict_files.files import FileError
+from surveillance_runtime.node_table import BY_NAME
 
 CONFIG = Path(__file__).resolve().parents[2] / 'config'
 PLACE = CONFIG / 'seven_rooms.yaml'
@@ -128,7 +129,7 @@ def test_a_rule_about_a_place_that_is_not_there_is_refused_before_a_start(tmp_pa
 )
 def test_a_wrong_robot_costs_one_line(tmp_path, robots, problem):
     with pytest.raises(FileError, match=problem) as told:
-        read_place_file(place_with(tmp_path, robots))
+        read_place_file(place_with(tmp_path, robots), reserved=BY_NAME)
     assert '\n' not in str(told.value)
 
 

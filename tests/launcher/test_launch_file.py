@@ -18,8 +18,8 @@ import pytest
 from launcher.fleet_launch import parts
 from launcher.run import Run
 from launcher.run_configuration import configuration, profile_of
+from strict_files.files import FileError
 from surveillance_runtime.configuration import Configuration, file_layer
-from surveillance_runtime.files import FileError
 from surveillance_runtime.node_table import BEHAVIOURS, MODES, find, select
 from surveillance_runtime.parameters import ParameterError
 from surveillance_runtime.run_parameters import WATCHED_STAY

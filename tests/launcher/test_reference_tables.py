@@ -88,7 +88,7 @@ def test_the_helps_of_the_packages_commands_are_theirs():
 
 def test_every_help_is_said_soon_and_needs_no_set_up(tmp_path):
     # A copy without an environment, and without the packages that need one.
-    for part in ('launcher', 'surveillance_runtime', 'libs/state_machines'):
+    for part in ('launcher', 'surveillance_runtime', 'libs/strict_files'):
         shutil.copytree(ROOT / part, tmp_path / part)
     shutil.copyfile(ROOT / 'launch.py', tmp_path / 'launch.py')
     for command in ('', 'run', 'node', 'list', 'params', 'service', 'setup', 'test', 'lint', 'map'):

@@ -17,6 +17,9 @@ ROSDEP = {
     'networkx': 'python3-networkx',
     'opencv-python-headless': 'python3-opencv',
     'pyyaml': 'python3-yaml',
+    'pillow': 'python3-pil',
+    'ruamel-yaml': 'python3-ruamel.yaml',
+    'scikit-image': 'python3-skimage',
 }
 """Keys of rosdep; what it lacks is named in docs/dependencies.md with the line for pip."""
 

@@ -39,10 +39,10 @@ from surveillance_behaviour.mission.mission_log import MissionRecord
 from surveillance_runtime import discovery
 from surveillance_runtime.command_line import page_address
 from surveillance_runtime.event_log import record_in
-from surveillance_runtime.files import TIMELINE
 from surveillance_runtime.incidents import Call, Cause, Incident, Severity
 from surveillance_runtime.node_table import DEFAULT_MODE
 from surveillance_runtime.profile import read_profile
+from surveillance_runtime.run_files import TIMELINE
 from surveillance_runtime.run_parameters import place_file, run_layers, write_parameters
 
 

@@ -12,10 +12,10 @@ from pathlib import Path
 
 import pytest
 
+from floor_plans import read_place_file
+from floor_plans.occupancy_map import write_map
+from floor_plans.plan_grid import draw
 from launcher import cli
-from surveillance_runtime.place import read_place_file
-from surveillance_runtime.place.occupancy_map import write_map
-from surveillance_runtime.place.plan_grid import draw
 from tests.launcher.conftest import ROOT, USER_ENVIRON, Started
 from tests.operator.test_rmf_building import building, level
 

@@ -10,11 +10,11 @@ import numpy as np
 from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped
 from nav_msgs.msg import OccupancyGrid
 
+from floor_plans import plan_grid, read_place_file
+from lidar_navigation.geometry import equally_spaced
 from state_machines.ros import GoalAbortedError, GoalRun, GoalServer
-from surveillance_controllers.geometry import equally_spaced
 from surveillance_runtime.conversions import map_message, pose_estimate, pose_from, pose_message
 from surveillance_runtime.node import PatrolNode
-from surveillance_runtime.place import plan_grid, read_place_file
 from surveillance_runtime.qos import STATE_QOS
 
 SPEED = 0.5

@@ -11,8 +11,8 @@ import pytest
 import yaml
 
 from benchmarks import regular_places
-from surveillance_runtime.place import read_place_file
-from surveillance_runtime.place.writing import format_place
+from floor_plans import read_place_file
+from floor_plans.writing import format_place
 
 pytestmark = pytest.mark.long
 

@@ -11,9 +11,9 @@ from typing import Any
 import pytest
 import yaml
 
-from surveillance_controllers.motion.place_locator import PlaceRegions
+from floor_plans import plan_grid, read_place_file
+from lidar_navigation.localisation.place_locator import PlaceRegions
 from surveillance_interfaces.msg import RobotPlace
-from surveillance_runtime.place import plan_grid, read_place_file
 from surveillance_runtime.qos import STATE_QOS
 from tests import nav2_definitions
 

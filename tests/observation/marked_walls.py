@@ -8,7 +8,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from surveillance_perception.observation.hung_markers import CameraView, SeenMarker
+from indoor_watch.hung_markers import CameraView, SeenMarker
 
 SIDE = 24
 """Of a marker, pixels; 0.15 metres."""

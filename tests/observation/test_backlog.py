@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from surveillance_perception.observation.backlog import Backlog
+from indoor_watch.backlog import Backlog
 
 
 class Worker:

@@ -10,23 +10,18 @@ from typing import Any
 import numpy as np
 import pytest
 
-from surveillance_perception.observation.answers import answered
-from surveillance_perception.observation.day_book import DayBook, Seen
-from surveillance_perception.observation.events import EventBook, EventState
-from surveillance_perception.observation.habits import HARMONICS, WEEK, Habits, PeriodicState
-from surveillance_perception.observation.hung_markers import CameraView
-from surveillance_perception.observation.observations import Kind, Observation
-from surveillance_perception.observation.other_robots import OtherRobots
-from surveillance_perception.observation.person_places import place_of
-from surveillance_perception.observation.persons import Person
-from surveillance_perception.observation.watch_rules import (
-    DEFAULT_RULES,
-    Level,
-    rule_from,
-    severity_of,
-)
-from surveillance_perception.observation.ways import BlockedWay, Ways
-from surveillance_runtime.place.occupancy_grid import Grid
+from floor_plans.occupancy_grid import Grid
+from indoor_watch.answers import answered
+from indoor_watch.day_book import DayBook, Seen
+from indoor_watch.events import EventBook, EventState
+from indoor_watch.habits import HARMONICS, WEEK, Habits, PeriodicState
+from indoor_watch.hung_markers import CameraView
+from indoor_watch.observations import Kind, Observation
+from indoor_watch.other_robots import OtherRobots
+from indoor_watch.person_places import place_of
+from indoor_watch.persons import Person
+from indoor_watch.watch_rules import DEFAULT_RULES, Level, rule_from, severity_of
+from indoor_watch.ways import BlockedWay, Ways
 
 from .marked_walls import camera_pose
 
@@ -373,7 +368,7 @@ def test_a_day_counts_each_thing_in_each_state() -> None:
 
 
 def test_what_is_too_much_for_a_day_is_counted_together(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr('surveillance_perception.observation.day_book.MOST_LINES', 2)
+    monkeypatch.setattr('indoor_watch.day_book.MOST_LINES', 2)
     book = DayBook(lambda stamp: datetime.fromtimestamp(stamp, UTC))
     for subject in ('D1', 'D2', 'D3', 'D4', 'D1'):
         book.take(Observation(Kind.DOOR, 'open', 'R1', subject, stamp=5.0))

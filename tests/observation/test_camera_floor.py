@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from surveillance_perception.observation.camera_floor import CameraFloor
-from surveillance_perception.observation.hung_markers import CameraView
-from surveillance_runtime.place.occupancy_grid import Grid
+from floor_plans.occupancy_grid import Grid
+from indoor_watch.camera_floor import CameraFloor
+from indoor_watch.hung_markers import CameraView
 
 from .marked_walls import camera_pose
 

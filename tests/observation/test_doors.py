@@ -8,7 +8,7 @@ import math
 import numpy as np
 import pytest
 
-from surveillance_perception.observation.doors import DoorState, read_door
+from indoor_watch.doors import DoorState, read_door
 
 WALL = 0.0
 DOOR = (-0.45, WALL, 0.45, WALL)

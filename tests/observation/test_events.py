@@ -6,9 +6,9 @@ import json
 
 import pytest
 
-from surveillance_perception.observation.answers import answered
-from surveillance_perception.observation.events import Event, EventBook, EventState
-from surveillance_perception.observation.observations import Kind, Observation
+from indoor_watch.answers import answered
+from indoor_watch.events import Event, EventBook, EventState
+from indoor_watch.observations import Kind, Observation
 
 
 def seen(kind=Kind.OBJECT, state='appeared', **more) -> Observation:

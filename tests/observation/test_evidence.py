@@ -8,15 +8,8 @@ import cv2
 import numpy as np
 import pytest
 
-from surveillance_perception.observation.evidence import (
-    DAY,
-    EvidenceStore,
-    is_sweep,
-    oldest,
-    side_by_side,
-    sweep_picture,
-)
-from surveillance_runtime.place.occupancy_grid import Grid
+from floor_plans.occupancy_grid import Grid
+from indoor_watch.evidence import DAY, EvidenceStore, is_sweep, oldest, side_by_side, sweep_picture
 
 PLAIN = np.full((40, 60), 90, np.uint8)
 NOW = 1_700_000_000.25

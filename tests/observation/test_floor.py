@@ -9,8 +9,8 @@ import cv2
 import numpy as np
 import pytest
 
-from surveillance_perception.observation.floor import Change, FloorView, FloorVisit, changes
-from surveillance_runtime.place.occupancy_grid import Grid
+from floor_plans.occupancy_grid import Grid
+from indoor_watch.floor import Change, FloorView, FloorVisit, changes
 
 pytestmark = pytest.mark.early
 

@@ -7,9 +7,9 @@ from datetime import UTC, datetime, timedelta
 
 import numpy as np
 
-from surveillance_perception.observation.habits import Habits, PeriodicState
-from surveillance_perception.observation.observations import Kind, Observation
-from surveillance_perception.observation.watch_rules import rule_from
+from indoor_watch.habits import Habits, PeriodicState
+from indoor_watch.observations import Kind, Observation
+from indoor_watch.watch_rules import rule_from
 
 MONDAY = datetime(2026, 3, 2, tzinfo=UTC)
 

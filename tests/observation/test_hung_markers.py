@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 import pytest
 
-from surveillance_perception.observation.hung_markers import AGREED, MOST, HungMarkers, SeenMarker
+from indoor_watch.hung_markers import AGREED, MOST, HungMarkers, SeenMarker
 
 from .marked_walls import METRE, aside, bare, camera, hang, seen_at, wall
 

@@ -4,15 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from surveillance_perception.observation.lost_sight import (
-    DROPPED,
-    FEWEST,
-    NO_POSE,
-    NONE_CAME,
-    SILENT,
-    WINDOW,
-    LostSight,
-)
+from indoor_watch.lost_sight import DROPPED, FEWEST, NO_POSE, NONE_CAME, SILENT, WINDOW, LostSight
 
 
 class Clock:

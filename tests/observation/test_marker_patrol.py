@@ -16,6 +16,16 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
+from floor_plans.floor_plan import Marker
+from floor_plans.plan_grid import draw
+from indoor_watch.events import Event, EventBook
+from indoor_watch.hung_markers import CameraView, SeenMarker
+from indoor_watch.marker_checks import MarkerChecks
+from indoor_watch.observations import Kind
+from indoor_watch.viewpoints import Viewpoints
+from indoor_watch.watch_rules import rule_from
+from indoor_watch.watcher import Watcher
+from lidar_navigation.localisation.place_locator import PlaceRegions
 from marker_detection.camera_model import CameraModel
 from marker_detection.detector import DetectorSettings, MarkerDetector
 from marker_detection.pose import pose_of
@@ -23,16 +33,6 @@ from state_machines import Interrupt
 from surveillance_behaviour.mission.looking import RoomLook
 from surveillance_behaviour.mission.mission_log import Looked
 from surveillance_behaviour.ports import Check, Doubt, Point
-from surveillance_controllers.motion.place_locator import PlaceRegions
-from surveillance_perception.observation.events import Event, EventBook
-from surveillance_perception.observation.hung_markers import CameraView, SeenMarker
-from surveillance_perception.observation.marker_checks import MarkerChecks
-from surveillance_perception.observation.observations import Kind
-from surveillance_perception.observation.viewpoints import Viewpoints
-from surveillance_perception.observation.watch_rules import rule_from
-from surveillance_perception.observation.watcher import Watcher
-from surveillance_runtime.place.floor_plan import Marker
-from surveillance_runtime.place.plan_grid import draw
 from surveillance_simulation.camera.model import Camera, Conditions, expose
 from surveillance_simulation.camera.rendering import Renderer
 from surveillance_simulation.robot.robot import Robot

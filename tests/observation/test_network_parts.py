@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from surveillance_perception.observation import ssd_network as ssd
+from indoor_watch import ssd_network as ssd
 
 
 def test_anchors_are_those_of_tensorflows_configuration() -> None:

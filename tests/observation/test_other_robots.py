@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from surveillance_perception.observation.observations import Kind
+from indoor_watch.observations import Kind
 
 from .test_watcher import HERE, Round, beams, texture
 

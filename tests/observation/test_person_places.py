@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from surveillance_perception.observation.person_places import place_of
-from surveillance_perception.observation.persons import Person
+from indoor_watch.person_places import place_of
+from indoor_watch.persons import Person
 
 from .marked_walls import camera
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import skimage
 
-from surveillance_perception.observation.persons import PersonFinder, load_finder
+from indoor_watch.persons import PersonFinder, load_finder
 from surveillance_simulation.camera.model import Camera, Conditions, expose
 from surveillance_simulation.camera.mujoco_rendering import MujocoRenderer
 from surveillance_simulation.camera.rendering import Renderer

@@ -9,16 +9,11 @@ import cv2
 import numpy as np
 import pytest
 
-from surveillance_perception.observation import doors, views
-from surveillance_perception.observation.doors import DoorState, read_door
-from surveillance_perception.observation.floor import (
-    Change,
-    FloorView,
-    FloorVisit,
-    changes,
-    is_leaf,
-)
-from surveillance_perception.observation.hung_markers import (
+from floor_plans.occupancy_grid import Grid
+from indoor_watch import doors, views
+from indoor_watch.doors import DoorState, read_door
+from indoor_watch.floor import Change, FloorView, FloorVisit, changes, is_leaf
+from indoor_watch.hung_markers import (
     CameraView,
     HungMarkers,
     SeenMarker,
@@ -28,11 +23,10 @@ from surveillance_perception.observation.hung_markers import (
     _is_seen_alike,
     _laid,
 )
-from surveillance_perception.observation.motion import WalkFinder, _steadiness, _things, _walk
-from surveillance_perception.observation.privacy import MARGIN, _inside
-from surveillance_perception.observation.reference_views import SAME_VIEW, _overlap, same_view
-from surveillance_perception.observation.views import Sight
-from surveillance_runtime.place.occupancy_grid import Grid
+from indoor_watch.motion import WalkFinder, _steadiness, _things, _walk
+from indoor_watch.privacy import MARGIN, _inside
+from indoor_watch.reference_views import SAME_VIEW, _overlap, same_view
+from indoor_watch.views import Sight
 
 from .marked_walls import camera, hang, seen_at, wall
 

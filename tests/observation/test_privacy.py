@@ -9,12 +9,8 @@ import numpy as np
 import pytest
 from skimage import data
 
-from surveillance_perception.observation.evidence import DAY, EvidenceStore, is_sweep
-from surveillance_perception.observation.privacy import (
-    PictureError,
-    blurred,
-    shareable,
-)
+from indoor_watch.evidence import DAY, EvidenceStore, is_sweep
+from indoor_watch.privacy import PictureError, blurred, shareable
 
 
 def detail(picture: np.ndarray) -> float:
@@ -79,7 +75,7 @@ def test_pictures_are_deleted_after_their_time(tmp_path: Path) -> None:
 def test_events_are_described_beside_their_pictures_in_bounded_number(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr('surveillance_perception.observation.evidence.MOST_DESCRIBED', 2)
+    monkeypatch.setattr('indoor_watch.evidence.MOST_DESCRIBED', 2)
     store = EvidenceStore(tmp_path)
     for number in range(1, 5):
         store.describe(number, '{}')

@@ -12,14 +12,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from surveillance_controllers.motion.place_locator import PlaceRegions
-from surveillance_perception.observation.hung_markers import HungSpot
-from surveillance_perception.observation.marker_checks import MarkerChecks
-from surveillance_perception.observation.viewpoints import ENOUGH, Viewpoints
-from surveillance_perception.observation.watch_rules import rule_from
-from surveillance_runtime.place.description import read_place_file
-from surveillance_runtime.place.occupancy_grid import Grid
-from surveillance_runtime.place.plan_grid import draw
+from floor_plans.description import read_place_file
+from floor_plans.occupancy_grid import Grid
+from floor_plans.plan_grid import draw
+from indoor_watch.hung_markers import HungSpot
+from indoor_watch.marker_checks import MarkerChecks
+from indoor_watch.viewpoints import ENOUGH, Viewpoints
+from indoor_watch.watch_rules import rule_from
+from lidar_navigation.localisation.place_locator import PlaceRegions
 
 CONFIG = Path(__file__).parents[2] / 'config'
 

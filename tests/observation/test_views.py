@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import skimage
 
-from surveillance_perception.observation.views import Sight, light_of, sight_of, view_changes
+from indoor_watch.views import Sight, light_of, sight_of, view_changes
 
 pytestmark = pytest.mark.early
 

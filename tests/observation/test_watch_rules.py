@@ -8,14 +8,9 @@ from textwrap import indent
 import pytest
 import yaml
 
-from surveillance_perception.observation.observations import Kind, Observation
-from surveillance_perception.observation.watch_rules import (
-    Level,
-    read_watch_file,
-    rule_from,
-    severity_of,
-)
-from surveillance_runtime.files import FileError
+from indoor_watch.observations import Kind, Observation
+from indoor_watch.watch_rules import Level, read_watch_file, rule_from, severity_of
+from strict_files.files import FileError
 
 TEXT = """
 - door: D1

@@ -14,18 +14,18 @@ import numpy as np
 import pytest
 import yaml
 
-from surveillance_perception.observation.events import EventBook, EventState
-from surveillance_perception.observation.evidence import EvidenceStore
-from surveillance_perception.observation.hung_markers import CameraView
-from surveillance_perception.observation.motion import WalkFinder
-from surveillance_perception.observation.observations import Kind, Observation
-from surveillance_perception.observation.other_robots import OtherRobots
-from surveillance_perception.observation.persons import Person
-from surveillance_perception.observation.reference_views import ReferenceViews
-from surveillance_perception.observation.watch_rules import rule_from
-from surveillance_perception.observation.watcher import Look, Watcher
-from surveillance_perception.observation.ways import Ways
-from surveillance_runtime.place.occupancy_grid import Grid
+from floor_plans.occupancy_grid import Grid
+from indoor_watch.events import EventBook, EventState
+from indoor_watch.evidence import EvidenceStore
+from indoor_watch.hung_markers import CameraView
+from indoor_watch.motion import WalkFinder
+from indoor_watch.observations import Kind, Observation
+from indoor_watch.other_robots import OtherRobots
+from indoor_watch.persons import Person
+from indoor_watch.reference_views import ReferenceViews
+from indoor_watch.watch_rules import rule_from
+from indoor_watch.watcher import Look, Watcher
+from indoor_watch.ways import Ways
 
 from .marked_walls import camera, camera_pose, hang, seen_at, wall
 

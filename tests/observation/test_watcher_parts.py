@@ -12,10 +12,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from surveillance_perception.observation.events import EventBook
-from surveillance_perception.observation.floor import FloorView
-from surveillance_perception.observation.observations import Kind, Observation
-from surveillance_perception.observation.watcher import (
+from floor_plans.occupancy_grid import Grid
+from indoor_watch.events import EventBook
+from indoor_watch.floor import FloorView
+from indoor_watch.observations import Kind, Observation
+from indoor_watch.watcher import (
     MOST_CELLS,
     Look,
     Watcher,
@@ -25,7 +26,6 @@ from surveillance_perception.observation.watcher import (
     _unpacked,
     same_map,
 )
-from surveillance_runtime.place.occupancy_grid import Grid
 
 from .marked_walls import camera
 

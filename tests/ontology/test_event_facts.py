@@ -11,12 +11,12 @@ import pytest
 from armor_service.client import ArmorClient, ArmorServiceInternalError, InProcessTransport
 from armor_service.protocol import DirectiveRequest, ListResponse
 from armor_service.service import ArmorService
+from floor_plans import read_place_file
 from libs.armor_service.tests.seven_rooms import IRI
 from surveillance_ontology.event_facts import MOST_EVENTS, EventFact, EventOntology, Sighting
 from surveillance_ontology.map_ontology import MapOntology
 from surveillance_ontology.patrol_vocabulary import ONTOLOGY
 from surveillance_ontology.robot_ontology import RobotOntology
-from surveillance_runtime.place import read_place_file
 
 PLACE = read_place_file(Path(__file__).parents[2] / 'config' / 'seven_rooms.yaml').place
 SEEN = Sighting(130, 0.98, (10.0, 14.5), '3_130_door-D3-closed.jpg')

@@ -19,11 +19,11 @@ from armor_service.client import (
 )
 from armor_service.protocol import DirectiveRequest
 from armor_service.service import ArmorService
+from floor_plans import Place, PlaceError, description_of, make_place
 from libs.armor_service.tests.seven_rooms import IRI, ONTOLOGY, SEVEN_ROOMS
 from surveillance_ontology.map_keeper import MapKeeper, Reports, RoomNote, Source, extended
 from surveillance_ontology.map_ontology import MapOntology, closed_doors, shown_doors
 from surveillance_ontology.robot_ontology import RobotOntology
-from surveillance_runtime.place import Place, PlaceError, description_of, make_place
 
 ROOMS = [*SEVEN_ROOMS, 'N1', 'N2']
 DOORS = [*sorted({door for doors in SEVEN_ROOMS.values() for door in doors}), 'X1', 'X2']

@@ -16,6 +16,7 @@ from armor_service.client import (
 )
 from armor_service.protocol import DirectiveRequest, DirectiveResponse, ListResponse
 from armor_service.service import ArmorService
+from floor_plans import Place, PlaceError, read_place_file
 from libs.armor_service.tests.seven_rooms import IRI, ONTOLOGY
 from surveillance_ontology import patrol_directives
 from surveillance_ontology.map_keeper import MapKeeper, Reports, RoomNote, Source
@@ -27,7 +28,6 @@ from surveillance_ontology.patrol_vocabulary import (
     never_visited,
 )
 from surveillance_ontology.robot_ontology import RobotOntology
-from surveillance_runtime.place import Place, PlaceError, read_place_file
 
 SEVEN = read_place_file(Path(__file__).parents[2] / 'config' / 'seven_rooms.yaml').place
 

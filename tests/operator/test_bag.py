@@ -27,7 +27,7 @@ from surveillance_operator.recording.bag import (
     segments,
 )
 from surveillance_operator.recording.schemas import definition, message_class
-from surveillance_runtime.files import RECORDING
+from surveillance_runtime.run_files import RECORDING
 from tests.operator.conftest import Disk
 
 TYPE = 'std_msgs/msg/String'

@@ -9,14 +9,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from indoor_watch import day_book
+from indoor_watch.day_book import DayBook
+from indoor_watch.events import EventBook, EventState
+from indoor_watch.evidence import EvidenceStore
+from indoor_watch.observations import Kind, Observation
+from strict_files.files import FileError
 from surveillance_operator.day_report import write_day
 from surveillance_operator.report import main
-from surveillance_perception.observation import day_book
-from surveillance_perception.observation.day_book import DayBook
-from surveillance_perception.observation.events import EventBook, EventState
-from surveillance_perception.observation.evidence import EvidenceStore
-from surveillance_perception.observation.observations import Kind, Observation
-from surveillance_runtime.files import LAUNCH_LOG, TIMELINE, FileError
+from surveillance_runtime.run_files import LAUNCH_LOG, TIMELINE
 
 
 def at(day: int, hour: int) -> float:

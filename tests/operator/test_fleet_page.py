@@ -28,9 +28,11 @@ from rich.console import Console
 from std_msgs.msg import String, UInt8
 from std_srvs.srv import SetBool, Trigger
 
+from floor_plans.occupancy_grid import Grid
 from patrol_policy.world import Decision
 from state_machines import Interrupt
 from state_machines.exceptions import CallError
+from strict_files.files import FileError
 from surveillance_behaviour.mission.mission_log import MissionRecord
 from surveillance_interfaces.msg import DoorStates, FleetRobot, MissionStatus
 from surveillance_operator import fleet_command, fleet_subscriber, node_graph_watch
@@ -57,9 +59,7 @@ from surveillance_operator.recording.timeline import TimelineWriter
 from surveillance_operator.replay import open_player
 from surveillance_operator.report import draw_picture, write_report
 from surveillance_operator.watch.view import MissionView, show_once
-from surveillance_runtime.files import FileError
 from surveillance_runtime.node import PatrolNode
-from surveillance_runtime.place.occupancy_grid import Grid
 from surveillance_runtime.qos import STATE_QOS
 from surveillance_runtime.rviz_layout import fleet_layout
 from tests.launcher.conftest import ROOT

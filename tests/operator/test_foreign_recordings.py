@@ -25,6 +25,7 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from sensor_msgs.msg import CompressedImage, LaserScan
 from std_msgs.msg import UInt8
 
+from strict_files.files import FileError
 from surveillance_interfaces.msg import Decision, FactChange, FactChanges, MissionStatus
 from surveillance_interfaces.msg import Fact as FactMessage
 from surveillance_operator.mission_markers_node import markers_of
@@ -34,7 +35,6 @@ from surveillance_operator.recording.runs import find_recordings
 from surveillance_operator.recording.schemas import definition
 from surveillance_operator.recording.stored import Conversion, RecordedSights, prefix_of
 from surveillance_operator.recording.timeline import Timeline
-from surveillance_runtime.files import FileError
 
 START = 1_000_000.0
 SECONDS = 20

@@ -9,11 +9,11 @@ import cv2
 import numpy as np
 import pytest
 
+from floor_plans import read_place_file
+from floor_plans.occupancy_map import write_map
+from floor_plans.plan_grid import draw
+from floor_plans.regions import Regions
 from surveillance_operator.import_command import main
-from surveillance_runtime.place import read_place_file
-from surveillance_runtime.place.occupancy_map import write_map
-from surveillance_runtime.place.plan_grid import draw
-from surveillance_runtime.place.regions import Regions
 
 pytestmark = pytest.mark.early
 

@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from floor_plans.drawing import Canvas, blend, draw_place
 from surveillance_behaviour.mission.mission_log import MissionRecord
 from surveillance_operator import map_command
-from surveillance_runtime.place.drawing import Canvas, blend, draw_place
 from surveillance_simulation.world.world import read_world
 
 pytestmark = pytest.mark.early

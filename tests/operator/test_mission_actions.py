@@ -12,6 +12,7 @@ from rcl_interfaces.srv import SetParameters
 from rclpy.parameter import Parameter
 from std_srvs.srv import Trigger
 
+from floor_plans import make_place
 from patrol_policy.decision import DecisionSettings
 from state_machines.exceptions import CallError
 from surveillance_behaviour.reasoner_node import Reasoner
@@ -29,7 +30,6 @@ from surveillance_ontology.ontology_map_builder_node import OntologyMapBuilder
 from surveillance_operator.console_commands import answer
 from surveillance_operator.mission_actions import MissionActions
 from surveillance_runtime.node import PatrolNode
-from surveillance_runtime.place import make_place
 from surveillance_runtime.waiting import AwaitedEvent
 from tests.operator.prompt import Prompt
 

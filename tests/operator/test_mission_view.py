@@ -13,6 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from rich.console import Console
 
+from floor_plans.occupancy_grid import Grid
 from patrol_policy.world import Decision
 from state_machines import Interrupt
 from surveillance_operator.mission_changes import changes, follow
@@ -25,7 +26,6 @@ from surveillance_operator.mission_state import (
 from surveillance_operator.watch import raster, view
 from surveillance_operator.watch.raster import Viewport, rasterise
 from surveillance_operator.watch.view import MissionView, node_page, show_once
-from surveillance_runtime.place.occupancy_grid import Grid
 
 STATUS = Status(95.0, 'surveillance', 'MOVE_TO_NEXT_ROOM', 'A', 'B', False, 'arrived in A', ())
 DECISION = Decision(90.0, 'A', 'B', 'B', 'URGENT', 'tour', 'B waits longest', {})

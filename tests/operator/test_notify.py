@@ -20,13 +20,13 @@ import numpy as np
 import pytest
 
 from launcher.alarm import Alarm
+from strict_files.files import FileError
 from surveillance_operator.notify import sinks
 from surveillance_operator.notify.news import News, news_of
 from surveillance_operator.notify.outbox import DeliveryError, Outbox
 from surveillance_operator.notify.pipeline import notifier
 from surveillance_operator.notify.settings import read_notify_file, sink_from
 from surveillance_operator.notify.sinks import sink_of
-from surveillance_runtime.files import FileError
 from surveillance_runtime.incidents import Call, Cause, Incident, Severity
 from tests.operator.ports import await_listening, free_port
 

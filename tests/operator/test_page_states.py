@@ -9,6 +9,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from floor_plans.occupancy_grid import Grid
+from floor_plans.zones import Zone
 from patrol_policy.world import Decision
 from surveillance_operator.mission_state import (
     MachineContainer,
@@ -21,8 +23,6 @@ from surveillance_operator.mission_state import (
 )
 from surveillance_operator.page.broadcaster import Broadcaster
 from surveillance_operator.page.server import Page
-from surveillance_runtime.place.occupancy_grid import Grid
-from surveillance_runtime.place.zones import Zone
 from tests.operator.browser import CHROMIUM, DESK, DRIVER, MISSING, PHONE, Viewer
 
 pytestmark = [

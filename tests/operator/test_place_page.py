@@ -12,12 +12,12 @@ from typing import Any
 import pytest
 from PIL import Image
 
+from floor_plans import read_place_file
+from floor_plans.occupancy_map import write_map
+from floor_plans.plan_grid import draw
 from surveillance_operator.page.server import Page
 from surveillance_operator.place_page.dropped_map import import_dropped
 from surveillance_operator.place_page.edit_command import editor_page, main
-from surveillance_runtime.place import read_place_file
-from surveillance_runtime.place.occupancy_map import write_map
-from surveillance_runtime.place.plan_grid import draw
 from tests.operator.browser import CHROMIUM, DESK, DRIVER, MISSING, PHONE, Viewer
 
 SEVEN = Path(__file__).parents[2] / 'config' / 'seven_rooms.yaml'

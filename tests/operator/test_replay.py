@@ -16,6 +16,8 @@ from typing import Any
 
 import pytest
 
+from floor_plans import read_place_file
+from strict_files.files import FileError
 from surveillance_behaviour.mission.mission_log import MissionRecord
 from surveillance_operator import replay, report
 from surveillance_operator.map_command import run_of
@@ -27,8 +29,6 @@ from surveillance_operator.recording.timeline import Timeline
 from surveillance_operator.replay import Player, Track
 from surveillance_operator.report import draw_picture, write_report
 from surveillance_runtime.event_log import read
-from surveillance_runtime.files import FileError
-from surveillance_runtime.place import read_place_file
 from tests.operator.test_timeline import record
 
 ROOT = Path(__file__).parents[2]

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
+from floor_plans import Regions, read_place_file
 from surveillance_operator.import_command import main
-from surveillance_runtime.place import Regions, read_place_file
 
 HALF = """\
   {name}:

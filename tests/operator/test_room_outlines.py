@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from floor_plans.occupancy_grid import Grid
 from surveillance_operator.room_outlines import RoomOutline, room_outlines
-from surveillance_runtime.place.occupancy_grid import Grid
 
 WALL = 100
 

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from rich.console import Console
 
+from floor_plans.occupancy_grid import Grid
 from surveillance_operator.mission_state import MissionState, Notice
 from surveillance_operator.watch import raster
 from surveillance_operator.watch.raster import CharacterCanvas, Viewport
@@ -21,7 +22,6 @@ from surveillance_operator.watch.view import (
     place_lines,
     robot_colour,
 )
-from surveillance_runtime.place.occupancy_grid import Grid
 
 from .test_mission_view import DECISION, STATUS, whole
 

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from patrol_policy.world import Decision
+from strict_files.files import FileError
 from surveillance_operator.mission_state import MissionState, Status
 from surveillance_operator.page_state import PatchMaker
 from surveillance_operator.recording.timeline import Timeline, TimelineWriter
-from surveillance_runtime.files import FileError
 
 DECISION = Decision(0.0, 'A', 'B', 'B', 'URGENT', 'tour', 'why', {'B': 1.0})
 

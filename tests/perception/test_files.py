@@ -18,11 +18,11 @@ from marker_detection.testing.marker_scene import (
     Panel,
     image_of,
 )
+from strict_files.files import FileError
 from surveillance_perception.detect_command import main
 from surveillance_perception.marker_registry import read_registry
 from surveillance_perception.stream.image_files import ImageError, decode_image, read_image
 from surveillance_perception.stream.video import open_source
-from surveillance_runtime.files import FileError
 
 CONFIG = Path(__file__).parents[2] / 'config'
 

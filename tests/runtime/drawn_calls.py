@@ -13,9 +13,9 @@ from unittest import mock
 
 import numpy as np
 
-from surveillance_runtime.place import read_place_file
-from surveillance_runtime.place.drawing import Canvas, Run, draw_place
-from surveillance_runtime.place.zones import zones_from
+from floor_plans import read_place_file
+from floor_plans.drawing import Canvas, Run, draw_place
+from floor_plans.zones import zones_from
 
 CONFIG = Path(__file__).parents[2] / 'config'
 RECORDS = Path(__file__).with_name('drawn')
@@ -105,7 +105,7 @@ def recorded(name: str, run: Run | None) -> list[str]:
         made.append(Recorded(*where))
         return made[0]
 
-    with mock.patch('surveillance_runtime.place.drawing.Canvas', canvas):
+    with mock.patch('floor_plans.drawing.Canvas', canvas):
         draw_place(plan, 'The house', 'two words', run)
     return made[0].calls
 

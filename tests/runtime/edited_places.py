@@ -11,8 +11,8 @@ from typing import Any
 
 import yaml
 
-from surveillance_runtime.place import Regions, read_place_file
-from surveillance_runtime.place_editor.operations import OPERATIONS, Draft, checked_fields
+from floor_plans import Regions, read_place_file
+from floor_plans.editor.operations import OPERATIONS, Draft, checked_fields
 
 CONFIG = Path(__file__).parents[2] / 'config'
 RECORD = Path(__file__).with_name('edited_places.txt')

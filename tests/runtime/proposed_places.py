@@ -12,8 +12,8 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from surveillance_runtime.map_rooms import propose
-from surveillance_runtime.place.occupancy_map import OccupancyMap
+from floor_plans.map_rooms import propose
+from floor_plans.occupancy_map import OccupancyMap
 
 RECORDS = Path(__file__).with_name('proposed')
 

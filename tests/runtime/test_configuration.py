@@ -13,6 +13,7 @@ import yaml
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
+from strict_files.files import FileError
 from surveillance_runtime.configuration import (
     Configuration,
     Entry,
@@ -24,7 +25,6 @@ from surveillance_runtime.configuration import (
     resolved_text,
     split_arguments,
 )
-from surveillance_runtime.files import FileError
 from surveillance_runtime.parameters import ParameterError
 from tests.launcher.conftest import ROOT
 

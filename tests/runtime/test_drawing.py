@@ -12,18 +12,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from surveillance_runtime.place import read_place_file
-from surveillance_runtime.place.drawing import (
-    Canvas,
-    Run,
-    _between,
-    _dashes,
-    blend,
-    draw_place,
-)
-from surveillance_runtime.place.floor_plan import FloorPlan
-from surveillance_runtime.place.regions import Regions
-from surveillance_runtime.place.zones import zones_from
+from floor_plans import read_place_file
+from floor_plans.drawing import Canvas, Run, _between, _dashes, blend, draw_place
+from floor_plans.floor_plan import FloorPlan
+from floor_plans.regions import Regions
+from floor_plans.zones import zones_from
 
 from . import drawn_calls
 
@@ -87,7 +80,7 @@ def drawn(plan: FloorPlan, monkeypatch: pytest.MonkeyPatch, run: Run | None = No
         made.append(Drawn(*where))
         return made[0]
 
-    monkeypatch.setattr('surveillance_runtime.place.drawing.Canvas', canvas)
+    monkeypatch.setattr('floor_plans.drawing.Canvas', canvas)
     draw_place(plan, 'The house', 'two words', run)
     return made[0]
 

@@ -11,10 +11,10 @@ from pathlib import Path
 
 import pytest
 
+from strict_files.files import FileError
 from surveillance_behaviour.mission.mission_log import MissionRecord, summarize
 from surveillance_runtime import event_log
 from surveillance_runtime.event_log import KINDS, EventLog, check, read, read_all
-from surveillance_runtime.files import FileError
 
 pytestmark = pytest.mark.unit
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from surveillance_runtime.files import (
+from strict_files.files import (
     FileError,
     KeptFile,
     LineFile,

@@ -10,11 +10,11 @@ import cv2
 import numpy as np
 import pytest
 
-from surveillance_runtime.map_rooms import Segmentation, joining, openings, proposal, propose
-from surveillance_runtime.map_rooms.segmentation import spread
-from surveillance_runtime.place import FloorPlan, Regions, check_passable
-from surveillance_runtime.place.occupancy_grid import Grid, distance_to
-from surveillance_runtime.place.occupancy_map import OccupancyMap
+from floor_plans import FloorPlan, Regions, check_passable
+from floor_plans.map_rooms import Segmentation, joining, openings, proposal, propose
+from floor_plans.map_rooms.segmentation import spread
+from floor_plans.occupancy_grid import Grid, distance_to
+from floor_plans.occupancy_map import OccupancyMap
 
 from . import proposed_places
 

@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from surveillance_runtime.files import FileError
-from surveillance_runtime.place import PlaceFile, Regions, read_place_file
-from surveillance_runtime.place.drawing import draw_place
-from surveillance_runtime.place.occupancy_map import read_map, write_map
-from surveillance_runtime.place.writing import copy_place, updated_text
+from floor_plans import PlaceFile, Regions, read_place_file
+from floor_plans.drawing import draw_place
+from floor_plans.occupancy_map import read_map, write_map
+from floor_plans.writing import copy_place, updated_text
+from strict_files.files import FileError
 
 SIDE = 0.05
 

@@ -7,9 +7,9 @@ from typing import Any
 
 import pytest
 
+from strict_files.suggestions import like, nearest
 from surveillance_runtime import parameter_checks, run_options
 from surveillance_runtime.command_line import CommandParser, page_address
-from surveillance_runtime.suggestions import like, nearest
 
 POSE = 'three numbers: x, y, yaw'
 MOUNTS = 'x, y, yaw and roll of each lidar; roll 0, or 3.1416 for one that hangs upside down'

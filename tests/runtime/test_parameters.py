@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import pytest
 from rclpy.parameter import Parameter
 
-from surveillance_runtime.parameters import ParameterError, converted, parameter, parameters
+from strict_files.settings import converted, parameter, parameters
+from surveillance_runtime.parameters import ParameterError
 
 
 @dataclass(frozen=True)

@@ -7,10 +7,10 @@ from typing import Any
 
 import pytest
 
-from surveillance_runtime.files import FileError
-from surveillance_runtime.place import read_place_file
-from surveillance_runtime.place.patrol_rules import patrol_rules
-from surveillance_runtime.place.rooms import PlaceError
+from floor_plans import read_place_file
+from floor_plans.patrol_rules import patrol_rules
+from floor_plans.rooms import PlaceError
+from strict_files.files import FileError
 
 CONFIG = Path(__file__).parents[2] / 'config' / 'seven_rooms.yaml'
 

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from surveillance_runtime.files import FileError
-from surveillance_runtime.place import Place, PlaceError, make_place, read_place_file
+from floor_plans import Place, PlaceError, make_place, read_place_file
+from strict_files.files import FileError
 from tests.seven_rooms import SEVEN_ROOMS
 
 POSITIONS = {room: [float(index), 0.0] for index, room in enumerate(SEVEN_ROOMS)}

@@ -7,13 +7,13 @@ from pathlib import Path
 
 import pytest
 
-from surveillance_runtime.files import FileError
-from surveillance_runtime.map_rooms import propose
-from surveillance_runtime.place import read_place_file
-from surveillance_runtime.place.occupancy_map import read_map, write_map
-from surveillance_runtime.place.plan_grid import draw
-from surveillance_runtime.place.writing import format_place
-from surveillance_runtime.place_editor import PlaceEditor
+from floor_plans import read_place_file
+from floor_plans.editor import PlaceEditor
+from floor_plans.map_rooms import propose
+from floor_plans.occupancy_map import read_map, write_map
+from floor_plans.plan_grid import draw
+from floor_plans.writing import format_place
+from strict_files.files import FileError
 
 from . import edited_places
 

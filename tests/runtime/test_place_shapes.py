@@ -10,9 +10,9 @@ import cv2
 import numpy as np
 import pytest
 
-from surveillance_runtime.map_rooms.joining import elongation, half_width, joined
-from surveillance_runtime.place import PlaceError, boxes, read_place_file
-from surveillance_runtime.place.fleet import (
+from floor_plans import PlaceError, boxes, read_place_file
+from floor_plans.editor.shapes import door_on_wall, fitted_door, free_point, sides_of
+from floor_plans.fleet import (
     members_of,
     points_to_pass,
     problem_in_robot_name,
@@ -21,17 +21,12 @@ from surveillance_runtime.place.fleet import (
     wide_ways,
     with_points,
 )
-from surveillance_runtime.place.floor_plan import Door
-from surveillance_runtime.place.occupancy_grid import Grid, distance_to
-from surveillance_runtime.place.plan_grid import draw
-from surveillance_runtime.place.regions import Regions
-from surveillance_runtime.place.zones import Zone, Zones
-from surveillance_runtime.place_editor.shapes import (
-    door_on_wall,
-    fitted_door,
-    free_point,
-    sides_of,
-)
+from floor_plans.floor_plan import Door
+from floor_plans.map_rooms.joining import elongation, half_width, joined
+from floor_plans.occupancy_grid import Grid, distance_to
+from floor_plans.plan_grid import draw
+from floor_plans.regions import Regions
+from floor_plans.zones import Zone, Zones
 from surveillance_runtime.team import members
 
 SEVEN_ROOMS = Path(__file__).parents[2] / 'config' / 'seven_rooms.yaml'
@@ -263,7 +258,7 @@ def test_the_width_of_a_strip_follows_from_its_clearance() -> None:
     ],
 )
 def test_names_of_robots(name: str, problem: str) -> None:
-    assert problem_in_robot_name(name) == problem
+    assert problem_in_robot_name(name, ('simulator',)) == problem
 
 
 def test_the_robots_that_a_place_names() -> None:

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from strict_files.files import FileError
 from surveillance_runtime.configuration import Configuration
-from surveillance_runtime.files import FileError
 from surveillance_runtime.node_table import select
 from surveillance_runtime.parameters import specs_of
 from surveillance_runtime.profile import (

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from surveillance_runtime.files import FileError
-from surveillance_runtime.place import read_place_file
-from surveillance_runtime.place.stations import Station, station_at, stations_of
+from floor_plans import read_place_file
+from floor_plans.stations import Station, station_at, stations_of
+from strict_files.files import FileError
 
 PLACE = """\
 /**:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from surveillance_runtime.suggestions import nearest
+from strict_files.suggestions import nearest
 
 NAMES = ['folder', 'execution_mode', 'policy', 'KITCHEN', 'robot_speed']
 

@@ -6,8 +6,8 @@ from typing import Any
 
 import pytest
 
-from surveillance_runtime.files import FileError
-from surveillance_runtime.yaml_file import EntryError, read_table
+from strict_files.files import FileError
+from strict_files.yaml_file import EntryError, read_table
 
 
 def lamp(name: str, entry: Mapping[str, Any]) -> tuple[str, float]:

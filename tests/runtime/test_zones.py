@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 import yaml
 
-from surveillance_runtime.files import FileError
-from surveillance_runtime.place import read_place_file
-from surveillance_runtime.place.filter_masks import write_filter_masks
-from surveillance_runtime.place.occupancy_map import read_map
-from surveillance_runtime.place.plan_grid import draw
-from surveillance_runtime.place.rooms import PlaceError
-from surveillance_runtime.place.zones import zones_from
+from floor_plans import read_place_file
+from floor_plans.filter_masks import write_filter_masks
+from floor_plans.occupancy_map import read_map
+from floor_plans.plan_grid import draw
+from floor_plans.rooms import PlaceError
+from floor_plans.zones import zones_from
+from strict_files.files import FileError
 
 pytestmark = pytest.mark.unit
 PLACE = Path(__file__).parents[2] / 'config' / 'seven_rooms.yaml'

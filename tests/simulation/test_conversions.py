@@ -10,10 +10,11 @@ from builtin_interfaces.msg import Duration, Time
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from floor_plans import plan_grid
 from surveillance_controllers import conversions as received
 from surveillance_interfaces.srv import SetMarker
 from surveillance_runtime.conversions import map_message, pose_from, pose_message, seconds_of
-from surveillance_runtime.place import plan_grid
+from surveillance_runtime.sensing.conversions import scan_from
 from surveillance_simulation import conversions
 from surveillance_simulation.camera.model import Camera
 from surveillance_simulation.robot.lidar import LidarModel
@@ -45,7 +46,7 @@ def test_a_duration_is_its_seconds() -> None:
 def test_a_scan_comes_back_with_its_infinities() -> None:
     ranges = np.array([1.0, np.inf, 2.5, 0.1], np.float32)
     message = conversions.scan_to_ros(ranges, LidarModel(rays=4), 'base_link', STAMP)
-    assert (received.scan_from(message).ranges == ranges).all()
+    assert (scan_from(message).ranges == ranges).all()
     last = message.angle_min + 3 * message.angle_increment
     assert last == pytest.approx(message.angle_max)
     assert message.header.stamp == STAMP

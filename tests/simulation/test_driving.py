@@ -9,12 +9,12 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from surveillance_controllers import geometry
-from surveillance_controllers.geometry import Scan
-from surveillance_controllers.motion.driving import Drive, State
-from surveillance_controllers.motion.navigator import Navigator
-from surveillance_controllers.planning.grid_planning import GridPlanner, NoPathError
-from surveillance_runtime.place import plan_grid
+from floor_plans import plan_grid
+from lidar_navigation import geometry
+from lidar_navigation.driving.driving import Drive, State
+from lidar_navigation.driving.navigator import Navigator
+from lidar_navigation.geometry import Scan
+from lidar_navigation.planning.grid_planning import GridPlanner, NoPathError
 from surveillance_simulation.robot.robot import Robot
 from surveillance_simulation.world.people import PeopleModel
 from surveillance_simulation.world.world import World, read_world

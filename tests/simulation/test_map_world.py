@@ -7,10 +7,10 @@ import math
 import numpy as np
 import pytest
 
-from surveillance_runtime.place import boxes
-from surveillance_runtime.place.occupancy_map import write_map
-from surveillance_runtime.place.plan_grid import draw
-from surveillance_runtime.yaml_file import read_yaml_file
+from floor_plans import boxes
+from floor_plans.occupancy_map import write_map
+from floor_plans.plan_grid import draw
+from strict_files.yaml_file import read_yaml_file
 from surveillance_simulation.robot.base import Base, BaseModel
 from surveillance_simulation.robot.lidar import LidarModel, scan
 from surveillance_simulation.world.people import People, PeopleModel

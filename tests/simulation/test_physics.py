@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from surveillance_controllers.geometry import Scan
-from surveillance_controllers.motion.odometry import OdometryBuffer, joined
+from lidar_navigation.geometry import Scan
+from lidar_navigation.localisation.odometry import OdometryBuffer, joined
 from surveillance_simulation.physics import base as physics_base
 from surveillance_simulation.physics.model import PhysicsModel
 from surveillance_simulation.robot.lidar import LidarModel

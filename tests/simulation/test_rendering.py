@@ -9,9 +9,9 @@ import cv2
 import numpy as np
 import pytest
 
+from floor_plans import PlaceError
+from floor_plans.floor_plan import Marker
 from marker_detection import CameraModel, FusedPositions, MarkerDetector, pose_of
-from surveillance_runtime.place import PlaceError
-from surveillance_runtime.place.floor_plan import Marker
 from surveillance_simulation.camera.model import LIGHTINGS, Camera, Conditions, expose, lit
 from surveillance_simulation.camera.mujoco_rendering import MujocoRenderer
 from surveillance_simulation.camera.rendering import Renderer

@@ -19,8 +19,8 @@ from sensor_msgs.msg import CameraInfo, Image, JointState, LaserScan
 from std_msgs.msg import Float32, String, UInt32
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
+from lidar_navigation.geometry import Mount
 from surveillance_controllers import conversions as received
-from surveillance_controllers.geometry import Mount
 from surveillance_interfaces.msg import DoorStates
 from surveillance_interfaces.srv import (
     DrainBattery,
@@ -34,6 +34,7 @@ from surveillance_interfaces.srv import (
 from surveillance_runtime.conversions import pose_from, seconds_of
 from surveillance_runtime.parameters import ParameterError
 from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
+from surveillance_runtime.sensing.conversions import scan_from
 from surveillance_simulation.simulator_node import Simulator
 
 from .places import TWO_ROOMS, changed
@@ -150,7 +151,7 @@ def test_a_scan_is_measured_while_somebody_listens(graph: Any) -> None:
     simulator(graph)
     scans = graph.listen(LaserScan, 'scan', SENSOR_QOS)
     graph.until(lambda: scans)
-    assert received.scan_from(scans[0]).ranges[0] == pytest.approx(0.95, abs=0.06)
+    assert scan_from(scans[0]).ranges[0] == pytest.approx(0.95, abs=0.06)
 
 
 def test_a_lidar_that_hangs_upside_down_tells_the_same_as_one_that_stands(graph: Any) -> None:
@@ -160,7 +161,7 @@ def test_a_lidar_that_hangs_upside_down_tells_the_same_as_one_that_stands(graph:
     tf2 = pytest.importorskip('tf2_msgs.msg')
     frames = graph.listen(tf2.TFMessage, 'tf_static', STATE_QOS)
     graph.until(lambda: scans and frames)
-    told = received.scan_from(scans[-1], Mount(mount, upside_down=True))
+    told = scan_from(scans[-1], Mount(mount, upside_down=True))
     assert told.points[:, 0].max() == pytest.approx(4.95, abs=0.03), 'through the door ahead'
     stands = node.robot.scan(mount)
     angles = node.robot.lidar.angles + mount[2]

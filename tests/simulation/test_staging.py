@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from surveillance_runtime.files import FileError
-from surveillance_runtime.place import PlaceError
+from floor_plans import PlaceError
+from strict_files.files import FileError
 from surveillance_simulation.camera.model import Camera, covered
 from surveillance_simulation.camera.mujoco_rendering import MujocoRenderer
 from surveillance_simulation.camera.rendering import Renderer

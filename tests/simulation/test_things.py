@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from surveillance_runtime.place import PlaceError
+from floor_plans import PlaceError
 from surveillance_simulation.world.things import (
     LIDAR_HEIGHT,
     Shape,

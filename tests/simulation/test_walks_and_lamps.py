@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from surveillance_runtime.place import PlaceError
+from floor_plans import PlaceError
 from surveillance_simulation.camera.lamps import LampLight
 from surveillance_simulation.camera.model import Array, Camera
 from surveillance_simulation.robot.robot import Robot

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from benchmarks import regular_places
-from surveillance_runtime.files import FileError
-from surveillance_runtime.place import occupancy_grid, plan_grid, writing
-from surveillance_runtime.place.floor_plan import Marker, PlaceError
+from floor_plans import occupancy_grid, plan_grid, writing
+from floor_plans.floor_plan import Marker, PlaceError
+from strict_files.files import FileError
 from surveillance_simulation.world.world import World, read_world
 
 from .places import CONFIG, changed, two_rooms

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from armor_service.protocol import DirectiveError
 from armor_service.rendering import shown
-from armor_service.settings import names_expected, parameter
+from strict_files.settings import names_expected, parameter
 
 CODE = Path(__file__).resolve().parent.parent
 ONTOLOGY_ENDINGS = ('.nt', '.omn', '.owl', '.owx', '.rdf', '.ttl', '.xml')

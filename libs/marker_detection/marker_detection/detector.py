@@ -46,7 +46,7 @@ from marker_detection.image_sampling import (
 )
 from marker_detection.other_families import OtherFamilies
 from marker_detection.preprocessing import PreparedImage, prepare
-from marker_detection.settings import converted, odd_numbers, parameter
+from strict_files.settings import converted, parameter
 
 # pixels between the middles of outlines that are one: what the search's masks differ by
 _SAME_QUAD = 2.0
@@ -65,6 +65,12 @@ _LARGEST_ERROR = 1e-5
 # confidence from which a reading is not held against other dictionaries: of their markers none was
 # read with more than 0.6, of ours nineteen in twenty are read with more
 _SURE = 0.8
+
+
+def odd_numbers(values: Sequence[int]) -> str | None:
+    """Ask for the sides of neighbourhoods around a pixel."""
+    good = values and all(each >= 3 and each % 2 for each in values)
+    return None if good else 'odd numbers from 3'
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from marker_detection.camera_model import Array, CameraModel
 from marker_detection.detector import Detection, DetectorSettings, MarkerDetector
 from marker_detection.dictionaries import MarkerCodes, dictionary_named
 from marker_detection.pose import MarkerPose, pose_of
-from marker_detection.settings import converted, parameter, parameters
+from strict_files.settings import converted, parameter, parameters
 
 # images that count, as a multiple of those that must show an id: half of them may miss it
 _WINDOW = 2

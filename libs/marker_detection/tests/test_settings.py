@@ -7,7 +7,7 @@ from dataclasses import fields
 import pytest
 
 from marker_detection import DetectorSettings, StreamSettings
-from marker_detection.settings import odd_numbers
+from marker_detection.detector import odd_numbers
 
 NUMBERS = {
     'bridges': ((5,), 2, 99),

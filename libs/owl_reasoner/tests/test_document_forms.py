@@ -16,7 +16,7 @@ from owl_reasoner.owl import expressions as ex
 from owl_reasoner.owl.axioms import Axiom
 from owl_reasoner.owl.expressions import Literal
 from owl_reasoner.owl.vocabulary import RDF, RDFS, XSD
-from owl_reasoner.suggestions import nearest
+from strict_files.suggestions import nearest
 
 COMMENT = RDFS + 'comment'
 OWL_XML = (

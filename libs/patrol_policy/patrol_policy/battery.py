@@ -15,7 +15,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from patrol_policy.graph import PatrolGraph
-from patrol_policy.settings import parameter
+from strict_files.settings import parameter
 
 LEARNED_FALL = 2.0
 """Percent by which the level falls while one rate is learned."""

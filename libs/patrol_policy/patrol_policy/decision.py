@@ -28,9 +28,9 @@ from patrol_policy.battery import (
 )
 from patrol_policy.fleet.assignment import FleetOutlook, Share
 from patrol_policy.policies import DEFAULT_POLICY, POLICIES, Charge, Scores, make_policy
-from patrol_policy.settings import converted, names_expected, parameter, parameters
-from patrol_policy.suggestions import closest_name
 from patrol_policy.world import Decision, World
+from strict_files.settings import converted, names_expected, parameter, parameters
+from strict_files.suggestions import nearest
 
 RECHARGE = 'recharge'
 """The rule of a decision to go charging."""
@@ -625,9 +625,7 @@ def check_place(place: str, world: World) -> None:
         return
     if place in world.classes:
         raise ValueError(f'{place} cannot be reached: no open door leads to it')
-    raise ValueError(
-        f'there is no place {place!r} on the map, expected {closest_name(place, places)}'
-    )
+    raise ValueError(f'there is no place {place!r} on the map, expected {nearest(place, places)}')
 
 
 def why_not(place: str, world: World, battery: Battery, settings: DecisionSettings) -> WhyNot:

@@ -25,7 +25,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime, timedelta, tzinfo
 
-from patrol_policy.suggestions import closest_name
+from strict_files.suggestions import nearest
 
 MUST, MAY, NOT = 'must', 'may', 'not'
 DAYS = ('mon', 'tue', 'wed', 'thu', 'fri', 'sat', 'sun')
@@ -153,7 +153,7 @@ def _days(text: str) -> list[int]:
         first, _, last = part.partition('-')
         for name in filter(None, (first, last)):
             if name not in DAYS:
-                known = closest_name(name, (*DAYS, 'daily'))
+                known = nearest(name, (*DAYS, 'daily'))
                 raise ValueError(f'{name!r} is no day, expected {known}')
         begin, end = DAYS.index(first), DAYS.index(last or first)
         found += [(begin + step) % 7 for step in range((end - begin) % 7 + 1)]

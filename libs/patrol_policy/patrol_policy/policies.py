@@ -26,8 +26,8 @@ from numpy.typing import NDArray
 
 from patrol_policy.battery import Energy
 from patrol_policy.plan import plan_of
-from patrol_policy.suggestions import closest_name
 from patrol_policy.world import Score, World
+from strict_files.suggestions import nearest
 
 Scores = Mapping[str, Score]
 DEFAULT_POLICY = 'tour'
@@ -62,7 +62,7 @@ def make_policy(name: str) -> Policy:
         ValueError: There is no such policy.
     """
     if name not in POLICIES:
-        raise ValueError(f'unknown policy {name!r}, expected {closest_name(name, POLICIES)}')
+        raise ValueError(f'unknown policy {name!r}, expected {nearest(name, POLICIES)}')
     return POLICIES[name]
 
 

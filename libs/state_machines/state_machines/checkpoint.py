@@ -18,12 +18,12 @@ from typing import Any
 from state_machines.clock import elapsed_of
 from state_machines.container import Container
 from state_machines.exceptions import CheckpointError, describe, shown
-from state_machines.files import parse_json, read_file, replace_file
 from state_machines.log import logerr, logwarn
 from state_machines.program import History
 from state_machines.state import State
 from state_machines.structure import Structure
 from state_machines.userdata import raw
+from strict_files.regular_files import parse_json, read_file, replace_file
 
 CHECKPOINT_FORMAT = 'surveillance-fsm-checkpoint'
 CHECKPOINT_VERSION = 3

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from state_machines import files
+from strict_files import regular_files as files
 
 
 def test_a_file_is_read_up_to_its_bound(tmp_path):

@@ -14,7 +14,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from surveillance_runtime.place import Place
+from floor_plans import Place
 
 Position = tuple[float, float]
 

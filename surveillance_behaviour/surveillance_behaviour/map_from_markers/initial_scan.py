@@ -16,8 +16,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
 
+from strict_files.settings import parameter
 from surveillance_behaviour.map_from_markers.assembly import SurveyReport
-from surveillance_runtime.parameters import parameter
 
 _OVERLAP = 0.12
 _REACH = 0.3

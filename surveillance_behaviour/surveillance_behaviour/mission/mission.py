@@ -7,6 +7,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
+from floor_plans.stations import AT_STATION
 from patrol_policy.battery import Battery
 from patrol_policy.decision import QUIET, RECHARGE, REQUEST, DecisionSettings
 from patrol_policy.promises import Promise
@@ -14,6 +15,8 @@ from patrol_policy.world import Decision
 from state_machines import Clock, Interrupt
 from state_machines.clock import elapsed_of
 from state_machines.exceptions import CallError, CallInterruptedError
+from strict_files.files import FileError
+from strict_files.settings import parameter, parameters
 from surveillance_behaviour.charging import BatteryMonitor, charge
 from surveillance_behaviour.mission.mission_log import (
     Looked,
@@ -22,9 +25,6 @@ from surveillance_behaviour.mission.mission_log import (
 )
 from surveillance_behaviour.mission.recovery import Failure, Recovery, RecoveryLimits
 from surveillance_behaviour.ports import Point, Ports, UnknownPlaceError
-from surveillance_runtime.files import FileError
-from surveillance_runtime.parameters import parameter, parameters
-from surveillance_runtime.place.stations import AT_STATION
 
 SAME_POINT = 0.2
 """A station within this distance of its room's point is at it, metres."""

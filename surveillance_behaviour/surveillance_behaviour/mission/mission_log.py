@@ -43,6 +43,7 @@ from typing import Any
 
 from patrol_policy.decision import RECHARGE
 from patrol_policy.promises import Promise
+from strict_files.files import FileError
 from surveillance_runtime.event_log import (
     A_DATE,
     CLOCKS,
@@ -54,7 +55,6 @@ from surveillance_runtime.event_log import (
     of_mission,
     read,
 )
-from surveillance_runtime.files import FileError
 
 
 class MissionRecord:

@@ -15,7 +15,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import StrEnum
 
-from surveillance_runtime.parameters import parameter
+from strict_files.settings import parameter
 
 WAITING_FOR_HELP = 'waiting for help'
 """How the line of the log begins by which the robot asks for somebody."""

@@ -15,11 +15,14 @@ from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.parameter import Parameter
 from std_srvs.srv import SetBool
 
+from floor_plans.patrol_rules import patrol_rules
+from floor_plans.stations import Station, stations_in
 from patrol_policy.decision import DecisionSettings
 from patrol_policy.promises import Promise
 from patrol_policy.world import Decision
 from state_machines import Interrupt
 from state_machines.exceptions import CallError
+from strict_files.settings import parameter
 from surveillance_behaviour import conversions
 from surveillance_behaviour.charging import BatteryMonitor
 from surveillance_behaviour.experience import Experience
@@ -29,10 +32,8 @@ from surveillance_behaviour.world_model import WorldModel
 from surveillance_interfaces.msg import Decision as DecisionMessage
 from surveillance_interfaces.srv import GoTo, WhyNot
 from surveillance_runtime.node import PatrolNode
-from surveillance_runtime.parameters import parameter
-from surveillance_runtime.place.patrol_rules import described_patrol_rules, patrol_rules
-from surveillance_runtime.place.stations import Station, described_stations, stations_in
 from surveillance_runtime.place_changes import TOPIC, follow_place
+from surveillance_runtime.place_parameters import described_patrol_rules, described_stations
 from surveillance_runtime.state_topics import OwnedTopic
 from surveillance_runtime.waiting import AwaitedWork
 

@@ -7,11 +7,11 @@ import time
 from dataclasses import dataclass, replace
 
 from patrol_policy.fleet import FleetRobot, FleetSettings, Intention, Layout, Share
+from strict_files.settings import parameter
 from surveillance_behaviour.fleet import FleetFacts, FleetKnowledge
 from surveillance_interfaces.msg import FleetRobot as FleetRobotMessage
 from surveillance_runtime.fleet_messages import FLEET_QOS, FLEET_TOPIC, hear_fleet
 from surveillance_runtime.node import PatrolNode
-from surveillance_runtime.parameters import parameter
 from surveillance_runtime.state_topics import AHEAD, AHEAD_SIMULATED
 
 REPEAT = 1.0

@@ -28,6 +28,7 @@ from state_machines.ros import (
     ServiceCaller,
 )
 from state_machines.structure import Structure
+from strict_files.settings import parameter
 from surveillance_behaviour.charging import BatteryMonitor
 from surveillance_behaviour.mission.mission import Mission
 from surveillance_behaviour.mission.recovery import WAITING_FOR_HELP
@@ -45,7 +46,6 @@ from surveillance_runtime.conversions import (
     seconds_of,
 )
 from surveillance_runtime.node import PatrolNode
-from surveillance_runtime.parameters import parameter
 from surveillance_runtime.state_topics import OwnedTopic, StateSubscription
 
 ASK_AGAIN = 10.0

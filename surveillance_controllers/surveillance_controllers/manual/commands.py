@@ -16,9 +16,9 @@ import re
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
-from surveillance_controllers import geometry
-from surveillance_controllers.geometry import Points
-from surveillance_runtime.suggestions import nearest
+from lidar_navigation import geometry
+from lidar_navigation.geometry import Points
+from strict_files.suggestions import nearest
 
 Point3 = tuple[float, float, float]
 """x, y, z in metres, world frame."""

@@ -8,8 +8,8 @@ from typing import Protocol
 
 import numpy as np
 
+from lidar_navigation.geometry import Points
 from state_machines.ros import GoalRun
-from surveillance_controllers.geometry import Points
 from surveillance_controllers.manual import commands
 
 

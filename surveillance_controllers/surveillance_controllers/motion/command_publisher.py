@@ -17,8 +17,8 @@ from collections.abc import Callable, Iterable
 
 from geometry_msgs.msg import Twist, TwistStamped
 
+from lidar_navigation.driving.path_following import Velocity
 from surveillance_controllers import conversions
-from surveillance_controllers.motion.path_following import Velocity
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.profile.parameters import CommandSettings
 

@@ -24,15 +24,8 @@ from builtin_interfaces.msg import Duration
 from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped
 from nav_msgs.msg import OccupancyGrid
 
-from state_machines import Interrupt
-from state_machines.ros import CallError, CallInterruptedError, GoalCaller, GoalRun
-from surveillance_controllers import conversions
-from surveillance_controllers.controller_parameters import (
-    MotionSettings,
-    door_segments,
-    place_positions,
-)
-from surveillance_controllers.geometry import (
+from floor_plans.stations import station_at, stations_in
+from lidar_navigation.geometry import (
     Points,
     angle_between,
     distance_nearest,
@@ -41,17 +34,22 @@ from surveillance_controllers.geometry import (
     point_of,
     points_passed,
 )
+from lidar_navigation.localisation.place_locator import PlaceLocator
+from state_machines import Interrupt
+from state_machines.ros import CallError, CallInterruptedError, GoalCaller, GoalRun
+from surveillance_controllers import conversions
+from surveillance_controllers.controller_parameters import MotionSettings
 from surveillance_controllers.map_knowledge import MapKnowledge
 from surveillance_controllers.motion.arrival import Motion, MotionFailedError, expect_place
 from surveillance_controllers.motion.holding import Hold
-from surveillance_controllers.motion.place_locator import PlaceLocator
 from surveillance_controllers.motion.place_recording import PlaceRecorder
 from surveillance_runtime.conversions import pose_from, pose_message, seconds_of
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.parameters import ParameterError
-from surveillance_runtime.place.stations import station_at, stations_in
 from surveillance_runtime.place_changes import follow_place
+from surveillance_runtime.place_parameters import door_segments, place_positions
 from surveillance_runtime.profile.parameters import declared_frames
+from surveillance_runtime.sensing.conversions import refusing
 from surveillance_runtime.state_topics import StateSubscription
 from surveillance_runtime.turning_path import bearing_of
 
@@ -228,13 +226,13 @@ class Nav2Motion:
         return poses
 
     def _on_pose(self, message: PoseWithCovarianceStamped) -> None:
-        with conversions.refusing(self._node, 'amcl_pose'):
+        with refusing(self._node, 'amcl_pose'):
             pose = pose_from(message.pose.pose)
             self._point, self._yaw = point_of(pose), pose[2]
             self._tell(self._point)
 
     def _on_map(self, message: OccupancyGrid) -> None:
-        with conversions.refusing(self._node, 'map'):
+        with refusing(self._node, 'map'):
             grid = conversions.grid_from(message)
             with self._lock:
                 self._places.set_map(grid)

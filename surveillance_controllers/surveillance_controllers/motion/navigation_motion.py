@@ -18,31 +18,21 @@ from geometry_msgs.msg import PoseWithCovarianceStamped
 from nav_msgs.msg import OccupancyGrid
 from sensor_msgs.msg import LaserScan, PointCloud2
 
+from floor_plans.zones import zones_from
+from lidar_navigation.driving.driving import TURNED, Drive, Spin, State
+from lidar_navigation.driving.navigator import Navigator
+from lidar_navigation.driving.path_following import DriveParameters, Velocity
+from lidar_navigation.geometry import Points, Pose, Scan, point_of
+from lidar_navigation.planning.grid_planning import NoPathError
 from state_machines import Interrupt
 from state_machines.ros import CallError, GoalCaller, GoalRun
 from surveillance_controllers import conversions
-from surveillance_controllers.controller_parameters import (
-    MotionSettings,
-    NavigationSettings,
-    door_segments,
-    door_segments_of,
-    place_positions,
-    place_zones,
-    positions_of,
-)
-from surveillance_controllers.geometry import Points, Pose, Scan, point_of
+from surveillance_controllers.controller_parameters import MotionSettings, NavigationSettings
 from surveillance_controllers.map_knowledge import MapKnowledge
 from surveillance_controllers.motion.arrival import MotionFailedError, expect_place
 from surveillance_controllers.motion.command_publisher import CommandPublisher
-from surveillance_controllers.motion.driving import TURNED, Drive, Spin, State
 from surveillance_controllers.motion.holding import Hold
-from surveillance_controllers.motion.navigator import Navigator
-from surveillance_controllers.motion.path_following import DriveParameters, Velocity
 from surveillance_controllers.motion.place_recording import PlaceRecorder
-from surveillance_controllers.motion.sensors import OdometryReader
-from surveillance_controllers.motion.silence import SensorWatch
-from surveillance_controllers.motion.transforms import MapFrame, ScanReader
-from surveillance_controllers.planning.grid_planning import NoPathError
 from surveillance_interfaces.action import ComputePath
 from surveillance_interfaces.msg import DoorStates
 from surveillance_runtime.conversions import (
@@ -55,9 +45,19 @@ from surveillance_runtime.conversions import (
 )
 from surveillance_runtime.incidents import Severity
 from surveillance_runtime.node import PatrolNode
-from surveillance_runtime.place.zones import zones_from
 from surveillance_runtime.place_changes import follow_place
+from surveillance_runtime.place_parameters import (
+    door_segments,
+    door_segments_of,
+    place_positions,
+    place_zones,
+    positions_of,
+)
 from surveillance_runtime.profile.parameters import declared_frames
+from surveillance_runtime.sensing.conversions import refusing
+from surveillance_runtime.sensing.sensors import OdometryReader
+from surveillance_runtime.sensing.silence import SensorWatch
+from surveillance_runtime.sensing.transforms import MapFrame, ScanReader
 from surveillance_runtime.state_topics import OwnedTopic, StateSubscription
 from surveillance_runtime.turning_path import bearing_of
 
@@ -324,7 +324,7 @@ class NavigationMotion:
             self._stepped.notify_all()
 
     def _on_map(self, message: OccupancyGrid) -> None:
-        with conversions.refusing(self._node, 'map'):
+        with refusing(self._node, 'map'):
             grid = conversions.grid_from(message)
             with self._lock:
                 self._navigator.set_map(grid)
@@ -346,7 +346,7 @@ class NavigationMotion:
             self._navigator.move(pose, measured)
 
     def _on_initial_pose(self, message: PoseWithCovarianceStamped) -> None:
-        with conversions.refusing(self._node, 'initialpose'):
+        with refusing(self._node, 'initialpose'):
             pose, frame = pose_from(message.pose.pose), message.header.frame_id.removeprefix('/')
             if frame not in ('', self._frames.map):
                 raise ValueError(f'a pose in the frame {frame!r}: expected {self._frames.map!r}')

@@ -9,8 +9,8 @@ import time
 from builtin_interfaces.msg import Time
 from std_msgs.msg import Header
 
+from lidar_navigation.geometry import Points
 from state_machines import Interrupt
-from surveillance_controllers.geometry import Points
 from surveillance_controllers.map_knowledge import MapKnowledge, answered, keep_up
 from surveillance_controllers.motion.arrival import nearest_place
 from surveillance_interfaces.msg import OntologyMap, RobotPlace

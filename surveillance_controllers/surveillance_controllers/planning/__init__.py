@@ -1,6 +1,4 @@
-"""Paths over an occupancy grid, and routes over doors.
+"""Routes over doors (`map_planner`) and doors that are watched (`door_watch`), as ROS sees them.
 
-`grid_planning` is the planner (`GridPlanner`, `NoPathError`), `grid_search`
-its search; none of them needs ROS. `map_planner` (with the routes over doors) and `door_watch` are
-their ROS side. They are imported from their modules, for the libraries behind them take their time.
+They are imported from their modules, for the libraries behind them take their time.
 """

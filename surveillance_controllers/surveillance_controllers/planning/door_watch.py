@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from floor_plans.floor_plan import Segment
 from state_machines import Interrupt
 from state_machines.ros import ServiceCaller
 from surveillance_controllers.map_knowledge import MapKnowledge, keep_up
@@ -16,7 +17,6 @@ from surveillance_interfaces.msg import DoorStates
 from surveillance_interfaces.srv import SetDoor
 from surveillance_ontology.patrol_vocabulary import OntologyNotReadyError
 from surveillance_runtime.node import PatrolNode
-from surveillance_runtime.place.floor_plan import Segment
 from surveillance_runtime.state_topics import StateSubscription
 
 RETRY_PERIOD = 1.0

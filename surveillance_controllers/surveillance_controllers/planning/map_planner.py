@@ -15,22 +15,15 @@ from nav_msgs.msg import OccupancyGrid
 from numpy.typing import ArrayLike, NDArray
 from sensor_msgs.msg import PointCloud2
 
+from floor_plans.occupancy_grid import Grid
+from floor_plans.zones import zones_from
+from lidar_navigation.geometry import Points, Pose, point_of
+from lidar_navigation.planning.grid_planning import GridPlanner, NoPathError, PlanningParameters
 from state_machines import Interrupt
 from state_machines.ros import GoalAbortedError, GoalRun
 from surveillance_controllers import conversions
-from surveillance_controllers.controller_parameters import (
-    door_segments,
-    door_segments_of,
-    place_zones,
-)
-from surveillance_controllers.geometry import Points, Pose, point_of
 from surveillance_controllers.map_knowledge import MapKnowledge
 from surveillance_controllers.planning.door_watch import DoorWatch
-from surveillance_controllers.planning.grid_planning import (
-    GridPlanner,
-    NoPathError,
-    PlanningParameters,
-)
 from surveillance_runtime.conversions import (
     points_from_cloud,
     pose_of_serialized,
@@ -38,9 +31,9 @@ from surveillance_runtime.conversions import (
     values_from_cloud,
 )
 from surveillance_runtime.node import PatrolNode
-from surveillance_runtime.place.occupancy_grid import Grid
-from surveillance_runtime.place.zones import zones_from
 from surveillance_runtime.place_changes import follow_place
+from surveillance_runtime.place_parameters import door_segments, door_segments_of, place_zones
+from surveillance_runtime.sensing.conversions import refusing
 from surveillance_runtime.state_topics import StateSubscription
 
 
@@ -131,7 +124,7 @@ class NavigationPlanning:
         return np.column_stack([path, np.linspace(start[2], goal[2], len(path))])
 
     def _on_map(self, message: OccupancyGrid) -> None:
-        with conversions.refusing(self._node, 'map'):
+        with refusing(self._node, 'map'):
             grid = conversions.grid_from(message)
             self._grid = grid
             self._plan_anew()
@@ -150,12 +143,12 @@ class NavigationPlanning:
             self._plan_anew()
 
     def _on_obstacles(self, message: PointCloud2) -> None:
-        with conversions.refusing(self._node, 'obstacles'):
+        with refusing(self._node, 'obstacles'):
             stays = values_from_cloud(message, 'stays')
             self._obstacles = points_from_cloud(message), None if stays is None else stays > 0
 
     def _on_pose(self, serialized: bytes) -> None:
-        with conversions.refusing(self._node, 'amcl_pose'):
+        with refusing(self._node, 'amcl_pose'):
             self._pose = pose_of_serialized(serialized)
 
 

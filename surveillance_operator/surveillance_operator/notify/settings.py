@@ -22,8 +22,8 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
-from surveillance_runtime.suggestions import nearest
-from surveillance_runtime.yaml_file import EntryError, read_table
+from strict_files.suggestions import nearest
+from strict_files.yaml_file import EntryError, read_table
 
 PICTURES = ('blurred', 'sharp', 'none')
 _SCHEMES = {

@@ -59,7 +59,7 @@ def pictures_of(settings: SinkSettings, news: News) -> list[tuple[str, bytes]]:
     if not news.pictures:
         return []
     # It takes its time, and most news have no picture.
-    from surveillance_perception.observation.privacy import PictureError, shareable
+    from indoor_watch.privacy import PictureError, shareable
 
     found = []
     for path in dict.fromkeys(news.pictures):

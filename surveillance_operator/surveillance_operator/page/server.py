@@ -38,7 +38,7 @@ from starlette.staticfiles import StaticFiles
 from starlette.types import ASGIApp, Receive, Scope, Send
 
 from state_machines.exceptions import CallError
-from state_machines.files import parse_json
+from strict_files.regular_files import parse_json
 from surveillance_operator.page.broadcaster import Broadcaster
 from surveillance_runtime import parameter_checks
 

@@ -17,11 +17,11 @@ from typing import Any
 
 import yaml
 
+from floor_plans.occupancy_map import PICTURES
+from strict_files.files import FileError, in_one_line
+from strict_files.yaml_file import read_yaml_file
 from surveillance_operator.graph_import import SUFFIXES
 from surveillance_operator.place_import import ImportRequest, import_place, is_levels
-from surveillance_runtime.files import FileError, in_one_line
-from surveillance_runtime.place.occupancy_map import PICTURES
-from surveillance_runtime.yaml_file import read_yaml_file
 
 MOST_BYTES = 48_000_000
 """Of all files together; as text they are a third longer."""

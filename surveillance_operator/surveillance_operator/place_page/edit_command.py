@@ -8,14 +8,14 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from floor_plans.editor import PlaceEditor
+from floor_plans.regions import ROBOT_RADIUS
 from surveillance_ontology.patrol_vocabulary import checked_names
 from surveillance_operator.page.broadcaster import Broadcaster
 from surveillance_operator.page.server import Page
 from surveillance_operator.place_page.dropped_map import MOST_BYTES, import_dropped
 from surveillance_operator.place_page.edit_session import EditSession
 from surveillance_runtime.command_line import EXIT_BAD_INPUT, CommandParser
-from surveillance_runtime.place_editor import PlaceEditor
-from surveillance_runtime.robot_base import ROBOT_RADIUS
 
 
 def _parse(argv: Sequence[str] | None) -> argparse.Namespace:

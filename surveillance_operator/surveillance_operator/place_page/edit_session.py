@@ -15,10 +15,10 @@ from typing import Any
 import numpy as np
 from PIL import Image, ImageColor
 
+from floor_plans.editor import PlaceEditor
+from floor_plans.patrol_rules import CLASSES
+from floor_plans.plan_grid import draw
 from surveillance_operator.page.server import Action
-from surveillance_runtime.place.patrol_rules import CLASSES
-from surveillance_runtime.place.plan_grid import draw
-from surveillance_runtime.place_editor import PlaceEditor
 
 _MOST_PIXELS = 1_500_000
 """The picture of a larger map shows several cells as one pixel."""

@@ -25,7 +25,8 @@ from mcap.records import Channel, Message, Schema
 from mcap.stream_reader import StreamReader
 from mcap.writer import CompressionType, Writer
 
-from surveillance_runtime.files import RECORDING, replace_text
+from strict_files.files import replace_text
+from surveillance_runtime.run_files import RECORDING
 
 METADATA = 'metadata.yaml'
 PROFILE, ENCODING, SCHEMA_ENCODING = 'ros2', 'cdr', 'ros2msg'

@@ -25,8 +25,8 @@ from mcap.opcode import Opcode
 from mcap.records import Channel, Chunk, Schema
 from mcap.stream_reader import get_chunk_data_stream
 
+from strict_files.files import FileError
 from surveillance_operator.recording.bag import ENCODING, MAGIC
-from surveillance_runtime.files import FileError
 
 SUFFIX = '.mcap'
 FIRST_SPANS = 20

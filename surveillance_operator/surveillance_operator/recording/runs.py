@@ -5,18 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+from strict_files.files import FileError, like_file
+from strict_files.suggestions import like
 from surveillance_operator.recording.reading import SUFFIX, files_of
 from surveillance_runtime.command_line import CommandParser
 from surveillance_runtime.event_log import record_in
-from surveillance_runtime.files import (
-    LAUNCH_LOG,
-    PLACE,
-    RECORDING,
-    TIMELINE,
-    FileError,
-    like_file,
-)
-from surveillance_runtime.suggestions import like
+from surveillance_runtime.run_files import LAUNCH_LOG, PLACE, RECORDING, TIMELINE
 
 LAST = 'last'
 

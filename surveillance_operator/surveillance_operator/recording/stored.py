@@ -23,6 +23,7 @@ from rclpy.serialization import deserialize_message
 from rosgraph_msgs.msg import Clock
 from visualization_msgs.msg import MarkerArray
 
+from strict_files.files import FileError, in_one_line
 from surveillance_interfaces.msg import FactChanges
 from surveillance_ontology.conversions import changes_from_ros
 from surveillance_operator.images import ANNOTATED, KINDS, PLAIN, SUFFIX, jpeg_from
@@ -42,7 +43,6 @@ from surveillance_operator.topics import (
     read_message,
     with_fact,
 )
-from surveillance_runtime.files import FileError, in_one_line
 from surveillance_runtime.node_table import name_for
 
 CLOCK = '/clock'

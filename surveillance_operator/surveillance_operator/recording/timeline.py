@@ -14,10 +14,10 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from state_machines.files import parse_json
+from strict_files.files import FileError, LineFile
+from strict_files.regular_files import parse_json
 from surveillance_operator.mission_state import MissionState
 from surveillance_operator.page_state import Parts, PatchMaker, lengthen
-from surveillance_runtime.files import FileError, LineFile
 
 LEFT_OUT = frozenset({'scan', 'usage'})
 """Parts that change all the time: they are in the recording itself."""

@@ -13,8 +13,8 @@ from numpy.typing import ArrayLike, NDArray
 from rich.segment import Segment
 from rich.style import Style
 
+from floor_plans.occupancy_grid import Box, Grid
 from surveillance_operator.mission_state import Pose
-from surveillance_runtime.place.occupancy_grid import Box, Grid
 
 UNKNOWN, FREE, WALL, LINK, OLD_TRAIL, TRAIL, OPEN_DOOR, CLOSED_DOOR, OBSTACLE = range(9)
 """What a pixel shows; those above `FREE` are drawn on the ground that the first two are."""

@@ -27,6 +27,7 @@ from rich.segment import Segment
 from rich.style import Style
 from rich.text import Text
 
+from floor_plans.occupancy_grid import Box
 from state_machines import Interrupt
 from surveillance_operator.figures import FIGURES, ShownFigure, shown_figures
 from surveillance_operator.fleet_actions import ALL
@@ -36,7 +37,6 @@ from surveillance_operator.mission_words import doing, troubles, why
 from surveillance_operator.page_state import events_of, health, merged_events
 from surveillance_operator.watch import raster
 from surveillance_operator.watch.raster import CharacterCanvas, Viewport, rasterise
-from surveillance_runtime.place.occupancy_grid import Box
 
 SIDE_BY_SIDE = 76
 """From this many columns on the panel stands beside the map, else below."""

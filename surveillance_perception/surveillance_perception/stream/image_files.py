@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from surveillance_runtime.files import FileError, read_file
+from strict_files.files import FileError, read_file
 
 # what OpenCV cannot decode is said once, by an ImageError
 _set_level = cv2.setLogLevel if hasattr(cv2, 'setLogLevel') else cv2.utils.logging.setLogLevel

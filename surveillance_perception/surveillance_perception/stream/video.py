@@ -9,13 +9,13 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from strict_files.files import like_file
 from surveillance_perception.stream.image_files import (
     IMAGE_SUFFIXES,
     ImageArray,
     ImageError,
     read_image,
 )
-from surveillance_runtime.files import like_file
 
 
 @dataclass(frozen=True)

@@ -10,8 +10,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
+from strict_files.suggestions import like
 from surveillance_runtime.profile.record import RobotProfile
-from surveillance_runtime.suggestions import like
 
 MOST_AGE = 2.0
 """A stamp that is older or younger than this beside this machine's clock is told, seconds."""

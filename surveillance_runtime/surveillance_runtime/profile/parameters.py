@@ -5,15 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING
 
+from strict_files.settings import parameter
 from surveillance_runtime import parameter_checks
-from surveillance_runtime.parameters import parameter
 from surveillance_runtime.profile.record import (
     COMMAND_TYPES,
-    Body,
     Frames,
     Lidars,
     Topics,
-    footprint,
     topic_names,
 )
 
@@ -70,15 +68,4 @@ class CommandSettings:
         'Type of the velocity that is published: Twist, or TwistStamped.',
         choices=COMMAND_TYPES,
         name='robot.command_type',
-    )
-
-
-def robot_footprint() -> tuple[float, ...]:
-    """Return the field of a record that is the parameter `robot.footprint`."""
-    return parameter(
-        Body.footprint,
-        'Corners x, y of a robot that is not round, m; empty: round, of robot_radius.',
-        name='robot.footprint',
-        of=float,
-        check=footprint,
     )

@@ -8,11 +8,11 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from surveillance_runtime.files import FileError
+from strict_files.files import FileError
+from strict_files.suggestions import nearest
+from strict_files.yaml_file import KeyPath, YamlFile, read_yaml_file
 from surveillance_runtime.parameters import ParameterError, specs_of, with_values
 from surveillance_runtime.profile.record import Lidars, RobotProfile
-from surveillance_runtime.suggestions import nearest
-from surveillance_runtime.yaml_file import KeyPath, YamlFile, read_yaml_file
 
 BUILT_IN = 'built_in'
 ROBOTS = 'robots'

@@ -12,9 +12,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 
+from floor_plans.regions import ROBOT_RADIUS
+from lidar_navigation.robot_base import ROBOT_DECELERATION, footprint
+from strict_files.settings import parameter, parameters
 from surveillance_runtime import parameter_checks
-from surveillance_runtime.parameters import parameter, parameters
-from surveillance_runtime.robot_base import ROBOT_DECELERATION, ROBOT_RADIUS
 
 COMMAND_TYPES = ('Twist', 'TwistStamped')
 BATTERY_SOURCES = ('model', 'topic')
@@ -39,30 +40,6 @@ def topic_names(names: Sequence[str]) -> str | None:
 def frame_name(text: str) -> str | None:
     """Ask for the name of a frame."""
     return None if _FRAME.match(text) else 'the name of a frame like base_link'
-
-
-def footprint(values: Sequence[float]) -> str | None:
-    """Ask for the corners of the robot, if for anything: a convex polygon around its centre."""
-    if not values:
-        return None
-    corners = list(zip(values[::2], values[1::2], strict=False))
-    expected = (
-        'the corners x, y of a convex polygon around the centre of the robot, in order, '
-        'at least 3, within 20 m'
-    )
-    if len(values) % 2 or len(corners) < 3 or max(map(abs, values)) > 20.0:
-        return expected
-    sides = list(zip(corners, [*corners[1:], corners[0]], strict=True))
-    # Around the centre each side turns the same way.
-    turns = [x1 * y2 - x2 * y1 for (x1, y1), (x2, y2) in sides]
-    following = [*sides[1:], sides[0]]
-    bends = [
-        (b[0] - a[0]) * (d[1] - c[1]) - (b[1] - a[1]) * (d[0] - c[0])
-        for (a, b), (c, d) in zip(sides, following, strict=True)
-    ]
-    around = all(turn > 1e-9 for turn in turns) or all(turn < -1e-9 for turn in turns)
-    convex = all(bend >= -1e-9 for bend in bends) or all(bend <= 1e-9 for bend in bends)
-    return None if around and convex else expected
 
 
 def voltage_curve(values: Sequence[float]) -> str | None:

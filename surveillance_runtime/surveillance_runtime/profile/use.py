@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator
 from typing import Any
 
+from strict_files.files import FileError
 from surveillance_runtime.configuration import Entry, Layer
-from surveillance_runtime.files import FileError
 from surveillance_runtime.parameters import specs_of
 from surveillance_runtime.profile.reading import ProfileFile
 from surveillance_runtime.profile.record import RobotProfile

@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from marker_detection.testing.image_effects import Light, glare, shadow, streak, vignette
-from surveillance_runtime.parameters import parameter
+from strict_files.settings import parameter
 
 Array = npt.NDArray[np.float64]
 Picture = npt.NDArray[np.uint8]

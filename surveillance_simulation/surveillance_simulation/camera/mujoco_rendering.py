@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from surveillance_runtime.place import boxes
-from surveillance_runtime.place.floor_plan import WALL_HEIGHT, WALL_THICKNESS, Door
-from surveillance_runtime.place.plan_grid import solid_lines
+from floor_plans import boxes
+from floor_plans.floor_plan import WALL_HEIGHT, WALL_THICKNESS, Door
+from floor_plans.plan_grid import solid_lines
 from surveillance_simulation.camera.lamps import LampLight
 from surveillance_simulation.camera.model import Array, Camera
 from surveillance_simulation.camera.scene import DOOR_HEIGHT, STATION_SIDE

@@ -9,9 +9,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from surveillance_runtime.place import boxes
-from surveillance_runtime.place.floor_plan import WALL_HEIGHT, WALL_THICKNESS, Door
-from surveillance_runtime.place.plan_grid import solid_lines
+from floor_plans import boxes
+from floor_plans.floor_plan import WALL_HEIGHT, WALL_THICKNESS, Door
+from floor_plans.plan_grid import solid_lines
 from surveillance_simulation.camera.model import Array
 from surveillance_simulation.world import textures
 from surveillance_simulation.world.textures import TILE, Texture

@@ -12,8 +12,8 @@ import numpy as np
 from builtin_interfaces.msg import Time
 from sensor_msgs.msg import CameraInfo, Image
 
+from strict_files.settings import parameter
 from surveillance_runtime.node import PatrolNode
-from surveillance_runtime.parameters import parameter
 from surveillance_simulation import conversions
 from surveillance_simulation.camera.model import Camera, Conditions, covered, expose
 from surveillance_simulation.camera.mujoco_rendering import MujocoRenderer

@@ -11,6 +11,7 @@ from rclpy.publisher import Publisher
 from rclpy.qos import QoSProfile
 from std_msgs.msg import Float32
 
+from floor_plans import PlaceError
 from surveillance_interfaces.srv import (
     ConsoleCommand,
     DrainBattery,
@@ -21,7 +22,6 @@ from surveillance_interfaces.srv import (
     SetMarker,
     SlipOdometry,
 )
-from surveillance_runtime.place import PlaceError
 from surveillance_simulation import conversions
 from surveillance_simulation.feeds.sensor_feed import topic_of
 from surveillance_simulation.robot.robot import Robot

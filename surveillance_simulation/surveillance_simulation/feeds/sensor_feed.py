@@ -15,12 +15,12 @@ from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState, LaserScan
 from std_msgs.msg import String, UInt32
 
+from floor_plans import plan_grid
+from floor_plans.rooms import Pose
+from strict_files.settings import parameter
 from surveillance_interfaces.msg import DoorStates
 from surveillance_runtime.conversions import map_message, nanoseconds_of
 from surveillance_runtime.node import PatrolNode
-from surveillance_runtime.parameters import parameter
-from surveillance_runtime.place import plan_grid
-from surveillance_runtime.place.rooms import Pose
 from surveillance_runtime.profile.description import description, fixed_frames
 from surveillance_runtime.profile.parameters import LidarSettings, declared_frames
 from surveillance_runtime.profile.record import Body, Frames, Lidars, RobotProfile, Wheels

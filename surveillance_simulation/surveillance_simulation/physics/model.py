@@ -13,12 +13,12 @@ from typing import Any
 
 import numpy as np
 
-from surveillance_runtime.parameters import parameter
-from surveillance_runtime.place import boxes
-from surveillance_runtime.place.floor_plan import WALL_HEIGHT, WALL_THICKNESS
-from surveillance_runtime.place.plan_grid import solid_lines
-from surveillance_runtime.place.rooms import Pose
-from surveillance_runtime.profile.parameters import robot_footprint
+from floor_plans import boxes
+from floor_plans.floor_plan import WALL_HEIGHT, WALL_THICKNESS
+from floor_plans.plan_grid import solid_lines
+from floor_plans.rooms import Pose
+from lidar_navigation.robot_base import robot_footprint
+from strict_files.settings import parameter
 from surveillance_simulation.mujoco_bodies import about_z, add_thing
 from surveillance_simulation.optional_mujoco import mujoco
 from surveillance_simulation.world.world import LEAF_THICKNESS, World

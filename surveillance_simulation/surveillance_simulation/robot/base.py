@@ -13,9 +13,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from surveillance_runtime.parameters import parameter
-from surveillance_runtime.place.rooms import Pose
-from surveillance_runtime.robot_base import robot_deceleration, robot_radius
+from floor_plans.rooms import Pose
+from lidar_navigation.robot_base import robot_deceleration, robot_radius
+from strict_files.settings import parameter
 from surveillance_simulation.world.world import World
 
 _CONTACT = 1e-3

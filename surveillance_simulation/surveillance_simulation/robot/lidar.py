@@ -14,9 +14,9 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from surveillance_runtime.parameters import parameter
-from surveillance_runtime.place import boxes
-from surveillance_runtime.place.rooms import Pose
+from floor_plans import boxes
+from floor_plans.rooms import Pose
+from strict_files.settings import parameter
 from surveillance_simulation.world.world import World
 
 _PARALLEL = 1e-12

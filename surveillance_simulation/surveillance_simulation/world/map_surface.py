@@ -11,8 +11,8 @@ import math
 
 import numpy as np
 
-from surveillance_runtime.place import boxes
-from surveillance_runtime.place.occupancy_grid import Grid, distance_to
+from floor_plans import boxes
+from floor_plans.occupancy_grid import Grid, distance_to
 
 _HALF_DIAGONAL = math.sqrt(0.5)
 

@@ -15,9 +15,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from surveillance_runtime.parameters import parameter
-from surveillance_runtime.place import boxes, occupancy_grid, plan_grid
-from surveillance_runtime.place.floor_plan import WALL_THICKNESS, FloorPlan, Point
+from floor_plans import boxes, occupancy_grid, plan_grid
+from floor_plans.floor_plan import WALL_THICKNESS, FloorPlan, Point
+from strict_files.settings import parameter
 
 MANNERS = ('polite', 'pushy')
 _KEPT_GAP = {'polite': 0.6, 'pushy': 0.05}

@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from surveillance_runtime.place import PlaceError
+from floor_plans import PlaceError
 
 Texture = npt.NDArray[np.uint8]
 

@@ -14,7 +14,7 @@ from enum import StrEnum
 
 import numpy as np
 
-from surveillance_runtime.place import PlaceError, boxes
+from floor_plans import PlaceError, boxes
 
 LIDAR_HEIGHT = 0.18
 """Height of the lidar's plane, metres."""

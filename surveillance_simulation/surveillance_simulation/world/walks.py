@@ -9,8 +9,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from surveillance_runtime.place import PlaceError
-from surveillance_runtime.place.floor_plan import Point
+from floor_plans import PlaceError
+from floor_plans.floor_plan import Point
 from surveillance_simulation.world.figures import person
 from surveillance_simulation.world.world import World
 

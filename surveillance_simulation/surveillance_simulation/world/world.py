@@ -14,15 +14,10 @@ from typing import Any
 
 import numpy as np
 
-from surveillance_runtime.place import PlaceError, boxes, read_place_file
-from surveillance_runtime.place.floor_plan import (
-    WALL_THICKNESS,
-    FloorPlan,
-    Marker,
-    Point,
-)
-from surveillance_runtime.place.regions import Regions
-from surveillance_runtime.suggestions import nearest
+from floor_plans import PlaceError, boxes, read_place_file
+from floor_plans.floor_plan import WALL_THICKNESS, FloorPlan, Marker, Point
+from floor_plans.regions import Regions
+from strict_files.suggestions import nearest
 from surveillance_simulation.world.figures import person
 from surveillance_simulation.world.map_surface import MapSurface
 from surveillance_simulation.world.things import Thing, barrel, boxes_of, discs_of

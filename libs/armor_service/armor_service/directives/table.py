@@ -22,7 +22,7 @@ from armor_service.rendering import (
     unsupported_type,
 )
 from owl_reasoner.owl.vocabulary import NOTHING, OWL, RDF, RDFS, THING, XSD
-from owl_reasoner.suggestions import nearest
+from strict_files.suggestions import nearest
 
 MAX_CARDINALITY = 2**31 - 1
 Run = TypeVar('Run', bound=Callable[..., Any])

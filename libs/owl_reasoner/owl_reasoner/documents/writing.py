@@ -23,7 +23,7 @@ from owl_reasoner.owl.axioms import (
 )
 from owl_reasoner.owl.expressions import Literal
 from owl_reasoner.owl.vocabulary import OWL, RDF, RDFS, SWRL, XSD
-from owl_reasoner.suggestions import nearest
+from strict_files.suggestions import nearest
 
 FORMATS = ('rdfxml', 'ntriples', 'manchester')
 _XML = ('http://www.w3.org/XML/1998/namespace', 'http://www.w3.org/2000/xmlns/')

@@ -1,0 +1,484 @@
+"""A place made of a map: rooms and doors with names, and in each room a point the robot can reach.
+
+Where two rooms meet there is a border of free cells. Its pieces that the robot fits through are
+doors, as wide as they are from jamb to jamb; the others are walls that the map does not show, as a
+gap that a scan left. Rooms that the robot cannot reach are left out and counted.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import count
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from floor_plans.floor_plan import Door, FloorPlan
+from floor_plans.map_rooms.segmentation import Line, Segmentation, segment, spread
+from floor_plans.occupancy_grid import Grid, distance_to
+from floor_plans.occupancy_map import OccupancyMap
+from floor_plans.plan_grid import walled_off
+from floor_plans.regions import Regions, check_passable
+from floor_plans.rooms import PlaceError
+
+Labels = NDArray[np.int32]
+Mask = NDArray[np.bool_]
+Point = tuple[float, float]
+
+_NEAR_POINT = 3.0
+"""A room's point need not be farther from walls than this many radii of the robot."""
+_WIDEST = 20.0
+_SPARE = 0.1
+"""More than the robot needs at the point of a door, where there is more, metres."""
+_SHORTEST_WALL = 0.12
+_LINE_CELLS = 5
+"""A room's point keeps this far from the lines of doors: their thickness, working cells."""
+_BESIDE_DOOR = 0.3
+"""An opening is a known door if their middles are at most so far apart, metres."""
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """What is proposed for a map.
+
+    Attributes:
+        parameters: All of the place's file below `ros__parameters`, but for the map's file.
+        segmentation: The rooms as they were found.
+        names: Name of each room by its number.
+        left_out: Numbers of the rooms that the robot cannot reach.
+    """
+
+    parameters: Mapping[str, Any]
+    segmentation: Segmentation
+    names: Mapping[int, str]
+    left_out: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class _Opening:
+    """A piece of a border: the rooms, its ends and a cell with room, column and row."""
+
+    rooms: tuple[int, int]
+    start: tuple[float, float]
+    end: tuple[float, float]
+    middle: tuple[float, float]
+    clearance: float
+
+
+def propose(
+    building: OccupancyMap, radius: float, doors: Mapping[str, Line] | None = None
+) -> Proposal:
+    """Return a place with the rooms and doors of a map.
+
+    Args:
+        building: The map.
+        radius: Of the robot, metres.
+        doors: Doors that are known, by name: each parts two rooms. World frame, metres.
+
+    Raises:
+        ValueError: The robot fits nowhere.
+    """
+    known = doors or {}
+    found = segment(building.own_grid, [_as_line(building.to_own(each)) for each in known.values()])
+    grid = found.working
+    # A working cell is not exactly 0.05 m where the map's are of another size.
+    scale = building.cells.shape[1] * building.resolution / grid.cells.shape[1]
+    free = grid.free
+    floor = _Floor(building, radius, known, scale, free, distance_to(~free, grid.resolution))
+    for _ in range(found.rooms):
+        layout = _laid_out(floor, found)
+        pair = layout.one_room or _not_parted(floor, layout)
+        if pair is None:
+            return layout.proposal
+        found = found.joined(*pair)
+    return _laid_out(floor, found).proposal
+
+
+@dataclass(frozen=True)
+class _Floor:
+    """What stays while rooms are tried.
+
+    Attributes:
+        building: The map.
+        radius: Of the robot, metres.
+        known: Doors that are known, by name.
+        scale: Side of a working cell, metres.
+        free: The working cells that are free.
+        clearance: How far each is from what is not, metres.
+    """
+
+    building: OccupancyMap
+    radius: float
+    known: Mapping[str, Line]
+    scale: float
+    free: Mask
+    clearance: NDArray[np.float32]
+
+    def world(self, points: list[tuple[float, float]]) -> NDArray[np.float64]:
+        """Return working cells (column, row) in the world, metres."""
+        return self.building.to_world((np.array(points) + 0.5) * self.scale)
+
+
+@dataclass(frozen=True)
+class _Layout:
+    """A proposal, and which rooms each of its doors joins.
+
+    Attributes:
+        proposal: The proposal.
+        joins: The numbers of the rooms on both sides of each door.
+        one_room: Two rooms that are one, as one of them has no point for the robot.
+    """
+
+    proposal: Proposal
+    joins: Mapping[str, tuple[int, int]]
+    one_room: tuple[int, int] | None = None
+
+
+def _laid_out(floor: _Floor, found: Segmentation) -> _Layout:
+    """Return the place of rooms as they were found.
+
+    Raises:
+        ValueError: The robot fits nowhere.
+    """
+    labels, clearance, radius, scale = (
+        *(found.working_labels, floor.clearance),
+        *(floor.radius, floor.scale),
+    )
+    reach = _reachable(labels, clearance, radius)
+    needed = radius + 1.5 * found.working.resolution
+    openings = _openings(labels, floor.free, clearance, needed + _SPARE)
+    ways = [each for each in openings if each.clearance > needed and _fits(reach, each)]
+    rooms = _joined_rooms({number for number in np.unique(labels[reach]).tolist() if number}, ways)
+    if not rooms:
+        raise ValueError(f'a robot with a radius of {radius:g} m fits nowhere: expected free floor')
+    ways = [each for each in ways if set(each.rooms) <= rooms]
+    listed = {id(each) for each in ways}
+    names = _names(rooms, found)
+    table: dict[str, list[str]] = {names[number]: [] for number in sorted(rooms)}
+    placed: dict[str, list[float]] = {}
+    middles = [floor.world([each.start, each.end]).mean(axis=0) for each in ways]
+    called = _called(middles, floor.known)
+    for name, door in zip(called, ways, strict=True):
+        if name in floor.known:
+            start, end = (np.array(each) for each in floor.known[name])
+            placed[name] = _line(np.array([start, end, (start + end) / 2]), 0.0)
+        else:
+            placed[name] = _line(floor.world([door.start, door.end, door.middle]), scale)
+        for number in door.rooms:
+            table[names[number]].append(name)
+    joins = {name: door.rooms for name, door in zip(called, ways, strict=True)}
+    if len(rooms) == 1:
+        table[next(iter(table))].append('D1')  # the door that leads out of the place
+    walls = [
+        _as_line(_longer(floor.world([each.start, each.end]), scale))
+        for each in openings
+        if id(each) not in listed and set(each.rooms) <= rooms
+    ]
+    lines = [Door(name, *row).ends for name, row in placed.items()]
+    near = _beside(floor, [*lines, *walls])
+    positions: dict[str, list[float]] = {}
+    one_room = None
+    for number in sorted(rooms):
+        mask = labels == number
+        inside = mask & ~near
+        if len(rooms) > 1 and not (inside & reach).any():
+            # So small that the lines of its doors fill it.
+            beside = [each.rooms for each in ways if number in each.rooms]
+            one_room = one_room or beside[0]
+            inside = mask
+        cell = point_in(inside, reach, clearance, radius)
+        positions[names[number]] = _rounded(floor.world([cell])[0])
+    walls += _gaps(floor, found, [*lines, *walls], list(positions.values()))
+    station, home = _station(floor.building, labels, reach & ~near, rooms, names, positions, scale)
+    parameters: dict[str, Any] = {
+        'map': table,
+        'room_positions': positions,
+        'robot_room': home,
+        'recharge_rooms': [home],
+        'station': station,
+    }
+    if placed:
+        parameters['doors'] = placed
+    if walls:
+        parameters['walls'] = {
+            f'W{index}': [*_rounded(np.array(start)), *_rounded(np.array(end))]
+            for index, (start, end) in enumerate(walls, start=1)
+        }
+    everything = set(range(1, found.rooms + 1))
+    proposal = Proposal(parameters, found, names, tuple(sorted(everything - rooms)))
+    return _Layout(proposal, joins, one_room)
+
+
+def _not_parted(floor: _Floor, layout: _Layout) -> tuple[int, int] | None:
+    """Return two rooms that their door does not part as the place's file has to; None: all fits.
+
+    It is asked what reads that file, so that no place is proposed which would then be refused.
+    """
+    parameters, names = layout.proposal.parameters, layout.proposal.names
+    try:
+        plan = FloorPlan.from_parameters(parameters, floor.building)
+        Regions(plan)
+        check_passable(plan, floor.radius)
+    except PlaceError as error:
+        table, name, *_ = (*error.where, '', '')
+        if table == 'doors' and name in layout.joins:
+            return layout.joins[name]
+        room = next((number for number, each in names.items() if each == name), None)
+        return next((pair for pair in layout.joins.values() if room in pair), None)
+    return None
+
+
+def _longer(ends: NDArray[np.float64], more: float) -> NDArray[np.float64]:
+    """Return a wall that reaches farther on both sides, and is as long as walls have to be."""
+    start, end = ends
+    gap = math.dist(start, end)
+    along = (end - start) / gap if gap > 1e-9 else np.array([1.0, 0.0])
+    longer = max(more, (_SHORTEST_WALL - gap) / 2)
+    return np.array([start - along * longer, end + along * longer])
+
+
+def _beside(floor: _Floor, lines: list[Line]) -> Mask:
+    """Return the working cells below the lines of doors and walls, and beside them."""
+    drawn = np.zeros(floor.free.shape, np.uint8)
+    for line in lines:
+        start, end = np.rint(floor.building.to_own(line) / floor.scale - 0.5).astype(int).tolist()
+        cv2.line(drawn, start, end, 1, _LINE_CELLS)
+    return drawn > 0
+
+
+def _gaps(
+    floor: _Floor, found: Segmentation, lines: list[Line], points: list[list[float]]
+) -> list[Line]:
+    """Return walls where two rooms are one beside their door, through cells that are too narrow.
+
+    Rooms are found on cells of 0.05 m; a finer map has gaps between them, and a border may run
+    through furniture, where no straight door closes it.
+    """
+    building, grid = floor.building, floor.building.own_grid
+    side = grid.resolution
+    drawn = [_as_line(building.to_own(line)) for line in lines]
+    opened = walled_off(grid, drawn).free.astype(np.uint8)
+    parts = cv2.connectedComponents(opened, connectivity=4)[1]
+    inside: dict[int, int] = {}
+    for x, y in building.to_own(points):
+        part = grid.at(parts, x, y)
+        inside[part] = inside.get(part, 0) + 1
+    crowded = [part for part, count_ in inside.items() if part and count_ > 1]
+    if not crowded:
+        return []
+    rooms = np.where(np.isin(parts, crowded), spread(found.labels), 0)
+    border = np.zeros(rooms.shape, np.bool_)
+    for here, there in ((np.s_[:, :-1], np.s_[:, 1:]), (np.s_[:-1], np.s_[1:])):
+        one, other = rooms[here], rooms[there]
+        border[here] |= (one > 0) & (other > 0) & (one != other)
+    narrow = border & (distance_to(~grid.free, side) < floor.radius)
+    count_, pieces = cv2.connectedComponents(
+        cv2.dilate(narrow.astype(np.uint8), np.ones((3, 3), np.uint8)), connectivity=8
+    )
+    cells = np.argwhere(narrow)
+    which = pieces[cells[:, 0], cells[:, 1]]
+    walls = []
+    for piece in range(1, count_):
+        mine = cells[which == piece][:, ::-1].astype(float)
+        start = mine[np.argmax(np.hypot(*(mine - mine.mean(axis=0)).T))]
+        end = mine[np.argmax(np.hypot(*(mine - start).T))]
+        ends = building.to_world((np.array([start, end]) + 0.5) * side)
+        walls.append(_as_line(_longer(ends, 1.5 * side)))
+    return walls
+
+
+def _called(middles: list[NDArray[np.float64]], known: Mapping[str, Line]) -> list[str]:
+    """Return the names of doors: that of the known one which is there, else the next of D1, D2."""
+    names = [''] * len(middles)
+    for name, line in known.items():
+        start, end = (np.array(each) for each in line)
+        gaps = [math.dist((start + end) / 2, middle) for middle in middles]
+        left = [index for index, taken in enumerate(names) if not taken]
+        best = min(left, key=gaps.__getitem__, default=None)
+        if best is not None and gaps[best] < max(math.dist(start, end) / 2, _BESIDE_DOOR):
+            names[best] = name
+    new = (name for index in count(1) if (name := f'D{index}') not in known)
+    return [name or next(new) for name in names]
+
+
+def _as_line(points: NDArray[np.float64]) -> Line:
+    (x1, y1), (x2, y2) = points.tolist()
+    return (x1, y1), (x2, y2)
+
+
+def _reachable(labels: Labels, clearance: NDArray[np.float32], radius: float) -> Mask:
+    """Return the cells of the largest part of the floor that the robot can be in."""
+    fits = (clearance > radius) & (labels > 0)
+    count, pieces, stats, _ = cv2.connectedComponentsWithStats(
+        fits.astype(np.uint8), connectivity=8
+    )
+    if count < 2:
+        return np.zeros_like(fits)
+    largest = 1 + int(np.argmax(stats[1:, cv2.CC_STAT_AREA]))
+    return np.asarray(pieces == largest)
+
+
+def _openings(
+    labels: Labels, free: Mask, clearance: NDArray[np.float32], enough: float
+) -> list[_Opening]:
+    """Return the pieces of free borders between rooms, in the order of the rooms.
+
+    Args:
+        labels: The rooms.
+        free: The cells that are free.
+        clearance: How far each is from what is not, metres.
+        enough: The clearance that a door's point needs, where there is as much, metres.
+    """
+    walkable = np.where(free, labels, 0)
+    padded = np.pad(walkable, 1)
+    found: list[_Opening] = []
+    pairs: dict[tuple[int, int], list[NDArray[np.intp]]] = {}
+    here = padded[1:-1, 1:-1]
+    # On the side of the lower number, so that a border is one cell wide.
+    for up, right in ((0, 1), (2, 1), (1, 0), (1, 2)):
+        other = padded[up : up + here.shape[0], right : right + here.shape[1]]
+        cells = np.argwhere((here > 0) & (other > here))
+        beside = other[cells[:, 0], cells[:, 1]]
+        own = here[cells[:, 0], cells[:, 1]]
+        for pair in np.unique(np.stack([own, beside], axis=1), axis=0):
+            mask = (own == pair[0]) & (beside == pair[1])
+            pairs.setdefault((int(pair[0]), int(pair[1])), []).append(cells[mask])
+    for rooms, several in sorted(pairs.items()):
+        cells = np.unique(np.vstack(several), axis=0)
+        low, high = cells.min(axis=0), cells.max(axis=0)
+        window = np.zeros(tuple(high - low + 1), np.uint8)
+        window[tuple((cells - low).T)] = 1
+        # Steps of a slanted border touch at corners, or miss by a cell.
+        grown = cv2.dilate(window, np.ones((3, 3), np.uint8))
+        pieces = cv2.connectedComponents(grown, connectivity=8)[1]
+        which = pieces[tuple((cells - low).T)]
+        for piece in np.unique(which):
+            mine = cells[which == piece]
+            found.append(_opening_of(rooms, mine, clearance, enough))
+    return found
+
+
+def _opening_of(
+    rooms: tuple[int, int],
+    cells: NDArray[np.intp],
+    clearance: NDArray[np.float32],
+    enough: float,
+) -> _Opening:
+    points = cells[:, ::-1].astype(float)
+    centre = points.mean(axis=0)
+    start = points[np.argmax(np.hypot(*(points - centre).T))]
+    end = points[np.argmax(np.hypot(*(points - start).T))]
+    clear = clearance[cells[:, 0], cells[:, 1]]
+    # Of the cells that are free enough the one in the middle: a door reaches equally far from it.
+    best = clear >= min(float(clear.max()) - 0.05, enough)
+    middle = points[best][np.argmin(np.hypot(*(points[best] - (start + end) / 2).T))]
+    as_pair = [(float(x), float(y)) for x, y in (start, end, middle)]
+    return _Opening(rooms, as_pair[0], as_pair[1], as_pair[2], float(clear.max()))
+
+
+def _fits(reach: Mask, opening: _Opening) -> bool:
+    column, row = (int(each) for each in opening.middle)
+    return bool(reach[max(0, row - 1) : row + 2, max(0, column - 1) : column + 2].any())
+
+
+def _joined_rooms(rooms: set[int], doors: list[_Opening]) -> set[int]:
+    """Return the largest set of rooms that doors join."""
+    beside: dict[int, set[int]] = {number: set() for number in rooms}
+    for door in doors:
+        first, second = door.rooms
+        if first in rooms and second in rooms:
+            beside[first].add(second)
+            beside[second].add(first)
+    best: set[int] = set()
+    left = set(rooms)
+    while left:
+        seen = {left.pop()}
+        queue = list(seen)
+        while queue:
+            new = beside[queue.pop()] - seen
+            seen |= new
+            queue += new
+        left -= seen
+        best = max(best, seen, key=len)
+    return best
+
+
+def _names(rooms: set[int], found: Segmentation) -> dict[int, str]:
+    names, counts = {}, {'R': 0, 'C': 0}
+    for number in sorted(rooms):
+        kind = 'C' if number in found.corridors else 'R'
+        counts[kind] += 1
+        names[number] = f'{kind}{counts[kind]}'
+    return names
+
+
+def point_in(
+    room: Mask,
+    reach: Mask,
+    clearance: NDArray[np.float32],
+    radius: float,
+    resolution: float = 0.05,
+) -> tuple[float, float]:
+    """Return a cell of a room that is free enough and near its middle, column and row.
+
+    Args:
+        room: Its cells.
+        reach: Those that the robot can be in.
+        clearance: How far each cell is from what is not free, metres.
+        radius: Of the robot, metres.
+        resolution: Side of a cell, metres.
+    """
+    cells = np.argwhere(room & reach)
+    clear = clearance[cells[:, 0], cells[:, 1]]
+    # Also far from the room's own borders, so that the robot is clearly inside.
+    inside = cv2.distanceTransform(np.pad(room, 1).astype(np.uint8), cv2.DIST_L2, 3)[1:-1, 1:-1]
+    deep = np.minimum(clear, resolution * inside[cells[:, 0], cells[:, 1]])
+    enough = deep >= min(float(deep.max()), _NEAR_POINT * radius) - 1e-6
+    good = cells[enough]
+    middle = np.argwhere(room).mean(axis=0)
+    row, column = good[np.argmin(np.hypot(*(good - middle).T))]
+    return float(column), float(row)
+
+
+def _line(points: NDArray[np.float64], side: float) -> list[float]:
+    """Return x, y, yaw and width of a door with these ends and this point with room, metres."""
+    start, end, middle = points
+    length = math.dist(start, end)
+    along = (end - start) / length if length > 0 else np.array([1.0, 0.0])
+    # On the line between its ends, beside that point; so long that it reaches both.
+    at = start + along * float((middle - start) @ along)
+    width = 2 * max(math.dist(at, start), math.dist(at, end)) + side
+    yaw = math.atan2(along[1], along[0])
+    if not -math.pi / 2 < yaw <= math.pi / 2 + 1e-9:
+        yaw -= math.copysign(math.pi, yaw)
+    return [*_rounded(at), round(yaw, 4), round(min(max(width, 0.3), _WIDEST), 3)]
+
+
+def _station(
+    building: OccupancyMap,
+    labels: Labels,
+    reach: Mask,
+    rooms: set[int],
+    names: Mapping[int, str],
+    positions: Mapping[str, list[float]],
+    scale: float,
+) -> tuple[list[float], str]:
+    """Return the pose and the room of the station: where the map began, if that is free.
+
+    A mapper begins at 0, 0, and usually that is the robot's dock.
+    """
+    own = Grid(np.zeros(labels.shape, np.int8), scale)
+    x, y = building.to_own([(0.0, 0.0)])[0]
+    if own.at(reach, x, y) and (number := own.at(labels, x, y)) in rooms:
+        return [0.0, 0.0, 0.0], names[number]
+    corridors = [name for name in positions if name.startswith('C')]
+    home = (corridors or list(positions))[0]
+    return [*positions[home], 0.0], home
+
+
+def _rounded(point: NDArray[np.float64]) -> list[float]:
+    return [round(float(each), 3) for each in point]

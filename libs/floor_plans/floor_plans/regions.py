@@ -1,0 +1,231 @@
+"""Which room a point of a floor plan lies in, and whether walls, doors and rooms fit together.
+
+A floor plan says where walls stand and the map which rooms its doors join. `Regions` finds the
+rooms between the walls and compares; `check_passable` asks whether a robot gets everywhere.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+
+from floor_plans.floor_plan import WALL_THICKNESS, FloorPlan
+from floor_plans.occupancy_grid import UNKNOWN, distance_to, regions
+from floor_plans.plan_grid import draw, walled, zone_cells
+from floor_plans.rooms import PlaceError
+
+ROBOT_RADIUS = 0.22
+"""Radius of a robot that has to get through the doors, metres, where nobody says another one."""
+_LARGE = 1.0
+"""A part of the floor from this size on that no point lies in is no part of a room, m^2."""
+
+
+class Regions:
+    """The rooms of a floor plan as regions of a grid.
+
+    Args:
+        plan: The floor plan.
+
+    Raises:
+        PlaceError: The walls do not fit the map: two rooms are one, a door does not touch the room
+            it leads into, or a position lies in a wall.
+    """
+
+    def __init__(self, plan: FloorPlan) -> None:
+        self._plan = plan
+        lines = plan.wall_pieces() + [door.ends for door in plan.doors.values()]
+        self.grid = walled(plan, lines)
+        if plan.walls and plan.map is None:
+            self._labels = regions(self.grid.free)
+            self._names = self._named()
+        else:
+            self._names = dict(enumerate(plan.place.positions, start=1))
+            self._labels = self._divided()
+        if plan.is_enclosed:
+            self._check_doors()
+            self._check_stations()
+
+    def room_at(self, x: float, y: float) -> str | None:
+        """Return the room that a point (metres) lies in, None outside of every room."""
+        return self._names.get(self.grid.at(self._labels, x, y))
+
+    def masks(self) -> dict[str, npt.NDArray[np.bool_]]:
+        """Return the cells (rows, columns) of each room on `grid`, every door closed."""
+        return {name: self._labels == label for label, name in self._names.items()}
+
+    def mask(self, room: str) -> npt.NDArray[np.bool_]:
+        """Return the cells (rows, columns) of one room on `grid`, every door closed."""
+        numbers = [number for number, name in self._names.items() if name == room]
+        return np.asarray(np.isin(self._labels, numbers))
+
+    def numbers(self) -> tuple[npt.NDArray[np.int32], dict[int, str]]:
+        """Return the number of each cell's room, and the rooms by their numbers."""
+        return self._labels, dict(self._names)
+
+    def _named(self) -> dict[int, str]:
+        names: dict[int, str] = {}
+        outside, free = int(self._labels[0, 0]), self.grid.free
+        for room, (x, y, _) in self._plan.place.positions.items():
+            where = ('room_positions', room)
+            label = self.grid.at(self._labels, x, y)
+            if label in (None, outside):
+                raise PlaceError(where, f'({x:g}, {y:g}) lies outside: expected walls all around')
+            if not self.grid.at(free, x, y):
+                raise PlaceError(
+                    where, f'({x:g}, {y:g}) lies in a wall or a door: expected free space'
+                )
+            if label in names:
+                raise PlaceError(
+                    where,
+                    f"'{room}' and '{names[label]}' are one room: "
+                    f'expected a wall between their positions',
+                )
+            names[label] = room
+        return names
+
+    def _divided(self) -> npt.NDArray[np.int32]:
+        """Return each cell's room by its number in `_names`, 0 in none, on a map or an open floor.
+
+        The lines of doors cut what is free into parts; a part is the room whose point lies in it,
+        and where several do (no door is drawn between them) the nearest one's. What is not free,
+        and a small part with no point, as the floor below a table, belongs to the nearest room.
+        """
+        import cv2
+
+        grid, positions = self.grid, self._plan.place.positions
+        free = grid.free
+        parts, stats = cv2.connectedComponentsWithStats(
+            free.astype(np.uint8), connectivity=4, ltype=cv2.CV_32S
+        )[1:3]
+        inside: dict[int, list[int]] = {}
+        for number, room in self._names.items():
+            x, y, _ = positions[room]
+            if not grid.at(free, x, y):
+                unknown = grid.at(grid.cells, x, y) in (None, UNKNOWN)
+                found = 'outside of what the map knows' if unknown else 'in a wall or a door'
+                raise PlaceError(
+                    ('room_positions', room),
+                    f'({x:g}, {y:g}) lies {found}: expected free space',
+                )
+            inside.setdefault(grid.at(parts, x, y), []).append(number)
+        number_of_part = np.full(len(stats), -1, np.int32)
+        for part, numbers in inside.items():
+            number_of_part[part] = numbers[0]
+        large = stats[:, cv2.CC_STAT_AREA] * grid.resolution**2 >= _LARGE
+        number_of_part[large & (number_of_part < 0)] = 0
+        number_of_part[0] = -1
+        labels: npt.NDArray[np.int32] = number_of_part[parts]
+        for part, numbers in inside.items():
+            if len(numbers) > 1:
+                cells = np.argwhere(parts == part)
+                centres = grid.centres_of(cells)
+                points = np.array([positions[self._names[number]][:2] for number in numbers])
+                away = np.stack([np.hypot(*(centres - point).T) for point in points])
+                labels[cells[:, 0], cells[:, 1]] = np.array(numbers)[np.argmin(away, axis=0)]
+        nearest = cv2.distanceTransformWithLabels(
+            (labels < 0).astype(np.uint8),
+            cv2.DIST_L2,
+            cv2.DIST_MASK_5,
+            labelType=cv2.DIST_LABEL_PIXEL,
+        )[1]
+        seeds = np.zeros(int(nearest.max()) + 1, np.int32)
+        known = labels >= 0
+        seeds[nearest[known]] = labels[known]
+        return np.asarray(seeds[nearest], dtype=np.int32)
+
+    def _check_doors(self) -> None:
+        # Beside the door of a map there may stand something, and its cells may be large.
+        far = () if self._plan.map is None else (0.3, 0.5)
+        reach = max(WALL_THICKNESS, 2 * self.grid.resolution)
+        for room, doors in self._plan.place.rooms.items():
+            for name in doors:
+                door = self._plan.doors.get(name)
+                if door is None:
+                    continue  # has no position, as it may where there are no walls
+                across = (-math.sin(door.yaw), math.cos(door.yaw))
+                sides = {
+                    self.room_at(door.x + step * across[0], door.y + step * across[1])
+                    for away in (reach, *far)
+                    for step in (-away, away)
+                }
+                if room not in sides:
+                    found = ' and '.join(sorted(side or 'outside' for side in sides))
+                    raise PlaceError(
+                        ('doors', name),
+                        f"stands between {found}: expected it at '{room}', as the map says",
+                    )
+
+    def _check_stations(self) -> None:
+        for room, station in self._plan.stations.items():
+            x, y, _ = station.pose
+            found = self.room_at(x, y)
+            # Without a recharge room the only station may stand anywhere.
+            allowed = (room,) if self._plan.place.recharge_rooms else tuple(self._plan.place.rooms)
+            if found not in allowed:
+                raise PlaceError(
+                    station.where,
+                    f'({x:g}, {y:g}) lies in {found or "no place"}: '
+                    f'expected a point in {" or ".join(allowed)}',
+                )
+
+
+def check_passable(plan: FloorPlan, radius: float) -> None:
+    """Make sure that a round robot gets from its start through every door and into every room.
+
+    Args:
+        plan: A floor plan whose regions were checked.
+        radius: Of the robot, metres.
+
+    Raises:
+        PlaceError: A door is too narrow or stands full, or a room cannot be reached.
+    """
+    import cv2  # takes 0.2 s, and a node that only needs the rooms does without
+
+    for name, door in plan.doors.items():
+        if door.width <= 2 * radius:
+            raise PlaceError(
+                ('doors', name),
+                f'width {door.width:g} m: expected more than {2 * radius:g} m, '
+                f'as the robot is {2 * radius:g} m wide',
+            )
+    if not plan.is_enclosed:
+        return
+    grid = draw(plan)
+    solid = ~grid.free if plan.map is not None else grid.occupied
+    for zone in plan.zones.keep_out.values():
+        solid |= zone_cells(grid, zone)
+    clearance = distance_to(solid, grid.resolution)
+    # A cell's centre may be half a cell farther from the wall than the wall's own surface.
+    fits = (clearance > radius - grid.resolution / 2).astype(np.uint8)
+    pieces = cv2.connectedComponents(fits, connectivity=8)[1]
+
+    def piece_at(x: float, y: float) -> int:
+        return int(pieces[grid.cell_of(x, y)])
+
+    for room, (x, y, _) in plan.place.positions.items():
+        if not piece_at(x, y):
+            raise PlaceError(
+                ('room_positions', room),
+                f'({x:g}, {y:g}) lies closer than {radius:g} m to {_what_bars(plan)}: '
+                'expected room for the robot',
+            )
+    for name, door in plan.doors.items():
+        if not piece_at(door.x, door.y):
+            raise PlaceError(
+                ('doors', name),
+                f'{_what_bars(plan)} stands in it: expected {door.width:g} m free',
+            )
+    start = piece_at(*plan.start[:2])
+    for room, (x, y, _) in plan.place.positions.items():
+        if piece_at(x, y) != start:
+            raise PlaceError(
+                ('room_positions', room),
+                f'a robot of {2 * radius:g} m cannot drive there from {plan.place.start}: '
+                f'expected no {_what_bars(plan)[2:]} in the way',
+            )
+
+
+def _what_bars(plan: FloorPlan) -> str:
+    return 'a wall or a keep-out zone' if plan.zones.keep_out else 'a wall'

@@ -1,0 +1,410 @@
+"""Events: sightings of the same thing over visits and robots, from the first one to its end.
+
+An event is open until a person acknowledges it, calls it normal or false, or it is over: what was
+seen is seen no more, in a look that would have shown it. The book is bounded: of what is over the
+least severe and oldest goes first; what is open stays.
+"""
+
+from __future__ import annotations
+
+import heapq
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass, replace
+from enum import StrEnum
+from typing import Any
+
+from indoor_watch.observations import Kind, Observation
+
+SAME_PLACE = 0.75
+"""Two sightings of one kind without a name are of one thing up to here, metres."""
+
+
+SURE = 0.95
+"""A sighting as sure as this needs no second one."""
+ELSEWHERE = 0.5
+"""A second look is one from so far from where the first one was, metres."""
+
+
+class EventState(StrEnum):
+    """How far an event is."""
+
+    OPEN = 'open'
+    ACKNOWLEDGED = 'acknowledged'
+    NORMAL = 'normal'
+    FALSE = 'false alarm'
+    OVER = 'over'
+
+
+@dataclass(frozen=True)
+class Event:
+    """What was seen once or more often.
+
+    Attributes:
+        number: Its number, from 1.
+        kind, seen, place, subject, position: As in its last observation; ``seen`` is the state.
+        severity: 0: of no rule; higher is worse.
+        rule: The rule in words that makes it matter; empty: none.
+        state: How far it is.
+        began, last: First and last sighting, seconds since 1970.
+        sightings: How many observations.
+        looks: In how many visits it was seen.
+        confidence: That at least one of its sightings was right.
+        robots: Who saw it.
+        evidence: Of the first and the last sighting.
+        compared_with: What the last sighting was compared with; or empty.
+        seen_from: Where the robot was at the first sighting, map frame, metres; None: not known.
+        confirmed: Whether one sighting was sure, or it was seen from elsewhere or in another look,
+            too.
+        sensors: What saw it, of a person.
+    """
+
+    number: int
+    kind: Kind
+    seen: str
+    place: str
+    subject: str
+    position: tuple[float, float] | None
+    severity: int
+    rule: str
+    state: EventState
+    began: float
+    last: float
+    sightings: int
+    looks: int
+    confidence: float
+    robots: tuple[str, ...]
+    evidence: tuple[str, ...]
+    compared_with: str = ''
+    seen_from: tuple[float, float] | None = None
+    confirmed: bool = False
+    sensors: tuple[str, ...] = ()
+
+    def words(self) -> str:
+        """Return it in words, as '3: door D1 is ajar in C1'."""
+        seen = Observation(self.kind, self.seen, self.place, self.subject)
+        at = '' if self.position is None or self.subject else ' at {:.1f}, {:.1f}'
+        return f'{self.number}: {seen.words()}{at.format(*(self.position or ()))}'
+
+    def to_json(self) -> dict[str, Any]:
+        """Return it as plain values."""
+        return asdict(self)
+
+    @classmethod
+    def from_json(cls, values: Mapping[str, Any]) -> Event:
+        """Return what `to_json` gave.
+
+        Raises:
+            ValueError, KeyError, TypeError: It is something else.
+        """
+        given = dict(values)
+        place = given['position']
+        given['position'] = None if place is None else (float(place[0]), float(place[1]))
+        if (origin := given.get('seen_from')) is not None:
+            given['seen_from'] = (float(origin[0]), float(origin[1]))
+        given['kind'], given['state'] = Kind(given['kind']), EventState(given['state'])
+        for name in ('robots', 'evidence', 'sensors'):
+            given[name] = tuple(given.get(name, ()))
+        return cls(**given)
+
+
+class EventBook:
+    """All events, joined from observations.
+
+    Args:
+        most: How many are kept.
+        told: Called with each event that begins or changes its state.
+    """
+
+    def __init__(self, most: int = 2000, told: Callable[[Event], object] = lambda _: None) -> None:
+        self._most = most
+        self._told = told
+        self._events: dict[int, Event] = {}
+        # What may be of one thing, of what goes on or is quiet: a month of what is over is not
+        # looked through for each observation.
+        self._current: dict[_Key, set[int]] = {}
+        self._over: list[tuple[int, float, int]] = []
+        self._normal: dict[_Key, list[Observation]] = {}
+        self._next = 1
+        self._looks: dict[int, int] = {}
+        self._quiet: set[int] = set()
+
+    @property
+    def events(self) -> list[Event]:
+        """All events, the newest first."""
+        return sorted(self._events.values(), key=lambda each: -each.last)
+
+    def find(self, number: int) -> Event | None:
+        """Return an event by its number."""
+        return self._events.get(number)
+
+    def take(self, seen: Observation, *, severity: int, rule: str, look: int) -> Event | None:
+        """Join an observation to its event, or begin one.
+
+        Args:
+            seen: What was seen.
+            severity: What the rules make of it; 0: nothing, it only ends others.
+            rule: The rule in words.
+            look: The number of the look, so that two sightings of one look count once.
+
+        Returns:
+            The event; None where it is normal, or of no severity and of no event.
+        """
+        self._end_others(seen)
+        if any(_same(each, seen) for each in self._normal.get(_key(seen), ())):
+            return None
+        event = self._event_of(seen)
+        if event is None:
+            if severity <= 0:
+                return None
+            evidence = (seen.evidence,) if seen.evidence else ()
+            event = Event(
+                self._next,
+                seen.kind,
+                seen.state,
+                seen.place,
+                seen.subject,
+                seen.position,
+                severity,
+                rule,
+                EventState.OPEN,
+                seen.stamp,
+                seen.stamp,
+                1,
+                1,
+                seen.confidence,
+                (seen.robot,),
+                evidence,
+                seen.compared_with,
+                seen.seen_from,
+                seen.confidence >= SURE,
+                (seen.sensor,) if seen.sensor else (),
+            )
+            self._next += 1
+            self._looks[event.number] = look
+            self._keep(event)
+            return event
+        new_look = self._looks.get(event.number) != look
+        self._looks[event.number] = look
+        first = event.evidence[:1]
+        changed = replace(
+            event,
+            position=seen.position or event.position,
+            severity=max(event.severity, severity),
+            rule=rule or event.rule,
+            # It may come late, from a robot that was cut off.
+            began=min(event.began, seen.stamp),
+            last=max(event.last, seen.stamp),
+            sightings=event.sightings + 1,
+            looks=event.looks + new_look,
+            confidence=1.0 - (1.0 - event.confidence) * (1.0 - seen.confidence),
+            robots=tuple(dict.fromkeys((*event.robots, seen.robot))),
+            evidence=(*first, seen.evidence) if seen.evidence else event.evidence,
+            compared_with=seen.compared_with or event.compared_with,
+            confirmed=event.confirmed
+            or seen.confidence >= SURE
+            or event.looks + new_look > 1
+            or _from_elsewhere(event, seen),
+            sensors=tuple(dict.fromkeys((*event.sensors, *([seen.sensor] if seen.sensor else ())))),
+        )
+        self._events[event.number] = changed
+        if changed.state != EventState.OPEN:
+            self._index(changed)
+        return changed
+
+    def answer(self, number: int, state: EventState) -> Event:
+        """Take a person's word: acknowledged, normal from now on, or a false alarm.
+
+        Raises:
+            KeyError: There is no such event.
+            ValueError: Only the robot's looks end an event.
+        """
+        if state in (EventState.OPEN, EventState.OVER):
+            raise ValueError(f'an event cannot be made {state} by hand')
+        event = replace(self._events[number], state=state)
+        if state == EventState.NORMAL:
+            is_normal = Observation(
+                event.kind, event.seen, event.place, event.subject, event.position
+            )
+            self._normal.setdefault(_key(is_normal), []).append(is_normal)
+        if state == EventState.FALSE:
+            self._quiet.add(number)
+        self._keep(event)
+        return event
+
+    def end(self, number: int, stamp: float) -> Event | None:
+        """Take that a look would have shown what was seen, and did not; None where it was over.
+
+        Raises:
+            KeyError: There is no such event.
+        """
+        event = self._events[number]
+        self._quiet.discard(number)
+        self._index(event)
+        if event.state not in _GOING_ON:
+            return None
+        event = replace(event, state=EventState.OVER, last=max(event.last, stamp))
+        self._keep(event)
+        return event
+
+    def set_back(self, stamp: float) -> None:
+        """Take that the clock was set back: what happened later than now happened now.
+
+        Else nothing that is seen from now on could end it until its time comes once more.
+
+        Args:
+            stamp: Now, seconds since 1970.
+        """
+        for event in [each for each in self._events.values() if each.last > stamp]:
+            changed = replace(event, began=min(event.began, stamp), last=stamp)
+            self._events[event.number] = changed
+            self._index(changed)
+
+    def false_rate(self, since: float) -> float:
+        """Return which part of the events since a time a person has called false."""
+        found = [each for each in self._events.values() if each.began >= since]
+        wrong = sum(each.state == EventState.FALSE for each in found)
+        return wrong / len(found) if found else 0.0
+
+    def to_json(self) -> dict[str, Any]:
+        """Return all as plain values, for `restore`."""
+        return {
+            'events': [each.to_json() for each in self._events.values()],
+            'normal': [each.to_json() for some in self._normal.values() for each in some],
+            'next': self._next,
+            'quiet': sorted(self._quiet),
+        }
+
+    def restore(self, values: Mapping[str, Any]) -> None:
+        """Take what `to_json` gave, in place of all there is.
+
+        Raises:
+            ValueError, KeyError, TypeError: It is something else; nothing is changed then.
+        """
+        events = [Event.from_json(each) for each in values['events']]
+        normal = [Observation.from_json(each) for each in values['normal']]
+        following = int(values['next'])
+        quiet = {int(each) for each in values['quiet']}
+        self._events = {each.number: each for each in events}
+        self._normal, self._next = {}, following
+        for each in normal:
+            self._normal.setdefault(_key(each), []).append(each)
+        self._looks, self._quiet = {}, quiet
+        self._current, self._over = {}, []
+        for event in events:
+            self._index(event)
+
+    @property
+    def current(self) -> list[Event]:
+        """Those that are open, acknowledged, or called false and still seen, by number."""
+        numbers = sorted(number for some in self._current.values() for number in some)
+        return [self._events[number] for number in numbers]
+
+    def _keep(self, event: Event) -> None:
+        self._events[event.number] = event
+        self._index(event)
+        self._told(event)
+        while len(self._events) > self._most and self._over:
+            severity, last, number = heapq.heappop(self._over)
+            least = self._events.get(number)
+            # An entry of an event that went on since, or that was seen again, is stale.
+            if least is None or least.state == EventState.OPEN:
+                continue
+            if (least.severity, least.last) != (severity, last):
+                continue
+            del self._events[number]
+            self._quiet.discard(number)
+            self._looks.pop(number, None)
+            self._current.get(_key(least), set()).discard(number)
+
+    def _index(self, event: Event) -> None:
+        """Put an event where `_near` finds it, and where the least one is found."""
+        some = self._current.setdefault(_key(event), set())
+        if event.state in _GOING_ON or event.number in self._quiet:
+            some.add(event.number)
+        else:
+            some.discard(event.number)
+        if event.state != EventState.OPEN:
+            heapq.heappush(self._over, (event.severity, event.last, event.number))
+            if len(self._over) > 4 * self._most + 100:
+                # Mostly stale entries of what was seen again and again.
+                ended = (e for e in self._events.values() if e.state != EventState.OPEN)
+                self._over = [(each.severity, each.last, each.number) for each in ended]
+                heapq.heapify(self._over)
+
+    def _near(self, seen: Observation) -> list[Event]:
+        """Return what goes on, or is quiet, of what may be the same thing."""
+        numbers = sorted(self._current.get(_key(seen), ()))
+        return [each for each in map(self._events.__getitem__, numbers) if _alike(each, seen)]
+
+    def _event_of(self, seen: Observation) -> Event | None:
+        # What a person called false is not told again while it is seen.
+        found = [each for each in self._near(seen) if _agrees(each, seen)]
+        return max(found, key=lambda each: each.last, default=None)
+
+    def _end_others(self, seen: Observation) -> None:
+        """End events of the same thing in another state: a door that is open is closed no more."""
+        for each in self._near(seen):
+            if not _ends(each, seen) or seen.stamp <= each.last:
+                continue
+            if each.state in _GOING_ON:
+                self._keep(replace(each, state=EventState.OVER, last=seen.stamp))
+            self._quiet.discard(each.number)
+            self._index(self._events[each.number])
+
+
+_GOING_ON = (EventState.OPEN, EventState.ACKNOWLEDGED)
+_Key = tuple[Kind, str]
+
+
+def _key(thing: Event | Observation) -> _Key:
+    """Return what two sightings of one thing have in common for certain."""
+    return thing.kind, thing.subject
+
+
+def _alike(event: Event, seen: Observation) -> bool:
+    """Tell whether an event and an observation are about one thing."""
+    if event.kind != seen.kind or event.subject != seen.subject:
+        return False
+    if event.subject:
+        return True
+    if event.kind == Kind.VIEW:
+        return True  # it is the camera that is covered, wherever the robot is
+    if event.kind == Kind.PERSON:
+        return event.place == seen.place  # a person walks
+    if event.position is None or seen.position is None:
+        return event.place == seen.place
+    return math.dist(event.position, seen.position) <= SAME_PLACE
+
+
+def _agrees(event: Event, seen: Observation) -> bool:
+    """Tell whether what was seen is what an event says.
+
+    A thing that has appeared and one that was moved there both stand there.
+    """
+    there = event.kind == Kind.OBJECT and {event.seen, seen.state} <= {'appeared', 'moved'}
+    return event.seen == seen.state or there
+
+
+def _ends(event: Event, seen: Observation) -> bool:
+    """Tell whether what was seen says that an event's thing is in another state now.
+
+    Whom a camera saw may stand there still when nobody walks.
+    """
+    if seen.state == 'nobody walks' and (event.seen == 'nobody' or 'camera' in event.sensors):
+        return False
+    return not _agrees(event, seen)
+
+
+def _from_elsewhere(event: Event, seen: Observation) -> bool:
+    if event.seen_from is None or seen.seen_from is None:
+        return False
+    return math.dist(event.seen_from, seen.seen_from) >= ELSEWHERE
+
+
+def _same(normal: Observation, seen: Observation) -> bool:
+    if normal.kind != seen.kind or normal.state != seen.state or normal.subject != seen.subject:
+        return False
+    if normal.kind == Kind.PERSON or normal.position is None or seen.position is None:
+        return normal.place == seen.place
+    return math.dist(normal.position, seen.position) <= SAME_PLACE

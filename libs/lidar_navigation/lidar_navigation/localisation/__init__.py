@@ -1,0 +1,1 @@
+"""Where the robot is, in which place that is, and what moves around it."""

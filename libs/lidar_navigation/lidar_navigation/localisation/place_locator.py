@@ -1,0 +1,155 @@
+"""Which place a point of the map belongs to.
+
+The map is divided along its doors: what is connected without going through a door is one region,
+and a region belongs to the place whose point lies in it. Where a map shows several places in one
+region (no door drawn between them), the place with the nearest point is taken.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from floor_plans.floor_plan import Segment
+from floor_plans.occupancy_grid import Grid, drawn_lines, regions
+from lidar_navigation.geometry import Points
+
+BESIDE = 0.3
+"""How far beside a door one is in one of its two rooms, metres."""
+
+
+class PlaceRegions:
+    """The places of a map.
+
+    Args:
+        grid: The map, with its doors open.
+        doors: Segments of all doors, metres.
+        positions: A point in each place: x, y in metres.
+    """
+
+    def __init__(
+        self,
+        grid: Grid,
+        doors: Iterable[Segment],
+        positions: Mapping[str, ArrayLike],
+    ) -> None:
+        self._grid = grid
+        doors = list(doors)
+        self._points = {
+            name: np.asarray(point, dtype=float)[:2] for name, point in positions.items()
+        }
+        # A little longer than the opening, so that no gap remains beside the frame.
+        lines = [_stretched(door, 2 * grid.resolution) for door in doors]
+        passable = grid.free & ~drawn_lines(grid, lines)
+        self._regions = regions(passable)
+        self._places: dict[int, list[str]] = {}
+        for name, point in self._points.items():
+            region = self._region(*point)
+            if region is not None:
+                self._places.setdefault(region, []).append(name)
+        self._beside: dict[int, set[int]] = {}
+        for door in doors:
+            first, second = (self._region(*point) for point in _sides(door))
+            if first is not None and second is not None and first != second:
+                self._beside.setdefault(first, set()).add(second)
+                self._beside.setdefault(second, set()).add(first)
+
+    def place_at(self, point: Sequence[float] | Points) -> str | None:
+        """Return the place that a point (x, y in metres) belongs to; None off the map.
+
+        A room without a place (it was taken from the map, or never entered) belongs to the place
+        that one comes into through its doors.
+        """
+        xy = float(point[0]), float(point[1])
+        region = self._region(*xy)
+        if region is None:
+            return None
+        seen, front = {region}, {region}
+        while front:
+            names = [name for each in front for name in self._places.get(each, ())]
+            if names:
+                return min(names, key=lambda name: math.dist(self._points[name], xy))
+            front = {other for each in front for other in self._beside.get(each, ())} - seen
+            seen |= front
+        return None
+
+    def cells_of(self, place: str) -> NDArray[np.bool_] | None:
+        """Return the free cells of a place, shape as the map's; None where it has none."""
+        region = self._region(*self._points[place]) if place in self._points else None
+        if region is None:
+            return None
+        cells = np.asarray((self._regions == region) & self._grid.free)
+        others = [name for name in self._places[region] if name != place]
+        if others:
+            rows, columns = np.nonzero(cells)
+            spots = self._grid.centres_of(np.stack([rows, columns], axis=1))
+            own = np.linalg.norm(spots - self._points[place], axis=1)
+            for name in others:
+                nearer = np.linalg.norm(spots - self._points[name], axis=1) < own
+                cells[rows[nearer], columns[nearer]] = False
+        return cells
+
+    def _region(self, x: float, y: float) -> int | None:
+        region: int | None = self._grid.at(self._regions, x, y)
+        return region
+
+
+class PlaceLocator:
+    """Which place a point belongs to, while the map and the places may change.
+
+    Args:
+        doors: Segments of all doors, metres.
+    """
+
+    def __init__(self, doors: Iterable[Segment]) -> None:
+        self._doors = tuple(doors)
+        self._grid: Grid | None = None
+        self._positions: Mapping[str, ArrayLike] = {}
+        self._regions: PlaceRegions | None = None
+
+    @property
+    def is_known(self) -> bool:
+        """Whether there are a map and places."""
+        return self._regions is not None
+
+    def set_map(self, grid: Grid) -> None:
+        """Take the map, or another one, with its doors open."""
+        self._grid = grid
+        self._divide()
+
+    def set_positions(self, positions: Mapping[str, ArrayLike]) -> None:
+        """Take the places: a point in each, metres."""
+        self._positions = dict(positions)
+        self._divide()
+
+    def place_at(self, point: Sequence[float] | Points) -> str | None:
+        """Return the place that a point (x, y in metres) belongs to; None: in none."""
+        return None if self._regions is None else self._regions.place_at(point)
+
+    def cells_of(self, place: str) -> NDArray[np.bool_] | None:
+        """Return the free cells of a place, shape as the map's; None where it has none."""
+        return None if self._regions is None else self._regions.cells_of(place)
+
+    def _divide(self) -> None:
+        if self._grid is not None and self._positions:
+            self._regions = PlaceRegions(self._grid, self._doors, self._positions)
+
+
+def _sides(door: Segment) -> tuple[np.ndarray, np.ndarray]:
+    """Return a point on each side of a door, metres."""
+    x1, y1, x2, y2 = door
+    middle = np.array([(x1 + x2) / 2, (y1 + y2) / 2])
+    across = np.array([y1 - y2, x2 - x1]) / max(math.hypot(x2 - x1, y2 - y1), 1e-9)
+    return middle + BESIDE * across, middle - BESIDE * across
+
+
+def _stretched(line: Segment, by: float) -> Segment:
+    x1, y1, x2, y2 = line
+    length = math.hypot(x2 - x1, y2 - y1)
+    if length == 0:
+        return line
+    dx, dy = (x2 - x1) / length * by, (y2 - y1) / length * by
+    return x1 - dx, y1 - dy, x2 + dx, y2 + dy

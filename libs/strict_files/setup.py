@@ -1,0 +1,12 @@
+"""Where colcon looks for the package; all else is in pyproject.toml."""
+
+from setuptools import setup
+
+setup(
+    data_files=[
+        ('share/ament_index/resource_index/packages', ['resource/strict_files']),
+        ('share/strict_files', ['package.xml']),
+    ],
+    # Here, as a text: colcon reads what setup() was given, and understands no other form.
+    python_requires='>=3.11',
+)

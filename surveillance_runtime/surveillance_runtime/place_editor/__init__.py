@@ -1,8 +1,0 @@
-"""Editing a place: rooms cut and joined, doors, zones, points, rules; undone, checked and saved.
-
-Read from the bottom up: `shapes` measures on the floor (where a line meets walls, which part of a
-room lies on which side), `operations` change what a place's file says, `editor` keeps the history,
-checks each change as the file would be checked, and writes the file with its comments kept.
-"""
-
-from surveillance_runtime.place_editor.editor import PlaceEditor as PlaceEditor

@@ -1,0 +1,124 @@
+"""What comes on the topics of a robot's sensors: whether it is new, when it was measured by this
+node's clock, and why it is of no use."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+from nav_msgs.msg import Odometry
+
+from lidar_navigation.geometry import Pose
+from surveillance_runtime.conversions import pose_of_serialized, stamp_of_serialized
+from surveillance_runtime.node import PatrolNode
+from surveillance_runtime.qos import SENSOR_QOS
+from surveillance_runtime.sensing import conversions
+from surveillance_runtime.stamp_offset import StampOffset
+from surveillance_runtime.state_topics import StateSubscription
+
+REPEATED = 'the same message comes again and again'
+
+
+class SensorStream:
+    """The messages of one sensor's topic, in the executor's thread.
+
+    Args:
+        node: The node that reads.
+        name: Of the topic, as the node names it.
+
+    Attributes:
+        topic: The full name of the topic.
+        came_at: When a message came last, good or not, steady seconds; None: none came.
+        heard_at: When one came that is of use; None: none came.
+    """
+
+    def __init__(self, node: PatrolNode, name: str) -> None:
+        self.topic = str(node.resolve_topic_name(name))
+        self.came_at: float | None = None
+        self.heard_at: float | None = None
+        self._node = node
+        self._name = name
+        # Under use_sim_time all have one clock, and its time comes in steps.
+        simulated = node.is_simulated
+        self._stamps = None if simulated else StampOffset(self.topic)
+        self._last: tuple[float, bytes] = (0.0, b'')
+        self._repeats = False
+
+    @property
+    def problem(self) -> str:
+        """Why what came last is of no use; empty where it is."""
+        return REPEATED if self._repeats else conversions.refusal(self._node, self._name)
+
+    @property
+    def offset(self) -> float:
+        """What the sensor's stamps are behind this node's clock, seconds; 0 where they agree."""
+        return 0.0 if self._stamps is None else self._stamps.offset
+
+    def come(self, stamp: float, content: bytes) -> float | None:
+        """Take that a message came.
+
+        Args:
+            stamp: Its stamp, seconds; 0: it has none.
+            content: What it says.
+
+        Returns:
+            When it was measured, seconds of this node's clock; None where it was there before: who
+            publishes what was measured once again and again sees nothing any more.
+        """
+        self.came_at = time.monotonic()
+        last, self._last = self._last, (stamp, content)
+        self._repeats = stamp != 0.0 and (stamp, content) == last
+        if self._repeats:
+            return None
+        now = float(self._node.get_clock().now().nanoseconds) / 1e9
+        if stamp == 0.0:
+            return now
+        if self._stamps is None or stamp < 0.0:
+            return stamp
+        measured = self._stamps.time_of(stamp, now)
+        if (warning := self._stamps.warning()) is not None:
+            self._node.get_logger().warn(warning)
+        return measured
+
+    @property
+    def stamp(self) -> float:
+        """What the message that came last is stamped, seconds of its clock; 0: nothing."""
+        return self._last[0]
+
+    def hear(self) -> None:
+        """Take that the message which came is of use."""
+        self.heard_at = self.came_at
+
+
+class OdometryReader:
+    """Reads `odom`.
+
+    Args:
+        node: The node that reads.
+        take: Called with each reading, and when it was made, seconds of the node's clock.
+
+    Attributes:
+        stream: What comes.
+    """
+
+    def __init__(self, node: PatrolNode, take: Callable[[Pose, float], object]) -> None:
+        self.stream = SensorStream(node, 'odom')
+        self._node = node
+        self._take = take
+        StateSubscription(
+            node,
+            Odometry,
+            'odom',
+            self._on_odometry,
+            raw=True,
+            each=True,
+            qos=SENSOR_QOS,
+            owner='simulator',
+        )
+
+    def _on_odometry(self, serialized: bytes) -> None:
+        with conversions.refusing(self._node, 'odom'):
+            measured = self.stream.come(stamp_of_serialized(serialized), serialized)
+            if measured is not None:
+                self._take(pose_of_serialized(serialized, texts=1), measured)
+                self.stream.hear()

@@ -1,0 +1,95 @@
+"""What a robot drives by and does not hear: incidents that name the topic, and say why."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import replace
+
+from rclpy.clock import Clock, ClockType
+
+from surveillance_runtime.graph_check import InputWatch
+from surveillance_runtime.incidents import Incidents, Severity
+from surveillance_runtime.node import PatrolNode
+from surveillance_runtime.profile.check_up import awaited
+from surveillance_runtime.profile.record import Frames, RobotProfile, Topics
+from surveillance_runtime.sensing import conversions
+from surveillance_runtime.sensing.sensors import SensorStream
+
+SILENT_AFTER = 8.0
+"""Seconds of real time without a message of use after which somebody is told; a node that is
+started again is there before."""
+
+
+class SilenceWatch:
+    """Begins an incident for a topic that tells nothing any more, and ends it when it does.
+
+    What never came is not told here.
+
+    Args:
+        incidents: Where it is told.
+        streams: What comes on the topics.
+    """
+
+    def __init__(self, incidents: Incidents, streams: Iterable[SensorStream]) -> None:
+        self._incidents = incidents
+        self._streams = tuple(streams)
+
+    def look(self, now: float) -> None:
+        """Look which topics tell nothing, at a steady time, seconds."""
+        for stream in self._streams:
+            cause = 'topic', stream.topic
+            if stream.heard_at is None or stream.came_at is None:
+                continue
+            if now - stream.heard_at < SILENT_AFTER:
+                self._incidents.end(cause, f'{stream.topic} is published again')
+                continue
+            what = f'nothing is published on {stream.topic}'
+            if now - stream.came_at < SILENT_AFTER and stream.problem:
+                what = f'nothing of use comes on {stream.topic} ({stream.problem})'
+            self._incidents.begin(cause, f'{what}: the robot cannot drive', Severity.ALARM)
+
+
+class SensorWatch:
+    """Tells what a node that drives by its sensors does not hear: what never came, with what is
+    there instead, and what fell silent.
+
+    Args:
+        node: The node.
+        frames: Those of the robot.
+        lidars: What comes of each lidar, by the topic's name.
+        odometry: What comes on `odom`.
+        awaits_map: Returns whether the map has not come yet; None: the node needs none.
+    """
+
+    def __init__(
+        self,
+        node: PatrolNode,
+        frames: Frames,
+        lidars: Mapping[str, SensorStream],
+        odometry: SensorStream,
+        awaits_map: Callable[[], bool] | None = None,
+    ) -> None:
+        streams = {each.topic: each for each in (*lidars.values(), odometry)}
+        map_topic = str(node.resolve_topic_name('map'))
+        scans = tuple(lidar.topic for lidar in lidars.values())
+        topics = replace(Topics(), map=map_topic, odom=odometry.topic, scans=scans)
+        known = {*streams, *([] if awaits_map is None else [map_topic])}
+        wanted = [
+            each
+            for each in awaited(replace(RobotProfile(), topics=topics, frames=frames))
+            if each.topic in known
+        ]
+
+        def missing() -> list[str]:
+            never = [topic for topic, each in streams.items() if each.heard_at is None]
+            return never + ([map_topic] if awaits_map is not None and awaits_map() else [])
+
+        def refused(topic: str) -> str:
+            stream = streams.get(topic)
+            return conversions.refusal(node, 'map') if stream is None else stream.problem
+
+        self._inputs = InputWatch(node, wanted, missing, refused)
+        self._silence = SilenceWatch(node.incidents, streams.values())
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        node.create_timer(1.0, lambda: self._silence.look(time.monotonic()), clock=steady)
