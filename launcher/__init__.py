@@ -1,4 +1,10 @@
-"""What stands behind `launch.py`: set-up of the environment, the command line, the supervisor."""
+"""What stands behind `launch.py`: set-up of the environment, the command line, the supervisor.
+
+Begin with `cli`, which carries a command out, and `run`, whose record has every option of a run.
+`run_mission` is one run from start to summary: `fleet_launch` says which robots there are,
+`run_configuration` which parameters their nodes get, `run_processes` which processes that makes,
+and `supervisor` runs them. `environment` sets up `.venv` before anything else.
+"""
 
 import sys
 from pathlib import Path

@@ -1,14 +1,9 @@
 """Seeing, steering and keeping a mission: terminal view, page, console, recording, replay, report.
 
-Free of ROS:
-
-- `MissionState`, `follow`, `changes`: what is known of a mission, and what changed.
-- `PatchMaker`: states as the page's parts, and patches between them.
-
-With ROS:
-
-- `MissionSubscriber` (in `mission_subscriber`) keeps the state of a running mission.
-- `MissionActions` (in `mission_actions`) does what a person wants.
+Begin with `mission_state`: the one record that every view shows. `mission_subscriber` keeps it of a
+running mission by the table of `topics`, `recording.stored` of a recorded one. `figures` is the
+table of what is shown everywhere, `page_state` that of the page's parts, which `page.broadcaster`
+passes on and `recording.timeline` keeps. `mission_actions` does what a person wants.
 """
 
 from surveillance_operator.mission_changes import changes, follow

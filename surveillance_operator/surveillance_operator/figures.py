@@ -39,7 +39,8 @@ class Figure(NamedTuple):
         words: Returns what is shown; empty while it is not known.
         is_bad: Tells whether a person should look at it.
         share: Returns how full it is, 0 to 1, where it is to be drawn as a bar; None: no bar.
-        awaited: The topic that is named while the figure is not known; empty: nothing is shown.
+        awaited: The topic that is named while the figure is not known, and who publishes it; None:
+            nothing is shown.
         is_brief: Whether it is shown where there is one line for a robot.
         heard: Where it comes from, unless it follows from fields that the state has already.
     """
@@ -49,13 +50,13 @@ class Figure(NamedTuple):
     words: Callable[[MissionState], str]
     is_bad: Callable[[MissionState], bool] = lambda _state: False
     share: Callable[[MissionState], float | None] = lambda _state: None
-    awaited: str = ''
+    awaited: tuple[str, str] | None = None
     is_brief: bool = False
     heard: Heard | None = None
 
 
 class ShownFigure(NamedTuple):
-    """A figure as it is at one moment."""
+    """A figure as it is at one moment; what its functions return, as `Figure` says."""
 
     figure: Figure
     words: str
@@ -63,22 +64,23 @@ class ShownFigure(NamedTuple):
     share: float | None
 
 
-def shown_figures(state: MissionState, *, brief: bool = False) -> Iterator[ShownFigure]:
-    """Yield the figures that are known, in the order of the table.
-
-    Args:
-        state: What is known of the mission.
-        brief: Only those that are shown in one line with others.
-    """
+def figures_of(state: MissionState) -> Iterator[ShownFigure]:
+    """Yield every figure as it is now, in the order of the table."""
     for each in FIGURES:
-        if (each.is_brief or not brief) and (words := each.words(state)):
-            yield ShownFigure(each, words, each.is_bad(state), each.share(state))
+        yield ShownFigure(each, each.words(state), each.is_bad(state), each.share(state))
 
 
 def figures_line(state: MissionState, *, brief: bool = False) -> str:
-    """Return the figures that are known in one line."""
-    shown = shown_figures(state, brief=brief)
-    return ' · '.join(f'{each.figure.label} {each.words}' for each in shown)
+    """Return the figures that are known in one line.
+
+    Args:
+        state: What is known of the mission.
+        brief: Only those that are shown where there is one line for a robot.
+    """
+    known = (
+        each for each in figures_of(state) if each.words and (each.figure.is_brief or not brief)
+    )
+    return ' · '.join(f'{each.figure.label} {each.words}' for each in known)
 
 
 def _battery(state: MissionState) -> str:
@@ -107,7 +109,7 @@ FIGURES: tuple[Figure, ...] = (
         _battery,
         lambda state: state.task.battery_low,
         lambda state: None if state.task.battery is None else state.task.battery / 100,
-        awaited='battery_level',
+        awaited=('battery_level', 'battery_controller publishes it'),
         is_brief=True,
     ),
     Figure(
@@ -121,7 +123,7 @@ FIGURES: tuple[Figure, ...] = (
         'doors',
         _doors,
         lambda state: not all((state.place.doors or {}).values()),
-        awaited='door_states',
+        awaited=('door_states', 'the simulator or the doors publish it'),
     ),
 )
 """Every figure, in the order in which they are shown."""

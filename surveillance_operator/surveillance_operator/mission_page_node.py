@@ -119,7 +119,7 @@ class MissionPage(PatrolNode):
             self.page = Page(
                 self._broadcaster,
                 questions=self._questions() | (session.questions if session else {}),
-                actions=(self._offered_actions() if control else {})
+                actions=(self._offered_actions(session) if control else {})
                 | (session.actions if session else {}),
                 picture=self._picture,
                 evidence=lambda name, robot, leaves: self._sightings.picture(
@@ -202,14 +202,15 @@ class MissionPage(PatrolNode):
             'sightings': self._sightings.listed,
         }
 
-    def _offered_actions(self) -> dict[str, Action]:
+    def _offered_actions(self, session: EditSession | None) -> dict[str, Action]:
         shared = self._actions.shared
+        rooms = RoomChanges(shared, session)
         return {
             'door': shared.set_door,
             'obstacle': shared.place_obstacle,
             'remove_obstacle': shared.remove_obstacle,
-            'add_room': shared.add_room,
-            'remove_room': shared.remove_room,
+            'add_room': rooms.add,
+            'remove_room': rooms.remove,
             'go': self._of_robots(MissionActions.go_to),
             'arm': self._of_robots(MissionActions.move_arm),
             'machine': self._of_robots(MissionActions.machine),
@@ -235,6 +236,41 @@ class MissionPage(PatrolNode):
         if word not in WORDS:
             raise ValueError(f'{word!r}: expected {nearest(word, WORDS)}')
         return self._actions.told(robot, WORDS[word][1])
+
+
+class RoomChanges:
+    """Rooms that a person adds or removes on the page: in the mission, and in the place's file.
+
+    The mission says whether it can be; the file follows, so that the editor, the next run and the
+    report have the place that the page shows.
+
+    Args:
+        mission: Changes the running mission.
+        session: Edits the place's file; None: it is not edited, and the change is of this run.
+    """
+
+    def __init__(self, mission: MissionActions, session: EditSession | None) -> None:
+        self._mission = mission
+        self._session = session
+
+    def add(self, name: str, x: float, y: float, doors: Sequence[str]) -> str:
+        """Add a room to this run; in a file it needs walls and doors, which the editor draws."""
+        said = self._mission.add_room(name, x, y, doors)
+        if self._session is None:
+            return said
+        return f'{said}; for this run: in the file of the place it is drawn in the editor'
+
+    def remove(self, name: str) -> str:
+        """Remove a room; in the editor that can be undone."""
+        if self._session is None:
+            return f'{self._mission.remove_room(name)}; for this run'
+        self._session.check_saved()
+        said = self._mission.remove_room(name)
+        try:
+            self._session.change_now('remove_room', {'room': name})
+        except ValueError as error:
+            return f'{said}; for this run, its file keeps it: {error}'
+        return f'{said}; also in the file: the editor can undo it'
 
 
 def _kept_token(path: str) -> str:

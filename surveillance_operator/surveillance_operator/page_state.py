@@ -19,8 +19,9 @@ from PIL import Image
 
 from floor_plans.occupancy_grid import Grid
 from patrol_policy.policies import POLICIES
+from patrol_policy.promises import Promise
 from patrol_policy.promises import lines as promise_lines
-from surveillance_operator.figures import figures_line, shown_figures
+from surveillance_operator.figures import figures_line, figures_of
 from surveillance_operator.mission_state import (
     NO_POINTS,
     RECORDS,
@@ -86,8 +87,14 @@ def _promises(state: MissionState) -> Any:
             'words': each.words,
             'hours': state.task.hours.get(each.place, ''),
         }
-        for each in state.task.promises
+        for each in _kept(state)
     }
+
+
+def _kept(state: MissionState) -> list[Promise]:
+    """Return what can be kept of each place; none of a place that was removed meanwhile."""
+    there = state.place.positions
+    return [each for each in state.task.promises if not there or each.place in there]
 
 
 def _seconds(value: float) -> float | None:
@@ -218,13 +225,14 @@ PARTS: Mapping[str, Callable[[MissionState], Any]] = {
     'status': _status,
     'figures': lambda s: [
         [each.figure.name, each.figure.label, each.words, each.is_bad, each.share]
-        for each in shown_figures(s)
+        for each in figures_of(s)
+        if each.words
     ],
     'brief': lambda s: figures_line(s, brief=True),
     'decision': _decision,
     'promises': _promises,
     # As the log says it: a place that is late by little is no trouble.
-    'kept': lambda s: promise_lines(s.task.promises)[0] if s.task.promises else None,
+    'kept': lambda s: promise_lines(kept)[0] if (kept := _kept(s)) else None,
     'grid': lambda s: _grid(s.place.grid),
     'places': _places,
     'regions': _regions,

@@ -39,6 +39,22 @@ def scanned(tmp_path: Path) -> PlaceEditor:
     return PlaceEditor(tmp_path / 'place.yaml')
 
 
+def test_a_room_is_removed_with_its_doors_and_brought_back(typed: PlaceEditor) -> None:
+    typed.apply('set_keep_out', {'room': 'R3', 'on': True})
+    assert typed.apply('remove_room', {'room': 'R3'}) == 'R3 is removed'
+    typed.save()
+    written = read_place_file(typed.path)
+    assert 'R3' not in written.place.rooms
+    assert 'D3' not in {*written.place.doors, *written.plan.doors}
+    assert 'R3' not in (typed.now.described.get('keep_out') or ())
+    typed.undo()
+    assert typed.now.plan.place.doors['D3'] == ('R3', 'C2')
+    with pytest.raises(ValueError, match='C2: is the only way to R3, R4'):
+        typed.apply('remove_room', {'room': 'C2'})
+    with pytest.raises(ValueError, match='holds a charging station'):
+        typed.apply('remove_room', {'room': 'E'})
+
+
 def room_at(editor: PlaceEditor, x: float, y: float) -> str:
     return editor.now.regions.room_at(x, y) or ''
 

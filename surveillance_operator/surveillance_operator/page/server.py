@@ -215,6 +215,7 @@ class Page:
             'control': int(may_act),
             'edit': int(may_edit),
             'imports': int(may_edit and 'import_map' in self._actions),
+            'live': int(self._front != name),
             'watch': int('sightings' in self._questions),
         }
         attributes = ' '.join(f'data-{name}="{value}"' for name, value in shown.items())

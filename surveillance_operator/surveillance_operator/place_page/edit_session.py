@@ -72,6 +72,35 @@ class EditSession:
             actions['import_map'] = self._import
         return actions
 
+    def check_saved(self) -> None:
+        """Make sure that the file has all that the editor shows.
+
+        Raises:
+            ValueError: The place has changes that nobody has saved.
+        """
+        with self._lock:
+            if self._editor.is_changed:
+                raise ValueError(
+                    'the editor has changes of the place that are not saved: save or undo them'
+                )
+
+    def change_now(self, operation: str, fields: Mapping[str, Any]) -> str:
+        """Change the place and write it, for a person who sees another page than the editor.
+
+        The change stands in the editor's history, where it can be undone.
+
+        Raises:
+            ValueError: It cannot be done, or the place has changes that nobody has saved.
+        """
+        self.check_saved()
+        with self._lock:
+            said = self._editor.apply(operation, fields)
+            try:
+                return f'{said}; {self._save()}'
+            except ValueError:
+                self._editor.undo()
+                raise
+
     @property
     def _editor(self) -> PlaceEditor:
         if self._open is None:

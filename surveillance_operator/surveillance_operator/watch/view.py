@@ -29,7 +29,7 @@ from rich.text import Text
 
 from floor_plans.occupancy_grid import Box
 from state_machines import Interrupt
-from surveillance_operator.figures import FIGURES, ShownFigure, shown_figures
+from surveillance_operator.figures import ShownFigure, figures_of
 from surveillance_operator.fleet_actions import ALL
 from surveillance_operator.fleet_table import fleet_lines
 from surveillance_operator.mission_state import MissionState, Pose
@@ -74,10 +74,8 @@ RECENT = 300
 PUBLISHERS = {
     'mission_status': 'robot_behavior tells what it does',
     'decision': 'no place was chosen',
-    'battery_level': 'battery_controller publishes it',
     'map': 'the simulator or a map server publishes it; in modes RANDOM and MANUAL nobody does',
     'amcl_pose': 'motion_controller publishes it in mode SIMULATED',
-    'door_states': 'the simulator or the doors publish it',
 }
 LEVELS = ('ok', 'WARN', 'ERROR', 'STALE')
 """Of what nodes report, by their numbers on `/diagnostics`."""
@@ -274,13 +272,14 @@ def figure_lines(state: MissionState, width: int, *, brief: bool) -> list[Text]:
         width: Columns that there are.
         brief: Those that are brief, or else the others.
     """
-    shown = {each.figure.name: each for each in shown_figures(state)}
     lines = []
-    for figure in (each for each in FIGURES if each.is_brief == brief):
-        if (each := shown.get(figure.name)) is not None:
+    for each in figures_of(state):
+        if each.figure.is_brief != brief:
+            continue
+        if each.words:
             lines.append(_figure(each, width))
-        elif figure.awaited:
-            lines.append(_nothing(state, figure.awaited))
+        elif each.figure.awaited:
+            lines.append(_nothing(state, *each.figure.awaited))
     return lines
 
 
@@ -446,8 +445,10 @@ def _box_around(state: MissionState) -> Box | None:
     return float(left), float(bottom), float(right), float(top)
 
 
-def _nothing(state: MissionState, topic: str, *, sketched: bool = False) -> Text:
-    why = state.health.silent.get(topic) or PUBLISHERS[topic]
+def _nothing(
+    state: MissionState, topic: str, publisher: str = '', *, sketched: bool = False
+) -> Text:
+    why = state.health.silent.get(topic) or publisher or PUBLISHERS[topic]
     return _dim(f'{"sketched: " if sketched else ""}nothing on {topic} yet: {why}')
 
 

@@ -127,6 +127,24 @@ def join(draft: Draft, first: str, second: str) -> str:
     return f'{second} is a part of {first}'
 
 
+def remove_room(draft: Draft, room: str) -> str:
+    """Take a room out of the place, with its doors, which lead nowhere then; its floor stays."""
+    draft.plan.place.without_room(room)  # which says why it cannot go
+    rooms = draft.table('map')
+    gone = rooms.pop(room)
+    for other, doors in rooms.items():
+        rooms[other] = [door for door in doors if door not in gone]
+    for door in gone:
+        draft.table('doors').pop(door, None)
+    for table in _ROOM_TABLES[1:]:
+        draft.table(table).pop(room, None)
+    for key in ('recharge_rooms', 'keep_out'):
+        draft.put(key, [each for each in draft.described.get(key) or () if each != room])
+    if draft.described.get('robot_room') == room:
+        draft.described['robot_room'] = next(iter(rooms))
+    return f'{room} is removed'
+
+
 def _open_for_good(draft: Draft, name: str) -> None:
     """Take a door's opening out of the walls: what remains of them stands on both sides."""
     door = draft.plan.doors.get(name)
@@ -429,7 +447,7 @@ def remove_marker(draft: Draft, name: str) -> str:
 OPERATIONS: Mapping[str, Callable[..., str]] = {
     each.__name__: each
     for each in (
-        *(cut, join, move_door, set_door, add_door, remove_door, rename, move_point),
+        *(cut, join, remove_room, move_door, set_door, add_door, remove_door, rename, move_point),
         *(move_station, add_station, remove_station),
         *(set_zone, remove_zone, set_rule, set_keep_out, set_text, set_marker, remove_marker),
     )

@@ -27,6 +27,16 @@ function follow(field, value) {
   field.dataset.known = field.value = value;
 }
 
+// A press that cannot be taken back here is asked for: the button shows the question, and the same press again means yes.
+const ASKED = 5000;
+
+function confirmed(button, label, question) {
+  const again = button.textContent === question;
+  button.textContent = again ? label : question;
+  if (!again) setTimeout(() => { button.textContent = label; }, ASKED);
+  return again;
+}
+
 export class Control {
   constructor(state, may) {
     this.state = state;
@@ -62,7 +72,7 @@ export class Control {
       this.form('Threshold', [this.seconds, h('span', {}, 's')], [['Set', 'threshold', (g) => g]]),
       this.form('Policy', [this.policy], [['Set', 'policy', (g) => g]]),
       this.arm,
-      this.form('Room', [this.room], [['Remove', 'remove_room', (g) => g]]),
+      this.form('Room', [this.room], [['Remove', 'remove_room', (g) => g, null, ({name}) => `Remove ${name}?`]]),
       this.point,
       this.form('New room', [input('name', 'name', 'R9', {class: 'short'}), input('doors', 'doors', 'D1', {class: 'short'})],
         [['Add', 'add_room', (g) => ({name: g.name, ...this.at(), doors: g.doors.split(/[ ,]+/).filter(Boolean)}), this.point]]),
@@ -72,12 +82,13 @@ export class Control {
     this.controller.addEventListener('change', () => { this.command.value = COMMANDS[this.controller.value]; });
   }
 
-  // Buttons: label, action, its fields from the form's, another form that it reads, too. The Enter key in a field is the first button.
+  // Buttons: label, action, its fields from the form's, another form that it reads, too, what is asked before. The Enter key in a field is the first button.
   form(title, fields, buttons) {
     const form = h('form', {'aria-label': title});
-    const pressed = buttons.map(([label, name, fieldsOf, other], number) => h('button', {type: number ? 'button' : 'submit', 'data-act': name, onclick: async (event) => {
+    const pressed = buttons.map(([label, name, fieldsOf, other, asks], number) => h('button', {type: number ? 'button' : 'submit', 'data-act': name, onclick: async (event) => {
       event.preventDefault();
       if (![form, other].every((each) => !each || each.reportValidity())) return;
+      if (asks && !confirmed(event.currentTarget, label, asks(Object.fromEntries(new FormData(form))))) return;
       const found = await act(name, fieldsOf(Object.fromEntries(new FormData(form))));
       form.append($('done'));
       $('done').textContent = (found.ok ? '✓ ' : '✗ ') + found.text;

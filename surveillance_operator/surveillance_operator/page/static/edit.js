@@ -3,6 +3,7 @@
 import {$, h, s, act, ask, names} from './dom.js';
 
 const may = document.documentElement.dataset.edit === '1';
+$('live-link').hidden = document.documentElement.dataset.live !== '1';
 const TOOLS = {
   select: ['Select', 'v', 'Tap a room, a door or a zone; drag its handle to move it; drag the floor to look around.'],
   cut: ['Cut', 'c', 'Draw a line through a room, or tap its two ends. It is carried on to the walls.'],
@@ -161,6 +162,7 @@ const FIELDS = {
       ['keep_out', 'never entered', room.keep_out, (value) => ['set_keep_out', {room: name, on: value}]],
       ['x', 'Point x, m', room.point[0], (value) => ['move_point', {room: name, x: value, y: room.point[1]}]],
       ['y', 'Point y, m', room.point[1], (value) => ['move_point', {room: name, x: room.point[0], y: value}]],
+      ['remove', 'Remove the room and its doors', null, () => ['remove_room', {room: name}]],
     ];
   },
   door: (name) => {

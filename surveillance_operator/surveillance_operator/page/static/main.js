@@ -105,7 +105,7 @@ const SHOW = {
     lightMachine($('machine'), state.active?.paths ?? [], state.transitions ?? []);
     $('paused').hidden = !state.active?.paused;
     const waiting = state.active?.waiting ?? [];
-    $('waiting').hidden = !waiting.length;
+    $('waiting').hidden = $('approve').hidden = !waiting.length;
     $('waiting').textContent = `waits for approval: ${waiting.join(', ')}`;
   }],
   stopped: [['stopped'], () => {
