@@ -8,10 +8,10 @@ from typing import Any
 
 import pytest
 
+from floor_plans import read_place_file
+from floor_plans.editor import PlaceEditor
 from surveillance_operator.mission_page_node import RoomChanges
 from surveillance_operator.place_page.edit_session import EditSession
-from surveillance_runtime.place import read_place_file
-from surveillance_runtime.place_editor import PlaceEditor
 
 SEVEN = Path(__file__).parents[2] / 'config' / 'seven_rooms.yaml'
 
