@@ -1,4 +1,4 @@
-"""The parts of a run of `launch.py`; what is in each, `surveillance_runtime.team` says."""
+"""The parts of a run of `launch.py`; what is in each, `surveillance_runtime.fleet_parts` says."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from pathlib import Path
 
 from launcher.run import Run
 from surveillance_runtime import node_table
+from surveillance_runtime.fleet_parts import Choice, TeamPart, team_parts
 from surveillance_runtime.profile import ProfileFile
 from surveillance_runtime.run_parameters import place_file
-from surveillance_runtime.team import Choice, TeamPart, team_parts
 
 
 @dataclass(frozen=True, kw_only=True)

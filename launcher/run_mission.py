@@ -189,7 +189,7 @@ def _look_for_others(run: Run, team: Sequence[RobotProcesses]) -> None:
         for node in part.nodes
         if node.name in node_table.RUN_NODES
     ]
-    words = [interpreter(), '-P', '-m', 'surveillance_runtime.namesakes', *names]
+    words = [interpreter(), '-P', '-m', 'surveillance_runtime.duplicate_nodes', *names]
     found = subprocess.run(words, env=node_environ(run), stdout=subprocess.PIPE, text=True)
     if found.returncode == EXIT_THERE:
         raise NotNowError(found.stdout.strip())

@@ -26,6 +26,7 @@ from floor_plans.writing import copy_place
 from launch import LaunchContext, LaunchDescription
 from surveillance_runtime.configuration import Configuration, Entry, Layer
 from surveillance_runtime.event_log import record_in
+from surveillance_runtime.fleet_parts import Choice, TeamPart, team_parts
 from surveillance_runtime.launch_protocol import EXIT_CANNOT_START, EXIT_NOT_NOW
 from surveillance_runtime.node_table import MARKERS, RECORDER, find, select
 from surveillance_runtime.node_table import Node as NodeOfTable
@@ -55,7 +56,6 @@ from surveillance_runtime.run_parameters import (
     watch_entries,
     write_parameters,
 )
-from surveillance_runtime.team import Choice, TeamPart, team_parts
 
 ARGUMENTS = [
     DeclareLaunchArgument(

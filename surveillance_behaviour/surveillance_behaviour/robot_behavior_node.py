@@ -42,9 +42,9 @@ from surveillance_behaviour.ros_adapters.peers import (
 from surveillance_behaviour.ros_adapters.purpose_feed import PurposeFeed
 from surveillance_behaviour.ros_adapters.reason_client import ReasonClient
 from surveillance_runtime.conversions import charging_from, seconds_of
+from surveillance_runtime.duplicate_nodes import DuplicateNodeWatch
 from surveillance_runtime.introspection import IntrospectionServer
 from surveillance_runtime.launch_protocol import NotNowError
-from surveillance_runtime.namesakes import NamesakeWatch
 from surveillance_runtime.node import JOIN_SECONDS, PatrolNode
 from surveillance_runtime.process import run_node
 from surveillance_runtime.qos import SENSOR_QOS
@@ -104,7 +104,7 @@ class RobotBehavior(PatrolNode):
             self, self.get_name(), self.machine, '/', self._on_pause
         )
         self._introspection.start()
-        NamesakeWatch(self)
+        DuplicateNodeWatch(self)
         hear_battery(self, battery)
         PurposeFeed(self, self.mission, self.machine, self._announcer, deadlines, clock.elapsed)
         StateSubscription(

@@ -46,7 +46,7 @@ from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.place_changes import follow_place
 from surveillance_runtime.place_parameters import place_zones
 from surveillance_runtime.process import run_node
-from surveillance_runtime.profile.check_up import Awaited, findings
+from surveillance_runtime.profile.check_up import ExpectedTopic, findings
 from surveillance_runtime.profile.parameters import declared_frames
 from surveillance_runtime.sensing.conversions import refusing
 from surveillance_runtime.sensing.transforms import ScanReader
@@ -292,7 +292,9 @@ class CollisionMonitor(PatrolNode):
         if types == {kind} or (not types and self._wanted == Velocity()):
             self.incidents.end(BASE_CAUSE, 'the base listens')
             return
-        command = Awaited('topics.command', self._base.topic, kind, False, 'the base drives by it')
+        command = ExpectedTopic(
+            'topics.command', self._base.topic, kind, False, 'the base drives by it'
+        )
         lines = '; '.join(findings(command, endpoints_of(self), UNGUARDED_AFTER))
         if not types:
             lines += (

@@ -47,7 +47,7 @@ from surveillance_ontology.map_ontology import MapOntology
 from surveillance_ontology.patrol_vocabulary import ROBOT, checked_names
 from surveillance_ontology.robot_ontology import RobotOntology
 from surveillance_runtime.conversions import point_from, point_message
-from surveillance_runtime.namesakes import NamesakeWatch
+from surveillance_runtime.duplicate_nodes import DuplicateNodeWatch
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.parameters import ParameterError
 from surveillance_runtime.place_changes import TOPIC, described_in_text
@@ -145,7 +145,7 @@ class OntologyMapBuilder(PatrolNode):
         self._place_file = Path(file).with_suffix('.place.json') if file else None
         self._tell_kept_place()
         self._serve()
-        NamesakeWatch(self)
+        DuplicateNodeWatch(self)
         self._look()
 
     def _cannot_build(self, reason: str) -> None:

@@ -35,11 +35,11 @@ from surveillance_perception.conversions import (
     trajectory_to_ros,
 )
 from surveillance_runtime.conversions import seconds_of
+from surveillance_runtime.fresh_images import FreshImages
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.process import run_node
 from surveillance_runtime.qos import SENSOR_QOS
 from surveillance_runtime.robot_arm import ARM, REST_PATIENCE, Arm, Array
-from surveillance_runtime.settled_frames import SettledFrames
 from surveillance_runtime.stamp_offset import StampOffset
 from surveillance_runtime.stamped_readings import OdometryStamps, StampedReadings
 from surveillance_runtime.state_topics import OwnedTopic, StateSubscription
@@ -147,7 +147,7 @@ class ArmController(PatrolNode):
         )
         self.stopping.subscribe(self._driver.wake)
         self.create_subscription(JointState, 'joint_states', self._on_joints, SENSOR_QOS)
-        self._read = SettledFrames(self)
+        self._read = FreshImages(self)
         self._fused, self._fused_in = FusedPositions(), ''
         # Where the odometry began on the map, as who localises tells of the same stamps.
         self._odometry = OdometryStamps[np.ndarray](KEPT_ODOMETRY)

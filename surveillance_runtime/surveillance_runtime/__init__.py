@@ -11,7 +11,7 @@ What others may use, by module:
 - `sensing`: streams of sensors, their ages, transforms.
 - `waiting`: `AwaitedWork` and `AwaitedEvent` for callbacks. `state_file`: `StateFile`, what
   outlives a killed process.
-- `qos`, `conversions`, `logging`, `robot_arm`, `settled_frames`, `image_effects`,
+- `qos`, `conversions`, `logging`, `robot_arm`, `fresh_images`, `image_effects`,
   `testing`.
 
 The modules are imported by themselves, so that a program without ROS can use those that need none.

@@ -16,7 +16,13 @@ from rclpy.subscription import Subscription
 from surveillance_runtime.conversions import seconds_of
 from surveillance_runtime.incidents import Severity
 from surveillance_runtime.node import PatrolNode
-from surveillance_runtime.profile.check_up import Awaited, Endpoint, Heard, Seen, findings
+from surveillance_runtime.profile.check_up import (
+    Endpoint,
+    ExpectedTopic,
+    GraphSample,
+    TopicSample,
+    findings,
+)
 from surveillance_runtime.qos import SENSOR_QOS
 
 try:
@@ -25,7 +31,7 @@ except ImportError:
     TFMessage = None
 
 
-def endpoints_of(node: Node) -> Seen:
+def endpoints_of(node: Node) -> GraphSample:
     """Return who publishes and who subscribes what, without what the node itself does."""
     publishers: dict[str, list[Endpoint]] = {}
     subscribers: dict[str, list[Endpoint]] = {}
@@ -37,7 +43,7 @@ def endpoints_of(node: Node) -> Seen:
             ends = [_endpoint(info) for info in infos if info.node_name != node.get_name()]
             if ends:
                 found[topic] = ends
-    return Seen(publishers, subscribers)
+    return GraphSample(publishers, subscribers)
 
 
 def _endpoint(info: Any) -> Endpoint:
@@ -58,7 +64,7 @@ class Listener:
         wanted: The topics.
     """
 
-    def __init__(self, node: Node, wanted: Iterable[Awaited]) -> None:
+    def __init__(self, node: Node, wanted: Iterable[ExpectedTopic]) -> None:
         self._node = node
         self._wanted = [each for each in wanted if each.heard]
         self._subscriptions: dict[str, Subscription] = {}
@@ -69,7 +75,7 @@ class Listener:
             latched = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
             node.create_subscription(TFMessage, 'tf_static', self._on_static, latched)
 
-    def look(self) -> Seen:
+    def look(self) -> GraphSample:
         """Subscribe what is published by now; return what is there and what came so far."""
         seen = endpoints_of(self._node)
         for each in self._wanted:
@@ -84,7 +90,7 @@ class Listener:
                 self._subscriptions[each.topic] = self._node.create_subscription(
                     kind, each.topic, partial(self._hear, each.topic), quality
                 )
-        return Seen(seen.publishers, seen.subscribers, self._heard(), self._parents)
+        return GraphSample(seen.publishers, seen.subscribers, self._heard(), self._parents)
 
     def _on_static(self, message: Any) -> None:
         for each in message.transforms:
@@ -99,13 +105,13 @@ class Listener:
             now = self._node.get_clock().now().nanoseconds / 1e9
             self._last[topic] = header.frame_id, now - stamp if stamp else None
 
-    def _heard(self) -> dict[str, Heard]:
+    def _heard(self) -> dict[str, TopicSample]:
         found = {}
         for topic, times in self._times.items():
             passed = times[-1] - times[0]
             frame, age = self._last.get(topic, ('', None))
             rate = (len(times) - 1) / passed if passed > 0 else 0.0
-            found[topic] = Heard(len(times), rate, frame, age)
+            found[topic] = TopicSample(len(times), rate, frame, age)
         return found
 
 
@@ -128,7 +134,7 @@ class InputWatch:
     def __init__(
         self,
         node: PatrolNode,
-        wanted: Sequence[Awaited],
+        wanted: Sequence[ExpectedTopic],
         missing: Callable[[], Iterable[str]],
         refused: Callable[[str], str] = lambda _topic: '',
     ) -> None:

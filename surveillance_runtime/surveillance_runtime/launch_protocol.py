@@ -46,7 +46,7 @@ EXIT_NOT_NOW = os.EX_TEMPFAIL
 
 
 EXIT_THERE = 3
-"""That of the look for other robots, see `namesakes`: there is one."""
+"""That of the look for other robots, see `duplicate_nodes`: there is one."""
 
 
 class NotNowError(ValueError):

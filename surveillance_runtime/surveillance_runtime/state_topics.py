@@ -3,7 +3,7 @@
 The owner (`OwnedTopic`) publishes each change, repeats its state about each second, answers every
 foreign value with its own, and tells of a second publisher in an incident with that node's name.
 A reader (`StateSubscription`) takes a new state once, refuses stamps ahead of its clock, and
-believes the owner: see `belief`. Where the owner is another program
+believes the owner: see `publisher_trust`. Where the owner is another program
 (map_server, a driver), which tells of nobody, the reader tells of a second publisher.
 """
 
@@ -21,10 +21,10 @@ from rclpy.qos import QoSProfile
 from rclpy.serialization import deserialize_message, serialize_message
 from rclpy.timer import Timer
 
-from surveillance_runtime.belief import Belief
 from surveillance_runtime.message_source import SOURCE
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.node_table import RUN_NODES
+from surveillance_runtime.publisher_trust import PublisherTrust
 from surveillance_runtime.qos import STATE_QOS
 
 M = TypeVar('M')
@@ -204,7 +204,7 @@ class StateSubscription(Generic[M]):
         self._name = name
         if owner:
             owner = f'{node.get_namespace().rstrip("/")}/{owner}'
-        self._belief = Belief(self._publishers, owner, only)
+        self._trust = PublisherTrust(self._publishers, owner, only)
         self._told = ''
         self._refused_at = -math.inf
         self._timer: Timer | None = None
@@ -218,10 +218,10 @@ class StateSubscription(Generic[M]):
     def _on_heard(self, heard: bytes, info: dict[str, Any]) -> None:
         if self._is_refused(heard):
             return
-        before = self._belief.value
-        if self._belief.hear(heard, info.get(SOURCE, b''), time.monotonic()):
+        before = self._trust.value
+        if self._trust.hear(heard, info.get(SOURCE, b''), time.monotonic()):
             self._believed(heard, before)
-        elif (due := self._belief.due) is not None:
+        elif (due := self._trust.due) is not None:
             self._wake_at(due)
 
     def _wake_at(self, due: float) -> None:
@@ -235,17 +235,17 @@ class StateSubscription(Generic[M]):
     def _on_due(self) -> None:
         assert self._timer is not None
         self._timer.cancel()
-        before = self._belief.value
-        if self._belief.settle(time.monotonic()):
-            assert self._belief.value is not None
-            self._believed(self._belief.value, before)
+        before = self._trust.value
+        if self._trust.settle(time.monotonic()):
+            assert self._trust.value is not None
+            self._believed(self._trust.value, before)
         self._tell_of_rivals()
-        if (due := self._belief.due) is not None:
+        if (due := self._trust.due) is not None:
             self._wake_at(due)
 
     def _tell_of_rivals(self) -> None:
         """Tell who else publishes the topic, where its owner is no node of the robot's own."""
-        rivals, owner = ', '.join(self._belief.rivals), self._belief.node
+        rivals, owner = ', '.join(self._trust.rivals), self._trust.node
         text = ''
         if rivals and owner and owner.rpartition('/')[2] not in RUN_NODES:
             text = f'{self._name} is published by {rivals}, too: {owner} is believed'
@@ -263,7 +263,7 @@ class StateSubscription(Generic[M]):
 
     def _is_refused(self, heard: bytes) -> bool:
         """Refuse a stamp that no clock has reached yet."""
-        if self._stamp is None or heard == self._belief.value:
+        if self._stamp is None or heard == self._trust.value:
             return False
         message = heard if self._raw else deserialize_message(heard, self._kind)
         ahead = self._stamp(message) - 1e-9 * self._node.get_clock().now().nanoseconds

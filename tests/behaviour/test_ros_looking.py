@@ -23,7 +23,7 @@ from surveillance_interfaces.srv import MarkerRoutine, PointCamera
 from surveillance_runtime.conversions import point_from, pose_estimate
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.qos import STATE_QOS
-from surveillance_runtime.turning_path import bearing_of
+from surveillance_runtime.spin_in_place import bearing_of
 
 REQUEST = MarkerRoutine.Request
 

@@ -25,10 +25,10 @@ from surveillance_controllers.motion_controller_node import MotionController
 from surveillance_runtime.configuration import Configuration
 from surveillance_runtime.profile import ProfileFile, profile_layer, read_profile
 from surveillance_runtime.profile.check_up import (
-    Awaited,
     Endpoint,
-    Heard,
-    Seen,
+    ExpectedTopic,
+    GraphSample,
+    TopicSample,
     awaited,
     findings,
     unplaced,
@@ -176,8 +176,10 @@ def test_what_a_mission_waits_for_is_named(
     graph.until(lambda: told('/front: nobody publishes it (sensor_msgs/LaserScan'))
 
 
-COMMAND = Awaited('topics.command', '/cmd_vel', 'geometry_msgs/Twist', False, 'to drive')
-SCAN = Awaited('topics.scans', '/scan', 'sensor_msgs/LaserScan', True, 'to see', frame='laser')
+COMMAND = ExpectedTopic('topics.command', '/cmd_vel', 'geometry_msgs/Twist', False, 'to drive')
+SCAN = ExpectedTopic(
+    'topics.scans', '/scan', 'sensor_msgs/LaserScan', True, 'to see', frame='laser'
+)
 
 
 @pytest.mark.parametrize(
@@ -185,42 +187,48 @@ SCAN = Awaited('topics.scans', '/scan', 'sensor_msgs/LaserScan', True, 'to see',
     [
         (
             COMMAND,
-            Seen(subscribers={'/cmd_vel': [Endpoint('/base', 'geometry_msgs/TwistStamped')]}),
+            GraphSample(
+                subscribers={'/cmd_vel': [Endpoint('/base', 'geometry_msgs/TwistStamped')]}
+            ),
             '/cmd_vel has a subscriber of geometry_msgs/TwistStamped (/base), the profile says '
             'geometry_msgs/Twist; types.command: TwistStamped in the robot profile fits it',
         ),
         (
             COMMAND,
-            Seen(subscribers={'/base/cmd_vel': [Endpoint('/base', 'geometry_msgs/Twist')]}),
+            GraphSample(subscribers={'/base/cmd_vel': [Endpoint('/base', 'geometry_msgs/Twist')]}),
             'the nearest that is there is /base/cmd_vel (geometry_msgs/Twist): topics.command',
         ),
-        (COMMAND, Seen(subscribers={'/cmd_vel': [Endpoint('/b', 'geometry_msgs/Twist')]}), ''),
-        (SCAN, Seen(), '/scan: nobody publishes it (sensor_msgs/LaserScan, to see)'),
+        (
+            COMMAND,
+            GraphSample(subscribers={'/cmd_vel': [Endpoint('/b', 'geometry_msgs/Twist')]}),
+            '',
+        ),
+        (SCAN, GraphSample(), '/scan: nobody publishes it (sensor_msgs/LaserScan, to see)'),
         (
             SCAN,
-            Seen({'/scan': [Endpoint('/lidar', 'sensor_msgs/LaserScan')]}),
+            GraphSample({'/scan': [Endpoint('/lidar', 'sensor_msgs/LaserScan')]}),
             '/scan: /lidar publishes it, but nothing came for 4 s',
         ),
         (
             SCAN,
-            Seen(
+            GraphSample(
                 {'/scan': [Endpoint('/lidar', 'sensor_msgs/LaserScan')]},
-                heard={'/scan': Heard(20, 10.0, 'base_scan', 0.1)},
+                heard={'/scan': TopicSample(20, 10.0, 'base_scan', 0.1)},
             ),
             "/scan: its frame is 'base_scan', the profile says frames.scans: 'laser'",
         ),
         (
             SCAN,
-            Seen(
+            GraphSample(
                 {'/scan': [Endpoint('/lidar', 'sensor_msgs/LaserScan')]},
-                heard={'/scan': Heard(20, 10.0, 'laser', 12.0)},
+                heard={'/scan': TopicSample(20, 10.0, 'laser', 12.0)},
             ),
             '/scan: its stamps are 12.0 s behind the clock',
         ),
     ],
 )
 def test_what_is_not_as_awaited_is_said_with_what_is_there(
-    wanted: Awaited, seen: Seen, said: str
+    wanted: ExpectedTopic, seen: GraphSample, said: str
 ) -> None:
     lines = list(findings(wanted, seen, 4.0))
     assert said in '\n'.join(lines)
@@ -244,7 +252,7 @@ def test_a_lidar_of_which_nobody_says_where_it_is_is_named(
     robot = replace(
         RobotProfile(), frames=replace(Frames(), base='chassis'), lidars=Lidars(mounts=mounts)
     )
-    seen = Seen(heard={'/r/scan': Heard(9, 10.0, '/laser', 0.1)}, parents=parents)
+    seen = GraphSample(heard={'/r/scan': TopicSample(9, 10.0, '/laser', 0.1)}, parents=parents)
     lines = list(unplaced(robot, seen, 'r'))
     assert len(lines) == is_told
     assert not lines or "/r/scan: where its frame 'laser' is on the robot is not known" in lines[0]

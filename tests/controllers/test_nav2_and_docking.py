@@ -28,7 +28,7 @@ from surveillance_runtime.conversions import map_message, point_messages, pose_e
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.parameters import ParameterError
 from surveillance_runtime.qos import STATE_QOS
-from surveillance_runtime.turning_path import turning_path
+from surveillance_runtime.spin_in_place import spin_path
 from tests.nav2_definitions import ACTIONS, stand_in
 
 PATH = np.array([[0.0, 0, 0], [3, 0, 0], [3, 4, 0]])
@@ -231,7 +231,7 @@ def test_a_path_that_leads_nowhere_is_a_turn_by_the_shorter_way(
     graph: Any, servers: Servers, run: Any
 ) -> None:
     motion = nav2(graph)
-    path = np.array(turning_path((1.0, 2.0), np.pi))
+    path = np.array(spin_path((1.0, 2.0), np.pi))
     with pytest.raises(MotionFailedError, match='nobody tells where the robot points'):
         motion.follow(path, run, lambda _: None)
     poses = graph.node.create_publisher(PoseWithCovarianceStamped, 'amcl_pose', STATE_QOS)

@@ -30,7 +30,7 @@ from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.parameters import ParameterError
 from surveillance_runtime.qos import SENSOR_QOS
 from surveillance_runtime.sensing.transforms import ScanReader
-from surveillance_runtime.turning_path import turning_path
+from surveillance_runtime.spin_in_place import spin_path
 
 
 class Steersman:
@@ -105,7 +105,7 @@ def test_a_turn_that_the_robot_has_no_room_for_is_no_turn(
     motion = motion_of(graph.node, navigator)
     scans = graph.node.create_publisher(LaserScan, 'scan', SENSOR_QOS)
     run: Any = SimpleNamespace(interrupt=Interrupt())
-    path = np.array(turning_path((0.0, 0.0), 1.5))
+    path = np.array(spin_path((0.0, 0.0), 1.5))
     with ThreadPoolExecutor() as threads:
         turned = threads.submit(motion.follow, path, run, lambda _: None)
 

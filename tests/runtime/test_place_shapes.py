@@ -27,7 +27,7 @@ from floor_plans.occupancy_grid import Grid, distance_to
 from floor_plans.plan_grid import draw
 from floor_plans.regions import Regions
 from floor_plans.zones import Zone, Zones
-from surveillance_runtime.team import members
+from surveillance_runtime.fleet_parts import members
 
 SEVEN_ROOMS = Path(__file__).parents[2] / 'config' / 'seven_rooms.yaml'
 PLAN = read_place_file(SEVEN_ROOMS).plan

@@ -16,9 +16,9 @@ from surveillance_behaviour.map_from_markers.assembly import Survey, SurveyRepor
 from surveillance_interfaces.action import ScanSurroundings
 from surveillance_interfaces.msg import MarkerDetectionArray
 from surveillance_interfaces.srv import MarkerRoutine, RoomInformation
+from surveillance_runtime.fresh_images import FreshImages
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.robot_arm import ARM, REST_PATIENCE
-from surveillance_runtime.settled_frames import SettledFrames
 
 _ARM_SECONDS = 30.0
 _ANSWER_SECONDS = 5.0
@@ -44,7 +44,7 @@ class CameraScanner:
         self._wait = ClockWait(node)
         self._move = ServiceCaller(node, MarkerRoutine, 'move_arm')
         self._scan = GoalCaller(node, ScanSurroundings, 'scan_surroundings', cancel_timeout=1.0)
-        self._read = SettledFrames(node)
+        self._read = FreshImages(node)
 
     def await_peers(self) -> None:
         """Wait for the nodes of arm and detector: only then does looking begin."""

@@ -32,8 +32,8 @@ from surveillance_runtime.conversions import (
 )
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.robot_arm import ARM
+from surveillance_runtime.spin_in_place import spin_path
 from surveillance_runtime.state_topics import StateSubscription
-from surveillance_runtime.turning_path import turning_path
 
 ARM_DEADLINE = 60.0
 """Within which the arm is at a pose, seconds of real time."""
@@ -162,7 +162,7 @@ class RosLooking:
         if not self.has_arm():
             if here is None:
                 raise CallError('amcl_pose: nobody tells where the robot is')
-            turn = FollowPath.Goal(path=point_messages(turning_path(here, bearing)))
+            turn = FollowPath.Goal(path=point_messages(spin_path(here, bearing)))
             run(self._follower, turn, limits.answer, limits.move, interrupt)
         else:
             self._resting.set()

@@ -2,7 +2,7 @@
 
 A path becomes a NavigateThroughPoses goal, so that Nav2 goes the way that was planned here, through
 the doors that are open. (Its action FollowPath has the name of this project's own, `follow_path`.)
-A path that only says where to turn (`turning_path`) becomes a Spin goal.
+A path that only says where to turn (`spin_in_place`) becomes a Spin goal.
 At the end of a way to the station a docking server (opennav_docking) may dock the robot, whoever
 drove it there.
 
@@ -50,8 +50,8 @@ from surveillance_runtime.place_changes import follow_place
 from surveillance_runtime.place_parameters import door_segments, place_positions
 from surveillance_runtime.profile.parameters import declared_frames
 from surveillance_runtime.sensing.conversions import refusing
+from surveillance_runtime.spin_in_place import bearing_of
 from surveillance_runtime.state_topics import StateSubscription
-from surveillance_runtime.turning_path import bearing_of
 
 SPACING = 1.5
 """The largest distance of the poses that Nav2 is led through, metres."""

@@ -58,8 +58,8 @@ from surveillance_runtime.sensing.conversions import refusing
 from surveillance_runtime.sensing.sensors import OdometryReader
 from surveillance_runtime.sensing.silence import SensorWatch
 from surveillance_runtime.sensing.transforms import MapFrame, ScanReader
+from surveillance_runtime.spin_in_place import bearing_of
 from surveillance_runtime.state_topics import OwnedTopic, StateSubscription
-from surveillance_runtime.turning_path import bearing_of
 
 POSE_PERIOD = 0.19
 """Least time between two messages on amcl_pose, seconds: with every second scan at 10 Hz."""

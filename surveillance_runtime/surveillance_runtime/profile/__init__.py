@@ -5,6 +5,12 @@ file `robot.yaml`, `use` says what it means to the nodes of a run (parameters an
 `description` draws it as a URDF, `nav2_parameters` lays it over Nav2's own file. No ROS in here.
 """
 
+from surveillance_runtime.profile.node_configuration import (
+    check_behaviour,
+    profile_layer,
+    remappings,
+    unmonitored_entries,
+)
 from surveillance_runtime.profile.reading import (
     BUILT_IN,
     ProfileFile,
@@ -13,12 +19,6 @@ from surveillance_runtime.profile.reading import (
     read_profile,
 )
 from surveillance_runtime.profile.record import RobotProfile
-from surveillance_runtime.profile.use import (
-    check_behaviour,
-    profile_layer,
-    remappings,
-    unmonitored_entries,
-)
 
 __all__ = [
     'BUILT_IN',

@@ -22,7 +22,7 @@ OWN_NODES = frozenset(('motion_controller', 'collision_monitor'))
 
 
 @dataclass(frozen=True)
-class Awaited:
+class ExpectedTopic:
     """One topic between the drivers and the patrol.
 
     Attributes:
@@ -63,7 +63,7 @@ class Endpoint:
 
 
 @dataclass(frozen=True)
-class Heard:
+class TopicSample:
     """What came on a topic while somebody listened.
 
     Attributes:
@@ -80,7 +80,7 @@ class Heard:
 
 
 @dataclass(frozen=True)
-class Seen:
+class GraphSample:
     """What is there.
 
     Attributes:
@@ -92,7 +92,7 @@ class Seen:
 
     publishers: Mapping[str, Sequence[Endpoint]] = field(default_factory=dict)
     subscribers: Mapping[str, Sequence[Endpoint]] = field(default_factory=dict)
-    heard: Mapping[str, Heard] = field(default_factory=dict)
+    heard: Mapping[str, TopicSample] = field(default_factory=dict)
     parents: Mapping[str, str] = field(default_factory=dict)
 
 
@@ -102,7 +102,7 @@ def named(topic: str, namespace: str = '') -> str:
     return '/' + '/'.join(part for part in parts if part)
 
 
-def awaited(profile: RobotProfile, namespace: str = '') -> tuple[Awaited, ...]:
+def awaited(profile: RobotProfile, namespace: str = '') -> tuple[ExpectedTopic, ...]:
     """Return what a mission awaits of a robot, what it needs most first.
 
     Args:
@@ -116,7 +116,7 @@ def awaited(profile: RobotProfile, namespace: str = '') -> tuple[Awaited, ...]:
 
     own = profile.dock.navigator == 'own'
     wanted = [
-        Awaited(
+        ExpectedTopic(
             'topics.map',
             name(topics.map),
             'nav_msgs/OccupancyGrid',
@@ -125,7 +125,7 @@ def awaited(profile: RobotProfile, namespace: str = '') -> tuple[Awaited, ...]:
             is_latched=True,
             frame=frames.map,
         ),
-        Awaited(
+        ExpectedTopic(
             'topics.odom',
             name(topics.odom),
             'nav_msgs/Odometry',
@@ -138,7 +138,7 @@ def awaited(profile: RobotProfile, namespace: str = '') -> tuple[Awaited, ...]:
     has_frames = 'frames.scans' in profile.origins and len(frames.scans) == len(topics.scans)
     for number, scan in enumerate(topics.scans):
         wanted.append(
-            Awaited(
+            ExpectedTopic(
                 'topics.scans',
                 name(scan),
                 'sensor_msgs/LaserScan',
@@ -150,7 +150,7 @@ def awaited(profile: RobotProfile, namespace: str = '') -> tuple[Awaited, ...]:
         )
     if own:
         wanted.append(
-            Awaited(
+            ExpectedTopic(
                 'topics.command',
                 name(topics.command),
                 f'geometry_msgs/{profile.types.command}',
@@ -160,7 +160,7 @@ def awaited(profile: RobotProfile, namespace: str = '') -> tuple[Awaited, ...]:
         )
     if profile.battery.source == 'topic':
         wanted.append(
-            Awaited(
+            ExpectedTopic(
                 'topics.battery',
                 name(topics.battery),
                 'sensor_msgs/BatteryState',
@@ -172,7 +172,7 @@ def awaited(profile: RobotProfile, namespace: str = '') -> tuple[Awaited, ...]:
     return tuple(wanted)
 
 
-def findings(wanted: Awaited, seen: Seen, seconds: float) -> Iterator[str]:
+def findings(wanted: ExpectedTopic, seen: GraphSample, seconds: float) -> Iterator[str]:
     """Yield what keeps a topic from being as awaited, one line each; nothing where it is.
 
     Args:
@@ -191,7 +191,7 @@ def findings(wanted: Awaited, seen: Seen, seconds: float) -> Iterator[str]:
         yield f'{wanted.topic}: {verb} ({wanted.type}, {wanted.purpose}){_nearest(wanted, seen)}'
     if not right or not wanted.heard:
         return
-    heard = seen.heard.get(wanted.topic, Heard())
+    heard = seen.heard.get(wanted.topic, TopicSample())
     if not heard.count:
         latched = wanted.is_latched and not any(end.latched for end in right)
         why = (
@@ -217,7 +217,7 @@ def findings(wanted: Awaited, seen: Seen, seconds: float) -> Iterator[str]:
         )
 
 
-def unplaced(profile: RobotProfile, seen: Seen, namespace: str = '') -> Iterator[str]:
+def unplaced(profile: RobotProfile, seen: GraphSample, namespace: str = '') -> Iterator[str]:
     """Yield which lidars nobody says the place of, one line each.
 
     Args:
@@ -244,7 +244,7 @@ def unplaced(profile: RobotProfile, seen: Seen, namespace: str = '') -> Iterator
             at, passed = seen.parents[at], passed + 1
 
 
-def _wrong_type(wanted: Awaited, end: Endpoint) -> str:
+def _wrong_type(wanted: ExpectedTopic, end: Endpoint) -> str:
     role = 'publisher' if wanted.heard else 'subscriber'
     fitting = ''
     if wanted.key == 'topics.command' and end.type.startswith('geometry_msgs/Twist'):
@@ -255,7 +255,7 @@ def _wrong_type(wanted: Awaited, end: Endpoint) -> str:
     )
 
 
-def _nearest(wanted: Awaited, seen: Seen) -> str:
+def _nearest(wanted: ExpectedTopic, seen: GraphSample) -> str:
     """Return the topic that may be meant: of the same type, the most like one first."""
     table = seen.publishers if wanted.heard else seen.subscribers
     alike = [
@@ -283,7 +283,7 @@ def _is_foreign(end: Endpoint) -> bool:
     return end.node.rpartition('/')[2] not in OWN_NODES
 
 
-def table(wanted: Sequence[Awaited], seen: Seen, seconds: float) -> list[str]:
+def table(wanted: Sequence[ExpectedTopic], seen: GraphSample, seconds: float) -> list[str]:
     """Return a report: a line for each topic, then what is not as awaited."""
     lines = []
     width = max(len(each.topic) for each in wanted)
@@ -292,7 +292,7 @@ def table(wanted: Sequence[Awaited], seen: Seen, seconds: float) -> list[str]:
         ends = (seen.publishers if each.heard else seen.subscribers).get(each.topic, ())
         ends = [end for end in ends if each.heard or _is_foreign(end)]
         found = list(findings(each, seen, seconds))
-        heard = seen.heard.get(each.topic, Heard())
+        heard = seen.heard.get(each.topic, TopicSample())
         said = [', '.join(sorted({end.node for end in ends})) or '-']
         said += sorted({end.quality for end in ends})
         if each.heard and heard.count:

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from surveillance_runtime.belief import PATIENCE, SILENT, Belief
+from surveillance_runtime.publisher_trust import PATIENCE, SILENT, PublisherTrust
 
 OWNER, OTHER, AGAIN = b'1', b'2', b'3'
 
@@ -17,18 +17,18 @@ class World:
     def __init__(self, owner: str = '', only: bool = False) -> None:
         self.nodes: dict[bytes, str] = {}
         self.now = 0.0
-        self.belief = Belief(lambda: self.nodes, owner, only)
+        self.trust = PublisherTrust(lambda: self.nodes, owner, only)
 
     def wait(self, seconds: float) -> None:
         end = self.now + seconds
-        while self.belief.due is not None and self.belief.due <= end:
-            self.now = self.belief.due
-            self.belief.settle(self.now)
+        while self.trust.due is not None and self.trust.due <= end:
+            self.now = self.trust.due
+            self.trust.settle(self.now)
         self.now = end
 
     def say(self, publisher: bytes, value: bytes) -> bytes | None:
-        self.belief.hear(value, publisher, self.now)
-        return self.belief.value
+        self.trust.hear(value, publisher, self.now)
+        return self.trust.value
 
 
 def test_the_first_publisher_is_believed_as_long_as_it_is_there() -> None:
@@ -37,13 +37,13 @@ def test_the_first_publisher_is_believed_as_long_as_it_is_there() -> None:
     assert world.say(OWNER, b'a') == b'a'
     assert world.say(OTHER, b'x') == b'a'
     world.wait(60.0)
-    assert world.belief.value == b'a'
-    assert world.belief.rivals == ('/stranger',)
+    assert world.trust.value == b'a'
+    assert world.trust.rivals == ('/stranger',)
     assert world.say(OWNER, b'b') == b'b'
     del world.nodes[OWNER]
     world.wait(2 * PATIENCE)
-    assert world.belief.value == b'x'
-    assert world.belief.rivals == ()
+    assert world.trust.value == b'x'
+    assert world.trust.rivals == ()
 
 
 def test_a_message_goes_with_its_sender() -> None:
@@ -55,7 +55,7 @@ def test_a_message_goes_with_its_sender() -> None:
     world.wait(1.0)
     del world.nodes[OWNER]
     world.wait(60.0)
-    assert world.belief.value == b'a'
+    assert world.trust.value == b'a'
 
 
 def test_an_owner_that_was_killed_and_started_again_is_believed() -> None:
@@ -66,9 +66,9 @@ def test_an_owner_that_was_killed_and_started_again_is_believed() -> None:
     world.say(AGAIN, b'b')
     world.say(OTHER, b'x')
     world.wait(SILENT / 2)
-    assert world.belief.value == b'a'
+    assert world.trust.value == b'a'
     world.wait(SILENT)
-    assert world.belief.value == b'b'
+    assert world.trust.value == b'b'
 
 
 def test_a_namesake_is_not_believed_while_the_owner_speaks() -> None:
@@ -88,10 +88,10 @@ def test_the_owner_by_name_is_believed_whoever_spoke_first() -> None:
     world.nodes[OWNER] = '/battery'
     world.say(OWNER, b'a')
     world.wait(2 * PATIENCE)
-    assert world.belief.value == b'a'
+    assert world.trust.value == b'a'
     world.say(OTHER, b'y')
     world.wait(2 * PATIENCE)
-    assert world.belief.value == b'a'
+    assert world.trust.value == b'a'
 
 
 @pytest.mark.parametrize('leaves', [False, True])
@@ -102,7 +102,7 @@ def test_where_only_the_owner_may_speak_nobody_else_is_believed(leaves: bool) ->
     if leaves:
         world.nodes = {}
     world.wait(5.0)
-    assert world.belief.value is None
+    assert world.trust.value is None
     world.nodes[OWNER] = '/monitor'
     assert world.say(OWNER, b'a') == b'a'
 
@@ -112,7 +112,7 @@ def test_one_of_whom_the_graph_knows_nothing_yet_waits_for_a_moment() -> None:
     assert world.say(OWNER, b'a') is None
     world.nodes = {OWNER: '/battery'}
     world.wait(2 * PATIENCE)
-    assert world.belief.value == b'a'
+    assert world.trust.value == b'a'
 
 
 @given(
@@ -137,4 +137,4 @@ def test_the_owners_word_wins_whatever_others_say(
         if leaves:
             del world.nodes[publisher]
     world.wait(10.0)
-    assert world.belief.value == b'owner'
+    assert world.trust.value == b'owner'

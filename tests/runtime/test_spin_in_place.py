@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from surveillance_runtime.turning_path import SHORT, bearing_of, turning_path
+from surveillance_runtime.spin_in_place import SHORT, bearing_of, spin_path
 
 pytestmark = pytest.mark.unit
 
@@ -14,7 +14,7 @@ pytestmark = pytest.mark.unit
 @pytest.mark.parametrize('degrees', [-170, -90, -30, 0, 60, 90, 135, 180])
 def test_a_turn_leads_where_it_was_asked_to_from_anywhere(degrees: int) -> None:
     bearing = math.radians(degrees)
-    path = turning_path((3.5, -2.0, 9.0), bearing)
+    path = spin_path((3.5, -2.0, 9.0), bearing)
     assert path[0] == (3.5, -2.0, 0.0)
     found = bearing_of(path)
     assert found is not None

@@ -15,7 +15,7 @@ SHORT = 0.02
 Point = Sequence[float]
 
 
-def turning_path(here: Point, bearing: float) -> list[tuple[float, float, float]]:
+def spin_path(here: Point, bearing: float) -> list[tuple[float, float, float]]:
     """Return the path that has the robot turn.
 
     Args:

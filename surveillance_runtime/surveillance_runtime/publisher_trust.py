@@ -18,7 +18,7 @@ PATIENCE = 0.1
 """Seconds between two looks at the graph while the message of another publisher waits."""
 
 
-class Belief:
+class PublisherTrust:
     """The state that a reader believes, as bytes.
 
     Args:

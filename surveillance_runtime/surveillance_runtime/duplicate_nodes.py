@@ -8,7 +8,7 @@ are to share a domain have a namespace each, and so other names.
 A message is taken for a node's only if the graph says that its publisher is of that node, and one
 message alone counts for nothing: a node that was killed stays in the graph, but says nothing more.
 
-`python -m surveillance_runtime.namesakes NODE...` listens before a launch begins, prints
+`python -m surveillance_runtime.duplicate_nodes NODE...` listens before a launch begins, prints
 who is there already, one line each, and ends with exit code 3 if anybody is.
 """
 
@@ -72,7 +72,7 @@ class _Spoken:
     last: float
 
 
-class Namesakes:
+class DuplicateNodes:
     """What was heard of nodes, and which of them have a namesake in another launch.
 
     Args:
@@ -121,11 +121,11 @@ class Namesakes:
 
 
 class _Ears:
-    """Hears the nodes of a ROS domain for a `Namesakes`."""
+    """Hears the nodes of a ROS domain for a `DuplicateNodes`."""
 
-    def __init__(self, node: PatrolNode, namesakes: Namesakes) -> None:
+    def __init__(self, node: PatrolNode, duplicates: DuplicateNodes) -> None:
         self._node = node
-        self._namesakes = namesakes
+        self._duplicates = duplicates
         self._named: dict[bytes, str] = {}
         node.create_subscription(DiagnosticArray, TOPIC, self._on_heard, 50, raw=True)
 
@@ -143,10 +143,10 @@ class _Ears:
                 launch = Launch(values[LAUNCH], float(values[AGE]))
             except (KeyError, ValueError):
                 continue
-            self._namesakes.hear(name, publisher, launch, time.monotonic())
+            self._duplicates.hear(name, publisher, launch, time.monotonic())
 
 
-class NamesakeWatch:
+class DuplicateNodeWatch:
     """Has a node tell of another robot of the same names, and end where its own is the younger.
 
     Args:
@@ -156,14 +156,14 @@ class NamesakeWatch:
     def __init__(self, node: PatrolNode) -> None:
         self._node = node
         self._own, _ = launch_of_process()
-        self._namesakes = Namesakes(self._own)
+        self._duplicates = DuplicateNodes(self._own)
         self._told: set[str] = set()
-        _Ears(node, self._namesakes)
+        _Ears(node, self._duplicates)
         node.create_timer(PERIOD, self._look, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def _look(self) -> None:
-        found = self._namesakes.launches(time.monotonic())
-        own = Launch(self._own, self._namesakes.own_age())
+        found = self._duplicates.launches(time.monotonic())
+        own = Launch(self._own, self._duplicates.own_age())
         for launch, nodes in found.items():
             text = described(launch, nodes, self._node.context.get_domain_id())
             if own.yields_to(launch):
@@ -195,14 +195,14 @@ def main(words: Sequence[str] | None = None) -> int:
     rclpy.init(args=[])
     spinner = ExecutorThread()
     node = PatrolNode(f'listener_{os.getpid()}', use_global_arguments=False)
-    namesakes = Namesakes('')
-    _Ears(node, namesakes)
+    duplicates = DuplicateNodes('')
+    _Ears(node, duplicates)
     spinner.executor.add_node(node)
     spinner.start()
     end, found = time.monotonic() + LISTEN, dict[Launch, list[str]]()
     while time.monotonic() < end and not found:
         time.sleep(0.05)
-        found = namesakes.launches(time.monotonic(), names)
+        found = duplicates.launches(time.monotonic(), names)
     for launch, nodes in found.items():
         print(described(launch, nodes, node.context.get_domain_id()))
     node.stop()

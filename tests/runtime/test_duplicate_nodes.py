@@ -7,9 +7,9 @@ from typing import Any
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
-from surveillance_runtime import namesakes
+from surveillance_runtime import duplicate_nodes
+from surveillance_runtime.duplicate_nodes import DuplicateNodes, DuplicateNodeWatch, Launch
 from surveillance_runtime.launch_protocol import AGE, LAUNCH, launch_of_process
-from surveillance_runtime.namesakes import Launch, Namesakes, NamesakeWatch
 from surveillance_runtime.node import PatrolNode
 
 OLD, NEW = Launch('desk, process 7', 900.0), Launch('robot, process 8', 3.0)
@@ -24,7 +24,7 @@ def test_the_younger_launch_ends_and_of_two_that_began_together_one() -> None:
 
 def test_one_that_was_killed_is_no_namesake() -> None:
     """The graph keeps it for a while, but it says nothing more."""
-    heard = Namesakes(OLD.name)
+    heard = DuplicateNodes(OLD.name)
     for now in range(3):
         heard.hear('/armor_server', b'1', OLD, now)
         heard.hear('/armor_server', b'2', NEW, now)
@@ -35,7 +35,7 @@ def test_one_that_was_killed_is_no_namesake() -> None:
 
 
 def test_one_message_says_nothing() -> None:
-    heard = Namesakes(OLD.name)
+    heard = DuplicateNodes(OLD.name)
     heard.hear('/armor_server', b'1', OLD, 0.0)
     heard.hear('/armor_server', b'2', NEW, 0.0)
     assert heard.launches(0.1) == {}
@@ -53,7 +53,7 @@ def speaker(graph: Any, name: str, says: str, launch: Launch) -> None:
 
 @pytest.fixture
 def quick(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(namesakes, 'PERIOD', 0.1)
+    monkeypatch.setattr(duplicate_nodes, 'PERIOD', 0.1)
 
 
 @pytest.mark.usefixtures('quick')
@@ -62,7 +62,7 @@ def test_the_younger_robot_ends_and_names_the_other(graph: Any) -> None:
     speaker(graph, 'armor_server', 'armor_server', Launch(own, 1.0))
     speaker(graph, 'armor_server', 'armor_server', OLD)
     watching = graph.add(PatrolNode, name='robot_behavior')
-    NamesakeWatch(watching)
+    DuplicateNodeWatch(watching)
     graph.until(lambda: watching.failure)
     assert watching.unusable
     assert 'started by desk, process 7 900 s ago: /armor_server; expected' in watching.failure
@@ -77,7 +77,7 @@ def test_the_older_robot_goes_on_and_tells(graph: Any) -> None:
     speaker(graph, 'stranger', 'motion_controller', Launch('elsewhere, process 1', 9e9))
     speaker(graph, 'motion_controller', 'motion_controller', Launch(own, 5000.0))
     watching = graph.add(PatrolNode, name='robot_behavior')
-    NamesakeWatch(watching)
+    DuplicateNodeWatch(watching)
     graph.until(watching.incidents.open)
     assert [str(each) for each in watching.incidents.open()] == ['robot desk, process 7']
     assert watching.failure is None

@@ -13,7 +13,7 @@ from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.stamp_offset import StampOffset
 
 
-class SettledFrames:
+class FreshImages:
     """Counts the pictures that the marker detector has looked at.
 
     Args:
